@@ -1,1 +1,76 @@
-//! Under construction.
+//! State estimation for robots that are *declared*.
+//!
+//! A robot is one [`robot!`]: links, joints, sensors, estimators. The macro checks what can be checked at compile
+//! time and expands to typed static wiring over this crate, the runtime:
+//!
+//! | what | where |
+//! |---|---|
+//! | messages: a payload with its time, frame and origin | [`message`], [`payload`] |
+//! | what a user implements: [`Sensor`], [`Estimator`], and the derives for options, inputs, outputs, payloads | [`component`] |
+//! | time, real or virtual | [`time`] |
+//! | links, joints and the transforms between them | [`topology`] |
+//! | a running estimator: fan-in, drops, counters | [`node`] |
+//! | subscriptions | [`pubsub`] |
+//! | start, run, stop | [`run`] |
+//!
+//! All stored quantities are SI: metres, seconds, radians, kilograms, tesla.
+
+// The derives name this crate by its absolute path, also when this crate itself uses them.
+extern crate self as bb_core;
+
+pub mod component;
+pub mod message;
+pub mod node;
+pub mod payload;
+pub mod pubsub;
+pub mod run;
+pub mod time;
+pub mod topology;
+
+mod check;
+
+pub use bb_macros::{Inputs, Options, Outputs, Payload, robot};
+pub use component::{
+    Context, Estimator, Fault, Input, Inputs, Options, Outputs, Reading, Reply, Sensor, SensorContext,
+};
+pub use message::{Finite, Frame, Origin, Payload, Stamped};
+pub use pubsub::{Overflow, Subscription};
+pub use run::{Builder, EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, Running, SensorHandle, Simulation, StartError};
+pub use time::{Clock, MonotonicTime, WallTime};
+
+pub use nalgebra;
+
+/// Everything a file that declares or runs a robot needs: `use bb_core::prelude::*;`.
+pub mod prelude {
+    pub use crate::component::{
+        Context, Estimator, External, Fault, Input, Inputs, NoOptions, Options, Outputs, Reading, Reply, Sensor,
+        SensorContext,
+    };
+    pub use crate::message::{Payload, Stamped};
+    pub use crate::payload::*;
+    pub use crate::pubsub::{Overflow, Subscription};
+    pub use crate::robot;
+    pub use crate::run::{Robot, Running, Simulation, StartError};
+    pub use crate::time::{Clock, MonotonicTime, WallTime};
+    pub use std::time::Duration;
+}
+
+/// What the expansions of the macros name. Not for users: it changes without notice.
+#[doc(hidden)]
+pub mod __private {
+    pub use crate::check::{
+        Declared, Given, check_dynamic, check_inputs, check_option, check_outputs, check_required, input_index,
+        nested_index, output_index,
+    };
+    pub use crate::component::{
+        Dimension, FieldIndex, Input, InputAt, InputField, OptionField, OutputAt, Range, Slot, SyncMiss,
+    };
+    pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
+    pub use crate::node::{AnyNode, EstimatorDeclaration, InputDeclaration, Node};
+    pub use crate::pubsub::{AnyTopic, Topic};
+    pub use crate::run::{
+        EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, SensorDeclaration, SensorHandle, Source, StartError, Startup,
+    };
+    pub use crate::topology::{Joint, JointKind, Limit, Link, Topology, Transform};
+    pub use std::sync::Arc;
+}

@@ -1,0 +1,180 @@
+//! A bag: a file and the topics in it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mcap::records::op;
+
+use crate::channels::Channels;
+use crate::error::{BagError, BagErrorKind};
+use crate::messages::{self, Messages, Wanted};
+use crate::records::Records;
+use crate::{ros, summary};
+
+/// A topic of a bag.
+///
+/// A name occurs twice only if its messages changed type or encoding on the way.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Topic {
+    /// The name, as `/imu`.
+    pub name: Arc<str>,
+    /// The type in its full spelling, as `sensor_msgs/msg/Imu` even where the file says `sensor_msgs/Imu`; empty
+    /// if the file gives none.
+    pub schema: Arc<str>,
+    /// How the messages are encoded; `cdr` is what can be read.
+    pub encoding: String,
+    /// How many messages there are, in a broken bag before the break; `None` if a summary leaves it out.
+    pub messages: Option<u64>,
+}
+
+/// A recording of ROS 2 messages in an MCAP file.
+#[derive(Debug, Clone)]
+pub struct Bag {
+    path: PathBuf,
+    topics: Vec<Topic>,
+}
+
+impl Bag {
+    /// Opens a bag and learns its topics: from its summary, or by reading it through once if there is none.
+    ///
+    /// A bag that breaks off opens if it has topics before the break; [`messages`](Self::messages) reports the
+    /// break when it comes to it.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing, unreadable or no MCAP, or breaks before the first topic.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, BagError> {
+        let path = path.as_ref();
+        let topics = topics(path).map_err(|kind| BagError::new(path, kind))?;
+        Ok(Self {
+            path: path.to_owned(),
+            topics,
+        })
+    }
+
+    /// The path of the file, as it was given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The topics, in the order in which the recorder numbered them.
+    pub fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    /// The only topic of a type; `sensor_msgs/Imu` and `sensor_msgs/msg/Imu` are one type.
+    ///
+    /// # Errors
+    ///
+    /// If there is none, which names the topics there are, or several, which names these.
+    pub fn topic_of(&self, schema: &str) -> Result<&Topic, BagError> {
+        let schema = ros::full_name(schema);
+        let mut found = self.topics.iter().filter(|t| *t.schema == *schema);
+        let kind = match (found.next(), found.next()) {
+            (Some(topic), None) => return Ok(topic),
+            (None, _) => BagErrorKind::NoTopicOfType {
+                schema,
+                topics: self.topics_in_words(),
+            },
+            (Some(a), Some(b)) => {
+                let candidates = [a, b]
+                    .into_iter()
+                    .chain(found)
+                    .map(|t| t.name.to_string())
+                    .collect();
+                BagErrorKind::SeveralTopicsOfType { schema, candidates }
+            }
+        };
+        Err(BagError::new(&self.path, kind))
+    }
+
+    /// The messages of the named topics, read as they are asked for and in the order of the file.
+    ///
+    /// Recorders write messages as they arrive, so the order of the file is that of the log times but for small
+    /// exceptions; it need not be that of the stamps. No names, no messages. The iterator has the file open by
+    /// itself: it can go to another thread and outlive the bag, and several can read at once.
+    ///
+    /// # Errors
+    ///
+    /// If the bag has no topic of a name, or its messages are not CDR or of no type in
+    /// [`RosMessage`](crate::RosMessage), or the file can no longer be opened.
+    pub fn messages<S: AsRef<str>>(&self, topics: &[S]) -> Result<Messages, BagError> {
+        let fail = |kind| BagError::new(&self.path, kind);
+        let mut wanted: Vec<Wanted> = Vec::new();
+        for name in topics.iter().map(AsRef::as_ref) {
+            if wanted.iter().any(|w| *w.topic == *name) {
+                continue;
+            }
+            let mut same = self.topics.iter().filter(|t| *t.name == *name).peekable();
+            let Some(first) = same.peek() else {
+                let kind = BagErrorKind::NoTopic {
+                    topic: name.to_owned(),
+                    topics: self.topics_in_words(),
+                };
+                return Err(fail(kind));
+            };
+            let mut new = Wanted {
+                topic: first.name.clone(),
+                expected: 0,
+                count: 0,
+            };
+            for topic in same {
+                messages::check(&topic.name, &topic.schema, &topic.encoding).map_err(fail)?;
+                new.expected = new.expected.saturating_add(topic.messages.unwrap_or(0));
+            }
+            wanted.push(new);
+        }
+        Messages::open(&self.path, wanted)
+    }
+
+    /// The topics for an error message.
+    fn topics_in_words(&self) -> String {
+        if self.topics.is_empty() {
+            return "the bag has no topics".into();
+        }
+        let topics: Vec<_> = self
+            .topics
+            .iter()
+            .map(|t| format!("{} ({})", t.name, t.schema))
+            .collect();
+        format!("the bag has {}", topics.join(", "))
+    }
+}
+
+fn topics(path: &Path) -> Result<Vec<Topic>, BagErrorKind> {
+    let records = Records::open(path)?;
+    let size = records.size();
+    if let Some(topics) = summary::topics(records.into_file(), size) {
+        return Ok(topics);
+    }
+    let mut records = Records::open(path)?;
+    let mut channels = Channels::default();
+    let mut counts = BTreeMap::new();
+    let end = scan(&mut records, &mut channels, &mut counts);
+    let topics = channels.topics(Some(&counts));
+    match end {
+        Err(kind) if topics.is_empty() => Err(kind),
+        _ => Ok(topics),
+    }
+}
+
+/// Reads a bag through for its channels and how many messages each has.
+fn scan(
+    records: &mut Records,
+    channels: &mut Channels,
+    counts: &mut BTreeMap<u16, u64>,
+) -> Result<(), BagErrorKind> {
+    while let Some(opcode) = records.advance()? {
+        if opcode == op::MESSAGE {
+            let message = messages::RawMessage::parse(records)?;
+            *counts.entry(message.channel).or_default() += 1;
+        } else {
+            channels
+                .define(opcode, records.body())
+                .map_err(|fault| records.corrupt(fault))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,224 @@
+//! What can go wrong with a bag, said so that the reader can act on it.
+
+use std::io;
+use std::path::Path;
+
+/// An error of a bag: the file and what is wrong with it.
+///
+/// `Display` gives the file, the fault and its place, then the way out, on one line.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {kind}")]
+pub struct BagError {
+    file: String,
+    // Boxed, for this travels in the `Result` of every message.
+    kind: Box<BagErrorKind>,
+}
+
+impl BagError {
+    pub(crate) fn new(path: &Path, kind: BagErrorKind) -> Self {
+        Self {
+            file: path.display().to_string(),
+            kind: Box::new(kind),
+        }
+    }
+
+    /// The path of the bag, as it was given to [`Bag::open`](crate::Bag::open).
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// What is wrong, for code that treats some faults apart: a truncated bag is often good enough.
+    pub fn kind(&self) -> &BagErrorKind {
+        &self.kind
+    }
+}
+
+/// What is wrong with a bag.
+///
+/// Offsets are in bytes from the start of the file: of the record, or of the chunk that holds it. `messages`
+/// counts the messages of all topics read before the place.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BagErrorKind {
+    /// There is no such file.
+    #[error("no such file; check the path")]
+    Missing,
+    /// The path is a directory or a device.
+    #[error("not a file; name the .mcap file itself, which a ROS 2 recording keeps in its directory")]
+    NotAFile,
+    /// The operating system refused.
+    #[error("cannot be read at byte {byte}: {cause}; check the file's permissions and the disk")]
+    Io {
+        /// Where reading stopped.
+        byte: u64,
+        /// What the operating system said.
+        cause: io::Error,
+    },
+    /// The file is something else than MCAP.
+    #[error("not an MCAP file: {found}")]
+    NotMcap {
+        /// What it seems to be, and what to do with it.
+        found: &'static str,
+    },
+    /// The file stops in the middle, as after a recorder that was killed.
+    #[error(
+        "truncated after {messages} messages (byte {byte} of {size}): the recorder was stopped or the copy is \
+         incomplete; copy it again, or go on with the messages before the break"
+    )]
+    Truncated {
+        /// Messages of all topics before the break.
+        messages: u64,
+        /// Where the first incomplete record starts.
+        byte: u64,
+        /// The size of the file in bytes.
+        size: u64,
+    },
+    /// A record contradicts the format or its checksum.
+    #[error(
+        "corrupt at byte {byte}, after {messages} messages: {fault}; copy the file again, or salvage the rest \
+         with `mcap recover`"
+    )]
+    Corrupt {
+        /// Messages of all topics before the place.
+        messages: u64,
+        /// Where the record or chunk starts.
+        byte: u64,
+        /// What is wrong with it.
+        fault: String,
+    },
+    /// A record or chunk that this reader refuses to hold in memory.
+    #[error(
+        "a record of {length} bytes at byte {byte}, after {messages} messages, and at most {limit} are taken; \
+         rewrite the bag in smaller chunks, as with `mcap compress`"
+    )]
+    TooLarge {
+        /// Messages of all topics before the place.
+        messages: u64,
+        /// Where the record or chunk starts.
+        byte: u64,
+        /// Its length in bytes, unpacked.
+        length: u64,
+        /// The longest taken, in bytes.
+        limit: u64,
+    },
+    /// A chunk is packed with an unknown method.
+    #[error(
+        "the chunk at byte {byte} is packed with `{compression}`, and only `lz4` and `zstd` are unpacked; record \
+         or convert with one of these"
+    )]
+    Compression {
+        /// Where the chunk starts.
+        byte: u64,
+        /// The method the file names.
+        compression: String,
+    },
+    /// The bag has no topic of that name.
+    #[error("no topic {topic}; {topics}")]
+    NoTopic {
+        /// The name that was asked for.
+        topic: String,
+        /// The topics the bag has, in words.
+        topics: String,
+    },
+    /// The bag has no topic of that type.
+    #[error("no topic of type {schema}; {topics}")]
+    NoTopicOfType {
+        /// The type that was asked for.
+        schema: String,
+        /// The topics the bag has, in words.
+        topics: String,
+    },
+    /// Several topics have that type, so it does not choose one.
+    #[error("several topics of type {schema}: {}; name one of them", candidates.join(", "))]
+    SeveralTopicsOfType {
+        /// The type that was asked for.
+        schema: String,
+        /// The names of the topics with that type.
+        candidates: Vec<String>,
+    },
+    /// The messages of the topic are not CDR.
+    #[error(
+        "the messages of {topic} are encoded as `{encoding}`, and only `cdr` is read; record with ROS 2 or \
+         convert the bag to it"
+    )]
+    Encoding {
+        /// The topic.
+        topic: String,
+        /// The encoding its channel names.
+        encoding: String,
+    },
+    /// The messages of the topic have a type that [`RosMessage`](crate::RosMessage) lacks.
+    #[error("the messages of {topic} are {schema}, which is not read; choose a topic of type {}", known.join(", "))]
+    UnknownType {
+        /// The topic.
+        topic: String,
+        /// Its type.
+        schema: String,
+        /// The types that are read.
+        known: Vec<&'static str>,
+    },
+    /// The payload of one message is malformed.
+    #[error(
+        "message {message} on {topic} at {} s (byte {byte}): {fault}; it is damaged, or the recorder's {schema} \
+         has other fields",
+        seconds(*log_time_ns)
+    )]
+    Payload {
+        /// The topic.
+        topic: String,
+        /// The type the payload should have.
+        schema: String,
+        /// The number of the message on its topic, from 1.
+        message: u64,
+        /// When it was logged, in nanoseconds of the recorder's clock.
+        log_time_ns: u64,
+        /// Where its record starts, or the chunk that holds it.
+        byte: u64,
+        /// What is wrong with it.
+        fault: String,
+    },
+}
+
+/// Nanoseconds as seconds with three digits, enough to find a message by.
+fn seconds(ns: u64) -> String {
+    format!("{}.{:03}", ns / 1_000_000_000, ns / 1_000_000 % 1000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_names_file_fault_and_way_out() {
+        let kind = BagErrorKind::NoTopicOfType {
+            schema: "sensor_msgs/msg/Imu".into(),
+            topics: "the bag has /scan (sensor_msgs/msg/LaserScan)".into(),
+        };
+        assert_eq!(
+            BagError::new(Path::new("walk.mcap"), kind).to_string(),
+            "walk.mcap: no topic of type sensor_msgs/msg/Imu; the bag has /scan (sensor_msgs/msg/LaserScan)"
+        );
+    }
+
+    #[test]
+    fn a_payload_error_names_message_topic_and_time() {
+        let kind = BagErrorKind::Payload {
+            topic: "/imu".into(),
+            schema: "sensor_msgs/msg/Imu".into(),
+            message: 1024,
+            log_time_ns: 12_345_678_901,
+            byte: 51_200,
+            fault: "the payload ends too early".into(),
+        };
+        let said = BagError::new(Path::new("walk.mcap"), kind).to_string();
+        assert!(
+            said.starts_with("walk.mcap: message 1024 on /imu at 12.345 s (byte 51200): the payload ends")
+        );
+    }
+
+    #[test]
+    fn errors_cross_threads() {
+        fn check<T: Send + Sync + 'static>() {}
+        check::<BagError>();
+    }
+}

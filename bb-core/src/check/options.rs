@@ -1,0 +1,86 @@
+//! Whether the options given to a component are complete, of the right dimension and in range.
+
+use super::text::{Text, equal};
+use crate::component::{Dimension, OptionField};
+
+/// One option as written in `robot!`.
+#[derive(Clone, Copy, Debug)]
+pub struct Given {
+    /// Its name.
+    pub name: &'static str,
+    /// The dimension of its unit, if it is a number with a unit.
+    pub dimension: Option<Dimension>,
+    /// Its number in SI, if it is a literal number.
+    pub number: Option<f64>,
+}
+
+/// That a given option has the dimension and keeps the range that its field states. Unknown names are left to rustc.
+#[track_caller]
+pub const fn check_option(component: &str, fields: &[OptionField], given: Given) {
+    let mut index = 0;
+    while index < fields.len() {
+        if equal(fields[index].name, given.name) {
+            check_dimension(component, fields[index], given);
+            check_range(component, fields[index], given);
+            return;
+        }
+        index += 1;
+    }
+}
+
+/// That every required option is given.
+#[track_caller]
+pub const fn check_required(component: &str, fields: &[OptionField], given: &[&str]) {
+    let mut index = 0;
+    while index < fields.len() {
+        let field = fields[index];
+        let mut found = !field.required;
+        let mut number = 0;
+        while number < given.len() {
+            found = found || equal(given[number], field.name);
+            number += 1;
+        }
+        if !found {
+            let text = Text::new("").name(component).push(" needs the option ").name(field.name);
+            let text = text.push("; give it: `").push(component).push("(").push(field.name).push(" = …)`");
+            panic!("{}", text.as_str())
+        }
+        index += 1;
+    }
+}
+
+#[track_caller]
+const fn check_dimension(component: &str, field: OptionField, given: Given) {
+    match (field.dimension, given.dimension) {
+        (Some(expected), Some(found)) => {
+            let mut index = 0;
+            while index < expected.exponents.len() {
+                if expected.exponents[index] != found.exponents[index] {
+                    let text = Text::new("expected ").push(expected.name).push(", found ").push(found.name);
+                    let text = text.push("; ").name(field.name).push(" of ").name(component);
+                    panic!("{}", text.push(" is in ").push(field.unit).as_str())
+                }
+                index += 1;
+            }
+        }
+        (Some(expected), None) if given.number.is_some() => {
+            let text = Text::new("expected ").push(expected.name).push(", found a number without a unit; ");
+            panic!("{}", text.push("write it with one, as in ").push(field.unit).as_str())
+        }
+        (None, Some(found)) => {
+            let text = Text::new("expected a plain value, found ").push(found.name).push("; leave the unit out");
+            panic!("{}", text.as_str())
+        }
+        _ => {}
+    }
+}
+
+#[track_caller]
+const fn check_range(component: &str, field: OptionField, given: Given) {
+    if let (Some(range), Some(number)) = (field.range, given.number)
+        && !(number >= range.start && number <= range.end)
+    {
+        let text = Text::new("").name(field.name).push(" of ").name(component).push(" must be in ");
+        panic!("{}", text.push(range.text).push(" ").push(field.unit).as_str())
+    }
+}

@@ -1,0 +1,89 @@
+//! What a component is told when it starts.
+
+use crate::message::Frame;
+use crate::node::EstimatorDeclaration;
+use crate::run::{SensorDeclaration, StopSignal};
+use crate::time::Clock;
+use nalgebra::Isometry3;
+
+/// What an estimator is told when it starts: where it stands in the robot, and where its inputs come from.
+#[derive(Clone, Copy, Debug)]
+pub struct Context {
+    pub(crate) robot: &'static str,
+    pub(crate) declaration: &'static EstimatorDeclaration,
+}
+
+impl Context {
+    /// The robot's name.
+    pub fn robot(&self) -> &'static str {
+        self.robot
+    }
+
+    /// The estimator's path: `estimator/base_link/pose`.
+    pub fn path(&self) -> &'static str {
+        self.declaration.path
+    }
+
+    /// The frame of what it publishes: its sensor's, or its link's.
+    pub fn frame(&self) -> Frame {
+        self.declaration.frame
+    }
+
+    /// Takes points from the frame of `input` to the frame of the output: the product of the fixed joints between.
+    ///
+    /// The identity where the two are one frame, where the input has no frame (a robot-level sensor), and across a
+    /// moving joint, which only an estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span.
+    ///
+    /// [`Estimator::HANDLES_MOVING_JOINTS`]: super::Estimator::HANDLES_MOVING_JOINTS
+    pub fn frame_from_input(&self, input: &str) -> Isometry3<f64> {
+        let declared = self.declaration.inputs.iter().find(|declared| declared.name == input);
+        declared.map_or_else(Isometry3::identity, |declared| declared.frame_from_input.isometry())
+    }
+}
+
+/// What a sensor is told when it starts.
+#[derive(Clone, Debug)]
+pub struct SensorContext {
+    pub(crate) robot: &'static str,
+    pub(crate) declaration: &'static SensorDeclaration,
+    pub(crate) clock: Clock,
+    pub(crate) stop: StopSignal,
+}
+
+impl SensorContext {
+    /// The robot's name.
+    pub fn robot(&self) -> &'static str {
+        self.robot
+    }
+
+    /// The sensor's path: `sensor/base_link/imu`.
+    pub fn path(&self) -> &'static str {
+        self.declaration.path
+    }
+
+    /// The frame of what it publishes.
+    pub fn frame(&self) -> Frame {
+        self.declaration.frame
+    }
+
+    /// The declared period in seconds, if it has a `rate`.
+    pub fn period_s(&self) -> Option<f64> {
+        self.declaration.period_nanos.map(|nanos| nanos as f64 * 1e-9)
+    }
+
+    /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; none if a
+    /// moving joint lies between, or the sensor has no frame.
+    pub fn root_from_frame(&self) -> Option<Isometry3<f64>> {
+        self.declaration.root_from_frame.map(|transform| transform.isometry())
+    }
+
+    /// The clock of the run.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// Whether the robot has been told to stop: a sensor that waits for its device gives up its wait then.
+    pub fn is_stopping(&self) -> bool {
+        self.stop.is_set()
+    }
+}

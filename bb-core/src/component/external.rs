@@ -1,0 +1,26 @@
+//! A sensor that other code feeds.
+
+use super::{Fault, NoOptions, Reading, Sensor, SensorContext};
+use crate::Payload;
+use crate::time::MonotonicTime;
+use std::marker::PhantomData;
+
+/// A sensor whose messages come from elsewhere: a driver's callback, a network, a test.
+///
+/// Declare `sensor imu: External<Imu>();` and hand in its readings with
+/// [`Running::publish`](crate::Running::publish) or [`Simulation::publish`](crate::Simulation::publish).
+#[derive(Debug)]
+pub struct External<T>(PhantomData<fn() -> T>);
+
+impl<T: Payload> Sensor for External<T> {
+    type Options = NoOptions;
+    type Output = T;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(PhantomData))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<T>, Fault> {
+        Ok(Reading::finished())
+    }
+}

@@ -1,0 +1,207 @@
+//! What an estimator takes: one payload, or a struct with a field per input.
+//!
+//! The driver's message goes to the estimator by reference. Every other input has a [`Slot`] that keeps its last known
+//! message. When the driver arrives, [`InputAt::snapshot`] holds the slots against the driver's time and makes the
+//! struct that the estimator takes, or names the input that was missing or too old.
+
+use crate::Payload;
+use crate::message::Stamped;
+use crate::node::InputDeclaration;
+use crate::time::MonotonicTime;
+use std::cell::Cell;
+use std::ops::Deref;
+
+/// What an estimator takes.
+///
+/// An estimator of one input names the payload: `type Input = Imu;`, and its `handle_input` gets `&Stamped<Imu>`. One of
+/// several inputs derives a struct whose fields are the inputs by name; an `Option` says that the estimator can do
+/// without it.
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// /// What a wheeled robot's pose is made of.
+/// #[derive(Debug, Inputs)]
+/// pub struct PoseInputs<'a> {
+///     /// The inertial sensor.
+///     pub imu: Input<'a, Imu>,
+///     /// The wheels.
+///     pub odometry: Input<'a, Odometry>,
+///     /// Magnetic heading, where the robot has it.
+///     pub magnetic_field: Option<Input<'a, MagneticField>>,
+/// }
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` cannot be the input of an estimator",
+    label = "neither a payload nor a struct of inputs",
+    note = "name a payload, or derive a struct of several: `#[derive(Inputs)]`"
+)]
+pub trait Inputs: 'static {
+    /// What `handle_input` gets.
+    type View<'a>;
+    /// The last known message of each input.
+    #[doc(hidden)]
+    type Cache: Default + Send + 'static;
+    /// The inputs by name; none if the input is a single payload.
+    const FIELDS: &'static [InputField];
+}
+
+/// What is known of one field of an input struct.
+#[derive(Clone, Copy, Debug)]
+pub struct InputField {
+    /// Its name.
+    pub name: &'static str,
+    /// Whether the estimator can do without it.
+    pub optional: bool,
+}
+
+/// The number of a field in an input or output struct, as a type.
+pub type FieldIndex = usize;
+
+/// One input of a struct: its message, and whether it is new since the last dispatch.
+#[derive(Debug)]
+pub struct Input<'a, T> {
+    message: &'a Stamped<T>,
+    is_new: bool,
+}
+
+impl<T> Clone for Input<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Input<'_, T> {}
+
+impl<'a, T> Input<'a, T> {
+    /// A message that has arrived since the last dispatch.
+    pub fn new(message: &'a Stamped<T>) -> Self {
+        Self { message, is_new: true }
+    }
+
+    /// A message that an earlier dispatch has seen already.
+    pub fn seen(message: &'a Stamped<T>) -> Self {
+        Self { message, is_new: false }
+    }
+
+    /// Whether it has arrived since the last dispatch, so that a slow sensor's reading is fused once.
+    pub fn is_new(&self) -> bool {
+        self.is_new
+    }
+
+    /// The message.
+    pub fn message(&self) -> &'a Stamped<T> {
+        self.message
+    }
+}
+
+impl<T> Deref for Input<'_, T> {
+    type Target = Stamped<T>;
+    fn deref(&self) -> &Stamped<T> {
+        self.message
+    }
+}
+
+/// That input number `I` of `Self` exists: what it carries, and what happens when it arrives.
+#[doc(hidden)]
+pub trait InputAt<const I: FieldIndex>: Inputs {
+    /// The payload it takes.
+    type Payload: Payload;
+
+    /// Its slot; none if a single payload is all the estimator takes, which needs no cache.
+    fn slot(cache: &mut Self::Cache) -> Option<&mut Slot<Self::Payload>>;
+
+    /// What the estimator takes when this input is the driver and `message` has arrived.
+    fn snapshot<'a>(
+        cache: &'a mut Self::Cache,
+        message: &'a Stamped<Self::Payload>,
+    ) -> Result<Self::View<'a>, SyncMiss>;
+}
+
+impl<T: Payload> Inputs for T {
+    type View<'a> = &'a Stamped<T>;
+    type Cache = ();
+    const FIELDS: &'static [InputField] = &[];
+}
+
+impl<T: Payload> InputAt<0> for T {
+    type Payload = T;
+
+    fn slot(_: &mut ()) -> Option<&mut Slot<T>> {
+        None
+    }
+
+    #[inline(always)]
+    fn snapshot<'a>((): &'a mut (), message: &'a Stamped<T>) -> Result<&'a Stamped<T>, SyncMiss> {
+        Ok(message)
+    }
+}
+
+/// The last known message of one input, and how old it may be.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Slot<T> {
+    message: Option<Stamped<T>>,
+    is_new: Cell<bool>,
+    declaration: Option<&'static InputDeclaration>,
+}
+
+impl<T> Default for Slot<T> {
+    fn default() -> Self {
+        Self { message: None, is_new: Cell::new(false), declaration: None }
+    }
+}
+
+/// Which input a dispatch was dropped for.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SyncMiss {
+    /// Its number among the declared inputs.
+    pub input: usize,
+    /// How much older than the driver it was; none if it has not arrived yet.
+    pub age_nanos: Option<i64>,
+}
+
+impl<T: Payload> Slot<T> {
+    /// Says which declared input fills it.
+    pub fn declare(&mut self, declaration: &'static InputDeclaration) {
+        self.declaration = Some(declaration);
+    }
+
+    /// Keeps `message` as the last known.
+    pub fn store(&mut self, message: &Stamped<T>) {
+        match &mut self.message {
+            Some(kept) => kept.clone_from(message),
+            none => *none = Some(message.clone()),
+        }
+        self.is_new.set(true);
+    }
+
+    /// The miss of a required input that has not arrived, or is too old for a driver of `time`; none if all is well.
+    pub fn miss(&self, time: MonotonicTime) -> Option<SyncMiss> {
+        let declaration = self.declaration.filter(|declaration| !declaration.optional)?;
+        let Some(message) = &self.message else {
+            return Some(SyncMiss { input: declaration.index, age_nanos: None });
+        };
+        let age_nanos = time.nanos_since(message.monotonic_time);
+        declaration.is_too_old(age_nanos).then_some(SyncMiss { input: declaration.index, age_nanos: Some(age_nanos) })
+    }
+
+    /// The message, if it has arrived and is not too old for a driver of `time`; from then on it counts as seen.
+    pub fn take(&self, time: MonotonicTime) -> Option<Input<'_, T>> {
+        let message = self.message.as_ref()?;
+        let is_too_old = self.declaration?.is_too_old(time.nanos_since(message.monotonic_time));
+        (!is_too_old).then(|| Input { message, is_new: self.is_new.replace(false) })
+    }
+
+    /// The message of a required input; the error is that of [`Self::miss`].
+    pub fn require(&self, time: MonotonicTime) -> Result<Input<'_, T>, SyncMiss> {
+        let input = self.declaration.map_or(usize::MAX, |declaration| declaration.index);
+        self.take(time).ok_or(SyncMiss { input, age_nanos: None })
+    }
+}
+
+/// Puts the names of inputs or outputs into a sentence.
+pub(crate) fn describe(names: impl Iterator<Item = &'static str>) -> String {
+    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,90 @@
+//! Typed options with defaults, ranges, units and docs.
+
+/// The options of a sensor or an estimator: a plain struct, filled from the parentheses in `robot!`.
+///
+/// Derive it. Every field has either a default or is `required`; numbers may state a unit, and then a literal in
+/// `robot!` must carry one of that dimension, and a range, which a literal must keep.
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// /// Options of a range finder.
+/// #[derive(Clone, Debug, Options)]
+/// pub struct RangeFinderOptions {
+///     /// Device file.
+///     #[option(required)]
+///     pub port: String,
+///     /// Readings beyond it are dropped. Unit: m.
+///     #[option(default = 4.0, range = 0.1..=30.0, unit = "m")]
+///     pub maximum_range: f64,
+/// }
+///
+/// assert_eq!(RangeFinderOptions::defaults().maximum_range, 4.0);
+/// assert!(RangeFinderOptions { maximum_range: 99.0, ..RangeFinderOptions::defaults() }.validate().is_err());
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an options struct",
+    label = "cannot be the options of a component",
+    note = "derive it: `#[derive(Clone, Debug, Options)]`, with `#[option(default = …)]` on each field"
+)]
+pub trait Options: Clone + std::fmt::Debug + Send + 'static {
+    /// What is known of each option, in the order of the fields.
+    const FIELDS: &'static [OptionField];
+
+    /// All defaults; a required option is at its type's `Default`.
+    fn defaults() -> Self;
+
+    /// Checks every range. The error names the option, its value and what is accepted.
+    fn validate(&self) -> Result<(), String>;
+}
+
+/// What is known of one option.
+#[derive(Clone, Copy, Debug)]
+pub struct OptionField {
+    /// Its name.
+    pub name: &'static str,
+    /// Its doc comment.
+    pub doc: &'static str,
+    /// Whether it must be given.
+    pub required: bool,
+    /// Its dimension, where a unit is stated.
+    pub dimension: Option<Dimension>,
+    /// The unit it was stated in.
+    pub unit: &'static str,
+    /// The numbers accepted, in SI.
+    pub range: Option<Range>,
+}
+
+/// The physical dimension of a quantity.
+#[derive(Clone, Copy, Debug)]
+pub struct Dimension {
+    /// Exponents of metre, kilogram, second, ampere, kelvin and radian.
+    pub exponents: [i8; 6],
+    /// With its article, for messages: "a length".
+    pub name: &'static str,
+}
+
+/// An interval of numbers, both ends included.
+#[derive(Clone, Copy, Debug)]
+pub struct Range {
+    /// The smallest accepted.
+    pub start: f64,
+    /// The largest accepted.
+    pub end: f64,
+    /// As the user wrote it, for messages.
+    pub text: &'static str,
+}
+
+/// For components without options.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoOptions;
+
+impl Options for NoOptions {
+    const FIELDS: &'static [OptionField] = &[];
+    fn defaults() -> Self {
+        Self
+    }
+    fn validate(&self) -> Result<(), String> {
+        Ok(())
+    }
+}

@@ -1,0 +1,57 @@
+//! What an estimator emits: one payload, or a struct with a field per output.
+
+use super::FieldIndex;
+use crate::Payload;
+
+/// What an estimator emits.
+///
+/// An estimator of one output names the payload: `type Output = Orientation;`, published at the estimator's own path.
+/// One of several derives a struct of `Option`s; each field that is `Some` is published at the path of the `output`
+/// of its name.
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// /// Where the robot is and how it moves.
+/// #[derive(Debug, Default, Outputs)]
+/// pub struct PoseOutputs {
+///     /// The pose, at every dispatch.
+///     pub pose: Option<Pose>,
+///     /// The velocity, when there is a new one.
+///     pub velocity: Option<Twist>,
+/// }
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` cannot be the output of an estimator",
+    label = "neither a payload nor a struct of outputs",
+    note = "name a payload, or derive a struct of several: `#[derive(Outputs)]`"
+)]
+pub trait Outputs: Send + 'static {
+    /// The outputs by name; none if the output is a single payload, whose name is `out`.
+    const FIELDS: &'static [&'static str];
+}
+
+/// That output number `I` of `Self` exists, and how to take it out of what was emitted.
+#[doc(hidden)]
+pub trait OutputAt<const I: FieldIndex>: Outputs {
+    /// What it carries.
+    type Payload: Payload;
+
+    /// Takes it, if it was emitted.
+    fn take(emitted: &mut Option<Self>) -> Option<Self::Payload>
+    where
+        Self: Sized;
+}
+
+impl<T: Payload> Outputs for T {
+    const FIELDS: &'static [&'static str] = &[];
+}
+
+impl<T: Payload> OutputAt<0> for T {
+    type Payload = T;
+
+    #[inline(always)]
+    fn take(emitted: &mut Option<T>) -> Option<T> {
+        emitted.take()
+    }
+}

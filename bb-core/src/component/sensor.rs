@@ -1,0 +1,131 @@
+//! The contract of a sensor.
+
+use super::{Fault, Options, SensorContext};
+use crate::Payload;
+use crate::time::MonotonicTime;
+
+/// Reads a device, a recording or a simulation.
+///
+/// The framework calls [`read`](Sensor::read) at the declared `rate`; without one, again and again, so that a driver may
+/// wait for its device there. The reading is published, and all estimators downstream run, before the next call.
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// /// Options of the simulated encoder.
+/// #[derive(Clone, Debug, Options)]
+/// pub struct EncoderOptions {
+///     /// Unit: rad/s.
+///     #[option(default = 1.0, unit = "rad/s")]
+///     pub velocity: f64,
+/// }
+///
+/// /// An encoder on a joint that turns for ever.
+/// #[derive(Debug)]
+/// pub struct SimulatedEncoder(EncoderOptions);
+///
+/// impl Sensor for SimulatedEncoder {
+///     type Options = EncoderOptions;
+///     type Output = JointState;
+///
+///     fn init(options: EncoderOptions, _: &SensorContext) -> Result<Self, Fault> {
+///         Ok(Self(options))
+///     }
+///
+///     fn read(&mut self, now: MonotonicTime) -> Result<Reading<JointState>, Fault> {
+///         let position = self.0.velocity * now.seconds_since(MonotonicTime::ZERO);
+///         Ok(Reading::now(JointState { position, velocity: Some(self.0.velocity), effort: None }))
+///     }
+/// }
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a sensor",
+    label = "cannot be declared with `sensor`",
+    note = "implement `bb_core::Sensor` for it"
+)]
+pub trait Sensor: Sized + Send + 'static {
+    /// What `Name(…)` in `robot!` fills.
+    type Options: Options;
+    /// What it publishes.
+    type Output: Payload;
+
+    /// Opens the device.
+    ///
+    /// # Errors
+    /// What keeps it from starting; the robot then does not start.
+    fn init(options: Self::Options, context: &SensorContext) -> Result<Self, Fault>;
+
+    /// Takes one reading. `now` is the time of the call.
+    ///
+    /// A read that waits must come back now and then with [`Reading::nothing`], so that the robot can stop.
+    ///
+    /// # Errors
+    /// What keeps it from going on; it is stopped and the fault is reported.
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
+
+    /// Closes the device, before it stops.
+    fn terminate(&mut self) {}
+}
+
+/// What one [`Sensor::read`] gave, and when to read next.
+#[derive(Clone, Debug, PartialEq)]
+#[must_use]
+pub struct Reading<T> {
+    pub(crate) payload: Option<T>,
+    pub(crate) time: Option<MonotonicTime>,
+    pub(crate) next: Next,
+}
+
+/// When a sensor is read next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// At its declared rate.
+    AtRate,
+    /// At that time.
+    At(MonotonicTime),
+    /// Never: there is no more to read.
+    Never,
+}
+
+impl<T> Reading<T> {
+    /// A reading taken now.
+    pub fn now(payload: T) -> Self {
+        Self { payload: Some(payload), time: None, next: Next::AtRate }
+    }
+
+    /// A reading with the device's own stamp.
+    pub fn at(time: MonotonicTime, payload: T) -> Self {
+        Self { payload: Some(payload), time: Some(time), next: Next::AtRate }
+    }
+
+    /// Nothing new this time.
+    pub fn nothing() -> Self {
+        Self { payload: None, time: None, next: Next::AtRate }
+    }
+
+    /// There is no more to read: the end of a recording.
+    pub fn finished() -> Self {
+        Self { payload: None, time: None, next: Next::Never }
+    }
+
+    /// Asks to be read next at `time`, whatever the rate: a recording asks for its next message's.
+    pub fn next_at(mut self, time: MonotonicTime) -> Self {
+        self.next = Next::At(time);
+        self
+    }
+
+    /// The payload read, if any.
+    pub fn payload(&self) -> Option<&T> {
+        self.payload.as_ref()
+    }
+
+    /// The device's own stamp, if any.
+    pub fn time(&self) -> Option<MonotonicTime> {
+        self.time
+    }
+
+    /// When to read next.
+    pub fn next(&self) -> Next {
+        self.next
+    }
+}

@@ -1,0 +1,119 @@
+//! A payload with what every message carries beside it.
+
+use super::Payload;
+use crate::time::{MonotonicTime, WallTime};
+use std::fmt;
+use std::ops::Deref;
+
+/// The name of a coordinate frame: that of a link or a joint, or empty where there is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Frame(&'static str);
+
+impl Frame {
+    /// The frame of no link: that of robot-level sensors.
+    pub const NONE: Self = Self("");
+
+    /// The frame `name`.
+    pub const fn new(name: &'static str) -> Self {
+        Self(name)
+    }
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        self.0
+    }
+}
+
+impl fmt::Display for Frame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0)
+    }
+}
+
+/// Where a message was first published.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Origin {
+    /// The robot's name.
+    pub robot: &'static str,
+    /// The name of the node (machine or process) that runs it.
+    pub node: &'static str,
+}
+
+/// All of a message but its payload.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stamp {
+    /// When it was measured: for order and age.
+    pub monotonic_time: MonotonicTime,
+    /// When it was measured: for logs.
+    pub wall_time: WallTime,
+    /// The frame the payload is in.
+    pub frame: Frame,
+    /// Where it was published.
+    pub origin: Origin,
+}
+
+impl Stamp {
+    /// A message with this stamp.
+    pub fn message<T>(self, payload: T) -> Stamped<T> {
+        let Self { monotonic_time, wall_time, frame, origin } = self;
+        Stamped { payload, monotonic_time, wall_time, frame, origin }
+    }
+}
+
+/// A message: a payload, when it was measured, in which frame, and where. Dereferences to its payload.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stamped<T> {
+    /// The data, in SI units.
+    pub payload: T,
+    /// When it was measured, on this machine's monotonic clock: for order and age.
+    pub monotonic_time: MonotonicTime,
+    /// When it was measured, by the calendar: for logs.
+    pub wall_time: WallTime,
+    /// The frame the payload is in.
+    pub frame: Frame,
+    /// Where it was published.
+    pub origin: Origin,
+}
+
+impl<T> Stamped<T> {
+    /// A message measured at `monotonic_time`, in no frame, of no robot: for tests of plain estimators.
+    pub fn new(monotonic_time: MonotonicTime, payload: T) -> Self {
+        Stamp { monotonic_time, ..Stamp::default() }.message(payload)
+    }
+
+    /// All but the payload.
+    pub fn stamp(&self) -> Stamp {
+        Stamp {
+            monotonic_time: self.monotonic_time,
+            wall_time: self.wall_time,
+            frame: self.frame,
+            origin: self.origin,
+        }
+    }
+}
+
+impl<T> Deref for Stamped<T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        &self.payload
+    }
+}
+
+/// That a publisher of `Self` may feed an input that takes `T`: it may if they are the same.
+///
+/// The wiring calls it at every `input`, so that a mismatch is reported there.
+#[diagnostic::on_unimplemented(
+    message = "this publishes `{Self}`, but the estimator's input takes `{T}`",
+    label = "publishes `{Self}`, not `{T}`"
+)]
+pub trait Feeds<T: Payload>: Payload {
+    /// The same message.
+    fn feed(message: &Stamped<Self>) -> &Stamped<T>;
+}
+
+impl<T: Payload> Feeds<T> for T {
+    #[inline(always)]
+    fn feed(message: &Stamped<T>) -> &Stamped<T> {
+        message
+    }
+}

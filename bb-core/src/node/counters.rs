@@ -1,0 +1,132 @@
+//! What a running estimator counts.
+
+use super::EstimatorDeclaration;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Why a message or a dispatch was dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum DropReason {
+    /// The driver arrived, and this input had not yet, or was too old.
+    SyncMiss,
+    /// The message was older than the last one of its input.
+    OutOfOrder,
+    /// The message held a NaN or an infinity.
+    NonFinite,
+    /// The estimator has stopped.
+    Stopped,
+}
+
+impl DropReason {
+    /// All reasons.
+    pub const ALL: [Self; 4] = [Self::SyncMiss, Self::OutOfOrder, Self::NonFinite, Self::Stopped];
+
+    /// As people read it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SyncMiss => "sync miss",
+            Self::OutOfOrder => "out of order",
+            Self::NonFinite => "non-finite",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+/// A count with one writer at a time (whoever holds its estimator) and any number of readers.
+///
+/// A plain load and store instead of an atomic addition: the writers exclude each other already.
+#[derive(Debug, Default)]
+pub(crate) struct Count(AtomicU64);
+
+impl Count {
+    pub(crate) fn increment(&self) {
+        self.0.store(self.0.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+
+    pub(crate) fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+#[derive(Debug, Default)]
+pub(super) struct InputCounters {
+    pub(super) received: Count,
+    pub(super) dropped: [Count; DropReason::ALL.len()],
+}
+
+#[derive(Debug, Default)]
+pub(super) struct Counters {
+    pub(super) inputs: Box<[InputCounters]>,
+    pub(super) dispatched: Count,
+    pub(super) emitted: Count,
+    pub(super) diverged: Count,
+}
+
+impl Counters {
+    pub(super) fn new(declaration: &EstimatorDeclaration) -> Self {
+        let inputs = declaration.inputs.iter().map(|_| InputCounters::default()).collect();
+        Self { inputs, ..Self::default() }
+    }
+
+    pub(super) fn drop(&self, input: usize, reason: DropReason) {
+        if let Some(counters) = self.inputs.get(input) {
+            counters.dropped[reason as usize].increment();
+        }
+    }
+
+    pub(super) fn statistics(
+        &self,
+        declaration: &EstimatorDeclaration,
+        stopped: Option<String>,
+    ) -> EstimatorStatistics {
+        let inputs = declaration.inputs.iter().zip(&self.inputs).map(|(declared, counters)| InputStatistics {
+            name: declared.name,
+            source: declared.source,
+            received: counters.received.get(),
+            dropped: DropReason::ALL.map(|reason| counters.dropped[reason as usize].get()),
+        });
+        EstimatorStatistics {
+            path: declaration.path,
+            inputs: inputs.collect(),
+            dispatched: self.dispatched.get(),
+            emitted: self.emitted.get(),
+            diverged: self.diverged.get(),
+            stopped,
+        }
+    }
+}
+
+/// What an estimator has counted since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EstimatorStatistics {
+    /// Its path.
+    pub path: &'static str,
+    /// By input, in the order of declaration.
+    pub inputs: Vec<InputStatistics>,
+    /// How often it was called.
+    pub dispatched: u64,
+    /// How often it emitted.
+    pub emitted: u64,
+    /// How often it reported that it has diverged.
+    pub diverged: u64,
+    /// Why it stopped, if it has.
+    pub stopped: Option<String>,
+}
+
+/// What an input has counted since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputStatistics {
+    /// Its name.
+    pub name: &'static str,
+    /// The path of its publisher.
+    pub source: &'static str,
+    /// Messages that arrived, the dropped ones included.
+    pub received: u64,
+    dropped: [u64; DropReason::ALL.len()],
+}
+
+impl InputStatistics {
+    /// How many were dropped for `reason`.
+    pub fn dropped(&self, reason: DropReason) -> u64 {
+        self.dropped[reason as usize]
+    }
+}

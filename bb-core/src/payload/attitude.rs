@@ -1,0 +1,31 @@
+//! Where a body is and how it is turned.
+
+use crate::Payload;
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
+
+/// How a body is turned in the world.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct Orientation {
+    /// Takes vectors of the body to the world (east, north, up).
+    pub world_from_body: UnitQuaternion<f64>,
+    /// Covariance of the error as a small rotation of the body, rad².
+    pub covariance: Option<Matrix3<f64>>,
+}
+
+impl Orientation {
+    /// An orientation, its covariance unknown.
+    pub fn new(world_from_body: UnitQuaternion<f64>) -> Self {
+        Self { world_from_body, covariance: None }
+    }
+}
+
+/// Where a body is and how it is turned in the world (`geometry_msgs/PoseWithCovariance`).
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct Pose {
+    /// The body's origin in the world, m.
+    pub position: Vector3<f64>,
+    /// Takes vectors of the body to the world.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// Covariance: position in the world (m²), then orientation as a small rotation of the body (rad²).
+    pub covariance: Option<Matrix6<f64>>,
+}

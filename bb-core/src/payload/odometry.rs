@@ -1,0 +1,25 @@
+//! Motion: twist, and pose with twist.
+
+use super::Pose;
+use crate::Payload;
+use nalgebra::{Matrix6, Vector3};
+
+/// How a body moves, in its own frame (`geometry_msgs/TwistWithCovariance`).
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct Twist {
+    /// Velocity of the body's origin, in the body's frame, m/s.
+    pub linear: Vector3<f64>,
+    /// Angular velocity, in the body's frame, rad/s.
+    pub angular: Vector3<f64>,
+    /// Covariance: linear (m²/s²), then angular (rad²/s²).
+    pub covariance: Option<Matrix6<f64>>,
+}
+
+/// Where a body is and how it moves (`nav_msgs/Odometry`).
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct Odometry {
+    /// The pose in the world.
+    pub pose: Pose,
+    /// The motion in the body's frame.
+    pub twist: Twist,
+}

@@ -1,0 +1,131 @@
+//! The bounded queue between a topic and one subscriber.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+use std::time::{Duration, Instant};
+
+/// What happens to a subscriber that is slower than its publisher.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overflow {
+    /// Keeps so many messages; then the oldest makes room, and the loss is counted.
+    DropOldest {
+        /// How many are kept; at least one.
+        capacity: usize,
+    },
+    /// Keeps the newest alone; the loss of the others is counted.
+    KeepLatest,
+}
+
+impl Default for Overflow {
+    fn default() -> Self {
+        Self::DropOldest { capacity: 1024 }
+    }
+}
+
+impl Overflow {
+    fn capacity(self) -> usize {
+        match self {
+            Self::DropOldest { capacity } => capacity.max(1),
+            Self::KeepLatest => 1,
+        }
+    }
+}
+
+#[derive(Debug)]
+pub(super) struct Queue<M> {
+    state: Mutex<State<M>>,
+    arrived: Condvar,
+    capacity: usize,
+}
+
+#[derive(Debug)]
+struct State<M> {
+    messages: VecDeque<M>,
+    lagged: u64,
+    closed: bool,
+    waker: Option<Waker>,
+}
+
+impl<M> Queue<M> {
+    /// All its room is made here, so that publishing allocates nothing.
+    pub(super) fn new(overflow: Overflow) -> Self {
+        let capacity = overflow.capacity();
+        let state =
+            State { messages: VecDeque::with_capacity(capacity), lagged: 0, closed: false, waker: None };
+        Self { state: Mutex::new(state), arrived: Condvar::new(), capacity }
+    }
+
+    pub(super) fn push(&self, message: M) {
+        let mut state = self.lock();
+        if state.messages.len() == self.capacity {
+            state.messages.pop_front();
+            state.lagged += 1;
+        }
+        state.messages.push_back(message);
+        self.wake(state);
+    }
+
+    pub(super) fn close(&self) {
+        let mut state = self.lock();
+        state.closed = true;
+        self.wake(state);
+    }
+
+    pub(super) fn pop(&self) -> Option<M> {
+        self.lock().messages.pop_front()
+    }
+
+    pub(super) fn lagged(&self) -> u64 {
+        self.lock().lagged
+    }
+
+    /// Waits for a message until `timeout` (none: for ever); none after the time, or once closed and empty.
+    pub(super) fn wait(&self, timeout: Option<Duration>) -> Option<M> {
+        let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
+        let mut state = self.lock();
+        loop {
+            if let Some(message) = state.messages.pop_front() {
+                return Some(message);
+            }
+            if state.closed {
+                return None;
+            }
+            state = match deadline {
+                None => self.arrived.wait(state).unwrap_or_else(PoisonError::into_inner),
+                Some(deadline) => {
+                    let left = deadline.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())?;
+                    self.arrived.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0
+                }
+            };
+        }
+    }
+
+    pub(super) fn poll(&self, context: &mut Context<'_>) -> Poll<Option<M>> {
+        let mut state = self.lock();
+        if let Some(message) = state.messages.pop_front() {
+            return Poll::Ready(Some(message));
+        }
+        if state.closed {
+            return Poll::Ready(None);
+        }
+        match &mut state.waker {
+            Some(waker) => waker.clone_from(context.waker()),
+            none => *none = Some(context.waker().clone()),
+        }
+        Poll::Pending
+    }
+
+    fn wake(&self, mut state: MutexGuard<'_, State<M>>) {
+        let waker = state.waker.take();
+        drop(state);
+        self.arrived.notify_one();
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<M>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,70 @@
+//! What goes wrong with components, as values.
+
+use crate::component::Fault;
+use std::any::Any;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Why a robot does not start: which component, and what keeps it.
+#[derive(Debug)]
+pub struct StartError {
+    path: &'static str,
+    fault: Fault,
+}
+
+impl StartError {
+    pub(crate) fn component(path: &'static str, fault: Fault) -> Self {
+        Self { path, fault }
+    }
+
+    /// The path of the component.
+    pub fn path(&self) -> &'static str {
+        self.path
+    }
+
+    /// What keeps it from starting.
+    pub fn fault(&self) -> &Fault {
+        &self.fault
+    }
+}
+
+impl fmt::Display for StartError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} cannot start: {}", self.path, self.fault)
+    }
+}
+
+impl std::error::Error for StartError {}
+
+/// A component that has stopped by a fault of its own, while the robot runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ComponentFault {
+    /// The path of the component.
+    pub path: &'static str,
+    /// What happened.
+    pub message: String,
+}
+
+impl fmt::Display for ComponentFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} stopped: {}", self.path, self.message)
+    }
+}
+
+impl std::error::Error for ComponentFault {}
+
+/// Calls a user's code; a panic in it becomes a fault.
+#[inline]
+pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(result) => result,
+        Err(panic) => Err(of_panic(&*panic)),
+    }
+}
+
+#[cold]
+fn of_panic(panic: &(dyn Any + Send)) -> Fault {
+    let message = panic.downcast_ref::<&str>().copied();
+    let message = message.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    Fault::new(format!("panicked: {}", message.unwrap_or("no message")))
+}

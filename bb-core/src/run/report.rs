@@ -1,0 +1,63 @@
+//! What a run has done: what was published where, and what was dropped and why.
+
+use super::ComponentFault;
+use crate::node::{DropReason, EstimatorStatistics};
+use crate::pubsub::TopicStatistics;
+use std::fmt;
+
+/// Counts since the start. `Display` prints them as a table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Report {
+    /// Every publisher.
+    pub topics: Vec<TopicStatistics>,
+    /// Every estimator.
+    pub estimators: Vec<EstimatorStatistics>,
+    /// Components that have stopped by a fault of their own.
+    pub faults: Vec<ComponentFault>,
+}
+
+impl Report {
+    /// The publisher of that path.
+    pub fn topic(&self, path: &str) -> Option<&TopicStatistics> {
+        self.topics.iter().find(|topic| topic.path == path)
+    }
+
+    /// The estimator of that path.
+    pub fn estimator(&self, path: &str) -> Option<&EstimatorStatistics> {
+        self.estimators.iter().find(|estimator| estimator.path == path)
+    }
+
+    /// This report, if no component has stopped by a fault.
+    ///
+    /// # Errors
+    /// The first fault.
+    pub fn ok(self) -> Result<Self, ComponentFault> {
+        match self.faults.first() {
+            Some(fault) => Err(fault.clone()),
+            None => Ok(self),
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let paths = self.topics.iter().map(|topic| topic.path.len()).max().unwrap_or(0).max("path".len());
+        let payloads = self.topics.iter().map(|topic| topic.payload.len()).max().unwrap_or(0).max("payload".len());
+        writeln!(f, "{:paths$}  {:payloads$}  {:>9}", "path", "payload", "published")?;
+        for topic in &self.topics {
+            writeln!(f, "{:paths$}  {:payloads$}  {:>9}", topic.path, topic.payload, topic.published)?;
+        }
+        for estimator in &self.estimators {
+            for input in &estimator.inputs {
+                for reason in DropReason::ALL.into_iter().filter(|reason| input.dropped(*reason) > 0) {
+                    let (path, name, dropped) = (estimator.path, input.name, input.dropped(reason));
+                    writeln!(f, "{path}: {dropped} dropped for `{name}`: {}", reason.name())?;
+                }
+            }
+        }
+        for fault in &self.faults {
+            writeln!(f, "{fault}")?;
+        }
+        Ok(())
+    }
+}

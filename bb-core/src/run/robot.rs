@@ -1,0 +1,53 @@
+//! What `robot!` implements.
+
+use super::{Builder, Source, StartError, Startup};
+use crate::node::AnyNode;
+use crate::pubsub::AnyTopic;
+use crate::topology::Topology;
+use std::sync::Arc;
+
+/// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
+pub trait Robot: Sized + Send + Sync + 'static {
+    /// Its name.
+    const NAME: &'static str;
+    /// Its links and joints.
+    const TOPOLOGY: &'static Topology;
+
+    /// The options of all components.
+    #[doc(hidden)]
+    type Options: Send;
+    /// The topics of all publishers.
+    #[doc(hidden)]
+    type Topics: Send + Sync;
+    /// The topics and the running estimators.
+    #[doc(hidden)]
+    type Wiring: Send + Sync;
+
+    /// The options as declared.
+    #[doc(hidden)]
+    fn options() -> Self::Options;
+    #[doc(hidden)]
+    fn topics() -> Self::Topics;
+    /// Starts all estimators.
+    #[doc(hidden)]
+    fn wire(topics: Self::Topics, options: &mut Self::Options, startup: &Startup)
+    -> Result<Self::Wiring, StartError>;
+    /// Starts all sensors.
+    #[doc(hidden)]
+    fn sources(
+        wiring: &Arc<Self::Wiring>,
+        options: Self::Options,
+        startup: &Startup,
+    ) -> Result<Vec<Box<dyn Source>>, StartError>;
+    #[doc(hidden)]
+    fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
+    #[doc(hidden)]
+    fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic>;
+    #[doc(hidden)]
+    fn all_nodes(wiring: &Self::Wiring) -> Vec<&dyn AnyNode>;
+
+    /// Assembles the robot: options may be changed and topics subscribed to before it starts.
+    fn builder() -> Builder<Self> {
+        Builder::new()
+    }
+}

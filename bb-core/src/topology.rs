@@ -1,0 +1,111 @@
+//! Links, joints and the transforms between them, as constant data.
+
+use crate::message::Frame;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+/// A robot's links and joints, in the order of their declaration; the first link is the root.
+#[derive(Clone, Copy, Debug)]
+pub struct Topology {
+    /// The links.
+    pub links: &'static [Link],
+    /// The joints.
+    pub joints: &'static [Joint],
+}
+
+/// A rigid body.
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    /// Its name, and that of its frame.
+    pub name: &'static str,
+    /// The number of the joint that carries it; none for the root.
+    pub parent_joint: Option<usize>,
+    /// Takes points from this link to the root, if only fixed joints lie between.
+    pub root_from_link: Option<Transform>,
+}
+
+/// What connects two links.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// Its name.
+    pub name: &'static str,
+    /// How it moves.
+    pub kind: JointKind,
+    /// The number of the link it is mounted on.
+    pub parent: usize,
+    /// The number of the link that it carries.
+    pub child: usize,
+    /// Takes points from the joint's frame, which is the child's at rest, to the parent's.
+    pub parent_from_joint: Transform,
+    /// The axis of motion in the joint's frame, of unit length; for a planar joint the plane's normal.
+    pub axis: Option<[f64; 3]>,
+    /// How far, fast and strongly it moves.
+    pub limit: Option<Limit>,
+}
+
+/// How a joint moves (URDF's types).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Not at all.
+    Fixed,
+    /// Turns about its axis between limits.
+    Revolute,
+    /// Turns about its axis without end.
+    Continuous,
+    /// Slides along its axis between limits.
+    Prismatic,
+    /// Slides in the plane normal to its axis.
+    Planar,
+    /// Moves freely.
+    Floating,
+}
+
+/// The limits of a joint: rad, rad/s, N·m where it turns, m, m/s, N where it slides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// Smallest position.
+    pub lower: Option<f64>,
+    /// Largest position.
+    pub upper: Option<f64>,
+    /// Largest speed.
+    pub velocity: Option<f64>,
+    /// Largest torque or force.
+    pub effort: Option<f64>,
+}
+
+/// A rotation and a translation as plain numbers, so that they can be constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform {
+    /// Translation, m.
+    pub translation: [f64; 3],
+    /// Unit quaternion: w, x, y, z.
+    pub rotation: [f64; 4],
+}
+
+impl Transform {
+    /// No motion at all.
+    pub const IDENTITY: Self = Self { translation: [0.0; 3], rotation: [1.0, 0.0, 0.0, 0.0] };
+
+    /// The same as an isometry.
+    pub fn isometry(&self) -> Isometry3<f64> {
+        let [w, x, y, z] = self.rotation;
+        let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        Isometry3::from_parts(Translation3::from(Vector3::from(self.translation)), rotation)
+    }
+}
+
+impl Topology {
+    /// The root link's frame.
+    pub fn root(&self) -> Frame {
+        self.links.first().map_or(Frame::NONE, |link| Frame::new(link.name))
+    }
+
+    /// The link of that name.
+    pub fn link(&self, name: &str) -> Option<&'static Link> {
+        self.links.iter().find(|link| link.name == name)
+    }
+
+    /// The joint of that name.
+    pub fn joint(&self, name: &str) -> Option<&'static Joint> {
+        self.joints.iter().find(|joint| joint.name == name)
+    }
+}

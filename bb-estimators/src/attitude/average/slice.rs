@@ -1,0 +1,55 @@
+//! The average of any number of orientations.
+
+use nalgebra::{Matrix4, Quaternion, SymmetricEigen, Unit, UnitQuaternion};
+
+use super::{AverageError, check};
+
+/// Below this relative difference of M's two greatest eigenvalues the average is not defined.
+const AMBIGUOUS: f64 = 1e-12;
+
+/// The average of orientations with weights, which need not add up to 1.
+///
+/// For inputs `world_from_body` the result is one, too, on the same half of the unit sphere as the heaviest of
+/// them. Two orientations are quicker by [`average_pair`](super::average_pair), with the same result. Does not
+/// allocate.
+///
+/// # Errors
+///
+/// [`AverageError`] if a weight or an orientation is not valid, if there is no weight above 0, or if two
+/// averages are equally good.
+///
+/// # Method
+///
+/// The eigenvector of the greatest eigenvalue of `M = Σ wᵢ qᵢ qᵢᵀ`, by the symmetric QR algorithm.
+pub fn average(weighted: &[(UnitQuaternion<f64>, f64)]) -> Result<UnitQuaternion<f64>, AverageError> {
+    for (index, (orientation, weight)) in weighted.iter().enumerate() {
+        check(index, orientation, *weight)?;
+    }
+    let by_weight = weighted.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let (heaviest, greatest) = by_weight
+        .filter(|(_, weight)| *weight > 0.0)
+        .ok_or(AverageError::NoWeight)?;
+
+    let mut moments = Matrix4::zeros();
+    for (orientation, weight) in weighted {
+        let q = &orientation.coords;
+        moments += q * q.transpose() * (weight / greatest);
+    }
+    let eigen = SymmetricEigen::new(moments);
+    let largest = eigen.eigenvalues.imax();
+    let gap = (0..4)
+        .filter(|&index| index != largest)
+        .map(|index| eigen.eigenvalues[largest] - eigen.eigenvalues[index])
+        .fold(f64::INFINITY, f64::min);
+    if gap < AMBIGUOUS * moments.trace() {
+        return Err(AverageError::Ambiguous);
+    }
+
+    let average = eigen.eigenvectors.column(largest).into_owned();
+    let sign = if average.dot(&heaviest.coords) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
+    Ok(Unit::new_normalize(Quaternion::from(average * sign)))
+}

@@ -1,0 +1,59 @@
+//! What every attitude filter does: samples in, one orientation out.
+
+use core::fmt::Debug;
+
+use nalgebra::UnitQuaternion;
+
+use super::{ImuSample, ParamsError, SampleError};
+
+/// A filter that estimates `world_from_body` in ENU from inertial and, if it has them, magnetic samples.
+///
+/// All implementations share how they start and what they do with bad input:
+///
+/// * The first sample whose specific force shows where up is starts the orientation: tilt from gravity,
+///   heading from the magnetic field. Until then [`world_from_body`](Self::world_from_body) is `None`.
+/// * Without a field in that sample the filter starts with the shortest rotation that levels it (heading 0).
+///   If it uses a magnetometer, the first field that comes later sets the heading at once.
+/// * The time step is the difference of two stamps. After a gap longer than [`MAX_GAP_S`](super::MAX_GAP_S)
+///   nothing is integrated: tilt starts anew from the accelerometer, heading is kept until the next field
+///   sets it at once (for ever without a magnetometer).
+/// * In free fall the filter follows the gyroscope alone.
+/// * A sample that is refused leaves the filter as it was.
+///
+/// The orientation has unit norm for ever.
+pub trait AttitudeFilter: Sized {
+    /// The tuning of the filter. `Default` is one set that works on ordinary sensors.
+    type Params: Clone + Debug + Default + PartialEq;
+
+    /// Makes a filter that has seen no sample yet.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    fn new(params: Self::Params) -> Result<Self, ParamsError>;
+
+    /// The parameters that the filter was made with.
+    fn params(&self) -> &Self::Params;
+
+    /// Takes one sample.
+    ///
+    /// # Errors
+    ///
+    /// [`SampleError`] if a value is not finite or absurdly large, or if time stands still or runs back. The
+    /// filter is then as it was before the call.
+    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError>;
+
+    /// Starts from an orientation that is known, heading included, at `time_ns`, in place of one from the
+    /// first sample.
+    ///
+    /// # Errors
+    ///
+    /// [`SampleError::NonFinite`] if the orientation is not a rotation. The filter is then as it was.
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError>;
+
+    /// The orientation after the last sample, or `None` before the filter has started.
+    fn world_from_body(&self) -> Option<UnitQuaternion<f64>>;
+
+    /// Forgets every sample; the parameters stay.
+    fn reset(&mut self);
+}

@@ -1,0 +1,119 @@
+//! One step of Madgwick's filter.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::MadgwickParams;
+use crate::attitude::rotation::turn;
+use crate::attitude::state::AttitudeState;
+use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
+
+/// Below this norm the gradient is rounding noise, which has no direction to descend in.
+const NO_GRADIENT: f64 = 1e-12;
+
+/// Madgwick's gradient-descent filter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Madgwick {
+    params: MadgwickParams,
+    state: AttitudeState,
+}
+
+impl AttitudeFilter for Madgwick {
+    type Params = MadgwickParams;
+
+    fn new(params: MadgwickParams) -> Result<Self, ParamsError> {
+        params.check()?;
+        Ok(Self {
+            params,
+            state: AttitudeState::new(params.magnetometer),
+        })
+    }
+
+    fn params(&self) -> &MadgwickParams {
+        &self.params
+    }
+
+    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError> {
+        let Some(step) = self.state.admit(sample)? else {
+            return Ok(());
+        };
+        // q̇ = ½ q ⊗ ω - β ∇F/‖∇F‖, and with ∇F = -2 q ⊗ e the second part is a turn at 2 β about e.
+        let mut orientation = turn(&step.world_from_body, &(sample.angular_velocity * step.dt_s));
+        if let Some(up) = step.up {
+            let descent = descent(&orientation, &up, step.field.as_ref());
+            orientation = turn(&orientation, &(2.0 * self.params.beta * step.dt_s * descent));
+        }
+        self.state.store(orientation, step.field);
+        Ok(())
+    }
+
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError> {
+        self.state.start_at(time_ns, world_from_body)
+    }
+
+    fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+        self.state.world_from_body()
+    }
+
+    fn reset(&mut self) {
+        self.state.reset();
+    }
+}
+
+/// The direction, a unit vector in the body frame, about which the body has to turn to descend fastest on
+///
+/// `F(q) = ½ ‖Rᵀẑ - a‖² + ½ ‖Rᵀb - m‖²`,
+///
+/// with the measured unit vectors `a` and `m`, `R(q)` taking body to world, and the field's reference
+/// `b = (0, √(h_x² + h_y²), h_z)`, `h = R m`: the measured field itself, its horizontal part turned north
+/// (the report's section on magnetic distortion).
+///
+/// A turn by the small body vector δ changes `Rᵀv` to `Rᵀv + Rᵀv × δ`, so that
+/// `∂F/∂δ = -(a × Rᵀẑ + m × Rᵀb) = -e`. On the unit sphere `dq = ½ q ⊗ δ`, hence `∇F = -2 q ⊗ e`: the
+/// papers' `Jᵀ f` less its part along q.
+///
+/// Zero where there is nothing to gain, except at the top of F, upside down, which is left about the body's
+/// x or y axis.
+fn descent(
+    world_from_body: &UnitQuaternion<f64>,
+    up: &Vector3<f64>,
+    field: Option<&Vector3<f64>>,
+) -> Vector3<f64> {
+    let (w, x, y, z) = (
+        world_from_body.w,
+        world_from_body.i,
+        world_from_body.j,
+        world_from_body.k,
+    );
+    let (x2, y2, z2) = (x + x, y + y, z + z);
+    let (wx, wy, xx, xz, yy, yz) = (w * x2, w * y2, x * x2, x * z2, y * y2, y * z2);
+    // Rᵀẑ, the third row of R.
+    let world_up = Vector3::new(xz - wy, yz + wx, 1.0 - xx - yy);
+
+    let error = match field {
+        None => up.cross(&world_up),
+        Some(field) => {
+            let (wz, xy, zz) = (w * z2, x * y2, z * z2);
+            let world_north = Vector3::new(xy + wz, 1.0 - xx - zz, yz - wx);
+            let east = (1.0 - yy - zz) * field.x + (xy - wz) * field.y + (xz + wy) * field.z;
+            let north = world_north.dot(field);
+            let vertical = world_up.dot(field);
+            let horizontal = (east * east + north * north).sqrt();
+            // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
+            (up + vertical * field).cross(&world_up) + horizontal * field.cross(&world_north)
+        }
+    };
+
+    let squared = error.norm_squared();
+    if squared > NO_GRADIENT * NO_GRADIENT {
+        return error * (1.0 / squared.sqrt());
+    }
+    if up.dot(&world_up) > 0.0 {
+        return Vector3::zeros();
+    }
+    let axis = if world_up.x.abs() < 0.5 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    axis.cross(&world_up).normalize()
+}

@@ -1,0 +1,47 @@
+//! Orientation from inertial and magnetic sensors.
+//!
+//! Conventions of every file below:
+//!
+//! * The world is ENU: x east, y north (magnetic north where a magnetometer gives it), z up.
+//! * An orientation is `world_from_body`: it takes coordinates in the sensor's frame to the world.
+//! * An accelerometer measures specific force: at rest it reads one g upwards.
+//!
+//! ```
+//! use bb_estimators::attitude::{AttitudeFilter, ImuSample, Madgwick, MadgwickParams};
+//! use nalgebra::Vector3;
+//!
+//! let mut filter = Madgwick::new(MadgwickParams::default())?;
+//! filter.update(&ImuSample {
+//!     time_ns: 0,
+//!     angular_velocity: Vector3::zeros(),
+//!     specific_force: Vector3::new(0.0, 0.0, 9.81),
+//!     magnetic_field: Some(Vector3::new(0.0, 20e-6, -45e-6)),
+//! })?;
+//! let orientation = filter.world_from_body().expect("the first sample starts the filter");
+//! assert!(orientation.angle() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod average;
+pub mod complementary;
+mod error;
+mod filter;
+pub mod initial;
+pub mod madgwick;
+mod params;
+mod rotation;
+mod sample;
+mod state;
+
+#[cfg(test)]
+mod laws;
+
+pub use complementary::{Complementary, ComplementaryParams};
+pub use error::{ErrorStatistics, OrientationError};
+pub use filter::AttitudeFilter;
+pub use madgwick::{Madgwick, MadgwickParams};
+pub use params::ParamsError;
+pub use sample::{
+    ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError,
+};
+pub use state::MAX_GAP_S;

@@ -1,0 +1,130 @@
+//! Rotations of a unit quaternion, written out so that they cost little and keep the norm.
+//!
+//! The norm is kept to rounding by each, and [`renormalised`] takes the rounding away once a sample, without
+//! a root or a division.
+
+use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
+
+/// Below this squared angle, rad², sine and cosine of the half angle are series.
+const SERIES_SQUARED_ANGLE: f64 = 0.01;
+
+/// `world_from_body ⊗ exp(½ rotation)`: turns the body by a rotation vector given in the body frame, rad.
+pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let squared_angle = rotation.norm_squared();
+    let (cos, scale) = if squared_angle < SERIES_SQUARED_ANGLE {
+        // With h = (θ/2)² below 0.0025 the first terms left out are below 1e-15.
+        let h = 0.25 * squared_angle;
+        (
+            1.0 - h * (1.0 / 2.0 - h * (1.0 / 24.0 - h * (1.0 / 720.0))),
+            0.5 - h * (1.0 / 12.0 - h * (1.0 / 240.0 - h * (1.0 / 10080.0))),
+        )
+    } else {
+        let angle = squared_angle.sqrt();
+        let (sin, cos) = (0.5 * angle).sin_cos();
+        (cos, sin / angle)
+    };
+    let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
+    let q = world_from_body;
+    unit(
+        cos * q.w - q.i * x - q.j * y - q.k * z,
+        cos * q.i + q.w * x + q.j * z - q.k * y,
+        cos * q.j + q.w * y + q.k * x - q.i * z,
+        cos * q.k + q.w * z + q.i * y - q.j * x,
+    )
+}
+
+/// Turns `world_from_body` about the world's vertical by `angle`, rad, counter-clockwise seen from above.
+pub(super) fn turn_heading(world_from_body: &UnitQuaternion<f64>, angle: f64) -> UnitQuaternion<f64> {
+    let (s, c) = (0.5 * angle).sin_cos();
+    let q = world_from_body;
+    unit(
+        c * q.w - s * q.k,
+        c * q.i - s * q.j,
+        c * q.j + s * q.i,
+        c * q.k + s * q.w,
+    )
+}
+
+/// Turns `world_from_body` by the shortest rotation, about a horizontal axis, that takes the world vector `up`
+/// to the vertical. `up` may have any length but 0. If it points straight down, the axis is east.
+pub(super) fn turn_upright(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f64>) -> UnitQuaternion<f64> {
+    // Along (n + z, y, -x, 0) with n the norm of `up`. Next to straight down n + z cancels, and
+    // (x² + y²) / (n - z) is the same number without that.
+    let horizontal = up.x * up.x + up.y * up.y;
+    let norm = (horizontal + up.z * up.z).sqrt();
+    let w = if up.z > 0.0 {
+        norm + up.z
+    } else {
+        horizontal / (norm - up.z)
+    };
+    let squared = w * w + horizontal;
+    let (w, x, y) = if squared > 0.0 {
+        let scale = 1.0 / squared.sqrt();
+        (w * scale, up.y * scale, -up.x * scale)
+    } else {
+        (0.0, 1.0, 0.0)
+    };
+    let q = world_from_body;
+    unit(
+        w * q.w - x * q.i - y * q.j,
+        w * q.i + x * q.w + y * q.k,
+        w * q.j + y * q.w - x * q.k,
+        w * q.k + x * q.j - y * q.i,
+    )
+}
+
+/// `orientation` with its norm, which is 1 but for rounding, brought back to 1.
+pub(super) fn renormalised(orientation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let q = orientation;
+    // One step of Newton's method for 1/√n at n = 1.
+    let scale = 1.5 - 0.5 * (q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k);
+    unit(q.w * scale, q.i * scale, q.j * scale, q.k * scale)
+}
+
+fn unit(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
+    Unit::new_unchecked(Quaternion::new(w, x, y, z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn agrees_with_the_exponential_at_every_angle() {
+        let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
+        let axis = Vector3::new(0.48, -0.6, 0.64);
+        for angle in [
+            0.0, 1e-300, 1e-9, 1e-3, 0.05, 0.0999, 0.1001, 1.0, 3.1, 6.0, 500.0,
+        ] {
+            let rotation = axis * angle;
+            let exact = start * UnitQuaternion::from_scaled_axis(rotation);
+            let turned = turn(&start, &rotation);
+            assert!(turned.angle_to(&exact) < 1e-12 * (1.0 + angle), "angle {angle}");
+            assert!((turned.norm() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn world_rotations_are_products_from_the_left() {
+        let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
+        let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.7) * start;
+        assert!(turn_heading(&start, 0.7).angle_to(&heading) < 1e-15);
+        for up in [
+            Vector3::new(3.0, -4.0, 1.0),
+            Vector3::new(1e-9, 0.0, -2.0),
+            Vector3::new(-0.2, 0.1, -5.0),
+        ] {
+            let upright = turn_upright(&start, &up) * start.inverse();
+            assert!((upright * up - Vector3::z() * up.norm()).norm() < 1e-14, "{up}");
+            assert!(upright.k.abs() < 1e-15);
+        }
+        let upright = turn_upright(&start, &-Vector3::z()) * start.inverse();
+        assert!((upright * Vector3::z() + Vector3::z()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn rounding_is_taken_away() {
+        let q = Quaternion::new(0.5, 0.5, -0.5, 0.5) * (1.0 + 1e-9);
+        assert!((renormalised(&Unit::new_unchecked(q)).norm() - 1.0).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,139 @@
+//! One sample of an inertial sensor, and why a filter may refuse it.
+
+use core::error::Error;
+use core::fmt;
+
+use nalgebra::Vector3;
+
+/// The greatest component of the angular velocity that a filter takes, rad/s. Gyroscopes end below 100 rad/s.
+pub const MAX_ANGULAR_VELOCITY: f64 = 1e3;
+
+/// The greatest component of the specific force that a filter takes, m/s². Shock sensors end below 10⁵ m/s².
+pub const MAX_SPECIFIC_FORCE: f64 = 1e6;
+
+/// The greatest component of the magnetic field that a filter takes, in whatever unit it comes.
+pub const MAX_MAGNETIC_FIELD: f64 = 1e15;
+
+/// One sample of an inertial sensor, with the magnetic field when there is a new one.
+///
+/// All vectors are in the body frame, which is the sensor's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuSample {
+    /// When it was measured, nanoseconds since any fixed moment.
+    pub time_ns: i64,
+    /// Angular velocity of the body relative to the world, rad/s.
+    pub angular_velocity: Vector3<f64>,
+    /// Specific force, m/s²: at rest one g upwards.
+    pub specific_force: Vector3<f64>,
+    /// Magnetic field, tesla. Only its direction is used, so any other unit does as well.
+    pub magnetic_field: Option<Vector3<f64>>,
+}
+
+/// A quantity that a filter is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// [`ImuSample::angular_velocity`].
+    AngularVelocity,
+    /// [`ImuSample::specific_force`].
+    SpecificForce,
+    /// [`ImuSample::magnetic_field`].
+    MagneticField,
+    /// An orientation to start from.
+    Orientation,
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AngularVelocity => "angular velocity",
+            Self::SpecificForce => "specific force",
+            Self::MagneticField => "magnetic field",
+            Self::Orientation => "orientation",
+        })
+    }
+}
+
+/// Why a filter refused a sample. The filter is as it was before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SampleError {
+    /// A component is NaN or infinite.
+    NonFinite {
+        /// Which quantity.
+        quantity: Quantity,
+    },
+    /// A component is larger than any sensor's.
+    OutOfRange {
+        /// Which quantity.
+        quantity: Quantity,
+        /// The greatest magnitude of a component, in the quantity's unit.
+        value: f64,
+        /// The greatest magnitude that is accepted.
+        limit: f64,
+    },
+    /// Time stands still or runs back.
+    TimeNotIncreasing {
+        /// The stamp of the last sample that was taken.
+        previous_ns: i64,
+        /// The stamp of the sample that was refused.
+        time_ns: i64,
+    },
+}
+
+impl fmt::Display for SampleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NonFinite { quantity } => write!(f, "{quantity} is not finite"),
+            Self::OutOfRange {
+                quantity,
+                value,
+                limit,
+            } => {
+                write!(f, "{quantity} reaches {value:e}, beyond the limit of {limit:e}")
+            }
+            Self::TimeNotIncreasing { previous_ns, time_ns } => {
+                write!(f, "time stamp {time_ns} ns does not follow {previous_ns} ns")
+            }
+        }
+    }
+}
+
+impl Error for SampleError {}
+
+impl ImuSample {
+    /// Whether every value is finite and one that a sensor can give.
+    #[inline]
+    pub(super) fn check(&self, magnetometer: bool) -> Result<(), SampleError> {
+        check(
+            Quantity::AngularVelocity,
+            &self.angular_velocity,
+            MAX_ANGULAR_VELOCITY,
+        )?;
+        check(Quantity::SpecificForce, &self.specific_force, MAX_SPECIFIC_FORCE)?;
+        match &self.magnetic_field {
+            Some(field) if magnetometer => check(Quantity::MagneticField, field, MAX_MAGNETIC_FIELD),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[inline]
+fn check(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> Result<(), SampleError> {
+    let within = |component: f64| component.abs() <= limit;
+    if within(value.x) && within(value.y) && within(value.z) {
+        return Ok(());
+    }
+    Err(refusal(quantity, value, limit))
+}
+
+#[cold]
+fn refusal(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> SampleError {
+    if value.iter().all(|component| component.is_finite()) {
+        SampleError::OutOfRange {
+            quantity,
+            value: value.amax(),
+            limit,
+        }
+    } else {
+        SampleError::NonFinite { quantity }
+    }
+}

@@ -1,0 +1,104 @@
+//! `#[derive(Inputs)]`: the cache behind a struct of several inputs, and how the struct is made of it.
+
+use super::fields;
+use crate::diagnostics::Diagnostics;
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+use syn::{DeriveInput, GenericParam, Ident, Type};
+
+struct Field<'a> {
+    name: &'a Ident,
+    slot: Ident,
+    payload: &'a Type,
+    optional: bool,
+}
+
+pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
+    let Some(named) = fields::named(item, "Inputs", diagnostics) else { return TokenStream::new() };
+    let one_lifetime = item.generics.params.len() == 1
+        && matches!(item.generics.params.first(), Some(GenericParam::Lifetime(_)));
+    if !one_lifetime {
+        let message = "a struct of inputs has one lifetime and no other parameter; write `<'a>` behind its name";
+        diagnostics.error(&item.ident, message.into());
+        return TokenStream::new();
+    }
+    let mut inputs = Vec::new();
+    for (index, field) in named.iter().enumerate() {
+        let inner = fields::wrapped(&field.ty, "Option");
+        let (Some(name), Some(payload)) = (&field.ident, fields::wrapped(inner.unwrap_or(&field.ty), "Input")) else {
+            let message = "expected `Input<'a, Payload>` or `Option<Input<'a, Payload>>`";
+            diagnostics.error(&field.ty, message.into());
+            continue;
+        };
+        inputs.push(Field { name, slot: format_ident!("f{index}"), payload, optional: inner.is_some() });
+    }
+    if diagnostics.any() {
+        return TokenStream::new();
+    }
+    let name = &item.ident;
+    let slots = inputs.iter().map(|Field { slot, payload, .. }| quote!(#slot: ::bb_core::__private::Slot<#payload>,));
+    let schema = inputs.iter().map(|Field { name, optional, .. }| {
+        let name = name.to_string();
+        quote!(::bb_core::__private::InputField { name: #name, optional: #optional },)
+    });
+    let fields = (0..inputs.len()).map(|index| input_at(name, &inputs, index));
+    quote! {
+        const _: () = {
+            #[derive(Default)]
+            pub struct Cache { #(#slots)* }
+
+            #[automatically_derived]
+            impl ::bb_core::Inputs for #name<'static> {
+                type View<'a> = #name<'a>;
+                type Cache = Cache;
+                const FIELDS: &'static [::bb_core::__private::InputField] = &[#(#schema)*];
+            }
+            #(#fields)*
+        };
+    }
+}
+
+/// What happens when field number `driver` is the driver: nothing counts as seen before all others are known to be
+/// there.
+fn input_at(name: &Ident, inputs: &[Field<'_>], driver: usize) -> TokenStream {
+    let Some(Field { slot, payload, .. }) = inputs.get(driver) else { return TokenStream::new() };
+    let (mut misses, mut view) = (TokenStream::new(), TokenStream::new());
+    for (index, Field { name, slot, optional, .. }) in inputs.iter().enumerate() {
+        let mut value = if index == driver {
+            quote!(::bb_core::__private::Input::new(message))
+        } else {
+            misses.extend(quote! {
+                if let ::core::option::Option::Some(miss) = cache.#slot.miss(time) {
+                    return ::core::result::Result::Err(miss);
+                }
+            });
+            if *optional { quote!(cache.#slot.take(time)) } else { quote!(cache.#slot.require(time)?) }
+        };
+        if index == driver && *optional {
+            value = quote!(::core::option::Option::Some(#value));
+        }
+        view.extend(quote!(#name: #value,));
+    }
+    quote! {
+        #[automatically_derived]
+        impl ::bb_core::__private::InputAt<#driver> for #name<'static> {
+            type Payload = #payload;
+
+            fn slot(cache: &mut Cache) -> ::core::option::Option<&mut ::bb_core::__private::Slot<#payload>> {
+                ::core::option::Option::Some(&mut cache.#slot)
+            }
+
+            #[inline]
+            #[allow(unused_variables)]
+            fn snapshot<'a>(
+                cache: &'a mut Cache,
+                message: &'a ::bb_core::__private::Stamped<#payload>,
+            ) -> ::core::result::Result<#name<'a>, ::bb_core::__private::SyncMiss> {
+                let cache: &'a Cache = cache;
+                let time = message.monotonic_time;
+                #misses
+                ::core::result::Result::Ok(#name { #view })
+            }
+        }
+    }
+}

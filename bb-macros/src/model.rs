@@ -1,0 +1,174 @@
+//! What a robot is once its names are resolved: plain data in lists, with numbers for references and spans kept.
+
+mod frames;
+mod rigid;
+mod resolve;
+
+pub(crate) use frames::Route;
+pub(crate) use resolve::resolve;
+pub(crate) use rigid::Rigid;
+
+use crate::parse::{self, Axis, Component, JointKind, Limit, Origin, Output, Path, Quantity, Setting};
+use proc_macro2::Ident;
+use syn::{Attribute, Visibility};
+
+pub(crate) type LinkId = usize;
+pub(crate) type JointId = usize;
+pub(crate) type SensorId = usize;
+pub(crate) type EstimatorId = usize;
+pub(crate) type PublisherId = usize;
+
+/// A robot. References between its parts are numbers in these lists.
+#[derive(Clone, Debug)]
+pub(crate) struct Robot {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) visibility: Visibility,
+    pub(crate) name: Option<Ident>,
+    /// The roots, then in the order of declaration; a verified robot has one root, number 0.
+    pub(crate) links: Vec<Link>,
+    pub(crate) joints: Vec<Joint>,
+    pub(crate) sensors: Vec<Sensor>,
+    pub(crate) estimators: Vec<Estimator>,
+    /// Whatever can be subscribed to, sensors first.
+    pub(crate) publishers: Vec<Publisher>,
+    /// Whether everything could be read; if not, what is missing may have been declared.
+    pub(crate) complete: bool,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Link {
+    pub(crate) name: Ident,
+    /// The joint that carries it; none for a root.
+    pub(crate) joint: Option<JointId>,
+    /// Links and joints from the root to this one.
+    pub(crate) path: Vec<Ident>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    pub(crate) name: Ident,
+    pub(crate) kind: JointKind,
+    pub(crate) kind_word: Ident,
+    pub(crate) parent: LinkId,
+    pub(crate) children: Vec<LinkId>,
+    pub(crate) origins: Vec<Origin>,
+    pub(crate) axes: Vec<Axis>,
+    pub(crate) limits: Vec<Limit>,
+    /// Links and joints from the root to this one.
+    pub(crate) path: Vec<Ident>,
+}
+
+/// Where a sensor is mounted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mount {
+    /// Of the robot as a whole: in no frame.
+    Robot,
+    Link(LinkId),
+    /// At a joint: fixed to the parent link, at the joint's origin.
+    Joint(JointId),
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Sensor {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    pub(crate) mount: Mount,
+    pub(crate) component: Component,
+    pub(crate) rates: Vec<Setting>,
+    pub(crate) publisher: PublisherId,
+}
+
+/// Where an estimator stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Home {
+    Sensor(SensorId),
+    Link(LinkId),
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Estimator {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    pub(crate) home: Home,
+    pub(crate) component: Component,
+    pub(crate) inputs: Vec<Input>,
+    pub(crate) outputs: Vec<Output>,
+    pub(crate) sync_tolerances: Vec<Setting>,
+    /// Its own path.
+    pub(crate) path: Vec<String>,
+    /// One per output; its own path if none is declared.
+    pub(crate) publishers: Vec<PublisherId>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Input {
+    pub(crate) word: Ident,
+    pub(crate) name: Ident,
+    pub(crate) path: Path,
+    pub(crate) driver: Option<Ident>,
+    pub(crate) optional: bool,
+    pub(crate) within: Option<Quantity>,
+    /// None if no publisher has that path.
+    pub(crate) source: Option<PublisherId>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Publisher {
+    /// Its path, name by name.
+    pub(crate) path: Vec<String>,
+    pub(crate) from: From,
+}
+
+/// Who publishes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum From {
+    Sensor(SensorId),
+    /// An estimator; with the number of the declared output, if any is declared.
+    Estimator(EstimatorId, Option<usize>),
+}
+
+impl Robot {
+    /// The frame in which a publisher's messages are.
+    pub(crate) fn mount_of(&self, publisher: PublisherId) -> Mount {
+        match self.publishers.get(publisher).map(|publisher| publisher.from) {
+            Some(From::Sensor(sensor)) => self.mount_of_sensor(sensor),
+            Some(From::Estimator(estimator, _)) => self.mount_of_estimator(estimator),
+            None => Mount::Robot,
+        }
+    }
+
+    pub(crate) fn mount_of_sensor(&self, sensor: SensorId) -> Mount {
+        self.sensors.get(sensor).map_or(Mount::Robot, |sensor| sensor.mount)
+    }
+
+    pub(crate) fn mount_of_estimator(&self, estimator: EstimatorId) -> Mount {
+        match self.estimators.get(estimator).map(|estimator| estimator.home) {
+            Some(Home::Sensor(sensor)) => self.mount_of_sensor(sensor),
+            Some(Home::Link(link)) => Mount::Link(link),
+            None => Mount::Robot,
+        }
+    }
+
+    /// The name of the frame of a mount.
+    pub(crate) fn frame_name(&self, mount: Mount) -> String {
+        match mount {
+            Mount::Robot => String::new(),
+            Mount::Link(link) => self.links.get(link).map_or(String::new(), |link| link.name.to_string()),
+            Mount::Joint(joint) => self.joints.get(joint).map_or(String::new(), |joint| joint.name.to_string()),
+        }
+    }
+}
+
+impl Estimator {
+    /// Whether it is nested in a sensor.
+    pub(crate) fn is_nested(&self) -> bool {
+        matches!(self.home, Home::Sensor(_))
+    }
+}
+
+impl std::convert::From<parse::Input> for Input {
+    fn from(input: parse::Input) -> Self {
+        let parse::Input { word, name, path, driver, optional, within } = input;
+        Self { word, name, path, driver, optional, within, source: None }
+    }
+}

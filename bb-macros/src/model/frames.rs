@@ -1,0 +1,79 @@
+//! How one frame is reached from another: the joints between, and the transform if all of them are fixed.
+
+use super::{JointId, LinkId, Mount, Rigid, Robot};
+use crate::parse::JointKind;
+
+/// The way from one frame to another through the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Route {
+    /// `target_from_source`; moving joints count as they stand at zero.
+    pub(crate) transform: Rigid,
+    /// The joints on the way that move.
+    pub(crate) moving: Vec<JointId>,
+}
+
+impl Robot {
+    /// The way from the frame of `source` to that of `target`. What has no frame needs no way.
+    pub(crate) fn route(&self, source: Mount, target: Mount) -> Route {
+        let (Some((source, link_from_source)), Some((target, link_from_target))) =
+            (self.link_of(source), self.link_of(target))
+        else {
+            return Route { transform: Rigid::IDENTITY, moving: Vec::new() };
+        };
+        let (mut up, mut down) = (self.ancestry(source), self.ancestry(target));
+        // What both have in common from the root on is not on the way.
+        while up.last().is_some() && up.last() == down.last() {
+            up.pop();
+            down.pop();
+        }
+        let common_from_source = self.product(&up).then(link_from_source);
+        let common_from_target = self.product(&down).then(link_from_target);
+        let moving = up.iter().chain(&down).copied().filter(|joint| self.moves(*joint)).collect();
+        Route { transform: common_from_target.inverse().then(common_from_source), moving }
+    }
+
+    /// The way from a frame to the root's.
+    pub(crate) fn route_to_root(&self, source: Mount) -> Option<Route> {
+        (source != Mount::Robot && !self.links.is_empty()).then(|| self.route(source, Mount::Link(0)))
+    }
+
+    /// `parent_from_joint` of the joint's origin.
+    pub(crate) fn parent_from_joint(&self, joint: JointId) -> Rigid {
+        let origin = self.joints.get(joint).and_then(|joint| joint.origins.first());
+        let values = |triple: Option<&[crate::parse::Quantity; 3]>| {
+            triple.map_or([0.0; 3], |triple| triple.each_ref().map(|quantity| quantity.value))
+        };
+        origin.map_or(Rigid::IDENTITY, |origin| {
+            Rigid::from_xyz_rpy(values(origin.xyz.as_ref()), values(origin.rpy.as_ref()))
+        })
+    }
+
+    fn moves(&self, joint: JointId) -> bool {
+        self.joints.get(joint).is_some_and(|joint| joint.kind != JointKind::Fixed)
+    }
+
+    /// The link that a mount is fixed to, and `link_from_mount`.
+    fn link_of(&self, mount: Mount) -> Option<(LinkId, Rigid)> {
+        match mount {
+            Mount::Robot => None,
+            Mount::Link(link) => Some((link, Rigid::IDENTITY)),
+            Mount::Joint(joint) => Some((self.joints.get(joint)?.parent, self.parent_from_joint(joint))),
+        }
+    }
+
+    /// The joints from a link up to the root.
+    fn ancestry(&self, link: LinkId) -> Vec<JointId> {
+        let mut joints = Vec::new();
+        let mut link = self.links.get(link);
+        while let Some(joint) = link.and_then(|link| link.joint) {
+            joints.push(joint);
+            link = self.joints.get(joint).and_then(|joint| self.links.get(joint.parent));
+        }
+        joints
+    }
+
+    /// `top_from_bottom` over joints from the bottom up.
+    fn product(&self, joints: &[JointId]) -> Rigid {
+        joints.iter().fold(Rigid::IDENTITY, |product, joint| self.parent_from_joint(*joint).then(product))
+    }
+}

@@ -1,0 +1,148 @@
+//! The tree to lists: every part gets its number and its path, every input its publisher.
+
+use super::{Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor, SensorId};
+use crate::parse;
+use proc_macro2::Ident;
+use std::collections::HashMap;
+use syn::Visibility;
+
+/// Resolves what can be resolved; what cannot be is left out of the references for the rules to report.
+pub(crate) fn resolve(tree: parse::Robot) -> Robot {
+    let parse::Robot { attributes, visibility, name, sensors, links, complete } = tree;
+    let mut robot = Robot {
+        attributes,
+        visibility: visibility.unwrap_or(Visibility::Inherited),
+        name,
+        links: Vec::new(),
+        joints: Vec::new(),
+        sensors: Vec::new(),
+        estimators: Vec::new(),
+        publishers: Vec::new(),
+        complete,
+    };
+    for sensor in sensors {
+        robot.add_sensor(sensor, Mount::Robot, &[]);
+    }
+    for link in links {
+        robot.add_link(link, None, &[]);
+    }
+    robot.resolve_inputs();
+    robot
+}
+
+impl Robot {
+    fn add_link(&mut self, link: parse::Link, joint: Option<JointId>, above: &[Ident]) -> LinkId {
+        let id = self.links.len();
+        let path = below(above, &link.name);
+        self.links.push(Link { name: link.name, joint, path: path.clone() });
+        for sensor in link.sensors {
+            self.add_sensor(sensor, Mount::Link(id), &path);
+        }
+        for estimator in link.estimators {
+            let own = texts("estimator", &below(&path, &estimator.name));
+            self.add_estimator(estimator, Home::Link(id), own);
+        }
+        for joint in link.joints {
+            self.add_joint(joint, id, &path);
+        }
+        id
+    }
+
+    fn add_joint(&mut self, joint: parse::Joint, parent: LinkId, above: &[Ident]) {
+        let id = self.joints.len();
+        let path = below(above, &joint.name);
+        let parse::Joint { name, kind, kind_word, origins, axes, limits, sensors, links } = joint;
+        let children = Vec::new();
+        self.joints.push(Joint {
+            name,
+            kind,
+            kind_word,
+            parent,
+            children,
+            origins,
+            axes,
+            limits,
+            path: path.clone(),
+        });
+        for sensor in sensors {
+            self.add_sensor(sensor, Mount::Joint(id), &path);
+        }
+        let children = links.into_iter().map(|link| self.add_link(link, Some(id), &path)).collect();
+        if let Some(joint) = self.joints.get_mut(id) {
+            joint.children = children;
+        }
+    }
+
+    fn add_sensor(&mut self, sensor: parse::Sensor, mount: Mount, above: &[Ident]) {
+        let id: SensorId = self.sensors.len();
+        let path = texts("sensor", &below(above, &sensor.name));
+        let parse::Sensor { attributes, name, component, rates, estimators } = sensor;
+        let publisher = self.add_publisher(path.clone(), From::Sensor(id));
+        self.sensors.push(Sensor { attributes, name, mount, component, rates, publisher });
+        for estimator in estimators {
+            let mut own = path.clone();
+            own.push(estimator.name.to_string());
+            self.add_estimator(estimator, Home::Sensor(id), own);
+        }
+    }
+
+    fn add_estimator(&mut self, estimator: parse::Estimator, home: Home, path: Vec<String>) {
+        let id = self.estimators.len();
+        let parse::Estimator { attributes, name, component, inputs, outputs, sync_tolerances } = estimator;
+        let publishers = if outputs.is_empty() {
+            vec![self.add_publisher(path.clone(), From::Estimator(id, None))]
+        } else {
+            let outputs = outputs.iter().enumerate();
+            outputs
+                .map(|(number, output)| {
+                    let path = output_path(&path, output);
+                    self.add_publisher(path, From::Estimator(id, Some(number)))
+                })
+                .collect()
+        };
+        let inputs = inputs.into_iter().map(Input::from).collect();
+        self.estimators.push(Estimator {
+            attributes,
+            name,
+            home,
+            component,
+            inputs,
+            outputs,
+            sync_tolerances,
+            path,
+            publishers,
+        });
+    }
+
+    fn add_publisher(&mut self, path: Vec<String>, from: From) -> usize {
+        self.publishers.push(Publisher { path, from });
+        self.publishers.len() - 1
+    }
+
+    fn resolve_inputs(&mut self) {
+        let mut by_path = HashMap::new();
+        for (id, publisher) in self.publishers.iter().enumerate() {
+            by_path.entry(publisher.path.join("::")).or_insert(id);
+        }
+        for input in self.estimators.iter_mut().flat_map(|estimator| &mut estimator.inputs) {
+            input.source = by_path.get(&input.path.text()).copied();
+        }
+    }
+}
+
+/// `[a, b]` overrides, `out` is the estimator's own path, any other name stands below it.
+fn output_path(estimator: &[String], output: &parse::Output) -> Vec<String> {
+    match &output.path {
+        Some(path) => path.iter().map(ToString::to_string).collect(),
+        None if output.name == "out" => estimator.to_vec(),
+        None => estimator.iter().cloned().chain([output.name.to_string()]).collect(),
+    }
+}
+
+fn below(above: &[Ident], name: &Ident) -> Vec<Ident> {
+    above.iter().chain([name]).cloned().collect()
+}
+
+fn texts(root: &str, path: &[Ident]) -> Vec<String> {
+    std::iter::once(root.to_owned()).chain(path.iter().map(ToString::to_string)).collect()
+}

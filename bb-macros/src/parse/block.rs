@@ -1,0 +1,131 @@
+//! The contents of braces, item by item, and how to go on behind one that cannot be read.
+
+use crate::diagnostics::Diagnostics;
+use crate::names::{did_you_mean, one_of};
+use proc_macro2::{Delimiter, Ident, TokenTree};
+use syn::ext::IdentExt;
+use syn::parse::{ParseBuffer, ParseStream};
+use syn::{Attribute, Token};
+
+/// All words of the language that start an item: where reading can start anew.
+const WORDS: &[&str] = &[
+    "sensors",
+    "link",
+    "joint",
+    "sensor",
+    "estimator",
+    "input",
+    "output",
+    "rate",
+    "sync_tolerance",
+    "origin",
+    "axis",
+    "limit",
+];
+
+/// Words that stand in the language but are not built yet.
+const PLANNED: &[&str] = &[
+    "parameters",
+    "states",
+    "commands",
+    "controllers",
+    "controller",
+    "actuator",
+    "bridge",
+    "topology",
+    "inertial",
+    "visual",
+    "collision",
+    "dynamics",
+    "transmission",
+    "mimic",
+    "latency_budget",
+    "lost_after",
+    "recover_after",
+    "on_degraded",
+    "on_lost",
+    "on_recovered",
+    "runs_on",
+];
+
+/// An item's attributes and its first word.
+pub(super) struct Head {
+    pub(super) attributes: Vec<Attribute>,
+    pub(super) word: Ident,
+}
+
+/// Reads items until the end. `item` gets each head and reads the rest; an item that it cannot read is reported and
+/// skipped.
+pub(super) fn items(
+    input: ParseStream<'_>,
+    diagnostics: &mut Diagnostics,
+    mut item: impl FnMut(Head, ParseStream<'_>, &mut Diagnostics) -> syn::Result<()>,
+) {
+    while !input.is_empty() {
+        if input.peek(Token![;]) {
+            // One too many is no harm.
+            let _: syn::Result<Token![;]> = input.parse();
+            continue;
+        }
+        let result = head(input).and_then(|head| item(head, input, diagnostics));
+        if let Err(error) = result {
+            diagnostics.syntax(&error);
+            skip(input);
+        }
+    }
+}
+
+/// Opens `{ … }`.
+pub(super) fn braced<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>> {
+    let content;
+    syn::braced!(content in input);
+    Ok(content)
+}
+
+/// Reads `;`. If it is missing that is reported; if the next item follows at once, reading goes on there.
+pub(super) fn semicolon(input: ParseStream<'_>, behind: &str, diagnostics: &mut Diagnostics) {
+    if input.peek(Token![;]) {
+        let _: syn::Result<Token![;]> = input.parse();
+        return;
+    }
+    let error = input.error(format!("expected `;` behind {behind}"));
+    diagnostics.syntax(&error);
+    let starts_an_item = input.fork().call(Ident::parse_any).is_ok_and(|word| WORDS.contains(&&*word.to_string()));
+    if !starts_an_item {
+        skip(input);
+    }
+}
+
+/// The error for a word that does not belong here.
+pub(super) fn unexpected(word: &Ident, place: &str, allowed: &[&str]) -> syn::Error {
+    let name = word.to_string();
+    let message = if PLANNED.contains(&&*name) {
+        format!("`{name}` is not supported yet; {place} holds {}", one_of(allowed))
+    } else if WORDS.contains(&&*name) {
+        format!("`{name}` does not belong in {place}, which holds {}", one_of(allowed))
+    } else {
+        let hint = did_you_mean(&name, allowed.iter().copied());
+        format!("unknown word `{name}`; {place} holds {}{hint}", one_of(allowed))
+    };
+    syn::Error::new(word.span(), message)
+}
+
+fn head(input: ParseStream<'_>) -> syn::Result<Head> {
+    let attributes = input.call(Attribute::parse_outer)?;
+    Ok(Head { attributes, word: input.call(Ident::parse_any)? })
+}
+
+/// Skips to behind the next `;` or `{ … }` of this level.
+fn skip(input: ParseStream<'_>) {
+    while !input.is_empty() {
+        let Ok(token) = input.parse::<TokenTree>() else { return };
+        match token {
+            TokenTree::Punct(punct) if punct.as_char() == ';' => return,
+            TokenTree::Group(group) if group.delimiter() == Delimiter::Brace => {
+                // A `;` behind braces, as in `origin: { … };`, belongs to the same item; `items` passes it over.
+                return;
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! `estimator pose: Eskf(gravity = 9.81 m/s^2) { input …; output …; sync_tolerance: 20 ms; }`
+//!
+//! Both forms are read alike; that a nested one takes no `input` is a rule, so that the error can say why.
+
+use super::block::{Head, items, unexpected};
+use super::{Component, Declared, Input, Output, Setting};
+use crate::diagnostics::Diagnostics;
+use proc_macro2::Ident;
+use syn::Attribute;
+use syn::parse::ParseStream;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Estimator {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    pub(crate) component: Component,
+    pub(crate) inputs: Vec<Input>,
+    pub(crate) outputs: Vec<Output>,
+    pub(crate) sync_tolerances: Vec<Setting>,
+}
+
+impl Estimator {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        let Declared { attributes, name, component, body } = Declared::parse(head, input, diagnostics)?;
+        let mut estimator = Self {
+            attributes,
+            name,
+            component,
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            sync_tolerances: Vec::new(),
+        };
+        if let Some(body) = body {
+            items(&body, diagnostics, |head, input, diagnostics| estimator.item(head, input, diagnostics));
+        }
+        Ok(estimator)
+    }
+
+    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+        match &*head.word.to_string() {
+            "input" => self.inputs.push(Input::parse(head, input, diagnostics)?),
+            "output" => self.outputs.push(Output::parse(head, input, diagnostics)?),
+            "sync_tolerance" => self.sync_tolerances.push(Setting::parse(head, input, diagnostics)?),
+            _ => return Err(unexpected(&head.word, "an estimator", &["input", "output", "sync_tolerance"])),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,86 @@
+//! `input gnss: sensor::base_link::gnss, optional, within: 250 ms;`
+
+use super::Quantity;
+use super::block::{Head, semicolon};
+use super::component::name;
+use crate::diagnostics::{Diagnostics, Place};
+use crate::names::did_you_mean;
+use proc_macro2::Ident;
+use syn::Token;
+use syn::ext::IdentExt;
+use syn::parse::ParseStream;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Input {
+    /// The word `input`.
+    pub(crate) word: Ident,
+    pub(crate) name: Ident,
+    pub(crate) path: Path,
+    /// Each word `driver`; more than one is harmless.
+    pub(crate) driver: Option<Ident>,
+    pub(crate) optional: bool,
+    pub(crate) within: Option<Quantity>,
+}
+
+/// `sensor::base_link::imu`
+#[derive(Clone, Debug)]
+pub(crate) struct Path(pub(crate) Vec<Ident>);
+
+impl Path {
+    /// The names, joined as in messages: `sensor::base_link::imu`.
+    pub(crate) fn text(&self) -> String {
+        self.0.iter().map(ToString::to_string).collect::<Vec<_>>().join("::")
+    }
+
+    pub(crate) fn place(&self) -> Place {
+        match (self.0.first(), self.0.last()) {
+            (Some(first), Some(last)) => Place { start: first.span(), end: last.span() },
+            _ => Place::from(proc_macro2::Span::call_site()),
+        }
+    }
+
+    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        let mut segments = vec![input.call(Ident::parse_any)?];
+        while input.peek(Token![::]) {
+            input.parse::<Token![::]>()?;
+            segments.push(input.call(Ident::parse_any)?);
+        }
+        Ok(Self(segments))
+    }
+}
+
+impl Input {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        let name = name(input, &head.word)?;
+        input.parse::<Token![:]>()?;
+        let place = input.span();
+        let path = Path::parse(input).map_err(|_| {
+            syn::Error::new(place, "expected the path of a publisher, as in `sensor::base_link::imu`")
+        })?;
+        let mut parsed = Self { word: head.word, name, path, driver: None, optional: false, within: None };
+        while input.peek(Token![,]) {
+            input.parse::<Token![,]>()?;
+            parsed.property(input)?;
+        }
+        semicolon(input, &format!("`{}`", parsed.name), diagnostics);
+        Ok(parsed)
+    }
+
+    fn property(&mut self, input: ParseStream<'_>) -> syn::Result<()> {
+        let word = input.call(Ident::parse_any)?;
+        match &*word.to_string() {
+            "driver" => self.driver = Some(word),
+            "optional" => self.optional = true,
+            "within" => {
+                input.parse::<Token![:]>()?;
+                self.within = Some(Quantity::parse(input)?);
+            }
+            other => {
+                let hint = did_you_mean(other, ["driver", "optional", "within"]);
+                let message = format!("expected `driver`, `optional` or `within: …`{hint}");
+                return Err(syn::Error::new(word.span(), message));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,96 @@
+//! `joint pan: revolute { origin: { … }; axis: z; limit: { … }; sensor … link head { … } }`
+
+mod geometry;
+
+pub(crate) use geometry::{Axis, Limit, Origin};
+
+use super::block::{Head, braced, items, semicolon, unexpected};
+use super::component::name;
+use super::{Link, Sensor};
+use crate::diagnostics::Diagnostics;
+use crate::names::{did_you_mean, one_of};
+use proc_macro2::Ident;
+use syn::Token;
+use syn::ext::IdentExt;
+use syn::parse::ParseStream;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    pub(crate) name: Ident,
+    pub(crate) kind: JointKind,
+    pub(crate) kind_word: Ident,
+    pub(crate) origins: Vec<Origin>,
+    pub(crate) axes: Vec<Axis>,
+    pub(crate) limits: Vec<Limit>,
+    pub(crate) sensors: Vec<Sensor>,
+    pub(crate) links: Vec<Link>,
+}
+
+/// URDF's types of joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum JointKind {
+    Fixed,
+    Revolute,
+    Continuous,
+    Prismatic,
+    Planar,
+    Floating,
+}
+
+impl JointKind {
+    const ALL: [(&'static str, Self); 6] = [
+        ("fixed", Self::Fixed),
+        ("revolute", Self::Revolute),
+        ("continuous", Self::Continuous),
+        ("prismatic", Self::Prismatic),
+        ("planar", Self::Planar),
+        ("floating", Self::Floating),
+    ];
+
+    fn parse(word: &Ident) -> syn::Result<Self> {
+        let name = word.to_string();
+        let found = Self::ALL.into_iter().find(|(known, _)| *known == name);
+        found.map(|(_, kind)| kind).ok_or_else(|| {
+            let known = Self::ALL.map(|(known, _)| known);
+            let hint = did_you_mean(&name, known);
+            syn::Error::new(word.span(), format!("unknown type of joint; expected {}{hint}", one_of(&known)))
+        })
+    }
+}
+
+impl Joint {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        let name = name(input, &head.word)?;
+        input.parse::<Token![:]>()?;
+        let kind_word = input.call(Ident::parse_any)?;
+        let mut joint = Self {
+            name,
+            kind: JointKind::parse(&kind_word)?,
+            kind_word,
+            origins: Vec::new(),
+            axes: Vec::new(),
+            limits: Vec::new(),
+            sensors: Vec::new(),
+            links: Vec::new(),
+        };
+        if input.peek(syn::token::Brace) {
+            let body = braced(input)?;
+            items(&body, diagnostics, |head, input, diagnostics| joint.item(head, input, diagnostics));
+        } else {
+            semicolon(input, &format!("`{}`", joint.name), diagnostics);
+        }
+        Ok(joint)
+    }
+
+    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+        match &*head.word.to_string() {
+            "origin" => self.origins.push(Origin::parse(head, input, diagnostics)?),
+            "axis" => self.axes.push(Axis::parse(head, input, diagnostics)?),
+            "limit" => self.limits.push(Limit::parse(head, input, diagnostics)?),
+            "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
+            "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
+            _ => return Err(unexpected(&head.word, "a joint", &["origin", "axis", "limit", "sensor", "link"])),
+        }
+        Ok(())
+    }
+}

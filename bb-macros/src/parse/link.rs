@@ -1,0 +1,40 @@
+//! `link base { sensor … estimator … joint … }`
+
+use super::block::{Head, braced, items, semicolon, unexpected};
+use super::component::name;
+use super::{Estimator, Joint, Sensor};
+use crate::diagnostics::Diagnostics;
+use proc_macro2::Ident;
+use syn::parse::ParseStream;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Link {
+    pub(crate) name: Ident,
+    pub(crate) sensors: Vec<Sensor>,
+    pub(crate) estimators: Vec<Estimator>,
+    pub(crate) joints: Vec<Joint>,
+}
+
+impl Link {
+    pub(super) fn parse(head: &Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        let name = name(input, &head.word)?;
+        let mut link = Self { name, sensors: Vec::new(), estimators: Vec::new(), joints: Vec::new() };
+        if input.peek(syn::token::Brace) {
+            let body = braced(input)?;
+            items(&body, diagnostics, |head, input, diagnostics| link.item(head, input, diagnostics));
+        } else {
+            semicolon(input, &format!("`{}`", link.name), diagnostics);
+        }
+        Ok(link)
+    }
+
+    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+        match &*head.word.to_string() {
+            "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
+            "estimator" => self.estimators.push(Estimator::parse(head, input, diagnostics)?),
+            "joint" => self.joints.push(Joint::parse(head, input, diagnostics)?),
+            _ => return Err(unexpected(&head.word, "a link", &["sensor", "estimator", "joint"])),
+        }
+        Ok(())
+    }
+}

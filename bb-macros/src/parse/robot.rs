@@ -1,0 +1,70 @@
+//! `robot Rover; sensors { … } link base { … }`
+
+use super::block::{Head, braced, items, semicolon, unexpected};
+use super::{Link, Sensor};
+use crate::diagnostics::Diagnostics;
+use proc_macro2::{Ident, Span};
+use syn::ext::IdentExt;
+use syn::parse::ParseStream;
+use syn::{Attribute, Visibility};
+
+/// The tree of a robot.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Robot {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) visibility: Option<Visibility>,
+    /// None if it could not be read.
+    pub(crate) name: Option<Ident>,
+    pub(crate) sensors: Vec<Sensor>,
+    pub(crate) links: Vec<Link>,
+    /// Whether everything could be read; if not, what is missing may have been declared.
+    pub(crate) complete: bool,
+}
+
+impl Robot {
+    pub(super) fn parse(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) {
+        if let Err(error) = self.header(input, diagnostics) {
+            diagnostics.syntax(&error);
+        }
+        items(input, diagnostics, |head, input, diagnostics| self.item(head, input, diagnostics));
+    }
+
+    /// `pub robot Rover;` If it is not there, nothing is consumed but what belongs to it.
+    fn header(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+        const EXPECTED: &str = "expected the robot's name first, as in `robot Rover;`";
+        if input.is_empty() {
+            return Err(syn::Error::new(Span::call_site(), EXPECTED));
+        }
+        let ahead = input.fork();
+        ahead.call(Attribute::parse_outer)?;
+        ahead.parse::<Visibility>()?;
+        let place = ahead.span();
+        if ahead.call(Ident::parse_any).ok().is_none_or(|word| word != "robot") {
+            return Err(syn::Error::new(place, EXPECTED));
+        }
+        self.attributes = input.call(Attribute::parse_outer)?;
+        self.visibility = Some(input.parse()?);
+        let word = input.call(Ident::parse_any)?;
+        self.name = Some(super::component::name(input, &word)?);
+        semicolon(input, "the robot's name", diagnostics);
+        Ok(())
+    }
+
+    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+        match &*head.word.to_string() {
+            "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
+            "sensors" => {
+                let body = braced(input)?;
+                items(&body, diagnostics, |head, input, diagnostics| {
+                    if head.word != "sensor" {
+                        return Err(unexpected(&head.word, "`sensors`", &["sensor"]));
+                    }
+                    self.sensors.push(Sensor::parse(head, input, diagnostics)?);
+                    Ok(())
+                });
+            }
+            _ => return Err(unexpected(&head.word, "a robot", &["link", "sensors"])),
+        }
+        Ok(())
+    }
+}

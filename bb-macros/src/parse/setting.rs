@@ -1,0 +1,25 @@
+//! A setting: a word, a colon and a quantity.
+
+use super::Quantity;
+use super::block::{Head, semicolon};
+use crate::diagnostics::Diagnostics;
+use proc_macro2::Ident;
+use syn::Token;
+use syn::parse::ParseStream;
+
+/// `rate: 200 Hz;`
+#[derive(Clone, Debug)]
+pub(crate) struct Setting {
+    pub(crate) word: Ident,
+    pub(crate) quantity: Quantity,
+}
+
+impl Setting {
+    /// Reads what stands behind the word.
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        input.parse::<Token![:]>()?;
+        let quantity = Quantity::parse(input)?;
+        semicolon(input, &format!("`{}`", head.word), diagnostics);
+        Ok(Self { word: head.word, quantity })
+    }
+}

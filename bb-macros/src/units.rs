@@ -1,0 +1,207 @@
+//! Units and their dimensions. Everything inside is SI; a unit is a factor to it.
+
+use proc_macro2::Ident;
+use syn::ext::IdentExt;
+use syn::parse::ParseStream;
+use syn::{LitInt, Token};
+
+/// Exponents of metre, kilogram, second, ampere, kelvin and radian.
+///
+/// An angle counts as a dimension, so that degrees cannot stand where a plain number or a length belongs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Dimension(pub(crate) [i8; 6]);
+
+impl Dimension {
+    pub(crate) const NONE: Self = Self([0; 6]);
+    pub(crate) const LENGTH: Self = Self([1, 0, 0, 0, 0, 0]);
+    pub(crate) const TIME: Self = Self([0, 0, 1, 0, 0, 0]);
+    pub(crate) const ANGLE: Self = Self([0, 0, 0, 0, 0, 1]);
+    pub(crate) const FREQUENCY: Self = Self([0, 0, -1, 0, 0, 0]);
+    pub(crate) const VELOCITY: Self = Self([1, 0, -1, 0, 0, 0]);
+    pub(crate) const ANGULAR_VELOCITY: Self = Self([0, 0, -1, 0, 0, 1]);
+    pub(crate) const FORCE: Self = Self([1, 1, -2, 0, 0, 0]);
+    pub(crate) const TORQUE: Self = Self([2, 1, -2, 0, 0, 0]);
+
+    /// With its article, for messages.
+    pub(crate) fn name(self) -> String {
+        let named = NAMED.iter().find(|(dimension, _)| *dimension == self.0);
+        named.map_or_else(|| format!("a quantity in {}", self.symbol()), |(_, name)| (*name).to_owned())
+    }
+
+    fn symbol(self) -> String {
+        let factors = self.0.iter().zip(["m", "kg", "s", "A", "K", "rad"]).filter(|(exponent, _)| **exponent != 0);
+        let factors = factors.map(|(exponent, base)| match exponent {
+            1 => base.to_owned(),
+            exponent => format!("{base}^{exponent}"),
+        });
+        factors.collect::<Vec<_>>().join("*")
+    }
+
+    fn times(self, other: Self, sign: i8) -> Self {
+        let mut product = self.0;
+        for (exponent, added) in product.iter_mut().zip(other.0) {
+            *exponent = exponent.saturating_add(added.saturating_mul(sign));
+        }
+        Self(product)
+    }
+}
+
+const NAMED: &[([i8; 6], &str)] = &[
+    ([0, 0, 0, 0, 0, 0], "a plain number"),
+    ([1, 0, 0, 0, 0, 0], "a length"),
+    ([2, 0, 0, 0, 0, 0], "an area"),
+    ([0, 1, 0, 0, 0, 0], "a mass"),
+    ([0, 0, 1, 0, 0, 0], "a time"),
+    ([0, 0, 0, 1, 0, 0], "a current"),
+    ([0, 0, 0, 0, 1, 0], "a temperature"),
+    ([0, 0, 0, 0, 0, 1], "an angle"),
+    ([0, 0, -1, 0, 0, 0], "a frequency"),
+    ([1, 0, -1, 0, 0, 0], "a velocity"),
+    ([1, 0, -2, 0, 0, 0], "an acceleration"),
+    ([0, 0, -1, 0, 0, 1], "an angular velocity"),
+    ([0, 0, -2, 0, 0, 1], "an angular acceleration"),
+    ([1, 1, -2, 0, 0, 0], "a force"),
+    ([2, 1, -2, 0, 0, 0], "a torque"),
+    ([2, 1, -3, 0, 0, 0], "a power"),
+    ([2, 1, 0, 0, 0, 0], "a moment of inertia"),
+    ([-1, 1, -2, 0, 0, 0], "a pressure"),
+    ([2, 1, -3, -1, 0, 0], "a voltage"),
+    ([0, 1, -2, -1, 0, 0], "a magnetic field"),
+];
+
+use std::f64::consts::PI;
+
+/// Symbol, dimension, factor to SI.
+const UNITS: &[(&str, [i8; 6], f64)] = &[
+    ("m", [1, 0, 0, 0, 0, 0], 1.0),
+    ("km", [1, 0, 0, 0, 0, 0], 1e3),
+    ("cm", [1, 0, 0, 0, 0, 0], 1e-2),
+    ("mm", [1, 0, 0, 0, 0, 0], 1e-3),
+    ("um", [1, 0, 0, 0, 0, 0], 1e-6),
+    ("µm", [1, 0, 0, 0, 0, 0], 1e-6),
+    ("kg", [0, 1, 0, 0, 0, 0], 1.0),
+    ("g", [0, 1, 0, 0, 0, 0], 1e-3),
+    ("s", [0, 0, 1, 0, 0, 0], 1.0),
+    ("ms", [0, 0, 1, 0, 0, 0], 1e-3),
+    ("us", [0, 0, 1, 0, 0, 0], 1e-6),
+    ("µs", [0, 0, 1, 0, 0, 0], 1e-6),
+    ("ns", [0, 0, 1, 0, 0, 0], 1e-9),
+    ("min", [0, 0, 1, 0, 0, 0], 60.0),
+    ("h", [0, 0, 1, 0, 0, 0], 3600.0),
+    ("A", [0, 0, 0, 1, 0, 0], 1.0),
+    ("mA", [0, 0, 0, 1, 0, 0], 1e-3),
+    ("K", [0, 0, 0, 0, 1, 0], 1.0),
+    ("rad", [0, 0, 0, 0, 0, 1], 1.0),
+    ("mrad", [0, 0, 0, 0, 0, 1], 1e-3),
+    ("deg", [0, 0, 0, 0, 0, 1], PI / 180.0),
+    ("rev", [0, 0, 0, 0, 0, 1], 2.0 * PI),
+    ("Hz", [0, 0, -1, 0, 0, 0], 1.0),
+    ("kHz", [0, 0, -1, 0, 0, 0], 1e3),
+    ("MHz", [0, 0, -1, 0, 0, 0], 1e6),
+    ("rpm", [0, 0, -1, 0, 0, 1], 2.0 * PI / 60.0),
+    ("N", [1, 1, -2, 0, 0, 0], 1.0),
+    ("kN", [1, 1, -2, 0, 0, 0], 1e3),
+    ("mN", [1, 1, -2, 0, 0, 0], 1e-3),
+    ("J", [2, 1, -2, 0, 0, 0], 1.0),
+    ("W", [2, 1, -3, 0, 0, 0], 1.0),
+    ("V", [2, 1, -3, -1, 0, 0], 1.0),
+    ("mV", [2, 1, -3, -1, 0, 0], 1e-3),
+    ("T", [0, 1, -2, -1, 0, 0], 1.0),
+    ("mT", [0, 1, -2, -1, 0, 0], 1e-3),
+    ("uT", [0, 1, -2, -1, 0, 0], 1e-6),
+    ("µT", [0, 1, -2, -1, 0, 0], 1e-6),
+    ("nT", [0, 1, -2, -1, 0, 0], 1e-9),
+    ("Pa", [-1, 1, -2, 0, 0, 0], 1.0),
+    ("hPa", [-1, 1, -2, 0, 0, 0], 1e2),
+    ("kPa", [-1, 1, -2, 0, 0, 0], 1e3),
+    ("bar", [-1, 1, -2, 0, 0, 0], 1e5),
+];
+
+/// A unit: a symbol, or a product of powers of symbols as in `kg*m/s^2`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Unit {
+    pub(crate) dimension: Dimension,
+    pub(crate) factor: f64,
+}
+
+impl Unit {
+    const ONE: Self = Self { dimension: Dimension::NONE, factor: 1.0 };
+
+    /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` belongs to the symbol behind it alone.
+    pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        let first = factor(input, input.call(Ident::parse_any)?)?;
+        Self::ONE.times(first, 1).rest(input)
+    }
+
+    /// The unit glued to a literal as its suffix, and what follows it: `60deg/s`.
+    pub(crate) fn with_suffix(suffix: &Ident, input: ParseStream<'_>) -> syn::Result<Self> {
+        Self::ONE.times(factor(input, suffix.clone())?, 1).rest(input)
+    }
+
+    fn rest(mut self, input: ParseStream<'_>) -> syn::Result<Self> {
+        loop {
+            let sign = if input.peek(Token![*]) {
+                input.parse::<Token![*]>()?;
+                1
+            } else if input.peek(Token![/]) {
+                input.parse::<Token![/]>()?;
+                -1
+            } else {
+                return Ok(self);
+            };
+            self = self.times(factor(input, input.call(Ident::parse_any)?)?, sign);
+        }
+    }
+
+    fn times(self, other: Self, sign: i8) -> Self {
+        let dimension = self.dimension.times(other.dimension, sign);
+        Self { dimension, factor: self.factor * other.factor.powi(sign.into()) }
+    }
+}
+
+/// A symbol with its exponent, if it has one: `s`, `s^2`.
+fn factor(input: ParseStream<'_>, symbol: Ident) -> syn::Result<Unit> {
+    let name = symbol.to_string();
+    let Some((_, dimension, factor)) = UNITS.iter().find(|(unit, ..)| *unit == name) else {
+        let hint = crate::names::did_you_mean(&name, UNITS.iter().map(|(unit, ..)| *unit));
+        return Err(syn::Error::new(symbol.span(), format!("unknown unit `{name}`{hint}")));
+    };
+    let unit = Unit { dimension: Dimension(*dimension), factor: *factor };
+    if !input.peek(Token![^]) {
+        return Ok(unit);
+    }
+    input.parse::<Token![^]>()?;
+    let literal: LitInt = input.parse()?;
+    let exponent = literal.base10_parse::<u8>().ok().filter(|exponent| (1..=9).contains(exponent));
+    let exponent = exponent.ok_or_else(|| syn::Error::new(literal.span(), "expected an exponent from 1 to 9"))?;
+    let power = (0..exponent).fold(Unit::ONE, |power, _| power.times(unit, 1));
+    Ok(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use syn::parse::Parser;
+
+    fn unit(text: &str) -> Result<Unit, String> {
+        Unit::parse.parse_str(text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn products_and_powers_are_put_together() -> Result<(), String> {
+        assert_eq!(unit("m/s^2")?.dimension.name(), "an acceleration");
+        assert_eq!(unit("N*m")?.dimension, Dimension::TORQUE);
+        assert_eq!(unit("kg*m^2/s^2")?, unit("J")?);
+        assert!((unit("deg/s")?.factor - PI / 180.0).abs() < 1e-15);
+        assert!((unit("km/h")?.factor - 1.0 / 3.6).abs() < 1e-15);
+        assert_eq!(unit("m^2*kg")?.dimension.name(), "a moment of inertia");
+        assert_eq!(unit("m^3")?.dimension.name(), "a quantity in m^3");
+        Ok(())
+    }
+
+    #[test]
+    fn unknown_units_are_named_with_the_nearest() {
+        assert_eq!(unit("dge"), Err("unknown unit `dge`; did you mean `deg`?".into()));
+        assert_eq!(unit("s^0"), Err("expected an exponent from 1 to 9".into()));
+    }
+}

@@ -1,0 +1,62 @@
+//! The law: what must hold of a robot before it is expanded.
+//!
+//! One rule is one file, and a folder of the same name in `tests/ui`. All rules run, so that all faults are reported
+//! together; each fault is reported by one rule. Facts about types are left to rustc (see `expand::checks`).
+
+mod declared_publishers;
+mod dimensions;
+mod distinct_paths;
+mod joint_geometry;
+mod link_nested_input;
+mod no_cycles;
+mod one_driver;
+mod one_root;
+mod positive_values;
+mod sensor_nested_input;
+mod single_settings;
+mod single_input_tolerance;
+mod unique_names;
+
+use crate::diagnostics::Diagnostics;
+use crate::model::{PublisherId, Robot};
+use proc_macro2::Ident;
+
+type Rule = fn(&Robot, &mut Diagnostics);
+
+/// The rules, in the order in which their faults are reported.
+const RULES: &[Rule] = &[
+    unique_names::check,
+    one_root::check,
+    joint_geometry::check,
+    dimensions::check,
+    sensor_nested_input::check,
+    link_nested_input::check,
+    one_driver::check,
+    single_input_tolerance::check,
+    declared_publishers::check,
+    no_cycles::check,
+    positive_values::check,
+    distinct_paths::check,
+    single_settings::check,
+];
+
+/// A robot of which all rules hold.
+#[derive(Debug)]
+pub(crate) struct Verified<'a> {
+    pub(crate) robot: &'a Robot,
+    pub(crate) name: &'a Ident,
+    /// The publisher of each input of each estimator.
+    pub(crate) sources: Vec<Vec<PublisherId>>,
+}
+
+/// Checks all rules; none if one does not hold, or if something could not be read.
+pub(crate) fn verify<'a>(robot: &'a Robot, diagnostics: &mut Diagnostics) -> Option<Verified<'a>> {
+    for rule in RULES {
+        rule(robot, diagnostics);
+    }
+    if diagnostics.any() {
+        return None;
+    }
+    let sources = robot.estimators.iter().map(|estimator| estimator.inputs.iter().map(|input| input.source).collect());
+    Some(Verified { robot, name: robot.name.as_ref()?, sources: sources.collect::<Option<_>>()? })
+}

@@ -1,0 +1,71 @@
+//! Revolute, prismatic, continuous and planar joints have an axis; revolute and prismatic ones a limit with lower
+//! below upper; a fixed joint has neither. (A floating joint moves freely: no axis either.)
+//!
+//! Right: `joint pan: revolute { axis: z; limit: { lower: -90 deg, upper: 90 deg }; link head { } }`
+//! Wrong: `joint pan: revolute { link head { } }`
+
+use crate::diagnostics::Diagnostics;
+use crate::model::{Joint, Robot};
+use crate::parse::{JointKind, Limit};
+
+pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
+    for joint in &robot.joints {
+        axis(joint, robot.complete, diagnostics);
+        limit(joint, robot.complete, diagnostics);
+    }
+}
+
+fn axis(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
+    let (kind, name) = (&joint.kind_word, &joint.name);
+    let moves_about_none = matches!(joint.kind, JointKind::Fixed | JointKind::Floating);
+    match joint.axes.first() {
+        Some(axis) if moves_about_none => {
+            diagnostics.error(&axis.word, format!("a {kind} joint has no axis; leave it out of `{name}`"));
+        }
+        Some(axis) => {
+            let length = axis.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
+            if !(length.is_finite() && length > 1e-9) {
+                diagnostics.at(axis.place, "this axis has no direction; give it a component that is not 0".into());
+            }
+        }
+        None if !moves_about_none && complete => {
+            let message = format!("a {kind} joint needs an axis; give `{name}` one, as in `axis: z;`");
+            diagnostics.error(kind, message);
+        }
+        None => {}
+    }
+}
+
+fn limit(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
+    let (kind, name) = (&joint.kind_word, &joint.name);
+    let needs_one = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
+    match joint.limits.first() {
+        Some(limit) if joint.kind == JointKind::Fixed => {
+            diagnostics.error(&limit.word, format!("a fixed joint has no limit; leave it out of `{name}`"));
+        }
+        Some(limit) if needs_one => range(limit, kind.to_string().as_str(), diagnostics),
+        Some(_) => {}
+        None if needs_one && complete => {
+            let unit = if joint.kind == JointKind::Revolute { "deg" } else { "m" };
+            let message = format!(
+                "a {kind} joint needs a limit; give `{name}` one, as in `limit: {{ lower: -1 {unit}, upper: 1 {unit} }};`"
+            );
+            diagnostics.error(kind, message);
+        }
+        None => {}
+    }
+}
+
+fn range(limit: &Limit, kind: &str, diagnostics: &mut Diagnostics) {
+    match (&limit.lower, &limit.upper) {
+        (Some(lower), Some(upper)) => {
+            if lower.dimension == upper.dimension && lower.value >= upper.value {
+                diagnostics.at(upper.place, "the upper limit must be above the lower one".into());
+            }
+        }
+        _ => {
+            let message = format!("the limit of a {kind} joint needs both `lower` and `upper`");
+            diagnostics.error(&limit.word, message);
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! A setting that holds for a whole block stands in it once.
+//!
+//! Wrong: `sensor imu: A() { rate: 100 Hz; rate: 200 Hz; }`
+
+use crate::diagnostics::Diagnostics;
+use crate::model::Robot;
+use proc_macro2::Ident;
+
+pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
+    for sensor in &robot.sensors {
+        once(sensor.rates.iter().map(|rate| &rate.word), diagnostics);
+    }
+    for joint in &robot.joints {
+        once(joint.origins.iter().map(|origin| &origin.word), diagnostics);
+        once(joint.axes.iter().map(|axis| &axis.word), diagnostics);
+        once(joint.limits.iter().map(|limit| &limit.word), diagnostics);
+    }
+    for estimator in robot.estimators.iter().filter(|estimator| !estimator.is_nested()) {
+        once(estimator.sync_tolerances.iter().map(|tolerance| &tolerance.word), diagnostics);
+    }
+}
+
+fn once<'a>(words: impl Iterator<Item = &'a Ident>, diagnostics: &mut Diagnostics) {
+    for extra in words.skip(1) {
+        diagnostics.error(extra, format!("`{extra}` stands here twice; leave one out"));
+    }
+}

@@ -1,0 +1,95 @@
+//! Names are unique among siblings; names of links and joints in the whole robot.
+//!
+//! Right: `link base { sensor imu: A(); sensor mag: B(); }`
+//! Wrong: `link base { sensor imu: A(); sensor imu: B(); }`
+
+use crate::diagnostics::Diagnostics;
+use crate::model::{Home, Mount, Robot};
+use crate::names::snake_case;
+use proc_macro2::Ident;
+use std::collections::HashMap;
+
+pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
+    if let Some(name) = &robot.name
+        && snake_case(&name.to_string()) == name.to_string()
+    {
+        let message = format!("`{name}` would be both the robot's type and its module; write it in camel case");
+        diagnostics.error(name, message);
+    }
+    let mut bodies = Names::new("the links and joints of the robot");
+    for name in robot.links.iter().map(|link| &link.name).chain(robot.joints.iter().map(|joint| &joint.name)) {
+        bodies.add(name, diagnostics);
+    }
+    let mut siblings: HashMap<Place, Names> = HashMap::new();
+    // Joints are siblings of the sensors and estimators of their link, links of the sensors of their joint.
+    for joint in &robot.joints {
+        siblings.entry(Place::Link(joint.parent)).or_insert_with(Names::of_siblings).know(&joint.name);
+    }
+    for link in &robot.links {
+        if let Some(joint) = link.joint {
+            siblings.entry(Place::Joint(joint)).or_insert_with(Names::of_siblings).know(&link.name);
+        }
+    }
+    let sensors = robot.sensors.iter().map(|sensor| (Place::of_mount(sensor.mount), &sensor.name));
+    let estimators = robot.estimators.iter().map(|estimator| (Place::of_home(estimator.home), &estimator.name));
+    for (place, name) in sensors.chain(estimators) {
+        siblings.entry(place).or_insert_with(Names::of_siblings).add(name, diagnostics);
+    }
+}
+
+/// Where siblings stand.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Place {
+    Robot,
+    Link(usize),
+    Joint(usize),
+    Sensor(usize),
+}
+
+impl Place {
+    fn of_mount(mount: Mount) -> Self {
+        match mount {
+            Mount::Robot => Self::Robot,
+            Mount::Link(link) => Self::Link(link),
+            Mount::Joint(joint) => Self::Joint(joint),
+        }
+    }
+
+    fn of_home(home: Home) -> Self {
+        match home {
+            Home::Sensor(sensor) => Self::Sensor(sensor),
+            Home::Link(link) => Self::Link(link),
+        }
+    }
+}
+
+struct Names<'a> {
+    scope: &'static str,
+    first: HashMap<String, &'a Ident>,
+}
+
+impl<'a> Names<'a> {
+    fn new(scope: &'static str) -> Self {
+        Self { scope, first: HashMap::new() }
+    }
+
+    fn of_siblings() -> Self {
+        Self::new("its siblings")
+    }
+
+    /// Takes a name without a check: another set reports it.
+    fn know(&mut self, name: &'a Ident) {
+        self.first.entry(name.to_string()).or_insert(name);
+    }
+
+    fn add(&mut self, name: &'a Ident, diagnostics: &mut Diagnostics) {
+        match self.first.get(&name.to_string()) {
+            None => self.know(name),
+            Some(first) => {
+                let message = format!("the name `{name}` is taken among {}; choose another", self.scope);
+                diagnostics.error(name, message);
+                diagnostics.error(first, format!("`{name}` is declared here first"));
+            }
+        }
+    }
+}
