@@ -48,10 +48,7 @@ impl Bag {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, BagError> {
         let path = path.as_ref();
         let topics = topics(path).map_err(|kind| BagError::new(path, kind))?;
-        Ok(Self {
-            path: path.to_owned(),
-            topics,
-        })
+        Ok(Self { path: path.to_owned(), topics })
     }
 
     /// The path of the file, as it was given.
@@ -74,16 +71,9 @@ impl Bag {
         let mut found = self.topics.iter().filter(|t| *t.schema == *schema);
         let kind = match (found.next(), found.next()) {
             (Some(topic), None) => return Ok(topic),
-            (None, _) => BagErrorKind::NoTopicOfType {
-                schema,
-                topics: self.topics_in_words(),
-            },
+            (None, _) => BagErrorKind::NoTopicOfType { schema, topics: self.topics_in_words() },
             (Some(a), Some(b)) => {
-                let candidates = [a, b]
-                    .into_iter()
-                    .chain(found)
-                    .map(|t| t.name.to_string())
-                    .collect();
+                let candidates = [a, b].into_iter().chain(found).map(|t| t.name.to_string()).collect();
                 BagErrorKind::SeveralTopicsOfType { schema, candidates }
             }
         };
@@ -109,17 +99,10 @@ impl Bag {
             }
             let mut same = self.topics.iter().filter(|t| *t.name == *name).peekable();
             let Some(first) = same.peek() else {
-                let kind = BagErrorKind::NoTopic {
-                    topic: name.to_owned(),
-                    topics: self.topics_in_words(),
-                };
+                let kind = BagErrorKind::NoTopic { topic: name.to_owned(), topics: self.topics_in_words() };
                 return Err(fail(kind));
             };
-            let mut new = Wanted {
-                topic: first.name.clone(),
-                expected: 0,
-                count: 0,
-            };
+            let mut new = Wanted { topic: first.name.clone(), expected: 0, count: 0 };
             for topic in same {
                 messages::check(&topic.name, &topic.schema, &topic.encoding).map_err(fail)?;
                 new.expected = new.expected.saturating_add(topic.messages.unwrap_or(0));
@@ -134,11 +117,7 @@ impl Bag {
         if self.topics.is_empty() {
             return "the bag has no topics".into();
         }
-        let topics: Vec<_> = self
-            .topics
-            .iter()
-            .map(|t| format!("{} ({})", t.name, t.schema))
-            .collect();
+        let topics: Vec<_> = self.topics.iter().map(|t| format!("{} ({})", t.name, t.schema)).collect();
         format!("the bag has {}", topics.join(", "))
     }
 }
@@ -171,9 +150,7 @@ fn scan(
             let message = messages::RawMessage::parse(records)?;
             *counts.entry(message.channel).or_default() += 1;
         } else {
-            channels
-                .define(opcode, records.body())
-                .map_err(|fault| records.corrupt(fault))?;
+            channels.define(opcode, records.body()).map_err(|fault| records.corrupt(fault))?;
         }
     }
     Ok(())

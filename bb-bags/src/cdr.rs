@@ -14,10 +14,7 @@ const PADDING: usize = 3;
 /// Reads a payload as a `T`; the error says in words what is wrong and where in the payload.
 pub(crate) fn decode<T: DeserializeOwned>(payload: &[u8]) -> Result<T, String> {
     let Some((header, body)) = payload.split_at_checked(HEADER) else {
-        return Err(format!(
-            "the payload has {} bytes, too few for the header of CDR",
-            payload.len()
-        ));
+        return Err(format!("the payload has {} bytes, too few for the header of CDR", payload.len()));
     };
     // The first two bytes are the representation, always big endian; the other two are options that plain CDR
     // leaves unused.
@@ -47,18 +44,13 @@ fn body_of<T: DeserializeOwned, O: ByteOrder>(body: &[u8]) -> Result<T, String> 
             body.len() - at,
             HEADER + at
         )),
-        Err(Error::Eof) => Err(format!(
-            "the payload ends too early: a field at byte {} of {length} does not fit",
-            HEADER + at
-        )),
-        Err(Error::BadBoolean(byte)) => Err(format!(
-            "byte {} of the payload should be a bool, 0 or 1, and is {byte}",
-            HEADER + at - 1
-        )),
-        Err(Error::BadUTF8(_)) => Err(format!(
-            "the text before byte {} of the payload is not UTF-8",
-            HEADER + at
-        )),
+        Err(Error::Eof) => {
+            Err(format!("the payload ends too early: a field at byte {} of {length} does not fit", HEADER + at))
+        }
+        Err(Error::BadBoolean(byte)) => {
+            Err(format!("byte {} of the payload should be a bool, 0 or 1, and is {byte}", HEADER + at - 1))
+        }
+        Err(Error::BadUTF8(_)) => Err(format!("the text before byte {} of the payload is not UTF-8", HEADER + at)),
         Err(other) => Err(format!("at byte {} of the payload: {other}", HEADER + at)),
     }
 }
@@ -80,10 +72,7 @@ mod tests {
     }
 
     fn header() -> Header {
-        Header {
-            stamp: Stamp { sec: 7, nanosec: 8 },
-            frame_id: "imu".into(),
-        }
+        Header { stamp: Stamp { sec: 7, nanosec: 8 }, frame_id: "imu".into() }
     }
 
     /// Written out from the definition of CDR, not by the encoder that the other tests use.
@@ -102,18 +91,8 @@ mod tests {
         }
         let got: MagneticField = decode(&bytes).expect("reads");
         assert_eq!(got.header, header());
-        assert_eq!(
-            got.magnetic_field,
-            Vector3 {
-                x: 1.0,
-                y: 2.0,
-                z: 3.0
-            }
-        );
-        assert_eq!(
-            got.magnetic_field_covariance,
-            [0., 1., 2., 3., 4., 5., 6., 7., 8.]
-        );
+        assert_eq!(got.magnetic_field, Vector3 { x: 1.0, y: 2.0, z: 3.0 });
+        assert_eq!(got.magnetic_field_covariance, [0., 1., 2., 3., 4., 5., 6., 7., 8.]);
     }
 
     /// `float64[36]` has no length prefix; neither may the nested array that stands for it.
@@ -178,10 +157,7 @@ mod tests {
 
     #[test]
     fn a_payload_cut_anywhere_is_an_error() {
-        let bytes = little(&Imu {
-            header: header(),
-            ..Imu::default()
-        });
+        let bytes = little(&Imu { header: header(), ..Imu::default() });
         for end in 0..bytes.len() {
             assert!(decode::<Imu>(&bytes[..end]).is_err(), "{end}");
         }
@@ -191,10 +167,7 @@ mod tests {
     /// A length prefix is believed only as far as there are bytes, so this neither allocates nor takes long.
     #[test]
     fn a_huge_length_prefix_is_an_error() {
-        let sent = JointState {
-            header: header(),
-            ..JointState::default()
-        };
+        let sent = JointState { header: header(), ..JointState::default() };
         let good = little(&sent);
         for at in [12, 20, 24, 28, 32] {
             let mut bytes = good.clone();

@@ -44,24 +44,16 @@ impl Channels {
                     Some(name) => name.clone(),
                     None if channel.schema_id == 0 => "".into(),
                     None => {
-                        return Err(format!(
-                            "{} has the unknown schema {}",
-                            channel.topic, channel.schema_id
-                        ));
+                        return Err(format!("{} has the unknown schema {}", channel.topic, channel.schema_id));
                     }
                 };
                 let topic = channel.topic.into();
-                let new = Channel {
-                    topic,
-                    schema,
-                    encoding: channel.message_encoding,
-                };
+                let new = Channel { topic, schema, encoding: channel.message_encoding };
                 let topic = new.topic.clone();
                 match self.channels.insert(channel.id, new.clone()) {
-                    Some(old) if old != new => Err(format!(
-                        "channel {} is defined twice, for {} and {topic}",
-                        channel.id, old.topic
-                    )),
+                    Some(old) if old != new => {
+                        Err(format!("channel {} is defined twice, for {} and {topic}", channel.id, old.topic))
+                    }
                     _ => Ok(()),
                 }
             }
@@ -126,19 +118,14 @@ mod tests {
     #[test]
     fn channels_of_one_topic_are_one_topic() {
         let mut channels = Channels::default();
-        channels
-            .define(op::SCHEMA, &schema(1, "sensor_msgs/Imu"))
-            .unwrap();
+        channels.define(op::SCHEMA, &schema(1, "sensor_msgs/Imu")).unwrap();
         for id in [4, 5] {
             channels.define(op::CHANNEL, &channel(id, 1, "/imu")).unwrap();
         }
         channels.define(op::CHANNEL, &channel(6, 0, "/raw")).unwrap();
         let topics = channels.topics(Some(&BTreeMap::from([(4, 10), (5, 20)])));
         assert_eq!(topics.len(), 2);
-        assert_eq!(
-            (&*topics[0].name, &*topics[0].schema),
-            ("/imu", "sensor_msgs/msg/Imu")
-        );
+        assert_eq!((&*topics[0].name, &*topics[0].schema), ("/imu", "sensor_msgs/msg/Imu"));
         assert_eq!(topics[0].messages, Some(30));
         assert_eq!((&*topics[1].schema, topics[1].messages), ("", Some(0)));
         assert_eq!(channels.topics(None)[0].messages, None);
@@ -147,41 +134,20 @@ mod tests {
     #[test]
     fn contradictions_are_faults() {
         let mut channels = Channels::default();
-        assert!(
-            channels
-                .define(op::CHANNEL, &channel(1, 9, "/imu"))
-                .unwrap_err()
-                .contains("schema 9")
-        );
+        assert!(channels.define(op::CHANNEL, &channel(1, 9, "/imu")).unwrap_err().contains("schema 9"));
         channels.define(op::CHANNEL, &channel(1, 0, "/imu")).unwrap();
         channels.define(op::CHANNEL, &channel(1, 0, "/imu")).unwrap();
-        assert!(
-            channels
-                .define(op::CHANNEL, &channel(1, 0, "/mag"))
-                .unwrap_err()
-                .contains("twice")
-        );
+        assert!(channels.define(op::CHANNEL, &channel(1, 0, "/mag")).unwrap_err().contains("twice"));
         channels.define(op::SCHEMA, &schema(1, "a/msg/B")).unwrap();
         channels.define(op::SCHEMA, &schema(1, "a/B")).unwrap();
-        assert!(
-            channels
-                .define(op::SCHEMA, &schema(1, "a/msg/C"))
-                .unwrap_err()
-                .contains("both")
-        );
+        assert!(channels.define(op::SCHEMA, &schema(1, "a/msg/C")).unwrap_err().contains("both"));
     }
 
     #[test]
     fn a_definition_cut_anywhere_is_a_fault() {
-        for (opcode, bytes) in [
-            (op::SCHEMA, schema(1, "a/msg/B")),
-            (op::CHANNEL, channel(1, 0, "/imu")),
-        ] {
+        for (opcode, bytes) in [(op::SCHEMA, schema(1, "a/msg/B")), (op::CHANNEL, channel(1, 0, "/imu"))] {
             for end in 0..bytes.len() {
-                assert!(
-                    Channels::default().define(opcode, &bytes[..end]).is_err(),
-                    "{opcode} {end}"
-                );
+                assert!(Channels::default().define(opcode, &bytes[..end]).is_err(), "{opcode} {end}");
             }
         }
     }

@@ -16,10 +16,7 @@ pub struct BagError {
 
 impl BagError {
     pub(crate) fn new(path: &Path, kind: BagErrorKind) -> Self {
-        Self {
-            file: path.display().to_string(),
-            kind: Box::new(kind),
-        }
+        Self { file: path.display().to_string(), kind: Box::new(kind) }
     }
 
     /// The path of the bag, as it was given to [`Bag::open`](crate::Bag::open).
@@ -211,9 +208,7 @@ mod tests {
             fault: "the payload ends too early".into(),
         };
         let said = BagError::new(Path::new("walk.mcap"), kind).to_string();
-        assert!(
-            said.starts_with("walk.mcap: message 1024 on /imu at 12.345 s (byte 51200): the payload ends")
-        );
+        assert!(said.starts_with("walk.mcap: message 1024 on /imu at 12.345 s (byte 51200): the payload ends"));
     }
 
     #[test]

@@ -76,34 +76,22 @@ impl Messages {
         };
         while let Some(opcode) = records.advance()? {
             if opcode != op::MESSAGE {
-                self.channels
-                    .define(opcode, records.body())
-                    .map_err(|fault| records.corrupt(fault))?;
+                self.channels.define(opcode, records.body()).map_err(|fault| records.corrupt(fault))?;
                 continue;
             }
-            let RawMessage {
-                channel,
-                log_time_ns,
-                payload,
-            } = RawMessage::parse(records)?;
+            let RawMessage { channel, log_time_ns, payload } = RawMessage::parse(records)?;
             let route = match self.routes.get(&channel) {
                 Some(route) => route,
                 None => {
                     let route = match self.channels.get(channel) {
                         None => {
-                            return Err(
-                                records.corrupt(format!("a message of the unknown channel {channel}"))
-                            );
+                            return Err(records.corrupt(format!("a message of the unknown channel {channel}")));
                         }
                         Some(c) => match self.wanted.iter().position(|w| w.topic == c.topic) {
                             None => None,
                             Some(topic) => {
                                 let decode = check(&c.topic, &c.schema, &c.encoding)?;
-                                Some(Route {
-                                    topic,
-                                    schema: c.schema.clone(),
-                                    decode,
-                                })
+                                Some(Route { topic, schema: c.schema.clone(), decode })
                             }
                         },
                     };
@@ -121,22 +109,14 @@ impl Messages {
                 byte: records.byte(),
                 fault,
             })?;
-            return Ok(Some(Message {
-                topic: topic.clone(),
-                log_time_ns,
-                payload,
-            }));
+            return Ok(Some(Message { topic: topic.clone(), log_time_ns, payload }));
         }
         // The length of a chunk and that it is one are covered by no checksum. Damage there can hide the chunk, and
         // only the summary knows.
         match self.wanted.iter().find(|w| w.count < w.expected) {
-            Some(Wanted {
-                topic,
-                expected,
-                count,
-            }) => Err(records.corrupt(format!(
-                "it ends with {count} of the {expected} messages on {topic}"
-            ))),
+            Some(Wanted { topic, expected, count }) => {
+                Err(records.corrupt(format!("it ends with {count} of the {expected} messages on {topic}")))
+            }
             None => Ok(None),
         }
     }
@@ -146,10 +126,7 @@ impl Iterator for Messages {
     type Item = Result<Message, BagError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let item = self
-            .step()
-            .map_err(|kind| BagError::new(&self.path, kind))
-            .transpose();
+        let item = self.step().map_err(|kind| BagError::new(&self.path, kind)).transpose();
         if !matches!(item, Some(Ok(_))) {
             self.records = None;
         }
@@ -173,18 +150,11 @@ impl fmt::Debug for Messages {
 /// How to read messages of this topic, if they can be read.
 pub(crate) fn check(topic: &str, schema: &str, encoding: &str) -> Result<Decode, BagErrorKind> {
     if encoding != "cdr" {
-        return Err(BagErrorKind::Encoding {
-            topic: topic.into(),
-            encoding: encoding.into(),
-        });
+        return Err(BagErrorKind::Encoding { topic: topic.into(), encoding: encoding.into() });
     }
     ros::decoder(schema).ok_or_else(|| BagErrorKind::UnknownType {
         topic: topic.into(),
-        schema: if schema.is_empty() {
-            "of no given type".into()
-        } else {
-            schema.into()
-        },
+        schema: if schema.is_empty() { "of no given type".into() } else { schema.into() },
         known: ros::known(),
     })
 }
@@ -209,11 +179,7 @@ impl<'a> RawMessage<'a> {
         let (log_time, rest) = rest.split_first_chunk()?;
         let (_publish_time, payload) = rest.split_first_chunk::<8>()?;
         let (channel, log_time_ns) = (u16::from_le_bytes(*channel), u64::from_le_bytes(*log_time));
-        Some(Self {
-            channel,
-            log_time_ns,
-            payload,
-        })
+        Some(Self { channel, log_time_ns, payload })
     }
 }
 
@@ -238,28 +204,15 @@ mod tests {
         }
         body.push(5);
         let message = RawMessage::from_bytes(&body).expect("whole");
-        assert_eq!(
-            (message.channel, message.log_time_ns, message.payload),
-            (2, 77, &[5][..])
-        );
+        assert_eq!((message.channel, message.log_time_ns, message.payload), (2, 77, &[5][..]));
     }
 
     #[test]
     fn what_cannot_be_read_is_refused_beforehand() {
         assert!(check("/imu", "sensor_msgs/msg/Imu", "cdr").is_ok());
-        let said = check("/imu", "sensor_msgs/msg/Imu", "ros1")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            said.starts_with("the messages of /imu are encoded as `ros1`"),
-            "{said}"
-        );
-        let said = check("/scan", "sensor_msgs/msg/LaserScan", "cdr")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            said.contains("sensor_msgs/msg/LaserScan, which is not read"),
-            "{said}"
-        );
+        let said = check("/imu", "sensor_msgs/msg/Imu", "ros1").unwrap_err().to_string();
+        assert!(said.starts_with("the messages of /imu are encoded as `ros1`"), "{said}");
+        let said = check("/scan", "sensor_msgs/msg/LaserScan", "cdr").unwrap_err().to_string();
+        assert!(said.contains("sensor_msgs/msg/LaserScan, which is not read"), "{said}");
     }
 }

@@ -68,18 +68,13 @@ impl Records {
         file.by_ref().take(16).read_to_end(&mut start).map_err(io)?;
         if !start.starts_with(MAGIC) {
             return Err(match MAGIC.starts_with(&start) {
-                true => BagErrorKind::Truncated {
-                    messages: 0,
-                    byte: 0,
-                    size,
-                },
+                true => BagErrorKind::Truncated { messages: 0, byte: 0, size },
                 false => BagErrorKind::NotMcap { found: guess(&start) },
             });
         }
 
         let mut end = Vec::new();
-        file.seek(SeekFrom::Start(size.saturating_sub(magic).max(magic)))
-            .map_err(io)?;
+        file.seek(SeekFrom::Start(size.saturating_sub(magic).max(magic))).map_err(io)?;
         file.by_ref().take(magic).read_to_end(&mut end).map_err(io)?;
         file.seek(SeekFrom::Start(magic)).map_err(io)?;
         let finished = end == MAGIC;
@@ -119,11 +114,7 @@ impl Records {
 
     /// The error for a fault in the current record.
     pub(crate) fn corrupt(&self, fault: impl Into<String>) -> BagErrorKind {
-        BagErrorKind::Corrupt {
-            messages: self.messages,
-            byte: self.byte,
-            fault: fault.into(),
-        }
+        BagErrorKind::Corrupt { messages: self.messages, byte: self.byte, fault: fault.into() }
     }
 
     /// Steps to the next schema, channel or message and returns its kind; `None` at the end of the data.
@@ -190,20 +181,13 @@ impl Records {
             op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK => {
                 self.within_limit(length)?;
                 self.body.clear();
-                let got = self
-                    .file
-                    .by_ref()
-                    .take(length)
-                    .read_to_end(&mut self.body)
-                    .map_err(|e| self.io(e))?;
+                let got = self.file.by_ref().take(length).read_to_end(&mut self.body).map_err(|e| self.io(e))?;
                 if (got as u64) < length {
                     return Err(self.overrun());
                 }
             }
             _ => {
-                self.file
-                    .seek(SeekFrom::Start(self.next))
-                    .map_err(|e| self.io(e))?;
+                self.file.seek(SeekFrom::Start(self.next)).map_err(|e| self.io(e))?;
             }
         }
         Ok(opcode)
@@ -214,20 +198,13 @@ impl Records {
         let Ok(Record::Chunk { header, data }) = mcap::parse_record(op::CHUNK, &self.body) else {
             return Err(self.corrupt("the head of the chunk is malformed"));
         };
-        let ChunkHeader {
-            compression,
-            uncompressed_size,
-            ..
-        } = header;
+        let ChunkHeader { compression, uncompressed_size, .. } = header;
         match compression.as_str() {
             // mcap counts down the bytes of an unpacked chunk without looking and would underflow.
             "" if !framed(&data) => return Err(self.corrupt("a record in the chunk runs over its end")),
             "" | "lz4" | "zstd" => self.within_limit(uncompressed_size)?,
             _ => {
-                return Err(BagErrorKind::Compression {
-                    byte: self.byte,
-                    compression,
-                });
+                return Err(BagErrorKind::Compression { byte: self.byte, compression });
             }
         }
         // No record of this chunk can be longer than this, packed or unpacked.
@@ -251,23 +228,14 @@ impl Records {
         if length <= LIMIT {
             return Ok(());
         }
-        Err(BagErrorKind::TooLarge {
-            messages: self.messages,
-            byte: self.byte,
-            length,
-            limit: LIMIT,
-        })
+        Err(BagErrorKind::TooLarge { messages: self.messages, byte: self.byte, length, limit: LIMIT })
     }
 
     /// The error for a record that the file is too short for.
     fn overrun(&self) -> BagErrorKind {
         match self.finished {
             true => self.corrupt("a record runs over the end of the file"),
-            false => BagErrorKind::Truncated {
-                messages: self.messages,
-                byte: self.byte,
-                size: self.size,
-            },
+            false => BagErrorKind::Truncated { messages: self.messages, byte: self.byte, size: self.size },
         }
     }
 
@@ -275,10 +243,7 @@ impl Records {
         match cause.kind() {
             // The file has become shorter since it was opened.
             io::ErrorKind::UnexpectedEof => self.overrun(),
-            _ => BagErrorKind::Io {
-                byte: self.byte,
-                cause,
-            },
+            _ => BagErrorKind::Io { byte: self.byte, cause },
         }
     }
 }
@@ -303,9 +268,7 @@ fn chunk_fault(error: McapError) -> String {
         }
         McapError::DecompressionError(what) => format!("the chunk cannot be unpacked ({what})"),
         McapError::Io(cause) => format!("the chunk cannot be unpacked ({cause})"),
-        McapError::UnexpectedEof | McapError::UnexpectedEoc => {
-            "the chunk ends in the middle of a record".into()
-        }
+        McapError::UnexpectedEof | McapError::UnexpectedEoc => "the chunk ends in the middle of a record".into(),
         McapError::RecordTooLarge { .. } => "a record in the chunk runs over its end".into(),
         other => format!("the chunk is malformed ({other})"),
     }

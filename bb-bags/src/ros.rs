@@ -48,35 +48,18 @@ pub(crate) type Decode = fn(&[u8]) -> Result<RosMessage, String>;
 
 /// Every type that is read, by its full name.
 const TYPES: &[(&str, Decode)] = &[
-    ("sensor_msgs/msg/Imu", |bytes| {
-        cdr::decode(bytes).map(RosMessage::Imu)
-    }),
-    ("sensor_msgs/msg/MagneticField", |bytes| {
-        cdr::decode(bytes).map(RosMessage::MagneticField)
-    }),
-    ("sensor_msgs/msg/NavSatFix", |bytes| {
-        cdr::decode(bytes).map(RosMessage::NavSatFix)
-    }),
-    ("sensor_msgs/msg/JointState", |bytes| {
-        cdr::decode(bytes).map(RosMessage::JointState)
-    }),
-    ("geometry_msgs/msg/PoseStamped", |bytes| {
-        cdr::decode(bytes).map(RosMessage::PoseStamped)
-    }),
-    ("nav_msgs/msg/Odometry", |bytes| {
-        cdr::decode(bytes).map(Box::new).map(RosMessage::Odometry)
-    }),
-    ("std_msgs/msg/Bool", |bytes| {
-        cdr::decode(bytes).map(RosMessage::Bool)
-    }),
+    ("sensor_msgs/msg/Imu", |bytes| cdr::decode(bytes).map(RosMessage::Imu)),
+    ("sensor_msgs/msg/MagneticField", |bytes| cdr::decode(bytes).map(RosMessage::MagneticField)),
+    ("sensor_msgs/msg/NavSatFix", |bytes| cdr::decode(bytes).map(RosMessage::NavSatFix)),
+    ("sensor_msgs/msg/JointState", |bytes| cdr::decode(bytes).map(RosMessage::JointState)),
+    ("geometry_msgs/msg/PoseStamped", |bytes| cdr::decode(bytes).map(RosMessage::PoseStamped)),
+    ("nav_msgs/msg/Odometry", |bytes| cdr::decode(bytes).map(Box::new).map(RosMessage::Odometry)),
+    ("std_msgs/msg/Bool", |bytes| cdr::decode(bytes).map(RosMessage::Bool)),
 ];
 
 /// How to read payloads of the type with this full name, if it is one of those that are read.
 pub(crate) fn decoder(schema: &str) -> Option<Decode> {
-    TYPES
-        .iter()
-        .find(|(name, _)| *name == schema)
-        .map(|(_, decode)| *decode)
+    TYPES.iter().find(|(name, _)| *name == schema).map(|(_, decode)| *decode)
 }
 
 /// The full names of the types that are read.
@@ -156,12 +139,7 @@ pub struct Quaternion {
 impl Default for Quaternion {
     /// The identity, as in the definition.
     fn default() -> Self {
-        Self {
-            x: 0.0,
-            y: 0.0,
-            z: 0.0,
-            w: 1.0,
-        }
+        Self { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }
     }
 }
 
@@ -318,27 +296,11 @@ mod tests {
 
     #[test]
     fn the_extreme_stamps_do_not_overflow() {
-        let most = Stamp {
-            sec: i32::MAX,
-            nanosec: u32::MAX,
-        };
-        assert_eq!(
-            most.nanoseconds(),
-            i64::from(i32::MAX) * 1_000_000_000 + i64::from(u32::MAX)
-        );
-        let least = Stamp {
-            sec: -1,
-            nanosec: 999_999_999,
-        };
+        let most = Stamp { sec: i32::MAX, nanosec: u32::MAX };
+        assert_eq!(most.nanoseconds(), i64::from(i32::MAX) * 1_000_000_000 + i64::from(u32::MAX));
+        let least = Stamp { sec: -1, nanosec: 999_999_999 };
         assert_eq!(least.nanoseconds(), -1);
-        assert_eq!(
-            Stamp {
-                sec: i32::MIN,
-                nanosec: 0
-            }
-            .nanoseconds(),
-            i64::from(i32::MIN) * 1_000_000_000
-        );
+        assert_eq!(Stamp { sec: i32::MIN, nanosec: 0 }.nanoseconds(), i64::from(i32::MIN) * 1_000_000_000);
     }
 
     #[test]

@@ -57,10 +57,7 @@ pub(crate) fn topics(mut file: BufReader<File>, size: u64) -> Option<Vec<Topic>>
                 let got = file.read(reader.insert(wanted)).ok()?;
                 reader.notify_read(got);
             }
-            LinearReadEvent::Record {
-                opcode: op::STATISTICS,
-                data,
-            } => {
+            LinearReadEvent::Record { opcode: op::STATISTICS, data } => {
                 let Ok(Record::Statistics(statistics)) = mcap::parse_record(op::STATISTICS, data) else {
                     return None;
                 };

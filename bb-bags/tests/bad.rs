@@ -37,9 +37,7 @@ fn read(path: &Path) -> (usize, Option<BagError>) {
 fn said(path: &Path) -> String {
     let said = read(path).1.expect("an error").to_string();
     let file = format!("{}: ", path.display());
-    said.strip_prefix(&file)
-        .unwrap_or_else(|| panic!("names the file: {said}"))
-        .to_owned()
+    said.strip_prefix(&file).unwrap_or_else(|| panic!("names the file: {said}")).to_owned()
 }
 
 #[test]
@@ -48,9 +46,7 @@ fn what_is_not_a_bag() {
     assert_eq!(said(&directory.join("none.mcap")), "no such file; check the path");
     assert!(said(directory).starts_with("not a file; name the .mcap file"));
     assert!(said(&file("sqlite.db3", b"SQLite format 3\0....")).contains("`ros2 bag convert`"));
-    assert!(
-        said(&file("text.mcap", b"t,gx,gy,gz\n0,1,2,3\n")).starts_with("not an MCAP file: it does not start")
-    );
+    assert!(said(&file("text.mcap", b"t,gx,gy,gz\n0,1,2,3\n")).starts_with("not an MCAP file: it does not start"));
     assert!(said(&file("empty.mcap", b"")).starts_with("truncated after 0 messages (byte 0 of 0)"));
     assert!(said(&file("start.mcap", b"\x89MCA")).starts_with("truncated after 0 messages (byte 0 of 4)"));
     assert!(said(&file("magic.mcap", mcap::MAGIC)).starts_with("truncated after 0 messages (byte 8 of 8)"));
@@ -65,40 +61,24 @@ fn topics_that_cannot_be_read() {
     let kind = |topic| bag.messages(&[topic]).unwrap_err();
     assert!(matches!(kind("/imu").kind(), BagErrorKind::Encoding { .. }));
     assert!(
-        kind("/imu")
-            .to_string()
-            .contains("the messages of /imu are encoded as `ros1`, and only `cdr` is read")
+        kind("/imu").to_string().contains("the messages of /imu are encoded as `ros1`, and only `cdr` is read")
     );
     assert!(matches!(kind("/scan").kind(), BagErrorKind::UnknownType { .. }));
-    assert!(kind("/gps").to_string().ends_with(
-        "no topic /gps; the bag has /imu (sensor_msgs/msg/Imu), /scan (sensor_msgs/msg/LaserScan)"
-    ));
+    assert!(
+        kind("/gps")
+            .to_string()
+            .ends_with("no topic /gps; the bag has /imu (sensor_msgs/msg/Imu), /scan (sensor_msgs/msg/LaserScan)")
+    );
 }
 
 #[test]
 fn a_malformed_payload_is_named_by_its_place() {
     let cases: [(&str, Vec<u8>, &str); 5] = [
-        (
-            "short",
-            little(&imu(0))[..100].to_vec(),
-            "the payload ends too early",
-        ),
-        (
-            "long",
-            [little(&imu(0)), vec![0; 4]].concat(),
-            "4 bytes are left over",
-        ),
+        ("short", little(&imu(0))[..100].to_vec(), "the payload ends too early"),
+        ("long", [little(&imu(0)), vec![0; 4]].concat(), "4 bytes are left over"),
         ("none", vec![], "the payload has 0 bytes"),
-        (
-            "xcdr2",
-            vec![0, 7, 0, 0, 0, 0],
-            "the payload has representation 0x0007 (XCDR2)",
-        ),
-        (
-            "text",
-            [&little(&imu(0))[..16], &[0xff; 400]].concat(),
-            "the text before byte",
-        ),
+        ("xcdr2", vec![0, 7, 0, 0, 0, 0], "the payload has representation 0x0007 (XCDR2)"),
+        ("text", [&little(&imu(0))[..16], &[0xff; 400]].concat(), "the text before byte"),
     ];
     for (name, payload, fault) in cases {
         for (layout, options) in layouts() {
@@ -115,10 +95,7 @@ fn a_malformed_payload_is_named_by_its_place() {
             let (count, error) = read(&path);
             assert_eq!(count, 40);
             let said = error.expect("an error").to_string();
-            assert!(
-                said.contains("mcap: message 21 on /imu at 12.400 s (byte "),
-                "{said}"
-            );
+            assert!(said.contains("mcap: message 21 on /imu at 12.400 s (byte "), "{said}");
             assert!(said.contains(fault), "{said}");
         }
     }
@@ -126,10 +103,7 @@ fn a_malformed_payload_is_named_by_its_place() {
     let topic = maker.topic("/moving", "std_msgs/msg/Bool");
     maker.bytes(topic, &[0, 1, 0, 0, 3]);
     let said = said(&file("payload_bool.mcap", &maker.finish()));
-    assert!(
-        said.contains("byte 4 of the payload should be a bool, 0 or 1, and is 3"),
-        "{said}"
-    );
+    assert!(said.contains("byte 4 of the payload should be a bool, 0 or 1, and is 3"), "{said}");
 }
 
 /// Cut anywhere, a bag gives the messages before the cut, then says that it is cut; once the data are whole, it
@@ -165,14 +139,9 @@ fn cut_anywhere() {
 /// checksums are the hard case: whatever is in them is believed.
 #[test]
 fn bits_flipped_anywhere() {
-    let mut cases: Vec<_> = layouts()
-        .into_iter()
-        .map(|(name, options)| (name.to_owned(), options))
-        .collect();
+    let mut cases: Vec<_> = layouts().into_iter().map(|(name, options)| (name.to_owned(), options)).collect();
     for (name, options) in layouts() {
-        let options = options
-            .calculate_chunk_crcs(false)
-            .calculate_summary_section_crc(false);
+        let options = options.calculate_chunk_crcs(false).calculate_summary_section_crc(false);
         cases.push((format!("{name}_unsummed"), options.clone()));
         let options = options.emit_summary_records(false).emit_summary_offsets(false);
         cases.push((format!("{name}_bare"), options));
@@ -229,10 +198,7 @@ fn a_damaged_chunk_is_named_by_its_place() {
         }
         other => panic!("{other}"),
     }
-    assert!(
-        error.to_string().contains("the checksum of the chunk is"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("the checksum of the chunk is"), "{error}");
 }
 
 #[test]
@@ -241,8 +207,5 @@ fn a_chunk_packed_in_an_unknown_way() {
     let at = bytes.windows(4).position(|w| w == b"zstd").expect("a chunk");
     bytes[at..at + 4].copy_from_slice(b"brot");
     let said = said(&file("brot.mcap", &bytes));
-    assert!(
-        said.starts_with("the chunk at byte ") && said.contains("packed with `brot`"),
-        "{said}"
-    );
+    assert!(said.starts_with("the chunk at byte ") && said.contains("packed with `brot`"), "{said}");
 }

@@ -8,10 +8,7 @@ use common::{Maker, big, file, header, imu, layouts, walk};
 use mcap::WriteOptions;
 
 fn all(bag: &Bag, topics: &[&str]) -> Vec<Message> {
-    bag.messages(topics)
-        .expect("opens")
-        .collect::<Result<_, _>>()
-        .expect("reads")
+    bag.messages(topics).expect("opens").collect::<Result<_, _>>().expect("reads")
 }
 
 #[test]
@@ -22,19 +19,12 @@ fn every_type_in_every_layout() {
     }
     let mag = MagneticField {
         header: header(2),
-        magnetic_field: Vector3 {
-            x: 2e-5,
-            y: 0.0,
-            z: -4e-5,
-        },
+        magnetic_field: Vector3 { x: 2e-5, y: 0.0, z: -4e-5 },
         magnetic_field_covariance: [1., 2., 3., 4., 5., 6., 7., 8., 9.],
     };
     let fix = NavSatFix {
         header: header(3),
-        status: NavSatStatus {
-            status: -1,
-            service: 9,
-        },
+        status: NavSatStatus { status: -1, service: 9 },
         latitude: 52.5,
         longitude: 13.4,
         altitude: 34.0,
@@ -49,34 +39,11 @@ fn every_type_in_every_layout() {
         effort: vec![1.0],
     };
     let pose = Pose {
-        position: Point {
-            x: 1.0,
-            y: 2.0,
-            z: 3.0,
-        },
-        orientation: Quaternion {
-            x: 0.0,
-            y: 0.6,
-            z: 0.0,
-            w: 0.8,
-        },
+        position: Point { x: 1.0, y: 2.0, z: 3.0 },
+        orientation: Quaternion { x: 0.0, y: 0.6, z: 0.0, w: 0.8 },
     };
-    let stamped = PoseStamped {
-        header: header(5),
-        pose,
-    };
-    let twist = Twist {
-        linear: Vector3 {
-            x: 1.0,
-            y: 0.0,
-            z: 0.0,
-        },
-        angular: Vector3 {
-            x: 0.0,
-            y: 0.0,
-            z: -1.0,
-        },
-    };
+    let stamped = PoseStamped { header: header(5), pose };
+    let twist = Twist { linear: Vector3 { x: 1.0, y: 0.0, z: 0.0 }, angular: Vector3 { x: 0.0, y: 0.0, z: -1.0 } };
     let odometry = Odometry {
         header: header(6),
         child_frame_id: "base".into(),
@@ -95,11 +62,7 @@ fn every_type_in_every_layout() {
             "nav_msgs/msg/Odometry",
             "std_msgs/msg/Bool",
         ];
-        let ids: Vec<u16> = names
-            .iter()
-            .zip(schemas)
-            .map(|(name, schema)| maker.topic(name, schema))
-            .collect();
+        let ids: Vec<u16> = names.iter().zip(schemas).map(|(name, schema)| maker.topic(name, schema)).collect();
         maker.message(ids[0], &imu(1));
         maker.message(ids[1], &mag);
         maker.message(ids[2], &fix);
@@ -112,13 +75,7 @@ fn every_type_in_every_layout() {
         assert_eq!(bag.topics().len(), 7, "{layout}");
         let got = all(&bag, &names);
         let times: Vec<u64> = got.iter().map(|m| m.log_time_ns).collect();
-        assert_eq!(
-            times,
-            (0..7)
-                .map(|i| 12_000_000_000 + i * 10_000_000)
-                .collect::<Vec<_>>(),
-            "{layout}"
-        );
+        assert_eq!(times, (0..7).map(|i| 12_000_000_000 + i * 10_000_000).collect::<Vec<_>>(), "{layout}");
         let topics: Vec<&str> = got.iter().map(|m| &*m.topic).collect();
         assert_eq!(topics, names, "{layout}");
         let sent = [
@@ -131,10 +88,7 @@ fn every_type_in_every_layout() {
             RosMessage::Bool(Bool { data: true }),
         ];
         for (got, sent) in got.into_iter().zip(sent) {
-            assert_eq!(
-                got.payload.header().is_none(),
-                matches!(sent, RosMessage::Bool(_))
-            );
+            assert_eq!(got.payload.header().is_none(), matches!(sent, RosMessage::Bool(_)));
             assert_eq!(got.payload, sent, "{layout}");
         }
     }
@@ -157,15 +111,8 @@ fn only_the_chosen_topics_come() {
     for (layout, options) in layouts() {
         let path = file(&format!("chosen_{layout}.mcap"), &walk(options, 100));
         let bag = Bag::open(path).expect("opens");
-        let counts: Vec<_> = bag
-            .topics()
-            .iter()
-            .map(|t| (&*t.name, &*t.schema, t.messages))
-            .collect();
-        let want = [
-            ("/imu", "sensor_msgs/msg/Imu", Some(100)),
-            ("/moving", "std_msgs/msg/Bool", Some(100)),
-        ];
+        let counts: Vec<_> = bag.topics().iter().map(|t| (&*t.name, &*t.schema, t.messages)).collect();
+        let want = [("/imu", "sensor_msgs/msg/Imu", Some(100)), ("/moving", "std_msgs/msg/Bool", Some(100))];
         assert_eq!(counts, want, "{layout}");
         assert_eq!(all(&bag, &["/imu"]).len(), 100);
         assert_eq!(all(&bag, &["/imu", "/moving", "/imu"]).len(), 200);
@@ -180,17 +127,12 @@ fn only_the_chosen_topics_come() {
 #[test]
 fn summaries_may_lack_anything() {
     for (layout, options) in layouts() {
-        let none = options
-            .clone()
-            .emit_summary_records(false)
-            .emit_summary_offsets(false);
+        let none = options.clone().emit_summary_records(false).emit_summary_offsets(false);
         let bare = options.clone().repeat_channels(false);
         let countless = options.emit_statistics(false);
-        for (what, options, count) in [
-            ("none", none, Some(40)),
-            ("bare", bare, Some(40)),
-            ("countless", countless, None),
-        ] {
+        for (what, options, count) in
+            [("none", none, Some(40)), ("bare", bare, Some(40)), ("countless", countless, None)]
+        {
             let bag = Bag::open(file(&format!("{what}_{layout}.mcap"), &walk(options, 40))).expect("opens");
             let topics: Vec<_> = bag.topics().iter().map(|t| (&*t.name, t.messages)).collect();
             assert_eq!(topics, [("/imu", count), ("/moving", count)], "{what} {layout}");
@@ -202,30 +144,18 @@ fn summaries_may_lack_anything() {
 #[test]
 fn a_bag_of_nothing_is_a_bag() {
     for (layout, options) in layouts() {
-        let bag = Bag::open(file(
-            &format!("nothing_{layout}.mcap"),
-            &Maker::new(options).finish(),
-        ))
-        .expect("opens");
+        let bag = Bag::open(file(&format!("nothing_{layout}.mcap"), &Maker::new(options).finish())).expect("opens");
         assert!(bag.topics().is_empty());
-        assert!(
-            bag.messages(&["/imu"])
-                .unwrap_err()
-                .to_string()
-                .ends_with("no topic /imu; the bag has no topics")
-        );
+        assert!(bag.messages(&["/imu"]).unwrap_err().to_string().ends_with("no topic /imu; the bag has no topics"));
     }
 }
 
 #[test]
 fn a_topic_is_found_by_its_type() {
     let mut maker = Maker::new(WriteOptions::new());
-    for (name, schema) in [
-        ("/imu", "sensor_msgs/Imu"),
-        ("/a", "std_msgs/msg/Bool"),
-        ("/b", "std_msgs/Bool"),
-        ("/s", "x/msg/Scan"),
-    ] {
+    for (name, schema) in
+        [("/imu", "sensor_msgs/Imu"), ("/a", "std_msgs/msg/Bool"), ("/b", "std_msgs/Bool"), ("/s", "x/msg/Scan")]
+    {
         maker.topic(name, schema);
     }
     let path = file("by_type.mcap", &maker.finish());
@@ -241,9 +171,7 @@ fn a_topic_is_found_by_its_type() {
         format!("{path}: several topics of type std_msgs/msg/Bool: /a, /b; name one of them")
     );
     let none = bag.topic_of("nav_msgs/msg/Odometry").unwrap_err().to_string();
-    assert!(none.starts_with(&format!(
-        "{path}: no topic of type nav_msgs/msg/Odometry; the bag has /imu (sen"
-    )));
+    assert!(none.starts_with(&format!("{path}: no topic of type nav_msgs/msg/Odometry; the bag has /imu (sen")));
 }
 
 #[test]
@@ -252,10 +180,5 @@ fn the_messages_outlive_the_bag_on_another_thread() {
         let bag = Bag::open(file("thread.mcap", &walk(WriteOptions::new(), 10))).expect("opens");
         bag.messages(&["/imu"]).expect("opens")
     };
-    assert_eq!(
-        std::thread::spawn(move || messages.count())
-            .join()
-            .expect("no panic"),
-        10
-    );
+    assert_eq!(std::thread::spawn(move || messages.count()).join().expect("no panic"), 10);
 }

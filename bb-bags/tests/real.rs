@@ -26,10 +26,7 @@ fn the_recordings_read_through() {
         let mag = bag.topic_of("sensor_msgs/MagneticField").expect("one").clone();
         let truth = bag.topic_of("geometry_msgs/PoseStamped").expect("one").clone();
         let moving = bag.topic_of("std_msgs/Bool").expect("one").clone();
-        assert_eq!(
-            [&*imu.name, &*mag.name, &*truth.name, &*moving.name],
-            ["/imu", "/mag", "/truth", "/moving"]
-        );
+        assert_eq!([&*imu.name, &*mag.name, &*truth.name, &*moving.name], ["/imu", "/mag", "/truth", "/moving"]);
 
         let start = Instant::now();
         let topics = [&imu, &mag, &truth, &moving];
@@ -40,10 +37,7 @@ fn the_recordings_read_through() {
         let mut last_log = 0;
         for message in bag.messages(&topics.map(|t| t.name.clone())).expect("opens") {
             let message = message.expect("reads");
-            let i = topics
-                .iter()
-                .position(|t| t.name == message.topic)
-                .expect("a chosen topic");
+            let i = topics.iter().position(|t| t.name == message.topic).expect("a chosen topic");
             assert!(message.log_time_ns >= last_log, "{name}: in order of log time");
             last_log = message.log_time_ns;
             let at = match message.payload.header() {
@@ -59,11 +53,7 @@ fn the_recordings_read_through() {
             match message.payload {
                 RosMessage::Imu(m) => {
                     let (w, f) = (m.angular_velocity, m.linear_acceleration);
-                    assert!(
-                        [w.x, w.y, w.z, f.x, f.y, f.z]
-                            .iter()
-                            .all(|v| v.is_finite() && v.abs() < 200.0)
-                    );
+                    assert!([w.x, w.y, w.z, f.x, f.y, f.z].iter().all(|v| v.is_finite() && v.abs() < 200.0));
                 }
                 RosMessage::MagneticField(m) => {
                     let b = m.magnetic_field;
@@ -84,15 +74,9 @@ fn the_recordings_read_through() {
         }
         let seconds = start.elapsed().as_secs_f64();
         let total: u64 = counts.iter().sum();
-        println!(
-            "{name}: {counts:?} messages, {:.0} messages/s",
-            total as f64 / seconds
-        );
+        println!("{name}: {counts:?} messages, {:.0} messages/s", total as f64 / seconds);
 
-        assert!(
-            (first_truth.expect("truth") - 1.0).abs() < 1e-5,
-            "{name}: the first truth is a rotation"
-        );
+        assert!((first_truth.expect("truth") - 1.0).abs() < 1e-5, "{name}: the first truth is a rotation");
         for (topic, count) in topics.iter().zip(counts) {
             assert_eq!(topic.messages, Some(count), "{name}: {}", topic.name);
         }

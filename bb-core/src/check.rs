@@ -7,7 +7,5 @@ mod names;
 mod options;
 mod text;
 
-pub use names::{
-    Declared, check_dynamic, check_inputs, check_outputs, input_index, nested_index, output_index,
-};
+pub use names::{Declared, check_dynamic, check_inputs, check_outputs, input_index, nested_index, output_index};
 pub use options::{Given, check_option, check_required};

@@ -13,7 +13,6 @@ pub use context::{Context, SensorContext};
 pub use estimator::{Estimator, Reply};
 pub use external::External;
 pub use fault::Fault;
-pub(crate) use inputs::describe;
 pub use inputs::{FieldIndex, Input, InputAt, InputField, Inputs, Slot, SyncMiss};
 pub use options::{Dimension, NoOptions, OptionField, Options, Range};
 pub use outputs::{OutputAt, Outputs};

@@ -28,6 +28,7 @@ pub mod time;
 pub mod topology;
 
 mod check;
+mod stub;
 
 pub use bb_macros::{Inputs, Options, Outputs, Payload, robot};
 pub use component::{
@@ -35,7 +36,10 @@ pub use component::{
 };
 pub use message::{Finite, Frame, Origin, Payload, Stamped};
 pub use pubsub::{Overflow, Subscription};
-pub use run::{Builder, EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, Running, SensorHandle, Simulation, StartError};
+pub use run::{
+    Builder, EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, Running, SensorHandle,
+    Simulation, StartError,
+};
 pub use time::{Clock, MonotonicTime, WallTime};
 
 pub use nalgebra;
@@ -43,21 +47,23 @@ pub use nalgebra;
 /// Everything a file that declares or runs a robot needs: `use bb_core::prelude::*;`.
 pub mod prelude {
     pub use crate::component::{
-        Context, Estimator, External, Fault, Input, Inputs, NoOptions, Options, Outputs, Reading, Reply, Sensor,
-        SensorContext,
+        Context, Estimator, External, Fault, Input, NoOptions, Reading, Reply, Sensor, SensorContext,
     };
-    pub use crate::message::{Payload, Stamped};
+    pub use crate::message::Stamped;
     pub use crate::payload::*;
     pub use crate::pubsub::{Overflow, Subscription};
     pub use crate::robot;
     pub use crate::run::{Robot, Running, Simulation, StartError};
     pub use crate::time::{Clock, MonotonicTime, WallTime};
+    // The traits and the derives of the same names.
+    pub use crate::{Inputs, Options, Outputs, Payload};
     pub use std::time::Duration;
 }
 
 /// What the expansions of the macros name. Not for users: it changes without notice.
 #[doc(hidden)]
 pub mod __private {
+    pub use crate::__stub_robot as stub_robot;
     pub use crate::check::{
         Declared, Given, check_dynamic, check_inputs, check_option, check_outputs, check_required, input_index,
         nested_index, output_index,
@@ -69,8 +75,10 @@ pub mod __private {
     pub use crate::node::{AnyNode, EstimatorDeclaration, InputDeclaration, Node};
     pub use crate::pubsub::{AnyTopic, Topic};
     pub use crate::run::{
-        EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, SensorDeclaration, SensorHandle, Source, StartError, Startup,
+        EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, SensorDeclaration, SensorHandle,
+        Source, StartError, Startup,
     };
+    pub use crate::stub::stub;
     pub use crate::topology::{Joint, JointKind, Limit, Link, Topology, Transform};
     pub use std::sync::Arc;
 }

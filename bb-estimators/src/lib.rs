@@ -1,6 +1,33 @@
-//! Attitude filters and what they share, as plain algorithms: values in, values out, no runtime.
+//! Attitude filters and their fusion.
 //!
-//! Each algorithm has a folder of its own; every filter the same files: `params`, `filter`, `tests`.
+//! Each algorithm is a plain value, values in, values out, with no runtime in sight: the modules below [`attitude`],
+//! which build without the feature `runtime`. The estimators at the top of this crate wrap them for `robot!`:
+//!
+//! | declared as | takes | emits |
+//! |---|---|---|
+//! | `Madgwick(beta = 0.1)`, `Complementary(…)` in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
+//! | `Madgwick<Marg>(…)`, `Complementary<Marg>(…)` in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
+//! | `Madgwick<ImuAndMagnetometer>(…)` on a link | `input imu`, driver, and `input magnetic_field`, of two sensors | `Orientation` of the link |
+//! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
+//!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
 pub mod attitude;
+#[cfg(feature = "simulation")]
+pub mod simulation;
+
+#[cfg(feature = "runtime")]
+pub use attitude::average::OrientationAverage;
+#[cfg(feature = "runtime")]
+pub use attitude::{Attitude, ImuAndMagnetometer};
+#[cfg(feature = "simulation")]
+pub use simulation::SimulatedImu;
+
+/// Madgwick's filter as an estimator: of six axes, `Madgwick<Marg>` and `Madgwick<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Madgwick<I = bb_core::payload::Imu> = Attitude<attitude::MadgwickFilter, I>;
+
+/// The complementary filter as an estimator: of six axes, `Complementary<Marg>` and
+/// `Complementary<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Complementary<I = bb_core::payload::Imu> = Attitude<attitude::ComplementaryFilter, I>;

@@ -7,7 +7,7 @@ mod outputs;
 mod payload;
 
 pub(crate) use inputs::inputs;
-pub(crate) use options::options;
+pub(crate) use options::{into_if_text, options};
 pub(crate) use outputs::outputs;
 pub(crate) use payload::payload;
 

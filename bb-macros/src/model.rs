@@ -1,10 +1,9 @@
 //! What a robot is once its names are resolved: plain data in lists, with numbers for references and spans kept.
 
 mod frames;
-mod rigid;
 mod resolve;
+mod rigid;
 
-pub(crate) use frames::Route;
 pub(crate) use resolve::resolve;
 pub(crate) use rigid::Rigid;
 
@@ -40,8 +39,6 @@ pub(crate) struct Link {
     pub(crate) name: Ident,
     /// The joint that carries it; none for a root.
     pub(crate) joint: Option<JointId>,
-    /// Links and joints from the root to this one.
-    pub(crate) path: Vec<Ident>,
 }
 
 #[derive(Clone, Debug)]
@@ -54,8 +51,6 @@ pub(crate) struct Joint {
     pub(crate) origins: Vec<Origin>,
     pub(crate) axes: Vec<Axis>,
     pub(crate) limits: Vec<Limit>,
-    /// Links and joints from the root to this one.
-    pub(crate) path: Vec<Ident>,
 }
 
 /// Where a sensor is mounted.

@@ -16,22 +16,29 @@ pub(crate) fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = 
     nearest(name, candidates).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 
-/// Levenshtein's distance in characters.
+/// The optimal string alignment distance in characters: insertions, deletions, replacements, and swaps of neighbours.
 fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, a) in a.chars().enumerate() {
-        let mut diagonal = i;
-        let mut left = i + 1;
-        for (slot, b) in row.iter_mut().skip(1).zip(&b) {
-            let replaced = diagonal + usize::from(a != *b);
-            diagonal = *slot;
-            left = replaced.min(left + 1).min(*slot + 1);
-            *slot = left;
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let width = b.len() + 1;
+    let mut table = vec![0; (a.len() + 1) * width];
+    for i in 0..=a.len() {
+        for j in 0..=b.len() {
+            let at = |i: usize, j: usize| table[i * width + j];
+            table[i * width + j] = match (i, j) {
+                (0, edits) | (edits, 0) => edits,
+                _ => {
+                    let replaced = at(i - 1, j - 1) + usize::from(a[i - 1] != b[j - 1]);
+                    let edited = replaced.min(at(i - 1, j) + 1).min(at(i, j - 1) + 1);
+                    if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                        edited.min(at(i - 2, j - 2) + 1)
+                    } else {
+                        edited
+                    }
+                }
+            };
         }
-        row[0] = i + 1;
     }
-    row.last().copied().unwrap_or(0)
+    table.last().copied().unwrap_or(0)
 }
 
 /// `RoverMk2` to `rover_mk2`.
@@ -68,6 +75,7 @@ mod tests {
         assert_eq!(nearest("gnss", ["imu", "wheels"]), None);
         assert_eq!(nearest("a", ["b"]), None);
         assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(distance("dge", "deg"), 1);
     }
 
     #[test]

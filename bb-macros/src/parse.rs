@@ -12,7 +12,7 @@ mod robot;
 mod sensor;
 mod setting;
 
-pub(crate) use component::{Component, Declared, OptionValue};
+pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
 pub(crate) use input::{Input, Path};
 pub(crate) use joint::{Axis, Joint, JointKind, Limit, Origin};

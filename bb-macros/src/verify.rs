@@ -13,8 +13,8 @@ mod one_driver;
 mod one_root;
 mod positive_values;
 mod sensor_nested_input;
-mod single_settings;
 mod single_input_tolerance;
+mod single_settings;
 mod unique_names;
 
 use crate::diagnostics::Diagnostics;
@@ -57,6 +57,7 @@ pub(crate) fn verify<'a>(robot: &'a Robot, diagnostics: &mut Diagnostics) -> Opt
     if diagnostics.any() {
         return None;
     }
-    let sources = robot.estimators.iter().map(|estimator| estimator.inputs.iter().map(|input| input.source).collect());
+    let sources =
+        robot.estimators.iter().map(|estimator| estimator.inputs.iter().map(|input| input.source).collect());
     Some(Verified { robot, name: robot.name.as_ref()?, sources: sources.collect::<Option<_>>()? })
 }

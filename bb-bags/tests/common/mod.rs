@@ -42,24 +42,15 @@ impl Maker {
 
     pub fn topic_encoded(&mut self, name: &str, schema: &str, encoding: &str) -> u16 {
         let schema = self.writer.add_schema(schema, "ros2msg", b"").expect("schema");
-        self.writer
-            .add_channel(schema, name, encoding, &BTreeMap::new())
-            .expect("channel")
+        self.writer.add_channel(schema, name, encoding, &BTreeMap::new()).expect("channel")
     }
 
     /// Writes the messages 0, 10, 20, … ms after 12 s.
     pub fn bytes(&mut self, channel_id: u16, payload: &[u8]) {
         let log_time = 12_000_000_000 + 10_000_000 * self.messages;
         let sequence = self.messages as u32;
-        let header = MessageHeader {
-            channel_id,
-            sequence,
-            log_time,
-            publish_time: log_time,
-        };
-        self.writer
-            .write_to_known_channel(&header, payload)
-            .expect("message");
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        self.writer.write_to_known_channel(&header, payload).expect("message");
         self.messages += 1;
     }
 
@@ -86,25 +77,14 @@ pub fn big(message: &impl Serialize) -> Vec<u8> {
 }
 
 pub fn header(sec: i32) -> Header {
-    Header {
-        stamp: Stamp { sec, nanosec: 500 },
-        frame_id: "imu_link".into(),
-    }
+    Header { stamp: Stamp { sec, nanosec: 500 }, frame_id: "imu_link".into() }
 }
 
 pub fn imu(sec: i32) -> Imu {
     Imu {
         header: header(sec),
-        angular_velocity: Vector3 {
-            x: 0.1,
-            y: -0.2,
-            z: f64::from(sec),
-        },
-        linear_acceleration: Vector3 {
-            x: 0.0,
-            y: 0.0,
-            z: 9.81,
-        },
+        angular_velocity: Vector3 { x: 0.1, y: -0.2, z: f64::from(sec) },
+        linear_acceleration: Vector3 { x: 0.0, y: 0.0, z: 9.81 },
         ..Imu::default()
     }
 }

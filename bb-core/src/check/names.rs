@@ -96,7 +96,8 @@ pub const fn nested_index(estimator: &str, fields: &[InputField]) -> usize {
     while index < fields.len() {
         if !fields[index].optional {
             if only.is_some() {
-                let text = Text::new("").name(estimator).push(" needs several inputs, and a nested estimator has one; ");
+                let text =
+                    Text::new("").name(estimator).push(" needs several inputs, and a nested estimator has one; ");
                 panic!("{}", text.push("declare it on the link, with an `input` for each").as_str())
             }
             only = Some(index);
@@ -113,7 +114,8 @@ pub const fn nested_index(estimator: &str, fields: &[InputField]) -> usize {
 #[track_caller]
 pub const fn check_outputs(estimator: &str, fields: &[&str]) {
     if !fields.is_empty() {
-        let text = Text::new("").name(estimator).push(" has several outputs; declare the ones to publish, `output ");
+        let text =
+            Text::new("").name(estimator).push(" has several outputs; declare the ones to publish, `output ");
         panic!("{}", list(text.push(fields[0]).push(";`, of "), fields).as_str())
     }
 }

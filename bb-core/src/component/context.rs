@@ -39,6 +39,12 @@ impl Context {
         let declared = self.declaration.inputs.iter().find(|declared| declared.name == input);
         declared.map_or_else(Isometry3::identity, |declared| declared.frame_from_input.isometry())
     }
+
+    /// The same for the driver, or for the only input.
+    pub fn frame_from_driver(&self) -> Isometry3<f64> {
+        let driver = self.declaration.inputs.iter().find(|declared| declared.driver);
+        driver.map_or_else(Isometry3::identity, |declared| declared.frame_from_input.isometry())
+    }
 }
 
 /// What a sensor is told when it starts.

@@ -61,10 +61,7 @@ pub trait Estimator: Sized + Send + 'static {
     ///
     /// # Errors
     /// What keeps it from going on; it is stopped and the fault is reported.
-    fn handle_input(
-        &mut self,
-        input: <Self::Input as Inputs>::View<'_>,
-    ) -> Result<Reply<Self::Output>, Fault>;
+    fn handle_input(&mut self, input: <Self::Input as Inputs>::View<'_>) -> Result<Reply<Self::Output>, Fault>;
 
     /// Cleans up, before it stops.
     fn terminate(&mut self) {}

@@ -184,7 +184,9 @@ impl<T: Payload> Slot<T> {
             return Some(SyncMiss { input: declaration.index, age_nanos: None });
         };
         let age_nanos = time.nanos_since(message.monotonic_time);
-        declaration.is_too_old(age_nanos).then_some(SyncMiss { input: declaration.index, age_nanos: Some(age_nanos) })
+        declaration
+            .is_too_old(age_nanos)
+            .then_some(SyncMiss { input: declaration.index, age_nanos: Some(age_nanos) })
     }
 
     /// The message, if it has arrived and is not too old for a driver of `time`; from then on it counts as seen.
@@ -199,9 +201,4 @@ impl<T: Payload> Slot<T> {
         let input = self.declaration.map_or(usize::MAX, |declaration| declaration.index);
         self.take(time).ok_or(SyncMiss { input, age_nanos: None })
     }
-}
-
-/// Puts the names of inputs or outputs into a sentence.
-pub(crate) fn describe(names: impl Iterator<Item = &'static str>) -> String {
-    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }

@@ -32,7 +32,23 @@ macro_rules! always_finite {
 
 finite_floats!(f32, f64);
 always_finite!(
-    (), bool, char, i8, i16, i32, i64, i128, isize, u8, u16, u32, u64, u128, usize, String, &'static str
+    (),
+    bool,
+    char,
+    i8,
+    i16,
+    i32,
+    i64,
+    i128,
+    isize,
+    u8,
+    u16,
+    u32,
+    u64,
+    u128,
+    usize,
+    String,
+    &'static str
 );
 
 impl<T: Finite> Finite for Option<T> {

@@ -77,7 +77,9 @@ impl<E: Estimator> Node<E> {
     ) where
         E::Input: InputAt<I>,
     {
-        let Some(declared) = self.declaration.inputs.get(input) else { return };
+        let Some(declared) = self.declaration.inputs.get(input) else {
+            return;
+        };
         let mut state = self.lock();
         let State { estimator, cache, admission, .. } = &mut *state;
         self.counters.inputs[input].received.increment();
@@ -101,11 +103,8 @@ impl<E: Estimator> Node<E> {
         // The estimator is dropped after a panic, so nothing sees what the panic left half done.
         match caught(|| running.handle_input(view)) {
             Ok(reply) => {
-                let stamp = Stamp {
-                    monotonic_time: message.monotonic_time,
-                    wall_time: message.wall_time,
-                    ..self.template
-                };
+                let stamp =
+                    Stamp { monotonic_time: message.monotonic_time, wall_time: message.wall_time, ..self.template };
                 self.complete(reply, stamp, emit);
             }
             Err(fault) => self.stop(&mut state, &fault),
@@ -113,12 +112,7 @@ impl<E: Estimator> Node<E> {
     }
 
     #[inline]
-    fn complete(
-        &self,
-        reply: Reply<E::Output>,
-        stamp: Stamp,
-        emit: impl FnOnce(&mut Option<E::Output>, Stamp),
-    ) {
+    fn complete(&self, reply: Reply<E::Output>, stamp: Stamp, emit: impl FnOnce(&mut Option<E::Output>, Stamp)) {
         let Reply { mut output, diverged } = reply;
         if let Some(reason) = diverged {
             self.counters.diverged.increment();
@@ -140,7 +134,9 @@ impl<E: Estimator> Node<E> {
     #[cold]
     fn miss(&self, miss: SyncMiss) {
         self.counters.drop(miss.input, DropReason::SyncMiss);
-        let Some(input) = self.declaration.inputs.get(miss.input) else { return };
+        let Some(input) = self.declaration.inputs.get(miss.input) else {
+            return;
+        };
         let (age_nanos, tolerance_nanos) = (miss.age_nanos, input.tolerance_nanos);
         let (estimator, input) = (self.declaration.path, input.name);
         tracing::debug!(estimator, input, age_nanos, tolerance_nanos, "dispatch dropped for sync");

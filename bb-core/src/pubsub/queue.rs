@@ -51,8 +51,7 @@ impl<M> Queue<M> {
     /// All its room is made here, so that publishing allocates nothing.
     pub(super) fn new(overflow: Overflow) -> Self {
         let capacity = overflow.capacity();
-        let state =
-            State { messages: VecDeque::with_capacity(capacity), lagged: 0, closed: false, waker: None };
+        let state = State { messages: VecDeque::with_capacity(capacity), lagged: 0, closed: false, waker: None };
         Self { state: Mutex::new(state), arrived: Condvar::new(), capacity }
     }
 

@@ -30,8 +30,11 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn topics() -> Self::Topics;
     /// Starts all estimators.
     #[doc(hidden)]
-    fn wire(topics: Self::Topics, options: &mut Self::Options, startup: &Startup)
-    -> Result<Self::Wiring, StartError>;
+    fn wire(
+        topics: Self::Topics,
+        options: &mut Self::Options,
+        startup: &Startup,
+    ) -> Result<Self::Wiring, StartError>;
     /// Starts all sensors.
     #[doc(hidden)]
     fn sources(

@@ -38,7 +38,9 @@ impl<R: Robot> Simulation<R> {
 
     /// Moves time on to the next sensor that is due and reads it; false once all have finished.
     pub fn step(&mut self) -> bool {
-        let Some(Reverse((time, index))) = self.due.pop() else { return false };
+        let Some(Reverse((time, index))) = self.due.pop() else {
+            return false;
+        };
         self.clock().advance_to(time);
         if let Some(source) = self.sources.get_mut(index) {
             source.fire();

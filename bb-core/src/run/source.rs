@@ -56,12 +56,8 @@ impl Startup {
     ) -> Result<Box<dyn Source>, StartError> {
         let refused = |fault: Fault| StartError::component(declaration.path, fault);
         options.validate().map_err(|message| refused(Fault::new(message)))?;
-        let context = SensorContext {
-            robot: self.robot(),
-            declaration,
-            clock: self.clock.clone(),
-            stop: self.stop.clone(),
-        };
+        let context =
+            SensorContext { robot: self.robot(), declaration, clock: self.clock.clone(), stop: self.stop.clone() };
         let sensor = caught(|| S::init(options, &context)).map_err(refused)?;
         let due = Some(self.clock.now());
         let startup = self.clone();
@@ -71,7 +67,9 @@ impl Startup {
 
 impl<S: Sensor, P: Fn(&Stamped<S::Output>) + Send> Running<S, P> {
     fn publish(&self, reading: &mut Reading<S::Output>, now: MonotonicTime) {
-        let Some(payload) = reading.payload.take() else { return };
+        let Some(payload) = reading.payload.take() else {
+            return;
+        };
         let monotonic_time = reading.time.unwrap_or(now);
         let stamp = Stamp {
             monotonic_time,

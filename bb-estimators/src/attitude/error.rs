@@ -28,11 +28,7 @@ impl OrientationError {
         let error = estimate.quaternion() * truth.quaternion().conjugate();
         let [x, y, z, w] = error.coords.into();
         if !(w + x + y + z).is_finite() {
-            return Some(Self {
-                total: f64::NAN,
-                heading: f64::NAN,
-                inclination: f64::NAN,
-            });
+            return Some(Self { total: f64::NAN, heading: f64::NAN, inclination: f64::NAN });
         }
         // The arctangents are the same angles as the arccosines of the definition, and exact near 0.
         Some(Self {
@@ -136,10 +132,7 @@ mod tests {
         let mut statistics = ErrorStatistics::new();
         assert_eq!(statistics.rms(), None);
         statistics.add(OrientationError::between(&truth(), &nan));
-        assert_eq!(
-            (statistics.count(), statistics.skipped(), statistics.rms()),
-            (0, 1, None)
-        );
+        assert_eq!((statistics.count(), statistics.skipped(), statistics.rms()), (0, 1, None));
         statistics.add(OrientationError::between(&turned(0.3), &truth()));
         statistics.add(OrientationError::between(&turned(-0.4), &truth()));
         let rms = statistics.rms().unwrap();

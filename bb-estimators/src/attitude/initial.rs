@@ -37,10 +37,7 @@ impl fmt::Display for InitialError {
         match self {
             Self::NonFinite { quantity } => write!(f, "{quantity} is not finite"),
             Self::FreeFall => {
-                write!(
-                    f,
-                    "specific force is below {FREE_FALL} m/s²: it does not show where up is"
-                )
+                write!(f, "specific force is below {FREE_FALL} m/s²: it does not show where up is")
             }
             Self::NoHorizontalField => {
                 f.write_str("magnetic field has no horizontal part: it does not show a heading")
@@ -67,9 +64,7 @@ pub fn initial_orientation(
     magnetic_field: Option<&Vector3<f64>>,
 ) -> Result<UnitQuaternion<f64>, InitialError> {
     if !specific_force.iter().all(|component| component.is_finite()) {
-        return Err(InitialError::NonFinite {
-            quantity: Quantity::SpecificForce,
-        });
+        return Err(InitialError::NonFinite { quantity: Quantity::SpecificForce });
     }
     let up = scaled_direction(specific_force, FREE_FALL).ok_or(InitialError::FreeFall)?;
     let level = turn_upright(&UnitQuaternion::identity(), &up);
@@ -77,9 +72,7 @@ pub fn initial_orientation(
         return Ok(level);
     };
     if !field.iter().all(|component| component.is_finite()) {
-        return Err(InitialError::NonFinite {
-            quantity: Quantity::MagneticField,
-        });
+        return Err(InitialError::NonFinite { quantity: Quantity::MagneticField });
     }
     let field = scaled_direction(field, 0.0).ok_or(InitialError::NoHorizontalField)?;
     let error = heading_error(&(level * field)).ok_or(InitialError::NoHorizontalField)?;
@@ -120,21 +113,12 @@ mod tests {
 
     #[test]
     fn every_orientation_is_found_again() {
-        for (roll, pitch, yaw) in [
-            (0.1, 0.2, 0.3),
-            (-3.0, 1.5, -2.0),
-            (PI - 1e-6, 0.0, 1.0),
-            (0.0, 0.5 * PI, 3.0),
-        ] {
+        for (roll, pitch, yaw) in [(0.1, 0.2, 0.3), (-3.0, 1.5, -2.0), (PI - 1e-6, 0.0, 1.0), (0.0, 0.5 * PI, 3.0)]
+        {
             let truth = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
             let body_from_world = truth.inverse();
-            let found =
-                initial_orientation(&(body_from_world * UP), Some(&(body_from_world * FIELD))).unwrap();
-            assert!(
-                found.angle_to(&truth) < 1e-10,
-                "{roll} {pitch} {yaw}: {}",
-                found.angle_to(&truth)
-            );
+            let found = initial_orientation(&(body_from_world * UP), Some(&(body_from_world * FIELD))).unwrap();
+            assert!(found.angle_to(&truth) < 1e-10, "{roll} {pitch} {yaw}: {}", found.angle_to(&truth));
         }
     }
 
@@ -172,29 +156,14 @@ mod tests {
         let nan = Vector3::new(0.0, f64::NAN, 1.0);
         let infinite = Vector3::new(0.0, f64::INFINITY, 1.0);
         assert_eq!(initial_orientation(&zero, None), Err(InitialError::FreeFall));
-        assert_eq!(
-            initial_orientation(&(UP * 0.01), None),
-            Err(InitialError::FreeFall)
-        );
-        assert_eq!(
-            initial_orientation(&UP, Some(&zero)),
-            Err(InitialError::NoHorizontalField)
-        );
-        assert_eq!(
-            initial_orientation(&UP, Some(&-UP)),
-            Err(InitialError::NoHorizontalField)
-        );
+        assert_eq!(initial_orientation(&(UP * 0.01), None), Err(InitialError::FreeFall));
+        assert_eq!(initial_orientation(&UP, Some(&zero)), Err(InitialError::NoHorizontalField));
+        assert_eq!(initial_orientation(&UP, Some(&-UP)), Err(InitialError::NoHorizontalField));
         for bad in [nan, infinite] {
             let quantity = Quantity::SpecificForce;
-            assert_eq!(
-                initial_orientation(&bad, None),
-                Err(InitialError::NonFinite { quantity })
-            );
+            assert_eq!(initial_orientation(&bad, None), Err(InitialError::NonFinite { quantity }));
             let quantity = Quantity::MagneticField;
-            assert_eq!(
-                initial_orientation(&UP, Some(&bad)),
-                Err(InitialError::NonFinite { quantity })
-            );
+            assert_eq!(initial_orientation(&UP, Some(&bad)), Err(InitialError::NonFinite { quantity }));
         }
     }
 }

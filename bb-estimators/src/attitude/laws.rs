@@ -167,12 +167,7 @@ pub(super) fn samples() -> impl Strategy<Value = Vec<ImuSample>> {
             .into_iter()
             .map(|(dt_ns, angular_velocity, specific_force, magnetic_field)| {
                 time_ns += dt_ns;
-                ImuSample {
-                    time_ns,
-                    angular_velocity,
-                    specific_force,
-                    magnetic_field,
-                }
+                ImuSample { time_ns, angular_velocity, specific_force, magnetic_field }
             })
             .collect();
         samples[0].magnetic_field = Some(first_field);
@@ -187,23 +182,16 @@ pub(super) fn wild_samples() -> impl Strategy<Value = Vec<ImuSample>> {
     let tame = || prop_oneof![vector(1e3), vector(1e-160), Just(Vector3::zeros())];
     let any_vector = move || prop_oneof![1 => (number(), number(), number()).prop_map(|(x, y, z)| Vector3::new(x, y, z)), 2 => tame()];
     let time_ns = prop_oneof![3 => 0..2_000_000_000_i64, 1 => any::<i64>()];
-    let one = (
-        time_ns,
-        any_vector(),
-        any_vector(),
-        proptest::option::of(any_vector()),
-    );
+    let one = (time_ns, any_vector(), any_vector(), proptest::option::of(any_vector()));
     proptest::collection::vec(one, 2..100).prop_map(|parts| {
         let mut samples: Vec<_> = parts
             .into_iter()
-            .map(
-                |(time_ns, angular_velocity, specific_force, magnetic_field)| ImuSample {
-                    time_ns,
-                    angular_velocity,
-                    specific_force,
-                    magnetic_field,
-                },
-            )
+            .map(|(time_ns, angular_velocity, specific_force, magnetic_field)| ImuSample {
+                time_ns,
+                angular_velocity,
+                specific_force,
+                magnetic_field,
+            })
             .collect();
         // Mostly in order, so that most are taken.
         let half = samples.len() / 2;
@@ -222,23 +210,14 @@ pub(super) fn unit_norm<F: Filter>(filter: &F, samples: &[ImuSample]) -> Result<
     for sample in samples {
         let _ = filter.update(sample);
         let orientation = filter.world_from_body();
-        prop_assert!(
-            orientation.is_some() || !started,
-            "started filters have an orientation"
-        );
-        prop_assert!(
-            orientation.as_ref().is_none_or(is_unit),
-            "{orientation:?} after {sample:?}"
-        );
+        prop_assert!(orientation.is_some() || !started, "started filters have an orientation");
+        prop_assert!(orientation.as_ref().is_none_or(is_unit), "{orientation:?} after {sample:?}");
         started = orientation.is_some();
     }
     Ok(())
 }
 
-pub(super) fn refused_changes_nothing<F: Filter>(
-    filter: &F,
-    samples: &[ImuSample],
-) -> Result<(), TestCaseError> {
+pub(super) fn refused_changes_nothing<F: Filter>(filter: &F, samples: &[ImuSample]) -> Result<(), TestCaseError> {
     let mut filter = filter.clone();
     for sample in samples {
         let before = filter.clone();
@@ -291,30 +270,18 @@ pub(super) fn heading_reference<F: Filter>(
     for sample in samples {
         filter.update(sample).unwrap();
         turned.update(sample).unwrap();
-        let (plain, turned) = (
-            filter.world_from_body().unwrap(),
-            turned.world_from_body().unwrap(),
-        );
+        let (plain, turned) = (filter.world_from_body().unwrap(), turned.world_from_body().unwrap());
         prop_assert!(turned.angle_to(&(turn * plain)) < 1e-6);
     }
     Ok(())
 }
 
-pub(super) fn field_unit<F: Filter>(
-    filter: &F,
-    samples: &[ImuSample],
-    scale: f64,
-) -> Result<(), TestCaseError> {
+pub(super) fn field_unit<F: Filter>(filter: &F, samples: &[ImuSample], scale: f64) -> Result<(), TestCaseError> {
     let (mut filter, mut scaled) = (filter.clone(), filter.clone());
     for sample in samples {
         filter.update(sample).unwrap();
         let magnetic_field = sample.magnetic_field.map(|field| field * scale);
-        scaled
-            .update(&ImuSample {
-                magnetic_field,
-                ..*sample
-            })
-            .unwrap();
+        scaled.update(&ImuSample { magnetic_field, ..*sample }).unwrap();
         if let (Some(plain), Some(scaled)) = (filter.world_from_body(), scaled.world_from_body()) {
             prop_assert!(plain.angle_to(&scaled) < 1e-6);
         }
@@ -335,19 +302,12 @@ pub(super) fn unit_norm_for_ever<F: Filter>(filter: &F) {
             })
             .unwrap();
         let norm = filter.world_from_body().unwrap().norm();
-        assert!(
-            (norm - 1.0).abs() < 4.0 * f64::EPSILON,
-            "norm {norm} after {i} samples"
-        );
+        assert!((norm - 1.0).abs() < 4.0 * f64::EPSILON, "norm {norm} after {i} samples");
     }
 }
 
 /// Runs a filter at rest in `truth` at 100 Hz, from `start`, and returns where it ends.
-fn settle<F: Filter>(
-    filter: &F,
-    start: UnitQuaternion<f64>,
-    truth: &UnitQuaternion<f64>,
-) -> UnitQuaternion<f64> {
+fn settle<F: Filter>(filter: &F, start: UnitQuaternion<f64>, truth: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let mut filter = filter.clone();
     filter.start_at(0, start).unwrap();
     for i in 1..20_000 {
@@ -369,19 +329,12 @@ fn starts() -> [UnitQuaternion<f64>; 6] {
 }
 
 pub(super) fn tilt_converges<F: Filter>(filter: &F) {
-    for truth in [
-        UnitQuaternion::identity(),
-        UnitQuaternion::from_euler_angles(0.5, -0.3, 1.0),
-    ] {
+    for truth in [UnitQuaternion::identity(), UnitQuaternion::from_euler_angles(0.5, -0.3, 1.0)] {
         for start in starts() {
             // Rotated by the truth, so that some starts are exactly upside down.
             let end = settle(filter, truth * start, &truth);
             let error = (end * truth.inverse() * Vector3::z()).angle(&Vector3::z());
-            assert!(
-                error.to_degrees() < 0.1,
-                "{} degrees from {start}",
-                error.to_degrees()
-            );
+            assert!(error.to_degrees() < 0.1, "{} degrees from {start}", error.to_degrees());
         }
     }
 }
@@ -390,20 +343,12 @@ pub(super) fn heading_converges<F: Filter>(filter: &F) {
     let truth = UnitQuaternion::from_euler_angles(0.5, -0.3, 1.0);
     for start in starts() {
         let error = settle(filter, start, &truth).angle_to(&truth);
-        assert!(
-            error.to_degrees() < 0.1,
-            "{} degrees from {start}",
-            error.to_degrees()
-        );
+        assert!(error.to_degrees() < 0.1, "{} degrees from {start}", error.to_degrees());
     }
     for heading in [-3.0, -1.0, 2.0] {
         let start = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading) * truth;
         let error = settle(filter, start, &truth).angle_to(&truth);
-        assert!(
-            error.to_degrees() < 0.1,
-            "{} degrees from heading {heading}",
-            error.to_degrees()
-        );
+        assert!(error.to_degrees() < 0.1, "{} degrees from heading {heading}", error.to_degrees());
     }
 }
 
@@ -416,26 +361,15 @@ pub(super) fn heading_is_left_alone<F: Filter>(filter: &F) {
 
 pub(super) fn constant_rotation<F: Filter>(filter: &F) {
     let start = UnitQuaternion::from_euler_angles(0.2, 0.4, -1.0);
-    for rate in [
-        Vector3::new(2.0, 0.0, 0.0),
-        Vector3::new(0.0, 0.0, -5.0),
-        Vector3::new(1.0, -2.0, 3.0),
-    ] {
+    for rate in [Vector3::new(2.0, 0.0, 0.0), Vector3::new(0.0, 0.0, -5.0), Vector3::new(1.0, -2.0, 3.0)] {
         let mut filter = filter.clone();
         filter.start_at(0, start).unwrap();
         for i in 1..6_000 {
             let truth = start * UnitQuaternion::from_scaled_axis(rate * (i as f64 * 0.01));
-            let sample = ImuSample {
-                angular_velocity: rate,
-                ..at_rest(i * 10_000_000, &truth)
-            };
+            let sample = ImuSample { angular_velocity: rate, ..at_rest(i * 10_000_000, &truth) };
             filter.update(&sample).unwrap();
             let error = filter.world_from_body().unwrap().angle_to(&truth);
-            assert!(
-                error.to_degrees() < 0.1,
-                "{} degrees at sample {i}",
-                error.to_degrees()
-            );
+            assert!(error.to_degrees() < 0.1, "{} degrees at sample {i}", error.to_degrees());
         }
     }
 }
@@ -444,16 +378,9 @@ pub(super) fn first_sample<F: Filter>(nine: &F, six: &F) {
     let truth = UnitQuaternion::from_euler_angles(2.5, -0.7, 1.0);
     let (mut nine, mut six) = (nine.clone(), six.clone());
     assert_eq!(nine.world_from_body(), None);
-    let fall = ImuSample {
-        specific_force: Vector3::zeros(),
-        ..at_rest(0, &truth)
-    };
+    let fall = ImuSample { specific_force: Vector3::zeros(), ..at_rest(0, &truth) };
     nine.update(&fall).unwrap();
-    assert_eq!(
-        nine.world_from_body(),
-        None,
-        "free fall does not show where up is"
-    );
+    assert_eq!(nine.world_from_body(), None, "free fall does not show where up is");
     nine.update(&at_rest(10_000_000, &truth)).unwrap();
     assert!(nine.world_from_body().unwrap().angle_to(&truth) < 1e-12);
     six.update(&at_rest(0, &truth)).unwrap();
@@ -466,12 +393,7 @@ pub(super) fn first_field<F: Filter>(filter: &F) {
     let truth = UnitQuaternion::from_euler_angles(0.5, -0.7, 2.0);
     let mut filter = filter.clone();
     for i in 0..100 {
-        filter
-            .update(&ImuSample {
-                magnetic_field: None,
-                ..at_rest(i * 10_000_000, &truth)
-            })
-            .unwrap();
+        filter.update(&ImuSample { magnetic_field: None, ..at_rest(i * 10_000_000, &truth) }).unwrap();
     }
     assert!(filter.world_from_body().unwrap().angle_to(&truth) > 1.0);
     filter.update(&at_rest(1_000_000_000, &truth)).unwrap();
@@ -502,56 +424,29 @@ pub(super) fn gap<F: Filter>(nine: &F, six: &F) {
     let before = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.8);
     let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.5);
     let truth = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -2.0) * tilt;
-    let sample = ImuSample {
-        angular_velocity: Vector3::new(9.0, 9.0, 9.0),
-        ..at_rest(after_ns, &truth)
-    };
+    let sample = ImuSample { angular_velocity: Vector3::new(9.0, 9.0, 9.0), ..at_rest(after_ns, &truth) };
 
     let mut six = six.clone();
     six.start_at(0, before).unwrap();
     six.update(&sample).unwrap();
     let orientation = six.world_from_body().unwrap();
-    assert!(
-        (orientation * sample.specific_force - UP).norm() < 1e-12,
-        "tilt is the accelerometer's"
-    );
+    assert!((orientation * sample.specific_force - UP).norm() < 1e-12, "tilt is the accelerometer's");
     let turned = orientation * before.inverse();
     assert!(turned.k.abs() < 1e-12, "heading is kept");
 
     let mut nine = nine.clone();
     nine.start_at(0, before).unwrap();
-    nine.update(&ImuSample {
-        magnetic_field: None,
-        ..sample
-    })
-    .unwrap();
-    assert!(
-        nine.world_from_body().unwrap().angle_to(&orientation) < 1e-12,
-        "no field, the same"
-    );
+    nine.update(&ImuSample { magnetic_field: None, ..sample }).unwrap();
+    assert!(nine.world_from_body().unwrap().angle_to(&orientation) < 1e-12, "no field, the same");
     nine.update(&at_rest(after_ns + 1_000_000, &truth)).unwrap();
-    assert!(
-        nine.world_from_body().unwrap().angle_to(&truth) < 0.01,
-        "the next field sets the heading"
-    );
+    assert!(nine.world_from_body().unwrap().angle_to(&truth) < 0.01, "the next field sets the heading");
     nine.update(&at_rest(i64::MAX, &before)).unwrap();
-    assert!(
-        nine.world_from_body().unwrap().angle_to(&before) < 1e-12,
-        "a field at once sets it at once"
-    );
+    assert!(nine.world_from_body().unwrap().angle_to(&before) < 1e-12, "a field at once sets it at once");
 
     let mut nine = nine.clone();
     nine.start_at(i64::MIN, before).unwrap();
-    nine.update(&ImuSample {
-        specific_force: Vector3::zeros(),
-        magnetic_field: None,
-        ..sample
-    })
-    .unwrap();
-    assert!(
-        nine.world_from_body().unwrap().angle_to(&before) < 1e-12,
-        "nothing known, nothing changed"
-    );
+    nine.update(&ImuSample { specific_force: Vector3::zeros(), magnetic_field: None, ..sample }).unwrap();
+    assert!(nine.world_from_body().unwrap().angle_to(&before) < 1e-12, "nothing known, nothing changed");
 }
 
 pub(super) fn bad_samples<F: Filter>(filter: &F) {
@@ -559,24 +454,15 @@ pub(super) fn bad_samples<F: Filter>(filter: &F) {
     let good = at_rest(5, &UnitQuaternion::identity());
     filter.update(&good).unwrap();
     let before = filter.clone();
-    let next = ImuSample {
-        time_ns: 10_000_000,
-        ..good
-    };
+    let next = ImuSample { time_ns: 10_000_000, ..good };
     let nan = Vector3::new(1.0, f64::NAN, 1.0);
     let infinite = Vector3::new(0.0, 0.0, f64::NEG_INFINITY);
     let huge = Vector3::new(0.0, -1e300, 0.0);
     type Set = fn(&mut ImuSample, Vector3<f64>);
     let quantities: [(Quantity, Set); 3] = [
-        (Quantity::AngularVelocity, |sample, value| {
-            sample.angular_velocity = value
-        }),
-        (Quantity::SpecificForce, |sample, value| {
-            sample.specific_force = value
-        }),
-        (Quantity::MagneticField, |sample, value| {
-            sample.magnetic_field = Some(value)
-        }),
+        (Quantity::AngularVelocity, |sample, value| sample.angular_velocity = value),
+        (Quantity::SpecificForce, |sample, value| sample.specific_force = value),
+        (Quantity::MagneticField, |sample, value| sample.magnetic_field = Some(value)),
     ];
     for (quantity, set) in quantities {
         for value in [nan, infinite] {
@@ -587,23 +473,15 @@ pub(super) fn bad_samples<F: Filter>(filter: &F) {
         let mut bad = next;
         set(&mut bad, huge);
         let result = filter.update(&bad);
-        assert!(
-            matches!(result, Err(SampleError::OutOfRange { quantity: q, value: 1e300, .. }) if q == quantity)
-        );
+        assert!(matches!(result, Err(SampleError::OutOfRange { quantity: q, value: 1e300, .. }) if q == quantity));
     }
     for time_ns in [5, 4, i64::MIN] {
-        let error = SampleError::TimeNotIncreasing {
-            previous_ns: 5,
-            time_ns,
-        };
+        let error = SampleError::TimeNotIncreasing { previous_ns: 5, time_ns };
         assert_eq!(filter.update(&ImuSample { time_ns, ..good }), Err(error));
     }
     let broken = Unit::new_unchecked(Quaternion::new(f64::NAN, 0.0, 0.0, 0.0));
     let quantity = Quantity::Orientation;
-    assert_eq!(
-        filter.start_at(7, broken),
-        Err(SampleError::NonFinite { quantity })
-    );
+    assert_eq!(filter.start_at(7, broken), Err(SampleError::NonFinite { quantity }));
     assert_eq!(filter, before);
     filter.update(&next).unwrap();
 }
@@ -611,11 +489,7 @@ pub(super) fn bad_samples<F: Filter>(filter: &F) {
 pub(super) fn reset<F: Filter>(filter: &F) {
     let mut used = filter.clone();
     for i in 0..10 {
-        used.update(&at_rest(
-            i * 10_000_000,
-            &UnitQuaternion::from_euler_angles(1.0, 0.5, 0.2),
-        ))
-        .unwrap();
+        used.update(&at_rest(i * 10_000_000, &UnitQuaternion::from_euler_angles(1.0, 0.5, 0.2))).unwrap();
     }
     used.reset();
     assert_eq!(&used, filter);

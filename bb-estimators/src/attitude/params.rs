@@ -20,17 +20,8 @@ pub struct ParamsError {
 
 impl fmt::Display for ParamsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            parameter,
-            value,
-            min,
-            max,
-            unit,
-        } = self;
-        write!(
-            f,
-            "`{parameter}` is {value} {unit}: choose a value from {min} to {max} {unit}"
-        )
+        let Self { parameter, value, min, max, unit } = self;
+        write!(f, "`{parameter}` is {value} {unit}: choose a value from {min} to {max} {unit}")
     }
 }
 
@@ -46,11 +37,5 @@ pub(super) fn accept(
     if (min..=max).contains(&value) {
         return Ok(());
     }
-    Err(ParamsError {
-        parameter,
-        value,
-        min,
-        max,
-        unit,
-    })
+    Err(ParamsError { parameter, value, min, max, unit })
 }

@@ -37,12 +37,7 @@ pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64
 pub(super) fn turn_heading(world_from_body: &UnitQuaternion<f64>, angle: f64) -> UnitQuaternion<f64> {
     let (s, c) = (0.5 * angle).sin_cos();
     let q = world_from_body;
-    unit(
-        c * q.w - s * q.k,
-        c * q.i - s * q.j,
-        c * q.j + s * q.i,
-        c * q.k + s * q.w,
-    )
+    unit(c * q.w - s * q.k, c * q.i - s * q.j, c * q.j + s * q.i, c * q.k + s * q.w)
 }
 
 /// Turns `world_from_body` by the shortest rotation, about a horizontal axis, that takes the world vector `up`
@@ -52,11 +47,7 @@ pub(super) fn turn_upright(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f
     // (x² + y²) / (n - z) is the same number without that.
     let horizontal = up.x * up.x + up.y * up.y;
     let norm = (horizontal + up.z * up.z).sqrt();
-    let w = if up.z > 0.0 {
-        norm + up.z
-    } else {
-        horizontal / (norm - up.z)
-    };
+    let w = if up.z > 0.0 { norm + up.z } else { horizontal / (norm - up.z) };
     let squared = w * w + horizontal;
     let (w, x, y) = if squared > 0.0 {
         let scale = 1.0 / squared.sqrt();
@@ -93,9 +84,7 @@ mod tests {
     fn agrees_with_the_exponential_at_every_angle() {
         let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
         let axis = Vector3::new(0.48, -0.6, 0.64);
-        for angle in [
-            0.0, 1e-300, 1e-9, 1e-3, 0.05, 0.0999, 0.1001, 1.0, 3.1, 6.0, 500.0,
-        ] {
+        for angle in [0.0, 1e-300, 1e-9, 1e-3, 0.05, 0.0999, 0.1001, 1.0, 3.1, 6.0, 500.0] {
             let rotation = axis * angle;
             let exact = start * UnitQuaternion::from_scaled_axis(rotation);
             let turned = turn(&start, &rotation);
@@ -109,11 +98,7 @@ mod tests {
         let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
         let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.7) * start;
         assert!(turn_heading(&start, 0.7).angle_to(&heading) < 1e-15);
-        for up in [
-            Vector3::new(3.0, -4.0, 1.0),
-            Vector3::new(1e-9, 0.0, -2.0),
-            Vector3::new(-0.2, 0.1, -5.0),
-        ] {
+        for up in [Vector3::new(3.0, -4.0, 1.0), Vector3::new(1e-9, 0.0, -2.0), Vector3::new(-0.2, 0.1, -5.0)] {
             let upright = turn_upright(&start, &up) * start.inverse();
             assert!((upright * up - Vector3::z() * up.norm()).norm() < 1e-14, "{up}");
             assert!(upright.k.abs() < 1e-15);

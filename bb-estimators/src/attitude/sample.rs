@@ -83,11 +83,7 @@ impl fmt::Display for SampleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NonFinite { quantity } => write!(f, "{quantity} is not finite"),
-            Self::OutOfRange {
-                quantity,
-                value,
-                limit,
-            } => {
+            Self::OutOfRange { quantity, value, limit } => {
                 write!(f, "{quantity} reaches {value:e}, beyond the limit of {limit:e}")
             }
             Self::TimeNotIncreasing { previous_ns, time_ns } => {
@@ -103,11 +99,7 @@ impl ImuSample {
     /// Whether every value is finite and one that a sensor can give.
     #[inline]
     pub(super) fn check(&self, magnetometer: bool) -> Result<(), SampleError> {
-        check(
-            Quantity::AngularVelocity,
-            &self.angular_velocity,
-            MAX_ANGULAR_VELOCITY,
-        )?;
+        check(Quantity::AngularVelocity, &self.angular_velocity, MAX_ANGULAR_VELOCITY)?;
         check(Quantity::SpecificForce, &self.specific_force, MAX_SPECIFIC_FORCE)?;
         match &self.magnetic_field {
             Some(field) if magnetometer => check(Quantity::MagneticField, field, MAX_MAGNETIC_FIELD),
@@ -128,11 +120,7 @@ fn check(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> Result<(), Sam
 #[cold]
 fn refusal(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> SampleError {
     if value.iter().all(|component| component.is_finite()) {
-        SampleError::OutOfRange {
-            quantity,
-            value: value.amax(),
-            limit,
-        }
+        SampleError::OutOfRange { quantity, value: value.amax(), limit }
     } else {
         SampleError::NonFinite { quantity }
     }

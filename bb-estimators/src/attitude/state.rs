@@ -41,12 +41,7 @@ pub(super) struct Step {
 impl AttitudeState {
     /// A state that has seen no sample.
     pub(super) fn new(magnetometer: bool) -> Self {
-        Self {
-            magnetometer,
-            previous_ns: None,
-            world_from_body: None,
-            heading_known: false,
-        }
+        Self { magnetometer, previous_ns: None, world_from_body: None, heading_known: false }
     }
 
     /// Checks a sample. `None` if the state has started or restarted with it and there is nothing to step.
@@ -72,12 +67,7 @@ impl AttitudeState {
             let dt_ns = time_ns.checked_sub(previous_ns).unwrap_or(i64::MAX);
             if dt_ns <= MAX_GAP_NS {
                 let dt_s = dt_ns as f64 * 1e-9;
-                return Ok(Some(Step {
-                    dt_s,
-                    world_from_body,
-                    up,
-                    field,
-                }));
+                return Ok(Some(Step { dt_s, world_from_body, up, field }));
             }
         }
         self.restart(up, field);
@@ -106,9 +96,7 @@ impl AttitudeState {
     ) -> Result<(), SampleError> {
         let norm = world_from_body.norm();
         if !(0.5..2.0).contains(&norm) {
-            return Err(SampleError::NonFinite {
-                quantity: Quantity::Orientation,
-            });
+            return Err(SampleError::NonFinite { quantity: Quantity::Orientation });
         }
         self.previous_ns = Some(time_ns);
         self.world_from_body = Some(Unit::new_normalize(world_from_body.into_inner()));

@@ -2,7 +2,9 @@
 
 use crate::diagnostics::Diagnostics;
 use syn::punctuated::Punctuated;
-use syn::{Attribute, Data, DeriveInput, Expr, Field, Fields, GenericArgument, Lit, Meta, PathArguments, Token, Type};
+use syn::{
+    Attribute, Data, DeriveInput, Expr, Field, Fields, GenericArgument, Lit, Meta, PathArguments, Token, Type,
+};
 
 /// The named fields of a struct; an error for anything else.
 pub(super) fn named<'a>(
@@ -38,7 +40,9 @@ pub(super) fn doc(attributes: &[Attribute]) -> String {
 pub(super) fn wrapped<'a>(kind: &'a Type, wrapper: &str) -> Option<&'a Type> {
     let Type::Path(path) = kind else { return None };
     let last = path.path.segments.last().filter(|segment| segment.ident == wrapper)?;
-    let PathArguments::AngleBracketed(arguments) = &last.arguments else { return None };
+    let PathArguments::AngleBracketed(arguments) = &last.arguments else {
+        return None;
+    };
     arguments.args.iter().find_map(|argument| match argument {
         GenericArgument::Type(kind) => Some(kind),
         _ => None,

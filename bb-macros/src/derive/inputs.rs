@@ -14,9 +14,11 @@ struct Field<'a> {
 }
 
 pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
-    let Some(named) = fields::named(item, "Inputs", diagnostics) else { return TokenStream::new() };
-    let one_lifetime = item.generics.params.len() == 1
-        && matches!(item.generics.params.first(), Some(GenericParam::Lifetime(_)));
+    let Some(named) = fields::named(item, "Inputs", diagnostics) else {
+        return TokenStream::new();
+    };
+    let one_lifetime =
+        item.generics.params.len() == 1 && matches!(item.generics.params.first(), Some(GenericParam::Lifetime(_)));
     if !one_lifetime {
         let message = "a struct of inputs has one lifetime and no other parameter; write `<'a>` behind its name";
         diagnostics.error(&item.ident, message.into());
@@ -25,7 +27,8 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
     let mut inputs = Vec::new();
     for (index, field) in named.iter().enumerate() {
         let inner = fields::wrapped(&field.ty, "Option");
-        let (Some(name), Some(payload)) = (&field.ident, fields::wrapped(inner.unwrap_or(&field.ty), "Input")) else {
+        let (Some(name), Some(payload)) = (&field.ident, fields::wrapped(inner.unwrap_or(&field.ty), "Input"))
+        else {
             let message = "expected `Input<'a, Payload>` or `Option<Input<'a, Payload>>`";
             diagnostics.error(&field.ty, message.into());
             continue;
@@ -36,7 +39,8 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
         return TokenStream::new();
     }
     let name = &item.ident;
-    let slots = inputs.iter().map(|Field { slot, payload, .. }| quote!(#slot: ::bb_core::__private::Slot<#payload>,));
+    let slots =
+        inputs.iter().map(|Field { slot, payload, .. }| quote!(#slot: ::bb_core::__private::Slot<#payload>,));
     let schema = inputs.iter().map(|Field { name, optional, .. }| {
         let name = name.to_string();
         quote!(::bb_core::__private::InputField { name: #name, optional: #optional },)
@@ -61,7 +65,9 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
 /// What happens when field number `driver` is the driver: nothing counts as seen before all others are known to be
 /// there.
 fn input_at(name: &Ident, inputs: &[Field<'_>], driver: usize) -> TokenStream {
-    let Some(Field { slot, payload, .. }) = inputs.get(driver) else { return TokenStream::new() };
+    let Some(Field { slot, payload, .. }) = inputs.get(driver) else {
+        return TokenStream::new();
+    };
     let (mut misses, mut view) = (TokenStream::new(), TokenStream::new());
     for (index, Field { name, slot, optional, .. }) in inputs.iter().enumerate() {
         let mut value = if index == driver {

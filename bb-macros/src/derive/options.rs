@@ -10,7 +10,9 @@ use syn::spanned::Spanned;
 use syn::{DeriveInput, Expr, ExprRange, Field, Lit, LitStr, RangeLimits};
 
 pub(crate) fn options(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
-    let Some(named) = fields::named(item, "Options", diagnostics) else { return TokenStream::new() };
+    let Some(named) = fields::named(item, "Options", diagnostics) else {
+        return TokenStream::new();
+    };
     let (mut schema, mut defaults, mut checks) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
     for field in named {
         let option = Attribute::read(field, diagnostics);
@@ -164,4 +166,3 @@ pub(crate) fn into_if_text(value: &Expr) -> TokenStream {
         other => quote!(#other),
     }
 }
-

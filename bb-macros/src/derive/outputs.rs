@@ -7,7 +7,9 @@ use quote::quote;
 use syn::DeriveInput;
 
 pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
-    let Some(named) = fields::named(item, "Outputs", diagnostics) else { return TokenStream::new() };
+    let Some(named) = fields::named(item, "Outputs", diagnostics) else {
+        return TokenStream::new();
+    };
     let name = &item.ident;
     let (generics, arguments, bounds) = item.generics.split_for_impl();
     let (mut names, mut takes) = (Vec::new(), TokenStream::new());

@@ -1,6 +1,8 @@
 //! The tree to lists: every part gets its number and its path, every input its publisher.
 
-use super::{Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor, SensorId};
+use super::{
+    Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor, SensorId,
+};
 use crate::parse;
 use proc_macro2::Ident;
 use std::collections::HashMap;
@@ -34,7 +36,7 @@ impl Robot {
     fn add_link(&mut self, link: parse::Link, joint: Option<JointId>, above: &[Ident]) -> LinkId {
         let id = self.links.len();
         let path = below(above, &link.name);
-        self.links.push(Link { name: link.name, joint, path: path.clone() });
+        self.links.push(Link { name: link.name, joint });
         for sensor in link.sensors {
             self.add_sensor(sensor, Mount::Link(id), &path);
         }
@@ -53,17 +55,7 @@ impl Robot {
         let path = below(above, &joint.name);
         let parse::Joint { name, kind, kind_word, origins, axes, limits, sensors, links } = joint;
         let children = Vec::new();
-        self.joints.push(Joint {
-            name,
-            kind,
-            kind_word,
-            parent,
-            children,
-            origins,
-            axes,
-            limits,
-            path: path.clone(),
-        });
+        self.joints.push(Joint { name, kind, kind_word, parent, children, origins, axes, limits });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Joint(id), &path);
         }

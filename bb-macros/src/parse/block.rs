@@ -118,7 +118,9 @@ fn head(input: ParseStream<'_>) -> syn::Result<Head> {
 /// Skips to behind the next `;` or `{ … }` of this level.
 fn skip(input: ParseStream<'_>) {
     while !input.is_empty() {
-        let Ok(token) = input.parse::<TokenTree>() else { return };
+        let Ok(token) = input.parse::<TokenTree>() else {
+            return;
+        };
         match token {
             TokenTree::Punct(punct) if punct.as_char() == ';' => return,
             TokenTree::Group(group) if group.delimiter() == Delimiter::Brace => {

@@ -40,11 +40,7 @@ pub(crate) struct Declared<'a> {
 
 impl<'a> Declared<'a> {
     /// Reads what stands behind the word.
-    pub(super) fn parse(
-        head: Head,
-        input: ParseStream<'a>,
-        diagnostics: &mut Diagnostics,
-    ) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'a>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
         input.parse::<Token![:]>()?;
         let component = Component::parse(input)?;
@@ -130,9 +126,8 @@ impl OptionValue {
 /// `Some(Some(number))` for a literal without a unit, `Some(None)` for an expression of several terms, and none where a
 /// suffix may be a unit.
 fn plain_number(expression: &Expr) -> Option<Option<f64>> {
-    const RUST: [&str; 15] = [
-        "", "i8", "i16", "i32", "i64", "i128", "isize", "u8", "u16", "u32", "u64", "u128", "usize", "f32", "f64",
-    ];
+    const RUST: [&str; 15] =
+        ["", "i8", "i16", "i32", "i64", "i128", "isize", "u8", "u16", "u32", "u64", "u128", "usize", "f32", "f64"];
     match expression {
         Expr::Unary(unary) => plain_number(&unary.expr).map(|number| number.map(|number| -number)),
         Expr::Lit(literal) => match &literal.lit {

@@ -3,7 +3,8 @@
 //! Both forms are read alike; that a nested one takes no `input` is a rule, so that the error can say why.
 
 use super::block::{Head, items, unexpected};
-use super::{Component, Declared, Input, Output, Setting};
+use super::component::Declared;
+use super::{Component, Input, Output, Setting};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::Attribute;
@@ -41,7 +42,9 @@ impl Estimator {
             "input" => self.inputs.push(Input::parse(head, input, diagnostics)?),
             "output" => self.outputs.push(Output::parse(head, input, diagnostics)?),
             "sync_tolerance" => self.sync_tolerances.push(Setting::parse(head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "an estimator", &["input", "output", "sync_tolerance"])),
+            _ => {
+                return Err(unexpected(&head.word, "an estimator", &["input", "output", "sync_tolerance"]));
+            }
         }
         Ok(())
     }

@@ -89,7 +89,9 @@ impl Joint {
             "limit" => self.limits.push(Limit::parse(head, input, diagnostics)?),
             "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
             "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "a joint", &["origin", "axis", "limit", "sensor", "link"])),
+            _ => {
+                return Err(unexpected(&head.word, "a joint", &["origin", "axis", "limit", "sensor", "link"]));
+            }
         }
         Ok(())
     }

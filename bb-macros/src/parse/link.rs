@@ -33,7 +33,9 @@ impl Link {
             "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
             "estimator" => self.estimators.push(Estimator::parse(head, input, diagnostics)?),
             "joint" => self.joints.push(Joint::parse(head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "a link", &["sensor", "estimator", "joint"])),
+            _ => {
+                return Err(unexpected(&head.word, "a link", &["sensor", "estimator", "joint"]));
+            }
         }
         Ok(())
     }

@@ -33,4 +33,3 @@ impl Output {
         Ok(Self { name, path })
     }
 }
-

@@ -21,9 +21,8 @@ pub(crate) struct Quantity {
 impl Quantity {
     /// Whether a number starts here.
     pub(crate) fn peek(input: ParseStream<'_>) -> bool {
-        let is_number = |input: ParseStream<'_>| {
-            matches!(input.fork().parse::<Lit>(), Ok(Lit::Int(_) | Lit::Float(_)))
-        };
+        let is_number =
+            |input: ParseStream<'_>| matches!(input.fork().parse::<Lit>(), Ok(Lit::Int(_) | Lit::Float(_)));
         if input.peek(Token![-]) {
             let ahead = input.fork();
             return ahead.parse::<Token![-]>().is_ok() && is_number(&ahead);

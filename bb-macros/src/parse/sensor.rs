@@ -1,7 +1,8 @@
 //! `sensor imu: Bmi270(bus = 1) { rate: 200 Hz; estimator … }`
 
 use super::block::{Head, items, unexpected};
-use super::{Component, Declared, Estimator, Setting};
+use super::component::Declared;
+use super::{Component, Estimator, Setting};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::Attribute;

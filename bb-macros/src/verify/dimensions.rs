@@ -47,8 +47,12 @@ fn geometry(joint: &Joint, diagnostics: &mut Diagnostics) {
     };
     // A fixed joint's limit is a fault of its own.
     for limit in joint.limits.iter().filter(|_| joint.kind != JointKind::Fixed) {
-        let expected =
-            [(&limit.lower, position), (&limit.upper, position), (&limit.velocity, velocity), (&limit.effort, effort)];
+        let expected = [
+            (&limit.lower, position),
+            (&limit.upper, position),
+            (&limit.velocity, velocity),
+            (&limit.effort, effort),
+        ];
         for (quantity, (dimension, example)) in expected {
             if let Some(quantity) = quantity {
                 expect(dimension, example, quantity, diagnostics);

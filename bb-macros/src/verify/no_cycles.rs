@@ -28,12 +28,16 @@ fn visit(
     path: &mut Vec<EstimatorId>,
     diagnostics: &mut Diagnostics,
 ) {
-    let (Some(estimator), Some(State::New)) = (robot.estimators.get(id), state.get(id)) else { return };
+    let (Some(estimator), Some(State::New)) = (robot.estimators.get(id), state.get(id)) else {
+        return;
+    };
     state[id] = State::Open;
     path.push(id);
     for input in &estimator.inputs {
         let publisher = input.source.and_then(|source| robot.publishers.get(source));
-        let Some(From::Estimator(source, _)) = publisher.map(|publisher| publisher.from) else { continue };
+        let Some(From::Estimator(source, _)) = publisher.map(|publisher| publisher.from) else {
+            continue;
+        };
         if state.get(source) == Some(&State::Open) {
             let start = path.iter().position(|open| *open == source).unwrap_or(0);
             // The path leads from consumer to publisher; messages flow the other way.

@@ -14,7 +14,8 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         match drivers.next() {
             Some((first, _)) => {
                 for (_, extra) in drivers {
-                    let message = format!("`{name}` has a driver already, the input `{first}`; leave out all but one");
+                    let message =
+                        format!("`{name}` has a driver already, the input `{first}`; leave out all but one");
                     diagnostics.error(extra, message);
                 }
             }

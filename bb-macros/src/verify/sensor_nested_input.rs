@@ -8,7 +8,9 @@ use crate::model::{Home, Robot};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for estimator in &robot.estimators {
-        let Home::Sensor(sensor) = estimator.home else { continue };
+        let Home::Sensor(sensor) = estimator.home else {
+            continue;
+        };
         let sensor = robot.sensors.get(sensor).map_or(String::new(), |sensor| sensor.name.to_string());
         for input in &estimator.inputs {
             let message = format!(

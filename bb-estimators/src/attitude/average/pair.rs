@@ -41,11 +41,7 @@ pub fn average_pair(
     let (w1, w2) = (first_weight / greatest, second_weight / greatest);
 
     let q1 = first.into_inner();
-    let q2 = if first.coords.dot(&second.coords) < 0.0 {
-        -second.into_inner()
-    } else {
-        second.into_inner()
-    };
+    let q2 = if first.coords.dot(&second.coords) < 0.0 { -second.into_inner() } else { second.into_inner() };
     let (sum, difference) = ((q1 + q2) * 0.5, (q1 - q2) * 0.5);
     let (cos, sin) = (sum.norm(), difference.norm());
 

@@ -26,9 +26,7 @@ pub fn average(weighted: &[(UnitQuaternion<f64>, f64)]) -> Result<UnitQuaternion
         check(index, orientation, *weight)?;
     }
     let by_weight = weighted.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let (heaviest, greatest) = by_weight
-        .filter(|(_, weight)| *weight > 0.0)
-        .ok_or(AverageError::NoWeight)?;
+    let (heaviest, greatest) = by_weight.filter(|(_, weight)| *weight > 0.0).ok_or(AverageError::NoWeight)?;
 
     let mut moments = Matrix4::zeros();
     for (orientation, weight) in weighted {
@@ -46,10 +44,6 @@ pub fn average(weighted: &[(UnitQuaternion<f64>, f64)]) -> Result<UnitQuaternion
     }
 
     let average = eigen.eigenvectors.column(largest).into_owned();
-    let sign = if average.dot(&heaviest.coords) < 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
+    let sign = if average.dot(&heaviest.coords) < 0.0 { -1.0 } else { 1.0 };
     Ok(Unit::new_normalize(Quaternion::from(average * sign)))
 }

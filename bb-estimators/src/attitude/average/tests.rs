@@ -98,10 +98,7 @@ proptest! {
 fn small_angles_are_weighted_like_numbers() {
     for angle in [1e-15, 1e-12, 1e-9, 1e-6, 1e-3] {
         let average = average_pair(&about_x(0.0), 1.0, &about_x(angle), 3.0).unwrap();
-        assert!(
-            (2.0 * average.i.atan2(average.w) - 0.75 * angle).abs() < 1e-6 * angle,
-            "{angle}"
-        );
+        assert!((2.0 * average.i.atan2(average.w) - 0.75 * angle).abs() < 1e-6 * angle, "{angle}");
     }
 }
 
@@ -142,12 +139,6 @@ fn invalid_input_is_an_error() {
     assert_eq!(average_pair(&q, 0.0, &q, 0.0), Err(AverageError::NoWeight));
     assert_eq!(average(&[]), Err(AverageError::NoWeight));
     assert_eq!(average(&[(q, 0.0)]), Err(AverageError::NoWeight));
-    assert_eq!(
-        average_pair(&nan, 1.0, &q, 1.0),
-        Err(AverageError::NonFinite { index: 0 })
-    );
-    assert_eq!(
-        average(&[(q, 1.0), (nan, 1.0)]),
-        Err(AverageError::NonFinite { index: 1 })
-    );
+    assert_eq!(average_pair(&nan, 1.0, &q, 1.0), Err(AverageError::NonFinite { index: 0 }));
+    assert_eq!(average(&[(q, 1.0), (nan, 1.0)]), Err(AverageError::NonFinite { index: 1 }));
 }

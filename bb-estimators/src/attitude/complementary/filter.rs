@@ -16,7 +16,7 @@ const UPSIDE_DOWN: f64 = 1e-6;
 
 /// The complementary filter on quaternions.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Complementary {
+pub struct ComplementaryFilter {
     params: ComplementaryParams,
     state: AttitudeState,
     /// Time since the heading was last corrected, at most [`MAX_GAP_S`]: a magnetometer may be slower than the
@@ -24,16 +24,12 @@ pub struct Complementary {
     since_field_s: f64,
 }
 
-impl AttitudeFilter for Complementary {
+impl AttitudeFilter for ComplementaryFilter {
     type Params = ComplementaryParams;
 
     fn new(params: ComplementaryParams) -> Result<Self, ParamsError> {
         params.check()?;
-        Ok(Self {
-            params,
-            state: AttitudeState::new(params.magnetometer),
-            since_field_s: 0.0,
-        })
+        Ok(Self { params, state: AttitudeState::new(params.magnetometer), since_field_s: 0.0 })
     }
 
     fn params(&self) -> &ComplementaryParams {
@@ -47,14 +43,14 @@ impl AttitudeFilter for Complementary {
         };
         let mut orientation = turn(&step.world_from_body, &(sample.angular_velocity * step.dt_s));
         if step.up.is_some() {
-            let gain = gain(step.dt_s, self.params.tilt_time_constant_s);
+            let gain = gain(step.dt_s, self.params.tilt_time_constant);
             orientation = correct_tilt(&orientation, &sample.specific_force, gain);
         }
         self.since_field_s = (self.since_field_s + step.dt_s).min(MAX_GAP_S);
         if let Some(field) = step.field
             && let Some(error) = heading_error(&(orientation * field))
         {
-            let gain = gain(self.since_field_s, self.params.heading_time_constant_s);
+            let gain = gain(self.since_field_s, self.params.heading_time_constant);
             orientation = turn_heading(&orientation, gain * error);
             self.since_field_s = 0.0;
         }
@@ -101,10 +97,6 @@ fn correct_tilt(
     if force.z < 0.0 && force.x * force.x + force.y * force.y < UPSIDE_DOWN * force.z * force.z {
         force.y -= force.z;
     }
-    let up = Vector3::new(
-        gain * force.x,
-        gain * force.y,
-        gain * force.z + (1.0 - gain) * GRAVITY,
-    );
+    let up = Vector3::new(gain * force.x, gain * force.y, gain * force.z + (1.0 - gain) * GRAVITY);
     turn_upright(world_from_body, &up)
 }

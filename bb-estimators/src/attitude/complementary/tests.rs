@@ -2,26 +2,22 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::{Complementary, ComplementaryParams};
+use super::{ComplementaryFilter, ComplementaryParams};
 use crate::attitude::laws::{at_rest, attitude_laws};
 use crate::attitude::{AttitudeFilter, ImuSample, OrientationError};
 
-fn filter(magnetometer: bool) -> Complementary {
-    Complementary::new(ComplementaryParams {
-        magnetometer,
-        ..Default::default()
-    })
-    .unwrap()
+fn filter(magnetometer: bool) -> ComplementaryFilter {
+    ComplementaryFilter::new(ComplementaryParams { magnetometer, ..Default::default() }).unwrap()
 }
 
 attitude_laws!(nine_axes: filter(true), six_axes: filter(false));
 
-fn error_of(filter: &Complementary) -> OrientationError {
+fn error_of(filter: &ComplementaryFilter) -> OrientationError {
     OrientationError::between(&filter.world_from_body().unwrap(), &UnitQuaternion::identity()).unwrap()
 }
 
 /// Runs at rest, level and facing north, for `seconds` with the field in every `every`-th sample at 100 Hz.
-fn run(filter: &mut Complementary, seconds: i64, every: i64) {
+fn run(filter: &mut ComplementaryFilter, seconds: i64, every: i64) {
     for i in 1..=seconds * 100 {
         let mut sample = at_rest(i * 10_000_000, &UnitQuaternion::identity());
         if i % every != 0 {
@@ -40,8 +36,8 @@ fn tilt_and_heading_decay_by_their_time_constants() {
         filter.start_at(0, start).unwrap();
         run(&mut filter, 3, every);
         // The low-pass turns by its gain times the sine of the tilt: tan(θ/2) decays exponentially.
-        let tilt_left = 2.0 * (0.15_f64.tan() * (-3.0 / filter.params().tilt_time_constant_s).exp()).atan();
-        let heading_left = (-3.0 / filter.params().heading_time_constant_s).exp();
+        let tilt_left = 2.0 * (0.15_f64.tan() * (-3.0 / filter.params().tilt_time_constant).exp()).atan();
+        let heading_left = (-3.0 / filter.params().heading_time_constant).exp();
         let error = error_of(&filter);
         assert!((error.inclination - tilt_left).abs() < 1e-4, "{error:?}");
         assert!((error.heading - 0.4 * heading_left).abs() < 0.01, "{error:?}");
@@ -55,12 +51,7 @@ fn a_field_of_any_direction_does_not_tilt() {
     for i in 1..1000 {
         let field = Vector3::new(1.0, 0.3, i as f64 * 0.01);
         let sample = at_rest(i * 10_000_000, &UnitQuaternion::identity());
-        filter
-            .update(&ImuSample {
-                magnetic_field: Some(field),
-                ..sample
-            })
-            .unwrap();
+        filter.update(&ImuSample { magnetic_field: Some(field), ..sample }).unwrap();
     }
     assert!(error_of(&filter).inclination < 1e-12);
     assert!(error_of(&filter).heading > 0.1);
@@ -83,15 +74,9 @@ fn accelerations_to_and_fro_do_not_tilt() {
 
 #[test]
 fn time_constants_of_0_follow_at_once() {
-    let params = ComplementaryParams {
-        tilt_time_constant_s: 0.0,
-        heading_time_constant_s: 0.0,
-        magnetometer: true,
-    };
-    let mut filter = Complementary::new(params).unwrap();
-    filter
-        .start_at(0, UnitQuaternion::from_euler_angles(1.0, 0.5, -2.0))
-        .unwrap();
+    let params = ComplementaryParams { tilt_time_constant: 0.0, heading_time_constant: 0.0, magnetometer: true };
+    let mut filter = ComplementaryFilter::new(params).unwrap();
+    filter.start_at(0, UnitQuaternion::from_euler_angles(1.0, 0.5, -2.0)).unwrap();
     filter.update(&at_rest(1, &UnitQuaternion::identity())).unwrap();
     assert!(error_of(&filter).total < 1e-12);
 }
@@ -100,21 +85,9 @@ fn time_constants_of_0_follow_at_once() {
 fn parameters_out_of_range_are_named() {
     let good = ComplementaryParams::default();
     for value in [-1.0, f64::NAN, f64::INFINITY] {
-        let tilt = ComplementaryParams {
-            tilt_time_constant_s: value,
-            ..good
-        };
-        assert_eq!(
-            Complementary::new(tilt).unwrap_err().parameter,
-            "tilt_time_constant_s"
-        );
-        let heading = ComplementaryParams {
-            heading_time_constant_s: value,
-            ..good
-        };
-        assert_eq!(
-            Complementary::new(heading).unwrap_err().parameter,
-            "heading_time_constant_s"
-        );
+        let tilt = ComplementaryParams { tilt_time_constant: value, ..good };
+        assert_eq!(ComplementaryFilter::new(tilt).unwrap_err().parameter, "tilt_time_constant");
+        let heading = ComplementaryParams { heading_time_constant: value, ..good };
+        assert_eq!(ComplementaryFilter::new(heading).unwrap_err().parameter, "heading_time_constant");
     }
 }

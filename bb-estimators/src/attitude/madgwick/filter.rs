@@ -12,20 +12,17 @@ const NO_GRADIENT: f64 = 1e-12;
 
 /// Madgwick's gradient-descent filter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Madgwick {
+pub struct MadgwickFilter {
     params: MadgwickParams,
     state: AttitudeState,
 }
 
-impl AttitudeFilter for Madgwick {
+impl AttitudeFilter for MadgwickFilter {
     type Params = MadgwickParams;
 
     fn new(params: MadgwickParams) -> Result<Self, ParamsError> {
         params.check()?;
-        Ok(Self {
-            params,
-            state: AttitudeState::new(params.magnetometer),
-        })
+        Ok(Self { params, state: AttitudeState::new(params.magnetometer) })
     }
 
     fn params(&self) -> &MadgwickParams {
@@ -73,17 +70,8 @@ impl AttitudeFilter for Madgwick {
 ///
 /// Zero where there is nothing to gain, except at the top of F, upside down, which is left about the body's
 /// x or y axis.
-fn descent(
-    world_from_body: &UnitQuaternion<f64>,
-    up: &Vector3<f64>,
-    field: Option<&Vector3<f64>>,
-) -> Vector3<f64> {
-    let (w, x, y, z) = (
-        world_from_body.w,
-        world_from_body.i,
-        world_from_body.j,
-        world_from_body.k,
-    );
+fn descent(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f64>, field: Option<&Vector3<f64>>) -> Vector3<f64> {
+    let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
     let (x2, y2, z2) = (x + x, y + y, z + z);
     let (wx, wy, xx, xz, yy, yz) = (w * x2, w * y2, x * x2, x * z2, y * y2, y * z2);
     // Rᵀẑ, the third row of R.
@@ -110,10 +98,6 @@ fn descent(
     if up.dot(&world_up) > 0.0 {
         return Vector3::zeros();
     }
-    let axis = if world_up.x.abs() < 0.5 {
-        Vector3::x()
-    } else {
-        Vector3::y()
-    };
+    let axis = if world_up.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
     axis.cross(&world_up).normalize()
 }

@@ -2,12 +2,12 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::{Madgwick, MadgwickParams};
+use super::{MadgwickFilter, MadgwickParams};
 use crate::attitude::laws::{at_rest, attitude_laws};
 use crate::attitude::{AttitudeFilter, ImuSample};
 
-fn filter(beta: f64, magnetometer: bool) -> Madgwick {
-    Madgwick::new(MadgwickParams { beta, magnetometer }).unwrap()
+fn filter(beta: f64, magnetometer: bool) -> MadgwickFilter {
+    MadgwickFilter::new(MadgwickParams { beta, magnetometer }).unwrap()
 }
 
 attitude_laws!(nine_axes: filter(0.05, true), six_axes: filter(0.05, false));
@@ -15,13 +15,9 @@ attitude_laws!(nine_axes: filter(0.05, true), six_axes: filter(0.05, false));
 #[test]
 fn a_wrong_tilt_goes_at_twice_beta() {
     let mut filter = filter(0.1, false);
-    filter
-        .start_at(0, UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 1.0))
-        .unwrap();
+    filter.start_at(0, UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 1.0)).unwrap();
     for i in 1..=200 {
-        filter
-            .update(&at_rest(i * 10_000_000, &UnitQuaternion::identity()))
-            .unwrap();
+        filter.update(&at_rest(i * 10_000_000, &UnitQuaternion::identity())).unwrap();
     }
     assert!((filter.world_from_body().unwrap().angle() - (1.0 - 2.0 * 0.1 * 2.0)).abs() < 1e-9);
 }
@@ -67,12 +63,7 @@ fn beta_0_is_the_gyroscope_alone() {
     let rate = Vector3::new(0.0, 0.3, 0.0);
     let truth = UnitQuaternion::identity();
     for i in 1..=100 {
-        filter
-            .update(&ImuSample {
-                angular_velocity: rate,
-                ..at_rest(i * 10_000_000, &truth)
-            })
-            .unwrap();
+        filter.update(&ImuSample { angular_velocity: rate, ..at_rest(i * 10_000_000, &truth) }).unwrap();
     }
     let end = UnitQuaternion::from_scaled_axis(rate);
     assert!(filter.world_from_body().unwrap().angle_to(&end) < 1e-12);
@@ -81,20 +72,9 @@ fn beta_0_is_the_gyroscope_alone() {
 #[test]
 fn parameters_out_of_range_are_named() {
     for beta in [-0.1, f64::NAN, f64::INFINITY, 1001.0] {
-        let error = Madgwick::new(MadgwickParams {
-            beta,
-            magnetometer: true,
-        })
-        .unwrap_err();
+        let error = MadgwickFilter::new(MadgwickParams { beta, magnetometer: true }).unwrap_err();
         assert_eq!(error.parameter, "beta");
     }
-    let error = Madgwick::new(MadgwickParams {
-        beta: -0.1,
-        magnetometer: true,
-    })
-    .unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "`beta` is -0.1 rad/s: choose a value from 0 to 1000 rad/s"
-    );
+    let error = MadgwickFilter::new(MadgwickParams { beta: -0.1, magnetometer: true }).unwrap_err();
+    assert_eq!(error.to_string(), "`beta` is -0.1 rad/s: choose a value from 0 to 1000 rad/s");
 }

@@ -7,10 +7,10 @@
 //! * An accelerometer measures specific force: at rest it reads one g upwards.
 //!
 //! ```
-//! use bb_estimators::attitude::{AttitudeFilter, ImuSample, Madgwick, MadgwickParams};
+//! use bb_estimators::attitude::{AttitudeFilter, ImuSample, MadgwickFilter, MadgwickParams};
 //! use nalgebra::Vector3;
 //!
-//! let mut filter = Madgwick::new(MadgwickParams::default())?;
+//! let mut filter = MadgwickFilter::new(MadgwickParams::default())?;
 //! filter.update(&ImuSample {
 //!     time_ns: 0,
 //!     angular_velocity: Vector3::zeros(),
@@ -33,15 +33,17 @@ mod rotation;
 mod sample;
 mod state;
 
+#[cfg(feature = "runtime")]
+mod estimator;
 #[cfg(test)]
 mod laws;
 
-pub use complementary::{Complementary, ComplementaryParams};
+pub use complementary::{ComplementaryFilter, ComplementaryParams};
 pub use error::{ErrorStatistics, OrientationError};
+#[cfg(feature = "runtime")]
+pub use estimator::{Attitude, Frames, ImuAndMagnetometer, InertialInput, InertialInputs};
 pub use filter::AttitudeFilter;
-pub use madgwick::{Madgwick, MadgwickParams};
+pub use madgwick::{MadgwickFilter, MadgwickParams};
 pub use params::ParamsError;
-pub use sample::{
-    ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError,
-};
+pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};
 pub use state::MAX_GAP_S;

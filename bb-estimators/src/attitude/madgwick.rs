@@ -23,5 +23,5 @@ mod params;
 #[cfg(test)]
 mod tests;
 
-pub use filter::Madgwick;
+pub use filter::MadgwickFilter;
 pub use params::MadgwickParams;

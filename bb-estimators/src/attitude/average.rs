@@ -5,6 +5,8 @@
 //! `M = Σ wᵢ qᵢ qᵢᵀ`, the eigenvector of M's greatest eigenvalue. It is the least-squares average of the
 //! rotation matrices, and the signs of the quaternions do not matter to it.
 
+#[cfg(feature = "runtime")]
+mod estimator;
 mod pair;
 mod slice;
 #[cfg(test)]
@@ -15,6 +17,8 @@ use core::fmt;
 
 use nalgebra::UnitQuaternion;
 
+#[cfg(feature = "runtime")]
+pub use estimator::{OrientationAverage, OrientationAverageOptions, OrientationPair};
 pub use pair::average_pair;
 pub use slice::average;
 
@@ -43,10 +47,7 @@ impl fmt::Display for AverageError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::InvalidWeight { index, weight } => {
-                write!(
-                    f,
-                    "weight {index} is {weight}: weights are finite and not negative"
-                )
+                write!(f, "weight {index} is {weight}: weights are finite and not negative")
             }
             Self::NoWeight => f.write_str("no orientation has a weight above 0"),
             Self::NonFinite { index } => write!(f, "orientation {index} is not finite"),

@@ -21,5 +21,5 @@ mod params;
 #[cfg(test)]
 mod tests;
 
-pub use filter::Complementary;
+pub use filter::ComplementaryFilter;
 pub use params::ComplementaryParams;

@@ -1,0 +1,79 @@
+//! A verified robot to its wiring: declarations and calls; loops and decisions live in `bb_core`.
+//!
+//! ```text
+//! pub struct Rover;                         // the robot's type
+//! type __RoverS0 = Bmi270;                  // one alias per component: its type is named once
+//! const _: () = {
+//!     …                                     // constants that check type facts at the user's tokens
+//!     static SENSORS, ESTIMATORS, TOPOLOGY  // what was declared, as data
+//!     struct Options, Topics, Wiring        // a field per component, publisher, estimator
+//!     impl Wiring { fn p0(&self, …) }       // what lies downstream of each publisher, by direct calls
+//!     impl Robot for Rover { … }
+//! };
+//! pub mod rover { … }                       // a handle per publisher, at its path
+//! ```
+
+mod checks;
+mod declarations;
+mod handles;
+mod literal;
+mod options;
+mod robot_impl;
+mod stub;
+mod types;
+mod wiring;
+
+pub(crate) use literal::dimension;
+pub(crate) use stub::stub;
+
+use crate::model::Robot;
+use crate::verify::Verified;
+use proc_macro2::{Ident, TokenStream};
+use quote::quote;
+use syn::Attribute;
+
+/// The whole expansion.
+pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
+    let (robot, name) = (verified.robot, verified.name);
+    let definition = definition(robot, name);
+    let aliases = types::aliases(robot, name);
+    let checks = checks::checks(verified);
+    let declarations = declarations::declarations(verified);
+    let options = options::options(robot, name);
+    let wiring = wiring::wiring(verified);
+    let implementation = robot_impl::robot_impl(robot, name);
+    let handles = handles::handles(robot, name, handles::Accessors::Wired);
+    quote! {
+        #definition
+        #aliases
+        #[allow(clippy::all, non_snake_case, unused_variables)]
+        const _: () = {
+            #checks
+            #declarations
+            #options
+            #wiring
+            #implementation
+        };
+        #handles
+    }
+}
+
+/// The robot's type, with the user's docs and attributes.
+fn definition(robot: &Robot, name: &Ident) -> TokenStream {
+    let (attributes, visibility) = (&robot.attributes, &robot.visibility);
+    quote! {
+        #(#attributes)*
+        #[derive(Clone, Copy, Debug)]
+        #visibility struct #name;
+    }
+}
+
+/// The doc comments among attributes.
+fn docs(attributes: &[Attribute]) -> impl Iterator<Item = &Attribute> {
+    attributes.iter().filter(|attribute| attribute.path().is_ident("doc"))
+}
+
+/// `a/b/c`
+fn path_text(path: &[String]) -> String {
+    path.join("/")
+}

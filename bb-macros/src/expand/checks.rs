@@ -1,0 +1,124 @@
+//! Constants that check type facts: each calls a function of `bb_core` at the user's token, and a fault is a panic
+//! there while rustc evaluates it.
+
+use super::literal::{dimension, option, spanned_call};
+use super::types::{Types, type_name};
+use crate::diagnostics::Place;
+use crate::model::Robot;
+use crate::parse::{Component, ComponentOption, OptionValue};
+use crate::verify::Verified;
+use proc_macro2::TokenStream;
+use quote::quote;
+
+pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
+    let robot = verified.robot;
+    let types = Types::new(robot, verified.name, 0);
+    let mut checks = TokenStream::new();
+    for (id, sensor) in robot.sensors.iter().enumerate() {
+        checks.extend(options(&sensor.component, &types.sensor_options(id)));
+    }
+    for (id, estimator) in robot.estimators.iter().enumerate() {
+        checks.extend(options(&estimator.component, &types.estimator_options(id)));
+        checks.extend(inputs(robot, &types, id));
+        checks.extend(outputs(robot, &types, id));
+    }
+    checks.extend(moving_joints(verified, &types));
+    checks
+}
+
+/// Required options are given; literals have the right dimension and keep their range.
+fn options(component: &Component, options: &TokenStream) -> TokenStream {
+    let name = type_name(component);
+    let given = component.options.iter().map(|option| option.name.to_string());
+    let fields = quote!(<#options as ::bb_core::Options>::FIELDS);
+    let mut checks = spanned_call(
+        Place::of(&component.kind),
+        quote!(::bb_core::__private::check_required),
+        quote!(#name, #fields, &[#(#given),*]),
+    );
+    for option in &component.options {
+        if let Some((place, given)) = given_number(option) {
+            checks.extend(spanned_call(
+                place,
+                quote!(::bb_core::__private::check_option),
+                quote!(#name, #fields, #given),
+            ));
+        }
+    }
+    checks
+}
+
+/// A literal number as a `bb_core::check::Given`, and its place.
+fn given_number(given: &ComponentOption) -> Option<(Place, TokenStream)> {
+    let (place, unit, number) = match &given.value {
+        OptionValue::Quantity(quantity) => {
+            let unit = quantity.has_unit.then(|| dimension(quantity.dimension));
+            (quantity.place, option(unit), quantity.value)
+        }
+        OptionValue::Expression { expression, number } => {
+            (Place::of(&**expression), option(None), number.as_ref().copied()?)
+        }
+    };
+    let name = given.name.to_string();
+    let number = option(Some(quote!(#number)));
+    Some((place, quote!(::bb_core::__private::Given { name: #name, dimension: #unit, number: #number })))
+}
+
+/// All inputs that the algorithm needs are declared.
+fn inputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
+    let Some(estimator) = robot.estimators.get(id).filter(|estimator| !estimator.is_nested()) else {
+        return TokenStream::new();
+    };
+    let (name, input) = (type_name(&estimator.component), types.estimator_input(id));
+    let declared = estimator.inputs.iter().map(|input| {
+        let (name, optional) = (input.name.to_string(), input.optional);
+        quote!(::bb_core::__private::Declared { name: #name, optional: #optional })
+    });
+    spanned_call(
+        Place::of(&estimator.component.kind),
+        quote!(::bb_core::__private::check_inputs),
+        quote!(#name, <#input as ::bb_core::Inputs>::FIELDS, &[#(#declared),*]),
+    )
+}
+
+/// An algorithm of several outputs has some declared.
+fn outputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
+    let Some(estimator) = robot.estimators.get(id).filter(|estimator| estimator.outputs.is_empty()) else {
+        return TokenStream::new();
+    };
+    let (name, output) = (type_name(&estimator.component), types.estimator_output(id));
+    spanned_call(
+        Place::of(&estimator.component.kind),
+        quote!(::bb_core::__private::check_outputs),
+        quote!(#name, <#output as ::bb_core::Outputs>::FIELDS),
+    )
+}
+
+/// No input spans a moving joint, unless the algorithm handles that.
+fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
+    let robot = verified.robot;
+    let mut checks = TokenStream::new();
+    for (id, (estimator, sources)) in robot.estimators.iter().zip(&verified.sources).enumerate() {
+        for (input, source) in estimator.inputs.iter().zip(sources) {
+            let route = robot.route(robot.mount_of(*source), robot.mount_of_estimator(id));
+            let Some(joint) = route.moving.first().and_then(|joint| robot.joints.get(*joint)) else {
+                continue;
+            };
+            let (name, kind) = (type_name(&estimator.component), types.estimator(id));
+            let (input_name, joint_name) = (input.name.to_string(), joint.name.to_string());
+            let joint_kind = joint.kind_word.to_string();
+            checks.extend(spanned_call(
+                Place::of(&input.word),
+                quote!(::bb_core::__private::check_dynamic),
+                quote!(
+                    #name,
+                    <#kind as ::bb_core::Estimator>::HANDLES_MOVING_JOINTS,
+                    #input_name,
+                    #joint_name,
+                    #joint_kind
+                ),
+            ));
+        }
+    }
+    checks
+}

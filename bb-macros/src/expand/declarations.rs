@@ -1,0 +1,162 @@
+//! What was declared, as constant data: sensors, estimators with their inputs, and the topology with all fixed joints
+//! multiplied out.
+
+use super::literal::{nanos, option, transform};
+use super::path_text;
+use crate::model::{Joint, Mount, Robot, Sensor};
+use crate::parse::{JointKind, Limit, Quantity};
+use crate::verify::Verified;
+use proc_macro2::TokenStream;
+use quote::quote;
+
+/// `static SENSORS`, `ESTIMATORS` and `TOPOLOGY`.
+pub(super) fn declarations(verified: &Verified<'_>) -> TokenStream {
+    let robot = verified.robot;
+    let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor));
+    let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, id));
+    let (sensor_count, estimator_count) = (robot.sensors.len(), robot.estimators.len());
+    let topology = topology(robot);
+    quote! {
+        static SENSORS: [::bb_core::__private::SensorDeclaration; #sensor_count] = [#(#sensors),*];
+        static ESTIMATORS: [::bb_core::__private::EstimatorDeclaration; #estimator_count] = [#(#estimators),*];
+        static TOPOLOGY: ::bb_core::__private::Topology = #topology;
+    }
+}
+
+fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
+    let path = robot.publishers.get(sensor.publisher).map_or(String::new(), |publisher| path_text(&publisher.path));
+    let frame = robot.frame_name(sensor.mount);
+    let period = option(sensor.rates.first().map(|rate| {
+        let period = nanos(1.0 / rate.quantity.value).max(1);
+        quote!(#period)
+    }));
+    let root = root_from(robot, sensor.mount);
+    quote!(::bb_core::__private::SensorDeclaration {
+        path: #path,
+        frame: ::bb_core::__private::Frame::new(#frame),
+        period_nanos: #period,
+        root_from_frame: #root,
+    })
+}
+
+/// The transform to the root, if only fixed joints lie between.
+fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
+    let route = robot.route_to_root(mount).filter(|route| route.moving.is_empty());
+    option(route.map(|route| transform(route.transform)))
+}
+
+fn estimator_declaration(verified: &Verified<'_>, id: usize) -> TokenStream {
+    let robot = verified.robot;
+    let (Some(estimator), Some(sources)) = (robot.estimators.get(id), verified.sources.get(id)) else {
+        return TokenStream::new();
+    };
+    let mount = robot.mount_of_estimator(id);
+    let (path, frame) = (path_text(&estimator.path), robot.frame_name(mount));
+    let nested = estimator.is_nested().then(|| nested_input(&estimator.path));
+    let synchronous = estimator.sync_tolerances.first().map(|tolerance| &tolerance.quantity);
+    let several = estimator.inputs.len() > 1;
+    let declared = estimator.inputs.iter().zip(sources).enumerate().map(|(index, (input, source))| {
+        let name = input.name.to_string();
+        let path = robot.publishers.get(*source).map_or(String::new(), |publisher| path_text(&publisher.path));
+        let driver = input.driver.is_some() || !several;
+        let optional = input.optional;
+        let tolerance = option(input.within.as_ref().or(synchronous).map(|tolerance| {
+            let tolerance = nanos(tolerance.value);
+            quote!(#tolerance)
+        }));
+        let frame_from_input = transform(robot.route(robot.mount_of(*source), mount).transform);
+        input_declaration(index, &name, &path, driver, optional, &tolerance, &frame_from_input)
+    });
+    let inputs = nested.into_iter().chain(declared);
+    quote!(::bb_core::__private::EstimatorDeclaration {
+        path: #path,
+        frame: ::bb_core::__private::Frame::new(#frame),
+        inputs: &[#(#inputs),*],
+    })
+}
+
+/// The one input of a nested estimator: its sensor, whose path is all but the last name of its own.
+fn nested_input(estimator: &[String]) -> TokenStream {
+    let sensor = estimator.split_last().map_or(&[][..], |(_, sensor)| sensor);
+    let name = sensor.last().cloned().unwrap_or_default();
+    let identity = quote!(::bb_core::__private::Transform::IDENTITY);
+    input_declaration(0, &name, &path_text(sensor), true, false, &option(None), &identity)
+}
+
+fn input_declaration(
+    index: usize,
+    name: &str,
+    source: &str,
+    driver: bool,
+    optional: bool,
+    tolerance: &TokenStream,
+    frame_from_input: &TokenStream,
+) -> TokenStream {
+    quote!(::bb_core::__private::InputDeclaration {
+        index: #index,
+        name: #name,
+        source: #source,
+        driver: #driver,
+        optional: #optional,
+        tolerance_nanos: #tolerance,
+        frame_from_input: #frame_from_input,
+    })
+}
+
+fn topology(robot: &Robot) -> TokenStream {
+    let links = robot.links.iter().enumerate().map(|(id, link)| {
+        let name = link.name.to_string();
+        let joint = option(link.joint.map(|joint| quote!(#joint)));
+        let root = root_from(robot, Mount::Link(id));
+        quote!(::bb_core::__private::Link { name: #name, parent_joint: #joint, root_from_link: #root })
+    });
+    let joints = robot.joints.iter().enumerate().map(|(id, data)| joint(robot, id, data));
+    quote!(::bb_core::__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
+}
+
+fn joint(robot: &Robot, id: usize, joint: &Joint) -> TokenStream {
+    let name = joint.name.to_string();
+    let kind = joint_kind(joint.kind);
+    let parent = joint.parent;
+    let child = joint.children.first().copied().unwrap_or_default();
+    let parent_from_joint = transform(robot.parent_from_joint(id));
+    let axis = option(joint.axes.first().map(|axis| {
+        let length = axis.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let direction = axis.direction.map(|value| value / length);
+        quote!([#(#direction),*])
+    }));
+    let limit = option(joint.limits.first().map(limit));
+    quote!(::bb_core::__private::Joint {
+        name: #name,
+        kind: ::bb_core::__private::JointKind::#kind,
+        parent: #parent,
+        child: #child,
+        parent_from_joint: #parent_from_joint,
+        axis: #axis,
+        limit: #limit,
+    })
+}
+
+fn limit(limit: &Limit) -> TokenStream {
+    let value = |quantity: &Option<Quantity>| {
+        option(quantity.as_ref().map(|quantity| {
+            let value = quantity.value;
+            quote!(#value)
+        }))
+    };
+    let (lower, upper, velocity, effort) =
+        (value(&limit.lower), value(&limit.upper), value(&limit.velocity), value(&limit.effort));
+    quote!(::bb_core::__private::Limit { lower: #lower, upper: #upper, velocity: #velocity, effort: #effort })
+}
+
+/// The name of a joint's kind in `bb_core`.
+fn joint_kind(kind: JointKind) -> TokenStream {
+    match kind {
+        JointKind::Fixed => quote!(Fixed),
+        JointKind::Revolute => quote!(Revolute),
+        JointKind::Continuous => quote!(Continuous),
+        JointKind::Prismatic => quote!(Prismatic),
+        JointKind::Planar => quote!(Planar),
+        JointKind::Floating => quote!(Floating),
+    }
+}

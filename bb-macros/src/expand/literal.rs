@@ -1,0 +1,73 @@
+//! Data of the macro as tokens.
+
+use crate::diagnostics::Place;
+use crate::model::Rigid;
+use crate::units::Dimension;
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::quote;
+
+/// A `bb_core::component::Dimension`.
+pub(crate) fn dimension(dimension: Dimension) -> TokenStream {
+    let (exponents, name) = (dimension.0, dimension.name());
+    quote!(::bb_core::__private::Dimension { exponents: [#(#exponents),*], name: #name })
+}
+
+pub(super) fn option(value: Option<TokenStream>) -> TokenStream {
+    match value {
+        Some(value) => quote!(::core::option::Option::Some(#value)),
+        None => quote!(::core::option::Option::None),
+    }
+}
+
+/// A `bb_core::topology::Transform`.
+pub(super) fn transform(rigid: Rigid) -> TokenStream {
+    if rigid == Rigid::IDENTITY {
+        return quote!(::bb_core::__private::Transform::IDENTITY);
+    }
+    // Tokens of negative numbers are a minus and a literal; quote does that for floats by itself.
+    let Rigid { translation, rotation } = rigid;
+    quote!(::bb_core::__private::Transform { translation: [#(#translation),*], rotation: [#(#rotation),*] })
+}
+
+/// Nanoseconds of a time in seconds.
+pub(super) fn nanos(seconds: f64) -> i64 {
+    // Verified to fit; a cast saturates all the same.
+    (seconds * 1e9).round() as i64
+}
+
+/// An identifier of the expansion's own.
+pub(super) fn ident(text: &str) -> Ident {
+    match text.strip_prefix("r#") {
+        Some(raw) => Ident::new_raw(raw, Span::call_site()),
+        None => Ident::new(text, Span::call_site()),
+    }
+}
+
+/// `head` spanned on the first and `tail` on the last token of a place, so that rustc underlines all between.
+pub(super) fn spanned_call(place: Place, function: TokenStream, arguments: TokenStream) -> TokenStream {
+    let head = respan(function, place.start);
+    let tail = quote::quote_spanned!(place.end=> (#arguments));
+    let colon = quote::quote_spanned!(place.start=> :);
+    let unit = quote::quote_spanned!(place.start=> ());
+    let equals = quote::quote_spanned!(place.start=> =);
+    let underscore = quote::quote_spanned!(place.start=> const _);
+    let end = quote::quote_spanned!(place.end=> ;);
+    quote!(#underscore #colon #unit #equals #head #tail #end)
+}
+
+/// The same tokens, all at `span`.
+pub(super) fn respan(tokens: TokenStream, span: Span) -> TokenStream {
+    tokens
+        .into_iter()
+        .map(|mut token| {
+            if let proc_macro2::TokenTree::Group(group) = &token {
+                let mut inner = proc_macro2::Group::new(group.delimiter(), respan(group.stream(), span));
+                inner.set_span(span);
+                token = inner.into();
+            } else {
+                token.set_span(span);
+            }
+            token
+        })
+        .collect()
+}

@@ -1,0 +1,24 @@
+//! A robot that failed: its type and handles only, so that code which uses them gives no errors of its own.
+
+use super::handles::{Accessors, handles};
+use super::{definition, types};
+use crate::model::Robot;
+use proc_macro2::TokenStream;
+use quote::quote;
+
+/// The type, the handles, and an implementation of `Robot` that never runs.
+pub(crate) fn stub(robot: &Robot) -> TokenStream {
+    let Some(name) = &robot.name else {
+        return TokenStream::new();
+    };
+    let definition = definition(robot, name);
+    let aliases = types::aliases(robot, name);
+    let handles = handles(robot, name, Accessors::Stub);
+    let text = name.to_string();
+    quote! {
+        #definition
+        #aliases
+        ::bb_core::__private::stub_robot!(#name, #text);
+        #handles
+    }
+}

@@ -1,0 +1,168 @@
+//! How the expansion names the types of components, and what follows from them.
+//!
+//! Each type that the user wrote is aliased once. The alias is then used at the span of the user's type, so that what
+//! rustc has to say of it is said there, and once.
+
+use super::literal::{ident, respan};
+use crate::diagnostics::Place;
+use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId};
+use crate::parse::Component;
+use proc_macro2::{Ident, TokenStream};
+use quote::{ToTokens, format_ident, quote};
+
+/// `type __RoverS0 = Bmi270;`
+pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
+    let sensors = robot.sensors.iter().enumerate();
+    let sensors = sensors.map(|(id, sensor)| (sensor_alias(name, id), &sensor.component.kind));
+    let estimators = robot.estimators.iter().enumerate();
+    let estimators = estimators.map(|(id, estimator)| (estimator_alias(name, id), &estimator.component.kind));
+    let aliases = sensors.chain(estimators).map(|(alias, kind)| {
+        quote! {
+            #[doc(hidden)]
+            #[allow(non_camel_case_types, dead_code)]
+            type #alias = #kind;
+        }
+    });
+    aliases.collect()
+}
+
+fn sensor_alias(name: &Ident, id: SensorId) -> Ident {
+    format_ident!("__{name}S{id}", span = proc_macro2::Span::call_site())
+}
+
+fn estimator_alias(name: &Ident, id: EstimatorId) -> Ident {
+    format_ident!("__{name}E{id}", span = proc_macro2::Span::call_site())
+}
+
+/// The last name of a component's type, for messages: `Madgwick`.
+pub(super) fn type_name(component: &Component) -> String {
+    component.kind.segments.last().map_or(String::new(), |segment| segment.ident.to_string())
+}
+
+/// Names types from the module where the robot stands, or from one below it.
+#[derive(Clone)]
+pub(super) struct Types<'a> {
+    robot: &'a Robot,
+    name: &'a Ident,
+    /// `super::super::`
+    above: TokenStream,
+}
+
+impl<'a> Types<'a> {
+    pub(super) fn new(robot: &'a Robot, name: &'a Ident, depth: usize) -> Self {
+        let above = (0..depth).map(|_| quote!(super::)).collect();
+        Self { robot, name, above }
+    }
+
+    /// The robot's type.
+    pub(super) fn robot(&self) -> TokenStream {
+        let (above, name) = (&self.above, ident(&self.name.to_string()));
+        quote!(#above #name)
+    }
+
+    pub(super) fn sensor(&self, id: SensorId) -> TokenStream {
+        let component = self.robot.sensors.get(id).map(|sensor| &sensor.component);
+        self.at(component, sensor_alias(self.name, id).into_token_stream())
+    }
+
+    pub(super) fn estimator(&self, id: EstimatorId) -> TokenStream {
+        let component = self.robot.estimators.get(id).map(|estimator| &estimator.component);
+        self.at(component, estimator_alias(self.name, id).into_token_stream())
+    }
+
+    pub(super) fn sensor_options(&self, id: SensorId) -> TokenStream {
+        let sensor = self.sensor(id);
+        self.at_sensor(id, quote!(<#sensor as ::bb_core::Sensor>::Options))
+    }
+
+    pub(super) fn estimator_options(&self, id: EstimatorId) -> TokenStream {
+        let estimator = self.estimator(id);
+        self.at_estimator(id, quote!(<#estimator as ::bb_core::Estimator>::Options))
+    }
+
+    pub(super) fn estimator_input(&self, id: EstimatorId) -> TokenStream {
+        let estimator = self.estimator(id);
+        self.at_estimator(id, quote!(<#estimator as ::bb_core::Estimator>::Input))
+    }
+
+    pub(super) fn estimator_output(&self, id: EstimatorId) -> TokenStream {
+        let estimator = self.estimator(id);
+        self.at_estimator(id, quote!(<#estimator as ::bb_core::Estimator>::Output))
+    }
+
+    /// The payload of a publisher. That of an estimator's output is named through its number, see `output_index`.
+    pub(super) fn payload(&self, publisher: PublisherId) -> TokenStream {
+        match self.robot.publishers.get(publisher).map(|publisher| publisher.from) {
+            Some(From::Sensor(id)) => {
+                let sensor = self.sensor(id);
+                self.at_sensor(id, quote!(<#sensor as ::bb_core::Sensor>::Output))
+            }
+            Some(From::Estimator(id, output)) => {
+                let emitted = self.estimator_output(id);
+                let index = self.output_index(id, output);
+                self.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::Payload))
+            }
+            None => quote!(()),
+        }
+    }
+
+    /// The number of a declared output in the algorithm's output type, looked up by name at compile time. An
+    /// estimator without declared outputs publishes its only one.
+    pub(super) fn output_index(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
+        let Some(estimator) = self.robot.estimators.get(id) else {
+            return quote!(0);
+        };
+        let Some(output) = output.and_then(|output| estimator.outputs.get(output)) else {
+            return quote!(0usize);
+        };
+        let (text, name) = (type_name(&estimator.component), output.name.to_string());
+        let emitted = self.estimator_output(id);
+        respan(
+            quote!(::bb_core::__private::output_index(#text, <#emitted as ::bb_core::Outputs>::FIELDS, #name)),
+            output.name.span(),
+        )
+    }
+
+    /// The number of a declared input in the algorithm's input type, looked up by name at compile time.
+    pub(super) fn input_index(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
+        let Some(estimator) = self.robot.estimators.get(id) else {
+            return quote!(0);
+        };
+        let text = type_name(&estimator.component);
+        let taken = self.estimator_input(id);
+        match input.and_then(|input| estimator.inputs.get(input)) {
+            Some(input) => {
+                let name = input.name.to_string();
+                let fields = quote!(<#taken as ::bb_core::Inputs>::FIELDS);
+                respan(quote!(::bb_core::__private::input_index(#text, #fields, #name)), input.name.span())
+            }
+            None => self.at_estimator(
+                id,
+                quote!(::bb_core::__private::nested_index(#text, <#taken as ::bb_core::Inputs>::FIELDS)),
+            ),
+        }
+    }
+
+    pub(super) fn at_estimator(&self, id: EstimatorId, tokens: TokenStream) -> TokenStream {
+        match self.robot.estimators.get(id) {
+            Some(estimator) => respan(tokens, Place::of(&estimator.component.kind).start),
+            None => tokens,
+        }
+    }
+
+    pub(super) fn at_sensor(&self, id: SensorId, tokens: TokenStream) -> TokenStream {
+        match self.robot.sensors.get(id) {
+            Some(sensor) => respan(tokens, Place::of(&sensor.component.kind).start),
+            None => tokens,
+        }
+    }
+
+    fn at(&self, component: Option<&Component>, alias: TokenStream) -> TokenStream {
+        let above = &self.above;
+        let tokens = quote!(#above #alias);
+        match component {
+            Some(component) => respan(tokens, Place::of(&component.kind).start),
+            None => tokens,
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Floor one: diagnostics as data.

@@ -1,0 +1,102 @@
+//! What a run gave: estimates beside the truth, and their errors.
+
+use crate::filter::Kind;
+use bb_core::Report;
+use bb_core::nalgebra::UnitQuaternion;
+use bb_estimators::attitude::{ErrorStatistics, OrientationError};
+use serde::Serialize;
+use std::fmt;
+
+pub(crate) struct Outcome {
+    pub(crate) filter: Kind,
+    /// The one that counts comes first.
+    pub(crate) series: Vec<Series>,
+    pub(crate) report: Report,
+    pub(crate) seconds: f64,
+    pub(crate) has_truth: bool,
+}
+
+/// One estimate over time.
+pub(crate) struct Series {
+    pub(crate) name: &'static str,
+    pub(crate) points: Vec<Point>,
+    errors: ErrorStatistics,
+}
+
+pub(crate) struct Point {
+    pub(crate) time_s: f64,
+    pub(crate) estimate: UnitQuaternion<f64>,
+    pub(crate) truth: Option<UnitQuaternion<f64>>,
+}
+
+/// The object that `--json` prints. Errors are null where there is no truth.
+#[derive(Serialize)]
+pub(crate) struct Summary {
+    filter: &'static str,
+    samples: usize,
+    total_deg: Option<f64>,
+    heading_deg: Option<f64>,
+    inclination_deg: Option<f64>,
+    seconds: f64,
+}
+
+impl Series {
+    pub(crate) fn new(name: &'static str) -> Self {
+        Self { name, points: Vec::new(), errors: ErrorStatistics::default() }
+    }
+
+    /// Adds an estimate; its error counts where the body moves and the truth is known.
+    pub(crate) fn add(
+        &mut self,
+        time_s: f64,
+        estimate: UnitQuaternion<f64>,
+        truth: Option<UnitQuaternion<f64>>,
+        moving: bool,
+    ) {
+        if moving {
+            self.errors.add(truth.and_then(|truth| OrientationError::between(&estimate, &truth)));
+        }
+        self.points.push(Point { time_s, estimate, truth });
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.points.len()
+    }
+}
+
+impl Outcome {
+    pub(crate) fn summary(&self) -> Summary {
+        let first = self.series.first();
+        let rms = first.and_then(|series| series.errors.rms());
+        Summary {
+            filter: self.filter.name(),
+            samples: first.map_or(0, Series::len),
+            total_deg: rms.map(|rms| rms.total.to_degrees()),
+            heading_deg: rms.map(|rms| rms.heading.to_degrees()),
+            inclination_deg: rms.map(|rms| rms.inclination.to_degrees()),
+            seconds: self.seconds,
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Published:\n\n{}", self.report)?;
+        let recorded_s =
+            self.series.first().and_then(|series| series.points.last()).map_or(0.0, |last| last.time_s);
+        let filter = self.filter.name();
+        writeln!(f, "{filter}: {recorded_s:.1} s in {:.2} s", self.seconds)?;
+        if !self.has_truth {
+            return writeln!(f, "The recording has no truth to compare with.");
+        }
+        writeln!(f, "\nError against the truth, RMS in degrees:\n")?;
+        writeln!(f, "{:16} {:>8} {:>8} {:>12} {:>9}", "orientation", "total", "heading", "inclination", "samples")?;
+        for series in &self.series {
+            let Some(rms) = series.errors.rms() else { continue };
+            let [total, heading, inclination] = [rms.total, rms.heading, rms.inclination].map(f64::to_degrees);
+            let count = series.errors.count();
+            writeln!(f, "{:16} {total:8.2} {heading:8.2} {inclination:12.2} {count:9}", series.name)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! A recorded IMU, played as the sensor.
+
+use crate::arguments::Arguments;
+use crate::bag::BagImu;
+use crate::filter::{Chosen, ChosenParams};
+use crate::outcome::{Outcome, Series};
+use crate::progress::Progress;
+use crate::truth::Truth;
+use bb_bags::Bag;
+use bb_core::prelude::*;
+use std::error::Error;
+use std::path::Path;
+use std::time::Instant;
+
+robot! {
+    /// The IMU of a recording.
+    robot Recorded;
+
+    link body {
+        sensor imu: BagImu() {
+            estimator orientation: Chosen();
+        }
+    }
+}
+
+pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
+    let bag = Bag::open(file)?;
+    let truth = Truth::read(&bag)?;
+
+    let mut builder = Recorded::builder();
+    let imu = builder.options(recorded::sensor::body::imu);
+    imu.file = file.to_owned();
+    imu.imu_topic = arguments.imu.clone().unwrap_or_default();
+    imu.magnetometer_topic = arguments.mag.clone().unwrap_or_default();
+    imu.magnetometer = params.magnetometer;
+    *builder.options(recorded::sensor::body::imu::orientation) = params.clone();
+    let orientation = builder.subscribe(recorded::sensor::body::imu::orientation);
+
+    let mut simulation = builder.simulate()?;
+    let samples =
+        bag.topics().iter().filter(|topic| &*topic.schema == crate::bag::IMU).find_map(|topic| topic.messages);
+    let progress = Progress::new("playing", samples.unwrap_or(0));
+    let mut series = Series::new("estimate");
+    let mut first = None;
+    let started = Instant::now();
+    while simulation.step() {
+        for message in orientation.drain() {
+            let time = message.monotonic_time;
+            let start = *first.get_or_insert(time);
+            let (truth, moving) = truth.at(time.as_nanos());
+            series.add(time.seconds_since(start), message.world_from_body, truth, moving);
+        }
+        progress.set(series.len() as u64);
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    progress.finish();
+    let report = simulation.stop().ok()?;
+    Ok(Outcome { filter: params.kind, series: vec![series], report, seconds, has_truth: truth.is_known() })
+}

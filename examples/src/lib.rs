@@ -1,0 +1,1 @@
+//! Small robots that run; each is an example target of this crate.
