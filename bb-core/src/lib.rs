@@ -65,8 +65,8 @@ pub mod prelude {
 pub mod __private {
     pub use crate::__stub_robot as stub_robot;
     pub use crate::check::{
-        Declared, Given, check_dynamic, check_inputs, check_option, check_outputs, check_required, input_index,
-        nested_index, output_index,
+        Declared, Given, check_dynamic, check_input, check_inputs, check_nested, check_option, check_output,
+        check_outputs, check_required, find_input, find_nested, find_output,
     };
     pub use crate::component::{
         Dimension, FieldIndex, Input, InputAt, InputField, OptionField, OutputAt, Range, Slot, SyncMiss,
@@ -78,7 +78,7 @@ pub mod __private {
         EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, SensorDeclaration, SensorHandle,
         Source, StartError, Startup,
     };
-    pub use crate::stub::stub;
+    pub use crate::stub::{Known, NotProbed, Probe, Unknown, both_known, stub};
     pub use crate::topology::{Joint, JointKind, Limit, Link, Topology, Transform};
     pub use std::sync::Arc;
 }

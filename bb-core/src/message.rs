@@ -31,4 +31,8 @@ pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Finite + 'static {
     /// The type's name, for people: `Imu`.
     const NAME: &'static str;
+
+    /// False for the stand-in of a payload that is not known, in a robot that does not compile.
+    #[doc(hidden)]
+    const KNOWN: bool = true;
 }

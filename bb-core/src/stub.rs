@@ -1,11 +1,69 @@
-//! What a robot that failed to verify expands to. It never runs, since it never compiles.
+//! What keeps one mistake to one message.
+//!
+//! A type that is declared as a sensor and is none would be reported wherever the wiring names it. So the wiring names
+//! it through [`Known`]: a type that is not what it is declared as is [`Unknown`] there, which fits everywhere, and the
+//! mistake is reported where the options are filled, once. Likewise an input or output that the algorithm does not
+//! have is `Unknown`, and is reported by its check (see `check`). None of this ever runs, since none of it compiles.
+
+mod unknown;
+
+pub(crate) use unknown::UNKNOWN_INDEX;
+pub use unknown::Unknown;
+
+use crate::component::{Estimator, Sensor};
+use crate::message::Payload;
+use std::marker::PhantomData;
+
+/// Tells as a constant whether `T` is a sensor or an estimator: its own constants where it is, else those of
+/// [`NotProbed`], since own ones go first.
+#[derive(Debug)]
+pub struct Probe<T>(PhantomData<fn() -> T>);
+
+impl<T: Sensor> Probe<T> {
+    /// `T` is a sensor.
+    pub const IS_SENSOR: bool = true;
+}
+
+impl<T: Estimator> Probe<T> {
+    /// `T` is an estimator.
+    pub const IS_ESTIMATOR: bool = true;
+}
+
+/// What holds of a [`Probe`] that has no constants of its own.
+pub trait NotProbed {
+    /// It is not known to be a sensor.
+    const IS_SENSOR: bool = false;
+    /// It is not known to be an estimator.
+    const IS_ESTIMATOR: bool = false;
+}
+
+impl<T> NotProbed for Probe<T> {}
+
+/// The type itself if it is what it was declared as, else [`Unknown`].
+pub trait Known<const KNOWN: bool> {
+    /// Which of the two.
+    type Type;
+}
+
+impl<T> Known<true> for T {
+    type Type = T;
+}
+
+impl<T> Known<false> for T {
+    type Type = Unknown;
+}
+
+/// Whether both payloads are known, so that they must be the same.
+pub const fn both_known<P: Payload, T: Payload>() -> bool {
+    P::KNOWN && T::KNOWN
+}
 
 /// Stands where a stub would have to give something.
 pub fn stub<T>() -> T {
     panic!("this robot did not verify")
 }
 
-/// An implementation of `Robot` with nothing in it.
+/// An implementation of `Robot` with nothing in it, for a robot that failed to verify.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __stub_robot {

@@ -1,50 +1,38 @@
 //! Whether declared inputs and outputs are the algorithm's, by name.
 
+use super::find::{find_input, find_output};
 use super::text::{Text, equal, nearest};
-use crate::component::InputField;
+use crate::component::{Inputs, Outputs};
+use crate::stub::UNKNOWN_INDEX;
 
-/// The number of the field that takes the declared input `name`; a single payload takes an input of any name.
+/// That the algorithm has the declared input `name`.
 #[track_caller]
-pub const fn input_index(estimator: &str, fields: &[InputField], name: &str) -> usize {
-    let mut index = 0;
-    while index < fields.len() {
-        if equal(fields[index].name, name) {
-            return index;
-        }
-        index += 1;
-    }
-    if fields.is_empty() {
-        return 0;
+pub const fn check_input<I: Inputs>(estimator: &str, name: &str) {
+    if !I::KNOWN || find_input::<I>(name) != UNKNOWN_INDEX {
+        return;
     }
     let mut names = [""; 64];
     let mut count = 0;
-    while count < fields.len() && count < 64 {
-        names[count] = fields[count].name;
+    while count < I::FIELDS.len() && count < 64 {
+        names[count] = I::FIELDS[count].name;
         count += 1;
     }
     let (names, _) = names.split_at(count);
     unknown(Text::new("").name(estimator).push(" has no input ").name(name).push("; it takes "), names, name)
 }
 
-/// The number of the field that holds the declared output `name`.
+/// That the algorithm has the declared output `name`.
 #[track_caller]
-pub const fn output_index(estimator: &str, fields: &[&str], name: &str) -> usize {
-    let mut index = 0;
-    while index < fields.len() {
-        if equal(fields[index], name) {
-            return index;
-        }
-        index += 1;
-    }
-    if fields.is_empty() && equal(name, "out") {
-        return 0;
+pub const fn check_output<O: Outputs>(estimator: &str, name: &str) {
+    if !O::KNOWN || find_output::<O>(name) != UNKNOWN_INDEX {
+        return;
     }
     let start = Text::new("").name(estimator).push(" has no output ").name(name);
-    if fields.is_empty() {
+    if O::FIELDS.is_empty() {
         let text = start.push("; its only one is `out`, which needs no declaration");
         panic!("{}", text.as_str())
     }
-    unknown(start.push("; it emits "), fields, name)
+    unknown(start.push("; it emits "), O::FIELDS, name)
 }
 
 /// An input as declared in `robot!`.
@@ -58,7 +46,17 @@ pub struct Declared {
 
 /// That every input the algorithm cannot do without is declared, and none of them as optional.
 #[track_caller]
-pub const fn check_inputs(estimator: &str, fields: &[InputField], declared: &[Declared]) {
+pub const fn check_inputs<I: Inputs>(estimator: &str, declared: &[Declared]) {
+    if !I::KNOWN {
+        return;
+    }
+    let fields = I::FIELDS;
+    let mut misspelt = false;
+    let mut number = 0;
+    while number < declared.len() {
+        misspelt = misspelt || find_input::<I>(declared[number].name) == UNKNOWN_INDEX;
+        number += 1;
+    }
     if fields.is_empty() && declared.len() > 1 {
         let text = Text::new("").name(estimator).push(" takes a single input; leave out all but one");
         panic!("{}", text.as_str())
@@ -78,7 +76,8 @@ pub const fn check_inputs(estimator: &str, fields: &[InputField], declared: &[De
             }
             number += 1;
         }
-        if !found {
+        // A misspelt name is reported as such, and may stand for this one.
+        if !found && !misspelt {
             let text = Text::new("").name(estimator).push(" needs an input ").name(field.name);
             let text = text.push("; declare it: `input ").push(field.name).push(": …;`");
             panic!("{}", text.as_str())
@@ -87,32 +86,25 @@ pub const fn check_inputs(estimator: &str, fields: &[InputField], declared: &[De
     }
 }
 
-/// The number of the field that takes what the parent sensor of a nested estimator publishes: the only one that the
-/// algorithm cannot do without.
+/// That a nested estimator has one input at most that it cannot do without: its sensor.
 #[track_caller]
-pub const fn nested_index(estimator: &str, fields: &[InputField]) -> usize {
-    let mut only = None;
-    let mut index = 0;
+pub const fn check_nested<I: Inputs>(estimator: &str) {
+    let fields = I::FIELDS;
+    let (mut needed, mut index) = (0, 0);
     while index < fields.len() {
-        if !fields[index].optional {
-            if only.is_some() {
-                let text =
-                    Text::new("").name(estimator).push(" needs several inputs, and a nested estimator has one; ");
-                panic!("{}", text.push("declare it on the link, with an `input` for each").as_str())
-            }
-            only = Some(index);
-        }
+        needed += if fields[index].optional { 0 } else { 1 };
         index += 1;
     }
-    match only {
-        Some(index) => index,
-        None => 0,
+    if needed > 1 {
+        let text = Text::new("").name(estimator).push(" needs several inputs, and a nested estimator has one; ");
+        panic!("{}", text.push("declare it on the link, with an `input` for each").as_str())
     }
 }
 
 /// That an algorithm of several outputs has at least one declared.
 #[track_caller]
-pub const fn check_outputs(estimator: &str, fields: &[&str]) {
+pub const fn check_outputs<O: Outputs>(estimator: &str) {
+    let fields = O::FIELDS;
     if !fields.is_empty() {
         let text =
             Text::new("").name(estimator).push(" has several outputs; declare the ones to publish, `output ");

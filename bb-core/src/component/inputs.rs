@@ -44,6 +44,10 @@ pub trait Inputs: 'static {
     type Cache: Default + Send + 'static;
     /// The inputs by name; none if the input is a single payload.
     const FIELDS: &'static [InputField];
+
+    /// False for the stand-in of an estimator that is not known, in a robot that does not compile.
+    #[doc(hidden)]
+    const KNOWN: bool = true;
 }
 
 /// What is known of one field of an input struct.

@@ -29,6 +29,10 @@ use crate::Payload;
 pub trait Outputs: Send + 'static {
     /// The outputs by name; none if the output is a single payload, whose name is `out`.
     const FIELDS: &'static [&'static str];
+
+    /// False for the stand-in of an estimator that is not known, in a robot that does not compile.
+    #[doc(hidden)]
+    const KNOWN: bool = true;
 }
 
 /// That output number `I` of `Self` exists, and how to take it out of what was emitted.

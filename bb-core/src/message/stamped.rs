@@ -99,21 +99,28 @@ impl<T> Deref for Stamped<T> {
     }
 }
 
-/// That a publisher of `Self` may feed an input that takes `T`: it may if they are the same.
+/// That a publisher of `Self` may feed an input that takes `T`: it may if they are the same, or if one of them is not
+/// known since another mistake hides it.
 ///
 /// The wiring calls it at every `input`, so that a mismatch is reported there.
 #[diagnostic::on_unimplemented(
     message = "this publishes `{Self}`, but the estimator's input takes `{T}`",
     label = "publishes `{Self}`, not `{T}`"
 )]
-pub trait Feeds<T: Payload>: Payload {
+pub trait Feeds<T: Payload, const KNOWN: bool>: Payload {
     /// The same message.
     fn feed(message: &Stamped<Self>) -> &Stamped<T>;
 }
 
-impl<T: Payload> Feeds<T> for T {
+impl<T: Payload> Feeds<T, true> for T {
     #[inline(always)]
     fn feed(message: &Stamped<T>) -> &Stamped<T> {
         message
+    }
+}
+
+impl<P: Payload, T: Payload> Feeds<T, false> for P {
+    fn feed(_: &Stamped<P>) -> &Stamped<T> {
+        crate::stub::stub()
     }
 }

@@ -27,14 +27,14 @@ type OptionsOf<R, O> = fn(&mut <R as Robot>::Options) -> &mut O;
 type PublishOf<R, T> = fn(&<R as Robot>::Wiring, &Stamped<T>);
 
 macro_rules! handle {
-    ($(#[$doc:meta])* $name:ident<$component:ident: $bound:path> { $($field:ident: $type:ty),* }) => {
+    ($(#[$doc:meta])* $name:ident<$($component:ident: $bound:path),+> { $($field:ident: $type:ty),* }) => {
         $(#[$doc])*
-        pub struct $name<R: Robot, $component: $bound> {
+        pub struct $name<R: Robot, $($component: $bound),+> {
             path: &'static str,
             $($field: $type,)*
         }
 
-        impl<R: Robot, $component: $bound> $name<R, $component> {
+        impl<R: Robot, $($component: $bound),+> $name<R, $($component),+> {
             #[doc(hidden)]
             pub const fn new(path: &'static str, $($field: $type),*) -> Self {
                 Self { path, $($field),* }
@@ -46,15 +46,15 @@ macro_rules! handle {
             }
         }
 
-        impl<R: Robot, $component: $bound> Clone for $name<R, $component> {
+        impl<R: Robot, $($component: $bound),+> Clone for $name<R, $($component),+> {
             fn clone(&self) -> Self {
                 *self
             }
         }
 
-        impl<R: Robot, $component: $bound> Copy for $name<R, $component> {}
+        impl<R: Robot, $($component: $bound),+> Copy for $name<R, $($component),+> {}
 
-        impl<R: Robot, $component: $bound> fmt::Debug for $name<R, $component> {
+        impl<R: Robot, $($component: $bound),+> fmt::Debug for $name<R, $($component),+> {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.debug_tuple(stringify!($name)).field(&self.path).finish()
             }
@@ -73,8 +73,8 @@ handle! {
 }
 
 handle! {
-    /// Names an estimator of one output of the robot `R`.
-    EstimatorHandle<E: Estimator> { topic: TopicOf<R, E::Output>, options: OptionsOf<R, E::Options> }
+    /// Names an estimator of one output, `T`, of the robot `R`.
+    EstimatorHandle<E: Estimator, T: Payload> { topic: TopicOf<R, T>, options: OptionsOf<R, E::Options> }
 }
 
 handle! {
@@ -104,12 +104,12 @@ impl<R: Robot, S: Sensor> Publisher<R> for SensorHandle<R, S> {
     }
 }
 
-impl<R: Robot, E: Estimator<Output: Payload>> Publisher<R> for EstimatorHandle<R, E> {
-    type Payload = E::Output;
+impl<R: Robot, E: Estimator, T: Payload> Publisher<R> for EstimatorHandle<R, E, T> {
+    type Payload = T;
     fn path(self) -> &'static str {
         self.path
     }
-    fn topic(self, topics: &R::Topics) -> &Topic<E::Output> {
+    fn topic(self, topics: &R::Topics) -> &Topic<T> {
         (self.topic)(topics)
     }
 }
@@ -140,16 +140,16 @@ impl<R: Robot, S: Sensor> Configurable<R> for SensorHandle<R, S> {
     }
 }
 
-macro_rules! configurable_estimator {
-    ($handle:ident) => {
-        impl<R: Robot, E: Estimator> Configurable<R> for $handle<R, E> {
-            type Options = E::Options;
-            fn options(self, options: &mut R::Options) -> &mut E::Options {
-                (self.options)(options)
-            }
-        }
-    };
+impl<R: Robot, E: Estimator, T: Payload> Configurable<R> for EstimatorHandle<R, E, T> {
+    type Options = E::Options;
+    fn options(self, options: &mut R::Options) -> &mut E::Options {
+        (self.options)(options)
+    }
 }
 
-configurable_estimator!(EstimatorHandle);
-configurable_estimator!(EstimatorOfSeveralHandle);
+impl<R: Robot, E: Estimator> Configurable<R> for EstimatorOfSeveralHandle<R, E> {
+    type Options = E::Options;
+    fn options(self, options: &mut R::Options) -> &mut E::Options {
+        (self.options)(options)
+    }
+}

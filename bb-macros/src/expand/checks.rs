@@ -64,34 +64,41 @@ fn given_number(given: &ComponentOption) -> Option<(Place, TokenStream)> {
     Some((place, quote!(::bb_core::__private::Given { name: #name, dimension: #unit, number: #number })))
 }
 
-/// All inputs that the algorithm needs are declared.
+/// All inputs that the algorithm needs are declared, and all that are declared are the algorithm's.
 fn inputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id).filter(|estimator| !estimator.is_nested()) else {
-        return TokenStream::new();
-    };
-    let (name, input) = (type_name(&estimator.component), types.estimator_input(id));
+    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
+    let (name, taken) = (type_name(&estimator.component), types.estimator_input(id));
+    let place = Place::of(&estimator.component.kind);
+    if estimator.is_nested() {
+        return spanned_call(place, quote!(::bb_core::__private::check_nested::<#taken>), quote!(#name));
+    }
     let declared = estimator.inputs.iter().map(|input| {
         let (name, optional) = (input.name.to_string(), input.optional);
         quote!(::bb_core::__private::Declared { name: #name, optional: #optional })
     });
-    spanned_call(
-        Place::of(&estimator.component.kind),
-        quote!(::bb_core::__private::check_inputs),
-        quote!(#name, <#input as ::bb_core::Inputs>::FIELDS, &[#(#declared),*]),
-    )
+    let needed =
+        spanned_call(place, quote!(::bb_core::__private::check_inputs::<#taken>), quote!(#name, &[#(#declared),*]));
+    let known = estimator.inputs.iter().map(|input| {
+        let input_name = input.name.to_string();
+        let place = Place::of(&input.name);
+        spanned_call(place, quote!(::bb_core::__private::check_input::<#taken>), quote!(#name, #input_name))
+    });
+    known.chain([needed]).collect()
 }
 
-/// An algorithm of several outputs has some declared.
+/// The declared outputs are the algorithm's, and one of several outputs has some declared.
 fn outputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id).filter(|estimator| estimator.outputs.is_empty()) else {
-        return TokenStream::new();
-    };
-    let (name, output) = (type_name(&estimator.component), types.estimator_output(id));
-    spanned_call(
-        Place::of(&estimator.component.kind),
-        quote!(::bb_core::__private::check_outputs),
-        quote!(#name, <#output as ::bb_core::Outputs>::FIELDS),
-    )
+    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
+    let (name, emitted) = (type_name(&estimator.component), types.estimator_output(id));
+    if estimator.outputs.is_empty() {
+        let place = Place::of(&estimator.component.kind);
+        return spanned_call(place, quote!(::bb_core::__private::check_outputs::<#emitted>), quote!(#name));
+    }
+    let known = estimator.outputs.iter().map(|output| {
+        let (output_name, place) = (output.name.to_string(), Place::of(&output.name));
+        spanned_call(place, quote!(::bb_core::__private::check_output::<#emitted>), quote!(#name, #output_name))
+    });
+    known.collect()
 }
 
 /// No input spans a moving joint, unless the algorithm handles that.

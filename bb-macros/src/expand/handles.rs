@@ -131,7 +131,8 @@ impl Handle {
                 let Some(estimator) = robot.estimators.get(id) else {
                     return TokenStream::new();
                 };
-                let (component, path) = (types.estimator(id), Some(path_text(&estimator.path)));
+                let (component, payload) = (types.estimator(id), types.payload(publisher));
+                let path = Some(path_text(&estimator.path));
                 let (topic, options) = (format_ident!("p{publisher}"), format_ident!("e{id}"));
                 let arguments = match accessors {
                     Accessors::Wired => {
@@ -141,7 +142,7 @@ impl Handle {
                         quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub())
                     }
                 };
-                let kind = quote!(::bb_core::EstimatorHandle<#this, #component>);
+                let kind = quote!(::bb_core::EstimatorHandle<#this, #component, #payload>);
                 (&estimator.attributes, path, kind, quote!(::bb_core::EstimatorHandle::new), arguments)
             }
             Self::Several(id) => {

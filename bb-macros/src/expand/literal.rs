@@ -3,7 +3,7 @@
 use crate::diagnostics::Place;
 use crate::model::Rigid;
 use crate::units::Dimension;
-use proc_macro2::{Ident, Span, TokenStream};
+use proc_macro2::{Group, Ident, Span, TokenStream, TokenTree};
 use quote::quote;
 
 /// A `bb_core::component::Dimension`.
@@ -43,25 +43,22 @@ pub(super) fn ident(text: &str) -> Ident {
     }
 }
 
-/// `head` spanned on the first and `tail` on the last token of a place, so that rustc underlines all between.
+/// `const _: () = function(arguments);`, spanned so that rustc underlines all of `place`.
 pub(super) fn spanned_call(place: Place, function: TokenStream, arguments: TokenStream) -> TokenStream {
-    let head = respan(function, place.start);
-    let tail = quote::quote_spanned!(place.end=> (#arguments));
-    let colon = quote::quote_spanned!(place.start=> :);
-    let unit = quote::quote_spanned!(place.start=> ());
-    let equals = quote::quote_spanned!(place.start=> =);
-    let underscore = quote::quote_spanned!(place.start=> const _);
-    let end = quote::quote_spanned!(place.end=> ;);
-    quote!(#underscore #colon #unit #equals #head #tail #end)
+    let head = respan(quote!(const _: () = #function), place.start);
+    let tail = respan(quote!((#arguments);), place.end);
+    quote!(#head #tail)
 }
 
-/// The same tokens, all at `span`.
+/// The same tokens, all at `span`. Names are looked up as in the expansion, wherever `span` comes from: a robot may be
+/// declared through a `macro_rules!` of the user's.
 pub(super) fn respan(tokens: TokenStream, span: Span) -> TokenStream {
+    let span = span.resolved_at(Span::call_site());
     tokens
         .into_iter()
         .map(|mut token| {
-            if let proc_macro2::TokenTree::Group(group) = &token {
-                let mut inner = proc_macro2::Group::new(group.delimiter(), respan(group.stream(), span));
+            if let TokenTree::Group(group) = &token {
+                let mut inner = Group::new(group.delimiter(), respan(group.stream(), span));
                 inner.set_span(span);
                 token = inner.into();
             } else {

@@ -1,7 +1,9 @@
 //! `struct Options`: the options of every component, at first as declared.
 
-use super::types::Types;
+use super::literal::respan;
+use super::types::{Types, estimator_alias, given, sensor_alias};
 use crate::derive::into_if_text;
+use crate::diagnostics::Place;
 use crate::model::Robot;
 use crate::parse::{Component, OptionValue};
 use proc_macro2::{Ident, TokenStream};
@@ -10,21 +12,26 @@ use quote::{format_ident, quote, quote_spanned};
 /// The struct, and `fn declared_options() -> Options`.
 pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     let types = Types::new(robot, name, 0);
-    let (mut fields, mut values) = (TokenStream::new(), TokenStream::new());
-    let sensors = robot.sensors.iter().enumerate();
-    let sensors = sensors.map(|(id, sensor)| (format_ident!("s{id}"), types.sensor_options(id), &sensor.component));
-    let estimators = robot
-        .estimators
-        .iter()
-        .enumerate()
-        .map(|(id, estimator)| (format_ident!("e{id}"), types.estimator_options(id), &estimator.component));
-    for (field, options, component) in sensors.chain(estimators) {
-        let value = filled(component, &options);
+    let (mut fields, mut functions, mut values) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+    let sensors = robot.sensors.iter().enumerate().map(|(id, sensor)| {
+        let given = given(&sensor_alias(name, id));
+        let given = types.at_sensor(id, quote!(<#given as ::bb_core::Sensor>::Options));
+        (format_ident!("s{id}"), types.sensor_options(id), given, &sensor.component)
+    });
+    let estimators = robot.estimators.iter().enumerate().map(|(id, estimator)| {
+        let given = given(&estimator_alias(name, id));
+        let given = types.at_estimator(id, quote!(<#given as ::bb_core::Estimator>::Options));
+        (format_ident!("e{id}"), types.estimator_options(id), given, &estimator.component)
+    });
+    for (field, options, given, component) in sensors.chain(estimators) {
         fields.extend(quote!(#field: #options,));
-        values.extend(quote!(#field: #value,));
+        functions.extend(filled(&field, &options, &given, component));
+        values.extend(quote!(#field: #field(),));
     }
     quote! {
         pub struct Options { #fields }
+
+        #functions
 
         fn declared_options() -> Options {
             Options { #values }
@@ -32,12 +39,10 @@ pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     }
 }
 
-/// `{ let mut options = defaults(); options.beta = 0.1; options }`
-fn filled(component: &Component, options: &TokenStream) -> TokenStream {
-    let defaults = quote!(<#options as ::bb_core::Options>::defaults());
-    if component.options.is_empty() {
-        return defaults;
-    }
+/// `fn e0() -> … { let mut options = defaults(); options.beta = 0.1; options }`
+///
+/// The only place that names the type as the user wrote it: that it is none of the kind is reported here.
+fn filled(field: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
     let settings = component.options.iter().map(|option| {
         let name = &option.name;
         let value = match &option.value {
@@ -47,11 +52,19 @@ fn filled(component: &Component, options: &TokenStream) -> TokenStream {
             }
             OptionValue::Expression { expression, .. } => into_if_text(expression),
         };
-        quote!(options.#name = #value;)
+        // What does not fit is reported at the value; the option's name is pointed at beside it.
+        let receiver = respan(quote!(options.), name.span());
+        quote!(#receiver #name = #value;)
     });
-    quote!({
-        let mut options = #defaults;
-        #(#settings)*
-        options
-    })
+    let place = Place::of(&component.kind).start;
+    let mutability = (!component.options.is_empty()).then(|| quote!(mut));
+    // Spanned at the user's type, which rustc points at when a value does not fit.
+    let start = respan(quote!(let #mutability options: #given = ::bb_core::Options::defaults();), place);
+    quote! {
+        fn #field() -> #options {
+            #start
+            #(#settings)*
+            options
+        }
+    }
 }

@@ -10,27 +10,40 @@ use crate::parse::Component;
 use proc_macro2::{Ident, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 
-/// `type __RoverS0 = Bmi270;`
+/// `type __RoverS0 = Bmi270;`, if it is a sensor, else `Unknown`; and as the user wrote it, `__RoverS0Given`.
 pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
     let sensors = robot.sensors.iter().enumerate();
-    let sensors = sensors.map(|(id, sensor)| (sensor_alias(name, id), &sensor.component.kind));
+    let sensors = sensors.map(|(id, sensor)| (sensor_alias(name, id), &sensor.component.kind, quote!(IS_SENSOR)));
     let estimators = robot.estimators.iter().enumerate();
-    let estimators = estimators.map(|(id, estimator)| (estimator_alias(name, id), &estimator.component.kind));
-    let aliases = sensors.chain(estimators).map(|(alias, kind)| {
+    let estimators = estimators
+        .map(|(id, estimator)| (estimator_alias(name, id), &estimator.component.kind, quote!(IS_ESTIMATOR)));
+    let aliases = sensors.chain(estimators).map(|(alias, kind, is_known)| {
+        let given = given(&alias);
         quote! {
             #[doc(hidden)]
             #[allow(non_camel_case_types, dead_code)]
-            type #alias = #kind;
+            type #given = #kind;
+            #[doc(hidden)]
+            #[allow(non_camel_case_types, dead_code)]
+            type #alias = <#given as ::bb_core::__private::Known<{
+                use ::bb_core::__private::NotProbed as _;
+                <::bb_core::__private::Probe<#given>>::#is_known
+            }>>::Type;
         }
     });
     aliases.collect()
 }
 
-fn sensor_alias(name: &Ident, id: SensorId) -> Ident {
+/// The alias of the type as the user wrote it.
+pub(super) fn given(alias: &Ident) -> Ident {
+    format_ident!("{alias}Given")
+}
+
+pub(super) fn sensor_alias(name: &Ident, id: SensorId) -> Ident {
     format_ident!("__{name}S{id}", span = proc_macro2::Span::call_site())
 }
 
-fn estimator_alias(name: &Ident, id: EstimatorId) -> Ident {
+pub(super) fn estimator_alias(name: &Ident, id: EstimatorId) -> Ident {
     format_ident!("__{name}E{id}", span = proc_macro2::Span::call_site())
 }
 
@@ -109,38 +122,25 @@ impl<'a> Types<'a> {
     /// The number of a declared output in the algorithm's output type, looked up by name at compile time. An
     /// estimator without declared outputs publishes its only one.
     pub(super) fn output_index(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
-        let Some(estimator) = self.robot.estimators.get(id) else {
-            return quote!(0);
-        };
-        let Some(output) = output.and_then(|output| estimator.outputs.get(output)) else {
-            return quote!(0usize);
-        };
-        let (text, name) = (type_name(&estimator.component), output.name.to_string());
+        let Some(estimator) = self.robot.estimators.get(id) else { return quote!(0) };
+        let output = output.and_then(|output| estimator.outputs.get(output));
+        let name = output.map_or("out".to_owned(), |output| output.name.to_string());
         let emitted = self.estimator_output(id);
-        respan(
-            quote!(::bb_core::__private::output_index(#text, <#emitted as ::bb_core::Outputs>::FIELDS, #name)),
-            output.name.span(),
-        )
+        self.at_estimator(id, quote!(::bb_core::__private::find_output::<#emitted>(#name)))
     }
 
     /// The number of a declared input in the algorithm's input type, looked up by name at compile time.
     pub(super) fn input_index(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
-        let Some(estimator) = self.robot.estimators.get(id) else {
-            return quote!(0);
-        };
-        let text = type_name(&estimator.component);
+        let Some(estimator) = self.robot.estimators.get(id) else { return quote!(0) };
         let taken = self.estimator_input(id);
-        match input.and_then(|input| estimator.inputs.get(input)) {
+        let find = match input.and_then(|input| estimator.inputs.get(input)) {
             Some(input) => {
                 let name = input.name.to_string();
-                let fields = quote!(<#taken as ::bb_core::Inputs>::FIELDS);
-                respan(quote!(::bb_core::__private::input_index(#text, #fields, #name)), input.name.span())
+                quote!(::bb_core::__private::find_input::<#taken>(#name))
             }
-            None => self.at_estimator(
-                id,
-                quote!(::bb_core::__private::nested_index(#text, <#taken as ::bb_core::Inputs>::FIELDS)),
-            ),
-        }
+            None => quote!(::bb_core::__private::find_nested::<#taken>()),
+        };
+        self.at_estimator(id, find)
     }
 
     pub(super) fn at_estimator(&self, id: EstimatorId, tokens: TokenStream) -> TokenStream {

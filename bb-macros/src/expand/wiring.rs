@@ -91,7 +91,9 @@ fn published(types: &Types<'_>, id: PublisherId, consumers: &[Consumer]) -> Toke
         let (index, number) = (index_name(*estimator, *input), input.unwrap_or(0));
         let taken = types.estimator_input(*estimator);
         let taken = quote!(<#taken as ::bb_core::__private::InputAt<{ #index }>>::Payload);
-        let feed = respan(quote!(<#payload as ::bb_core::__private::Feeds<#taken>>::feed(message)), *span);
+        let known = quote!({ ::bb_core::__private::both_known::<#payload, #taken>() });
+        let feed = quote!(<#payload as ::bb_core::__private::Feeds<#taken, #known>>::feed(message));
+        let feed = respan(feed, *span);
         quote!(self.#node.receive::<{ #index }>(#number, #feed, |emitted, stamp| self.#emit(emitted, stamp));)
     });
     quote! {

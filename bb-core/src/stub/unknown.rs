@@ -1,0 +1,97 @@
+//! The type that fits everywhere.
+
+use super::stub;
+use crate::component::{
+    Context, Estimator, Fault, InputAt, InputField, Inputs, NoOptions, OutputAt, Outputs, Reading, Reply, Sensor,
+    SensorContext, Slot, SyncMiss,
+};
+use crate::message::{Finite, Payload, Stamped};
+use crate::time::MonotonicTime;
+
+/// A payload, a sensor and an estimator, wherever one is needed that is not known.
+#[derive(Clone, Copy, Debug)]
+pub struct Unknown;
+
+/// What an unknown estimator takes: anything.
+#[derive(Clone, Copy, Debug)]
+pub struct UnknownInput;
+
+/// What an unknown estimator emits: anything.
+#[derive(Clone, Copy, Debug)]
+pub struct UnknownOutput;
+
+/// The number of an input or output that does not exist.
+pub(crate) const UNKNOWN_INDEX: usize = usize::MAX;
+
+impl Finite for Unknown {
+    fn is_finite(&self) -> bool {
+        true
+    }
+}
+
+impl Payload for Unknown {
+    const NAME: &'static str = "unknown";
+    const KNOWN: bool = false;
+}
+
+#[diagnostic::do_not_recommend]
+impl Sensor for Unknown {
+    type Options = NoOptions;
+    type Output = Self;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        stub()
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Self>, Fault> {
+        stub()
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl Estimator for Unknown {
+    type Options = NoOptions;
+    type Input = UnknownInput;
+    type Output = UnknownOutput;
+    const HANDLES_MOVING_JOINTS: bool = true;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        stub()
+    }
+
+    fn handle_input(&mut self, (): ()) -> Result<Reply<UnknownOutput>, Fault> {
+        stub()
+    }
+}
+
+impl Inputs for UnknownInput {
+    type View<'a> = ();
+    type Cache = ();
+    const FIELDS: &'static [InputField] = &[];
+    const KNOWN: bool = false;
+}
+
+impl Outputs for UnknownOutput {
+    const FIELDS: &'static [&'static str] = &[];
+    const KNOWN: bool = false;
+}
+
+impl<I: Inputs> InputAt<UNKNOWN_INDEX> for I {
+    type Payload = Unknown;
+
+    fn slot(_: &mut I::Cache) -> Option<&mut Slot<Unknown>> {
+        None
+    }
+
+    fn snapshot<'a>(_: &'a mut I::Cache, _: &'a Stamped<Unknown>) -> Result<I::View<'a>, SyncMiss> {
+        stub()
+    }
+}
+
+impl<O: Outputs> OutputAt<UNKNOWN_INDEX> for O {
+    type Payload = Unknown;
+
+    fn take(_: &mut Option<O>) -> Option<Unknown> {
+        stub()
+    }
+}
