@@ -1,0 +1,1 @@
+//! Tests of whole robots; see the test targets of this crate.
