@@ -1,1 +1,12 @@
-//! Whole robots.
+//! Whole robots: what a running one does, rule by rule of its documentation.
+
+mod components;
+
+mod external;
+mod fan_in;
+mod faults;
+mod frames;
+mod outputs;
+mod real_time;
+mod simulation;
+mod subscriptions;

@@ -1,0 +1,121 @@
+//! Small sensors and estimators that the robots of these tests are made of.
+
+use bb_core::prelude::*;
+
+/// A number.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub(crate) struct Number(pub(crate) f64);
+
+/// Options of [`Counter`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct CounterOptions {
+    /// The first number.
+    #[option(default = 0.0)]
+    pub(crate) start: f64,
+    /// How many numbers it gives.
+    #[option(default = 5)]
+    pub(crate) count: u32,
+}
+
+/// Counts up by one.
+#[derive(Debug)]
+pub(crate) struct Counter(CounterOptions);
+
+impl Sensor for Counter {
+    type Options = CounterOptions;
+    type Output = Number;
+
+    fn init(options: CounterOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(options))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if self.0.count == 0 {
+            return Ok(Reading::finished());
+        }
+        self.0.count -= 1;
+        self.0.start += 1.0;
+        Ok(Reading::now(Number(self.0.start - 1.0)))
+    }
+}
+
+/// Options of [`Scale`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct ScaleOptions {
+    /// What each number is multiplied by.
+    #[option(default = 2.0, range = -1e3..=1e3)]
+    pub(crate) factor: f64,
+}
+
+/// Multiplies.
+#[derive(Debug)]
+pub(crate) struct Scale(f64);
+
+impl Estimator for Scale {
+    type Options = ScaleOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: ScaleOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self(options.factor))
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(number.0 * self.0)))
+    }
+}
+
+/// What [`Snapshot`] saw: the numbers, and which were new. NaN would be dropped, so what is missing is -1.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub(crate) struct Seen {
+    /// The driver's number.
+    pub(crate) driver: f64,
+    /// The second number.
+    pub(crate) second: f64,
+    /// Whether it was new.
+    pub(crate) second_is_new: bool,
+    /// The number that need not be there.
+    pub(crate) third: f64,
+    /// Whether it was new.
+    pub(crate) third_is_new: bool,
+}
+
+/// Three numbers.
+#[derive(Clone, Copy, Debug, Inputs)]
+pub(crate) struct Numbers<'a> {
+    /// The one that dispatches in these tests.
+    pub(crate) driver: Input<'a, Number>,
+    /// One that must be there.
+    pub(crate) second: Input<'a, Number>,
+    /// One that need not.
+    pub(crate) third: Option<Input<'a, Number>>,
+}
+
+/// Emits what it is given.
+#[derive(Debug)]
+pub(crate) struct Snapshot;
+
+impl Estimator for Snapshot {
+    type Options = NoOptions;
+    type Input = Numbers<'static>;
+    type Output = Seen;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, numbers: Numbers<'_>) -> Result<Reply<Seen>, Fault> {
+        Ok(Reply::emit(Seen {
+            driver: numbers.driver.0,
+            second: numbers.second.0,
+            second_is_new: numbers.second.is_new(),
+            third: numbers.third.map_or(-1.0, |third| third.0),
+            third_is_new: numbers.third.is_some_and(|third| third.is_new()),
+        }))
+    }
+}
+
+/// The time `millis` after zero.
+pub(crate) fn at(millis: i64) -> MonotonicTime {
+    MonotonicTime::from_nanos(millis * 1_000_000)
+}

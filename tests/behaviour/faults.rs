@@ -1,0 +1,142 @@
+//! Components that fail: at the start, in a callback, by a panic. The others go on.
+
+use crate::components::{Counter, Number, Scale};
+use bb_core::node::DropReason;
+use bb_core::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Options of [`Fragile`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct FragileOptions {
+    /// `init`, `error`, `panic` or `none`.
+    #[option(default = "none")]
+    pub(crate) fails_by: &'static str,
+}
+
+/// Fails at the third message.
+#[derive(Debug)]
+pub(crate) struct Fragile(FragileOptions, u32);
+
+static TERMINATED: AtomicUsize = AtomicUsize::new(0);
+
+impl Estimator for Fragile {
+    type Options = FragileOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: FragileOptions, _: &Context) -> Result<Self, Fault> {
+        match options.fails_by {
+            "init" => Err(Fault::new("there is no map")),
+            "panic in init" => panic!("no map at all"),
+            _ => Ok(Self(options, 0)),
+        }
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        self.1 += 1;
+        match (self.1, self.0.fails_by) {
+            (3, "error") => Err(Fault::new("covariance is not positive definite")),
+            (3, "panic") => panic!("index out of bounds"),
+            _ => Ok(Reply::emit(number.payload).diverged("always")),
+        }
+    }
+
+    fn terminate(&mut self) {
+        TERMINATED.fetch_add(1, Ordering::SeqCst);
+    }
+}
+
+/// A sensor that breaks.
+#[derive(Debug)]
+pub(crate) struct Broken(bool);
+
+impl Sensor for Broken {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(false))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if self.0 {
+            return Err(Fault::new("no answer on the bus"));
+        }
+        self.0 = true;
+        Ok(Reading::now(Number(1.0)))
+    }
+}
+
+robot! {
+    robot Patient;
+
+    link base {
+        sensor numbers: Counter(count = 6) {
+            rate: 10 Hz;
+            estimator first: Fragile();
+            estimator second: Scale();
+        }
+        sensor broken: Broken() { rate: 10 Hz; }
+    }
+}
+
+#[test]
+fn a_component_that_cannot_start_is_named() {
+    for (fails_by, expected) in [
+        ("init", "sensor/base/numbers/first cannot start: there is no map"),
+        ("panic in init", "sensor/base/numbers/first cannot start: panicked: no map at all"),
+    ] {
+        let mut builder = Patient::builder();
+        builder.options(patient::sensor::base::numbers::first).fails_by = fails_by;
+        let error = builder.simulate().expect_err("it cannot start");
+        assert_eq!(error.to_string(), expected);
+    }
+    let mut builder = Patient::builder();
+    builder.options(patient::sensor::base::numbers::second).factor = f64::NAN;
+    let error = builder.start().expect_err("NaN is outside every range").to_string();
+    assert_eq!(error, "sensor/base/numbers/second cannot start: option `factor` is NaN, but must be in -1e3..=1e3");
+}
+
+#[test]
+fn an_estimator_that_fails_stops_alone() -> Result<(), StartError> {
+    for (fails_by, message) in
+        [("error", "covariance is not positive definite"), ("panic", "panicked: index out of bounds")]
+    {
+        let mut builder = Patient::builder();
+        builder.options(patient::sensor::base::numbers::first).fails_by = fails_by;
+        let (first, second) = (
+            builder.subscribe(patient::sensor::base::numbers::first),
+            builder.subscribe(patient::sensor::base::numbers::second),
+        );
+        let mut simulation = builder.simulate()?;
+        simulation.run_to_end();
+        assert_eq!((first.drain().count(), second.drain().count()), (2, 6));
+        let report = simulation.stop();
+        let estimator = report.estimator("sensor/base/numbers/first").expect("it is declared");
+        assert_eq!(estimator.stopped.as_deref(), Some(message));
+        assert_eq!(estimator.diverged, 2);
+        assert_eq!(estimator.inputs[0].dropped(DropReason::Stopped), 3);
+        let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            faults,
+            [
+                "sensor/base/broken stopped: no answer on the bus".to_owned(),
+                format!("sensor/base/numbers/first stopped: {message}")
+            ]
+        );
+        assert!(report.ok().is_err());
+    }
+    Ok(())
+}
+
+#[test]
+fn stopping_terminates_estimators_and_ends_subscriptions() -> Result<(), StartError> {
+    let builder = Patient::builder();
+    let first = builder.subscribe(patient::sensor::base::numbers::first);
+    let simulation = builder.simulate()?;
+    let before = TERMINATED.load(Ordering::SeqCst);
+    simulation.stop();
+    assert!(TERMINATED.load(Ordering::SeqCst) > before);
+    assert!(first.recv().is_none());
+    Ok(())
+}

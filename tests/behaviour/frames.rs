@@ -1,0 +1,145 @@
+//! Frames of outputs, transforms of inputs, and the topology as data.
+
+use crate::components::{Counter, Number};
+use bb_core::nalgebra::Vector3;
+use bb_core::prelude::*;
+use bb_core::topology::JointKind;
+
+/// Where the inputs' origins are in the frame of the output, m.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub(crate) struct Origins {
+    /// Of `near`.
+    pub(crate) near: Vector3<f64>,
+    /// Of `far`.
+    pub(crate) far: Vector3<f64>,
+    /// The x axis of `far`.
+    pub(crate) far_x: Vector3<f64>,
+}
+
+/// Two numbers from two places.
+#[derive(Clone, Copy, Debug, Inputs)]
+pub(crate) struct Places<'a> {
+    /// From here.
+    pub(crate) near: Input<'a, Number>,
+    /// From there.
+    pub(crate) far: Input<'a, Number>,
+}
+
+/// Tells what it was given at the start.
+#[derive(Debug)]
+pub(crate) struct Surveyor<const MOVING: bool = false>(Origins);
+
+impl<const MOVING: bool> Estimator for Surveyor<MOVING> {
+    type Options = NoOptions;
+    type Input = Places<'static>;
+    type Output = Origins;
+    const HANDLES_MOVING_JOINTS: bool = MOVING;
+
+    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
+        let far = context.frame_from_input("far");
+        Ok(Self(Origins {
+            near: context.frame_from_input("near").translation.vector,
+            far: far.translation.vector,
+            far_x: far.rotation * Vector3::x(),
+        }))
+    }
+
+    fn handle_input(&mut self, places: Places<'_>) -> Result<Reply<Origins>, Fault> {
+        assert!((places.near.0 - places.far.0).abs() <= 1.0, "both count from 0 at 1 Hz");
+        Ok(Reply::emit(self.0))
+    }
+}
+
+robot! {
+    robot Mast;
+
+    sensors { sensor clock: Counter() { rate: 1 Hz; } }
+
+    link base {
+        sensor imu: Counter() { rate: 1 Hz; }
+        estimator here: Surveyor() {
+            input near: sensor::base::imu, driver;
+            input far: sensor::base::mount::mast::tip::top::imu;
+        }
+        estimator moving: Surveyor<true>() {
+            input near: sensor::clock, driver;
+            input far: sensor::base::pan::head::imu;
+        }
+        joint mount: fixed {
+            origin: { xyz: [1 m, 0 m, 0 m], rpy: [0 deg, 0 deg, 90 deg] };
+            sensor weight: Counter() { rate: 1 Hz; }
+            link mast {
+                joint tip: fixed {
+                    origin: { xyz: [2 m, 0 m, 3 m] };
+                    link top {
+                        sensor imu: Counter() { rate: 1 Hz; estimator scaled: crate::components::Scale(); }
+                        estimator back: Surveyor() {
+                            input near: sensor::base::mount::mast::tip::top::imu, driver;
+                            input far: sensor::base::imu;
+                        }
+                        estimator at_joint: Surveyor() {
+                            input near: sensor::base::mount::mast::tip::top::imu, driver;
+                            input far: sensor::base::mount::weight;
+                        }
+                    }
+                }
+            }
+        }
+        joint pan: continuous {
+            origin: { xyz: [0 m, 0 m, 5 m] };
+            axis: [0, 3, 4];
+            limit: { velocity: 60 deg/s, effort: 5 N*m };
+            link head { sensor imu: Counter() { rate: 1 Hz; } }
+        }
+    }
+}
+
+#[test]
+fn transforms_are_the_products_of_the_fixed_joints() -> Result<(), StartError> {
+    let builder = Mast::builder();
+    let here = builder.subscribe(mast::estimator::base::here);
+    let back = builder.subscribe(mast::estimator::base::mount::mast::tip::top::back);
+    let at_joint = builder.subscribe(mast::estimator::base::mount::mast::tip::top::at_joint);
+    let moving = builder.subscribe(mast::estimator::base::moving);
+    let scaled = builder.subscribe(mast::sensor::base::mount::mast::tip::top::imu::scaled);
+    let mut simulation = builder.simulate()?;
+    simulation.run_for(Duration::from_secs(1));
+
+    let here = here.drain().last().expect("it emitted");
+    assert_eq!((here.near, here.frame.name()), (Vector3::zeros(), "base"));
+    assert!((here.far - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12);
+    assert!((here.far_x - Vector3::y()).norm() < 1e-12);
+
+    let back = back.drain().last().expect("it emitted");
+    assert_eq!((back.near, back.frame.name()), (Vector3::zeros(), "top"));
+    assert!((back.far - Vector3::new(-2.0, 1.0, -3.0)).norm() < 1e-12);
+    assert!((back.far_x + Vector3::y()).norm() < 1e-12);
+
+    // A sensor at a joint stands where the joint stands, fixed to the parent.
+    let at_joint = at_joint.drain().last().expect("it emitted");
+    assert!((at_joint.far - Vector3::new(-2.0, 0.0, -3.0)).norm() < 1e-12);
+
+    // Across a moving joint the transform is that of the joint at zero; a robot-level sensor has no frame.
+    let moving = moving.drain().last().expect("it emitted");
+    assert!((moving.far - Vector3::new(0.0, 0.0, 5.0)).norm() < 1e-12);
+    assert_eq!(moving.near, Vector3::zeros());
+
+    assert_eq!(scaled.drain().last().map(|number| number.frame.name()), Some("top"));
+    Ok(())
+}
+
+#[test]
+fn the_topology_is_data() {
+    let topology = Mast::TOPOLOGY;
+    assert_eq!(Mast::NAME, "Mast");
+    assert_eq!(topology.root().name(), "base");
+    let top = topology.link("top").and_then(|link| link.root_from_link).expect("only fixed joints lie between");
+    assert!((top.isometry().translation.vector - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12);
+    assert!(topology.link("head").is_some_and(|head| head.root_from_link.is_none()));
+    let pan = topology.joint("pan").expect("it is declared");
+    assert_eq!((pan.kind, pan.axis), (JointKind::Continuous, Some([0.0, 0.6, 0.8])));
+    assert_eq!((topology.links[pan.parent].name, topology.links[pan.child].name), ("base", "head"));
+    let limit = pan.limit.expect("it is declared");
+    assert_eq!((limit.lower, limit.effort), (None, Some(5.0)));
+    assert!((limit.velocity.unwrap_or(0.0) - 60f64.to_radians()).abs() < 1e-15);
+}

@@ -1,0 +1,90 @@
+//! Virtual time.
+
+use crate::components::{Counter, Number, Scale, at};
+use bb_core::prelude::*;
+
+robot! {
+    robot Clockwork;
+
+    link base {
+        sensor fast: Counter(count = 1000) { rate: 100 Hz; estimator scaled: Scale(factor = 3.0); }
+        sensor slow: Counter(start = 100.0, count = 2) { rate: 4 Hz; }
+    }
+}
+
+#[test]
+fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() -> Result<(), StartError> {
+    let builder = Clockwork::builder();
+    let slow = builder.subscribe(clockwork::sensor::base::slow);
+    let fast = builder.subscribe(clockwork::sensor::base::fast);
+    let mut simulation = builder.simulate()?;
+    simulation.run_for(Duration::from_millis(495));
+    assert_eq!(simulation.clock().now(), at(495));
+    assert_eq!(fast.drain().count(), 50);
+    let slow: Vec<_> = slow.drain().map(|number| (number.monotonic_time, number.0)).collect();
+    assert_eq!(slow, [(at(0), 100.0), (at(250), 101.0)]);
+    Ok(())
+}
+
+#[test]
+fn every_run_is_the_same() -> Result<(), StartError> {
+    let run = || -> Result<_, StartError> {
+        let builder = Clockwork::builder();
+        let scaled = builder.subscribe(clockwork::sensor::base::fast::scaled);
+        let mut simulation = builder.simulate()?;
+        simulation.run_to_end();
+        Ok((scaled.drain().collect::<Vec<_>>(), simulation.stop()))
+    };
+    let (first, second) = (run()?, run()?);
+    assert_eq!(first, second);
+    assert_eq!(first.0.len(), 1000);
+    Ok(())
+}
+
+#[test]
+fn options_are_those_declared_unless_they_are_changed_before_the_start() -> Result<(), StartError> {
+    let mut builder = Clockwork::builder();
+    assert_eq!(builder.options(clockwork::sensor::base::fast::scaled).factor, 3.0);
+    builder.options(clockwork::sensor::base::fast::scaled).factor = -1.0;
+    builder.options(clockwork::sensor::base::fast).start = 7.0;
+    let scaled = builder.subscribe(clockwork::sensor::base::fast::scaled);
+    builder.simulate()?.step();
+    assert_eq!(scaled.try_recv().map(|number| number.payload), Some(Number(-7.0)));
+    Ok(())
+}
+
+/// A sensor that forgets to say when to read it next.
+#[derive(Debug)]
+pub(crate) struct Restless;
+
+impl Sensor for Restless {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::now(Number(0.0)).next_at(now))
+    }
+}
+
+robot! {
+    robot Stuck;
+    link base {
+        sensor restless: Restless();
+        sensor no_rate: Counter();
+    }
+}
+
+#[test]
+fn a_sensor_that_stops_virtual_time_is_stopped_and_named() -> Result<(), StartError> {
+    let mut simulation = Stuck::builder().simulate()?;
+    simulation.run_to_end();
+    let faults = simulation.stop().faults;
+    let paths: Vec<_> = faults.iter().map(|fault| fault.path).collect();
+    assert_eq!(paths, ["sensor/base/restless", "sensor/base/no_rate"]);
+    assert!(faults[1].message.contains("declare `rate`"), "{}", faults[1]);
+    Ok(())
+}
