@@ -20,6 +20,9 @@
 //! }
 //! ```
 //!
+//! [`BagImu`] plays a recorded IMU as the sensor of a robot, and [`Truth`] is what a recording knows of the true
+//! orientation.
+//!
 //! # What is read
 //!
 //! Files with the messages in chunks (uncompressed, lz4 or zstd) or outside them, with a summary or without one,
@@ -37,12 +40,16 @@ mod bag;
 mod cdr;
 mod channels;
 mod error;
+mod imu;
 mod messages;
 mod records;
 pub mod ros;
 mod summary;
+mod truth;
 
 pub use bag::{Bag, Topic};
 pub use error::{BagError, BagErrorKind};
+pub use imu::{BagImu, BagImuOptions, IMU, MAGNETIC_FIELD};
 pub use messages::{Message, Messages};
 pub use ros::RosMessage;
+pub use truth::Truth;

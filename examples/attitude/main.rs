@@ -4,14 +4,12 @@
 //! of both. With `--data FILE.mcap` a recorded IMU takes their place.
 
 mod arguments;
-mod bag;
 mod filter;
 mod outcome;
 mod plot;
 mod progress;
 mod recorded;
 mod simulated;
-mod truth;
 
 use arguments::Arguments;
 use clap::Parser;

@@ -1,12 +1,10 @@
 //! A recorded IMU, played as the sensor.
 
 use crate::arguments::Arguments;
-use crate::bag::BagImu;
 use crate::filter::{Chosen, ChosenParams};
 use crate::outcome::{Outcome, Series};
 use crate::progress::Progress;
-use crate::truth::Truth;
-use bb_bags::Bag;
+use bb_bags::{Bag, BagImu, IMU, MAGNETIC_FIELD, Truth};
 use bb_core::prelude::*;
 use std::error::Error;
 use std::path::Path;
@@ -25,6 +23,9 @@ robot! {
 
 pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
     let bag = Bag::open(file)?;
+    if params.magnetometer && arguments.mag.is_none() {
+        bag.topic_of(MAGNETIC_FIELD).map_err(|error| format!("{error} (or choose --axes 6)"))?;
+    }
     let truth = Truth::read(&bag)?;
 
     let mut builder = Recorded::builder();
@@ -37,8 +38,7 @@ pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> R
     let orientation = builder.subscribe(recorded::sensor::body::imu::orientation);
 
     let mut simulation = builder.simulate()?;
-    let samples =
-        bag.topics().iter().filter(|topic| &*topic.schema == crate::bag::IMU).find_map(|topic| topic.messages);
+    let samples = bag.topics().iter().filter(|topic| &*topic.schema == IMU).find_map(|topic| topic.messages);
     let progress = Progress::new("playing", samples.unwrap_or(0));
     let mut series = Series::new("estimate");
     let mut first = None;

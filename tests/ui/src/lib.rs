@@ -1,1 +1,11 @@
-//! The components that the robots of these tests declare.
+//! The components that the robots of these tests declare: the least that has the shape a rule speaks of.
+
+mod estimators;
+mod sensors;
+
+pub use estimators::{Heading, HeadingInputs, Jointed, Motion, MotionOutputs, Tilt, TiltOptions};
+pub use sensors::{Bmi270, Bmi270Options, Magnetometer};
+
+/// A type that is neither a sensor nor an estimator.
+#[derive(Debug)]
+pub struct Wheel;

@@ -1,12 +1,15 @@
 //! The truth of a recording: optical orientation, and when the body moves.
 
-use bb_bags::{Bag, BagError, RosMessage};
+use crate::{Bag, BagError, RosMessage};
 use bb_core::nalgebra::{Quaternion, UnitQuaternion};
 
 /// Beyond it nothing is said about the time between two poses.
 const LONGEST_GAP_NS: i64 = 100_000_000;
 
-pub(crate) struct Truth {
+/// What a recording knows of the true orientation: poses (`geometry_msgs/PoseStamped`), and when the body moves
+/// (`std_msgs/Bool`, on change).
+#[derive(Clone, Debug, Default)]
+pub struct Truth {
     /// By time; none where the markers were lost.
     poses: Vec<(i64, Option<UnitQuaternion<f64>>)>,
     /// Changes, by time; a recording without them counts as moving all the time.
@@ -14,8 +17,11 @@ pub(crate) struct Truth {
 }
 
 impl Truth {
-    /// Reads `geometry_msgs/PoseStamped` and `std_msgs/Bool`, where the bag has them.
-    pub(crate) fn read(bag: &Bag) -> Result<Self, BagError> {
+    /// Reads both, where the bag has exactly one topic of their types.
+    ///
+    /// # Errors
+    /// The bag is broken; says where.
+    pub fn read(bag: &Bag) -> Result<Self, BagError> {
         let mut truth = Self { poses: Vec::new(), moving: Vec::new() };
         let wanted = ["geometry_msgs/msg/PoseStamped", "std_msgs/msg/Bool"];
         let topics: Vec<_> = wanted.iter().filter_map(|schema| bag.topic_of(schema).ok()).collect();
@@ -45,12 +51,15 @@ impl Truth {
         Ok(truth)
     }
 
-    pub(crate) fn is_known(&self) -> bool {
+    /// Whether any orientation is known.
+    pub fn is_known(&self) -> bool {
         self.poses.iter().any(|(_, pose)| pose.is_some())
     }
 
-    /// The true orientation at a time, if it is known, and whether the body moves then.
-    pub(crate) fn at(&self, time_ns: i64) -> (Option<UnitQuaternion<f64>>, bool) {
+    /// The true orientation `world_from_body` at a time in nanoseconds since the Unix epoch, if it is known, and whether
+    /// the body moves then (always, where the recording does not say). Between two poses at most 0.1 s apart it is
+    /// interpolated.
+    pub fn at(&self, time_ns: i64) -> (Option<UnitQuaternion<f64>>, bool) {
         let changed = self.moving.partition_point(|(time, _)| *time <= time_ns);
         let moving = match changed.checked_sub(1).and_then(|last| self.moving.get(last)) {
             Some((_, moving)) => *moving,

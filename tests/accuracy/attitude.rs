@@ -1,0 +1,92 @@
+//! Orientation on the trials of BROAD: the mean over them of the RMS errors, one parameter set for all.
+
+use crate::recordings::broad;
+use bb_bags::{BagImu, Truth};
+use bb_core::prelude::*;
+use bb_estimators::attitude::{ErrorStatistics, OrientationError};
+use bb_estimators::{Complementary, Madgwick};
+use std::error::Error;
+use std::path::Path;
+
+robot! {
+    /// Both filters on one recorded IMU, each with nine axes and with six.
+    robot Recorded;
+
+    link body {
+        sensor imu: BagImu() {
+            estimator madgwick: Madgwick<Marg>(beta = 0.12);
+            estimator madgwick_six: Madgwick<Marg>(beta = 0.03, magnetometer = false);
+            estimator complementary: Complementary<Marg>();
+            estimator complementary_six: Complementary<Marg>(magnetometer = false);
+        }
+    }
+}
+
+/// Total, heading and inclination in degrees of each of the four.
+type Errors = [[f64; 3]; 4];
+
+fn errors(file: &Path) -> Result<Errors, Box<dyn Error>> {
+    let truth = Truth::read(&bb_bags::Bag::open(file)?)?;
+    let mut builder = Recorded::builder();
+    builder.options(recorded::sensor::body::imu).file = file.to_owned();
+    let mut filters = [
+        builder.subscribe(recorded::sensor::body::imu::madgwick),
+        builder.subscribe(recorded::sensor::body::imu::madgwick_six),
+        builder.subscribe(recorded::sensor::body::imu::complementary),
+        builder.subscribe(recorded::sensor::body::imu::complementary_six),
+    ]
+    .map(|orientation| (orientation, ErrorStatistics::new()));
+    let mut simulation = builder.simulate()?;
+    while simulation.step() {
+        for (orientation, statistics) in &mut filters {
+            for message in orientation.drain() {
+                let (truth, moving) = truth.at(message.monotonic_time.as_nanos());
+                if moving {
+                    let error = truth.and_then(|truth| OrientationError::between(&message.world_from_body, &truth));
+                    statistics.add(error);
+                }
+            }
+        }
+    }
+    simulation.stop().ok()?;
+    let rms = |statistics: ErrorStatistics| {
+        let rms = statistics.rms().ok_or("no sample moves and has truth")?;
+        Ok([rms.total, rms.heading, rms.inclination].map(f64::to_degrees))
+    };
+    let [a, b, c, d] = filters.map(|(_, statistics)| rms(statistics));
+    let all: Result<Errors, &str> = (|| Ok([a?, b?, c?, d?]))();
+    Ok(all?)
+}
+
+#[test]
+fn mean_errors_on_broad() -> Result<(), Box<dyn Error>> {
+    let Some(files) = broad() else { return Ok(()) };
+    let mut sums: Errors = Default::default();
+    for file in &files {
+        let errors = errors(file)?;
+        assert!(errors.as_flattened().iter().all(|error| error.is_finite()), "{}: {errors:?}", file.display());
+        for (sum, error) in sums.as_flattened_mut().iter_mut().zip(errors.as_flattened()) {
+            *sum += error / files.len() as f64;
+        }
+    }
+    if files.len() != 10 {
+        println!("{} trials instead of 10: no bounds are known for these", files.len());
+        return Ok(());
+    }
+    // Measured, degrees; six axes have no heading.
+    let known = [
+        ("Madgwick, nine axes", sums[0], [5.252, 4.194, 3.005]),
+        ("Madgwick, six axes", sums[1], [f64::INFINITY, f64::INFINITY, 1.996]),
+        ("complementary, nine axes", sums[2], [3.701, 3.095, 1.801]),
+        ("complementary, six axes", sums[3], [f64::INFINITY, f64::INFINITY, 1.801]),
+    ];
+    for (name, measured, known) in known {
+        println!("{name}: total {:.3}, heading {:.3}, inclination {:.3}", measured[0], measured[1], measured[2]);
+        for (measured, known) in measured.iter().zip(known) {
+            assert!(*measured <= known * 1.02, "{name}: {measured} was {known}");
+        }
+    }
+    // The published figure of Madgwick with nine axes at this beta is 5.27.
+    assert!((sums[0][0] / 5.27 - 1.0).abs() < 0.05);
+    Ok(())
+}

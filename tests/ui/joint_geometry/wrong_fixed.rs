@@ -1,0 +1,18 @@
+//! A fixed joint neither turns nor slides.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover;
+    link base {
+        joint mount: fixed {
+            axis: z;
+            limit: { lower: 0 deg, upper: 0 deg, velocity: 0 deg/s };
+            link mast { }
+        }
+        joint fly: floating { axis: z; link drone { } }
+    }
+}
+
+fn main() {}

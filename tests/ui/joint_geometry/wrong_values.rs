@@ -1,0 +1,18 @@
+//! A limit the wrong way round, an axis without direction.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover;
+    link base {
+        joint pan: revolute {
+            axis: z;
+            limit: { lower: 90 deg, upper: -90 deg };
+            link head { }
+        }
+        joint turn: continuous { axis: [0, 0, 0]; link disc { } }
+    }
+}
+
+fn main() {}

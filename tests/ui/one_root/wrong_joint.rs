@@ -1,0 +1,17 @@
+//! A joint that carries nothing, and one that carries two links.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover;
+    link base {
+        joint mount: fixed { }
+        joint pan: fixed {
+            link head { }
+            link camera { }
+        }
+    }
+}
+
+fn main() {}

@@ -1,0 +1,18 @@
+//! Two inputs the wrong way round.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover;
+    link base {
+        sensor imu: Bmi270(bus = "i2c-1");
+        sensor field: Magnetometer();
+        estimator heading: Heading() {
+            input imu: sensor::base::field, driver;
+            input field: sensor::base::imu;
+        }
+    }
+}
+
+fn main() {}

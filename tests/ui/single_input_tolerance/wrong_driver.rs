@@ -1,0 +1,18 @@
+//! That the single input is marked as driver makes no difference.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover;
+    link base {
+        sensor imu: Bmi270(bus = "i2c-1");
+        estimator motion: Motion() {
+            sync_tolerance: 20 ms;
+            input imu: sensor::base::imu, driver;
+            output velocity;
+        }
+    }
+}
+
+fn main() {}

@@ -1,0 +1,7 @@
+//! Nothing.
+
+use bb_core::prelude::*;
+
+robot! {}
+
+fn main() {}

@@ -1,0 +1,18 @@
+//! Semicolons that are missing.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover
+    link base {
+        sensor imu: Bmi270(bus = "i2c-1") { rate: 200 Hz }
+        sensor field: Magnetometer()
+        estimator heading: Heading() {
+            input imu: sensor::base::imu, driver
+            input field: sensor::base::field;
+        }
+    }
+}
+
+fn main() {}
