@@ -1,1 +1,80 @@
-//! What the documents claim.
+//! What ARCHITECTURE.md claims: every path in it exists, and arrows between crates point one way.
+
+use std::path::Path;
+
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
+fn read(file: &str) -> String {
+    std::fs::read_to_string(root().join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
+}
+
+#[test]
+fn every_path_in_the_documents_exists() {
+    for document in ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"] {
+        let text = read(document);
+        let quoted = text.split('`').skip(1).step_by(2);
+        let linked = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        let is_path = |word: &&str| {
+            let top = word.split('/').next().unwrap_or("");
+            word.contains('/') && !word.contains([' ', ':', '<']) && root().join(top).exists() || word.ends_with(".md")
+        };
+        let paths: Vec<&str> = quoted.chain(linked).filter(is_path).collect();
+        assert!(!paths.is_empty() || document == "CONTRIBUTING.md", "{document} names no path");
+        for path in paths {
+            assert!(root().join(path).exists(), "{document} names {path}, which is not there");
+        }
+    }
+}
+
+#[test]
+fn every_folder_of_code_is_on_the_map() {
+    let map = read("ARCHITECTURE.md");
+    for krate in ["bb-macros", "bb-core", "bb-estimators", "bb-bags"] {
+        let source = root().join(krate).join("src");
+        let entries = std::fs::read_dir(&source).unwrap_or_else(|error| panic!("{}: {error}", source.display()));
+        for entry in entries.flatten().filter(|entry| entry.path().is_dir()) {
+            let folder = format!("{krate}/src/{}", entry.file_name().to_string_lossy());
+            // A folder stands on the map itself, or as the file beside it of the same name.
+            let is_there = map.contains(&format!("{folder}/")) || map.contains(&format!("{folder}.rs"));
+            assert!(is_there, "ARCHITECTURE.md does not name {folder}");
+        }
+    }
+}
+
+#[test]
+fn every_rule_has_its_folder_of_robots() {
+    let rules = std::fs::read_dir(root().join("bb-macros/src/verify")).expect("it is on the map");
+    for rule in rules.flatten() {
+        let name = rule.path().file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let folder = root().join("tests/ui").join(&name);
+        let cases = std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("tests/ui/{name}: {error}"));
+        let cases: Vec<_> = cases.flatten().map(|case| case.file_name().to_string_lossy().into_owned()).collect();
+        let count = |start: &str| cases.iter().filter(|case| case.starts_with(start) && case.ends_with(".rs")).count();
+        assert!(count("wrong_") >= 2 && count("right_") >= 1, "tests/ui/{name} needs two wrong robots and a right one");
+    }
+}
+
+#[test]
+fn arrows_between_crates_point_one_way() {
+    let depends = |krate: &str, on: &str| {
+        let manifest = read(&format!("{krate}/Cargo.toml"));
+        let dependencies = manifest.split("[dependencies]").nth(1).unwrap_or("");
+        let dependencies = dependencies.split("\n[").next().unwrap_or("");
+        dependencies.lines().any(|line| line.starts_with(on))
+    };
+    assert!(depends("bb-core", "bb-macros"));
+    for (krate, on) in [
+        ("bb-macros", "bb-core"),
+        ("bb-macros", "bb-estimators"),
+        ("bb-core", "bb-estimators"),
+        ("bb-core", "bb-bags"),
+        ("bb-estimators", "bb-macros"),
+        ("bb-estimators", "bb-bags"),
+        ("bb-bags", "bb-estimators"),
+        ("bb-bags", "bb-macros"),
+    ] {
+        assert!(!depends(krate, on), "{krate} must not depend on {on}");
+    }
+}

@@ -1,1 +1,13 @@
-//! Tests of whole robots; see the test targets of this crate.
+//! Tests of whole robots; see the test targets of this crate. The code in the documents is compiled here.
+
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/components.md")]
+struct Components;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/attitude.md")]
+struct Attitude;
