@@ -30,7 +30,9 @@ pub mod topology;
 mod check;
 mod stub;
 
-pub use bb_macros::{Inputs, Options, Outputs, Payload, robot};
+#[doc = include_str!("robot.md")]
+pub use bb_macros::robot;
+pub use bb_macros::{Inputs, Options, Outputs, Payload};
 pub use component::{
     Context, Estimator, Fault, Input, Inputs, Options, Outputs, Reading, Reply, Sensor, SensorContext,
 };

@@ -5,5 +5,5 @@ mod subscription;
 mod topic;
 
 pub use queue::Overflow;
-pub use subscription::{Next, Subscription};
+pub use subscription::{RecvAsync, Subscription};
 pub use topic::{AnyTopic, Topic, TopicStatistics};

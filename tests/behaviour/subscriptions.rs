@@ -29,11 +29,11 @@ async fn a_subscription_can_be_awaited() -> Result<(), StartError> {
     let mut running = builder.start()?;
     let mut sum = 0.0;
     for _ in 0..10 {
-        sum += numbers.next().await.map_or(f64::NAN, |Stamped { payload: Number(number), .. }| number);
+        sum += numbers.recv_async().await.map_or(f64::NAN, |Stamped { payload: Number(number), .. }| number);
     }
     assert_eq!(sum, 45.0);
     running.wait();
     running.stop();
-    assert!(numbers.next().await.is_none());
+    assert!(numbers.recv_async().await.is_none());
     Ok(())
 }

@@ -48,8 +48,8 @@ impl<T> Subscription<T> {
 
     /// Awaits the next message, on any executor; none once the robot has stopped and all are read. One task at a time
     /// may await a subscription.
-    pub fn next(&mut self) -> Next<'_, T> {
-        Next(self)
+    pub fn recv_async(&mut self) -> RecvAsync<'_, T> {
+        RecvAsync(self)
     }
 
     /// The messages that wait now.
@@ -75,11 +75,11 @@ impl<T> fmt::Debug for Subscription<T> {
     }
 }
 
-/// The future of [`Subscription::next`].
+/// The future of [`Subscription::recv_async`].
 #[derive(Debug)]
-pub struct Next<'a, T>(&'a mut Subscription<T>);
+pub struct RecvAsync<'a, T>(&'a mut Subscription<T>);
 
-impl<T> Future for Next<'_, T> {
+impl<T> Future for RecvAsync<'_, T> {
     type Output = Option<Stamped<T>>;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {

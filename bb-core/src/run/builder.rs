@@ -8,6 +8,9 @@ use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::Arc;
 
+/// The wiring with its estimators, and the sensors that feed it.
+type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
+
 /// A robot that is assembled and not yet started: options may still be changed, and a subscription made here misses
 /// nothing.
 pub struct Builder<R: Robot> {
@@ -55,7 +58,7 @@ impl<R: Robot> Builder<R> {
         Ok(Simulation::new(machine, sources))
     }
 
-    fn assemble(mut self, startup: Startup) -> Result<(Machine<R>, Vec<Box<dyn Source>>), StartError> {
+    fn assemble(mut self, startup: Startup) -> Result<Assembled<R>, StartError> {
         let wiring = Arc::new(R::wire(self.topics, &mut self.options, &startup)?);
         let machine = Machine { wiring, startup };
         match R::sources(&machine.wiring, self.options, &machine.startup) {

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     if let Some(name) = &robot.name
-        && snake_case(&name.to_string()) == name.to_string()
+        && *name == snake_case(&name.to_string())
     {
         let message = format!("`{name}` would be both the robot's type and its module; write it in camel case");
         diagnostics.error(name, message);
