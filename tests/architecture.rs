@@ -18,7 +18,8 @@ fn every_path_in_the_documents_exists() {
         let linked = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
         let is_path = |word: &&str| {
             let top = word.split('/').next().unwrap_or("");
-            word.contains('/') && !word.contains([' ', ':', '<']) && root().join(top).exists() || word.ends_with(".md")
+            word.contains('/') && !word.contains([' ', ':', '<']) && root().join(top).exists()
+                || word.ends_with(".md")
         };
         let paths: Vec<&str> = quoted.chain(linked).filter(is_path).collect();
         assert!(!paths.is_empty() || document == "CONTRIBUTING.md", "{document} names no path");
@@ -51,8 +52,12 @@ fn every_rule_has_its_folder_of_robots() {
         let folder = root().join("tests/ui").join(&name);
         let cases = std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("tests/ui/{name}: {error}"));
         let cases: Vec<_> = cases.flatten().map(|case| case.file_name().to_string_lossy().into_owned()).collect();
-        let count = |start: &str| cases.iter().filter(|case| case.starts_with(start) && case.ends_with(".rs")).count();
-        assert!(count("wrong_") >= 2 && count("right_") >= 1, "tests/ui/{name} needs two wrong robots and a right one");
+        let count =
+            |start: &str| cases.iter().filter(|case| case.starts_with(start) && case.ends_with(".rs")).count();
+        assert!(
+            count("wrong_") >= 2 && count("right_") >= 1,
+            "tests/ui/{name} needs two wrong robots and a right one"
+        );
     }
 }
 
