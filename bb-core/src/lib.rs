@@ -81,6 +81,9 @@ pub mod __private {
         Source, StartError, Startup,
     };
     pub use crate::stub::{Known, NotProbed, Probe, Unknown, both_known, stub};
-    pub use crate::topology::{Joint, JointKind, Limit, Link, Topology, Transform};
+    pub use crate::topology::{
+        Collision, Dynamics, Geometry, Inertial, Joint, JointKind, Limit, Link, Material, Mimic, Origin, Topology,
+        Transform, Transmission, Visual,
+    };
     pub use std::sync::Arc;
 }

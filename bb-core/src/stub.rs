@@ -72,6 +72,8 @@ macro_rules! __stub_robot {
             const NAME: &'static str = $name;
             const TOPOLOGY: &'static $crate::topology::Topology =
                 &$crate::topology::Topology { links: &[], joints: &[] };
+            const SENSORS: &'static [$crate::__private::SensorDeclaration] = &[];
+            const ESTIMATORS: &'static [$crate::__private::EstimatorDeclaration] = &[];
             type Options = ();
             type Topics = ();
             type Wiring = ();

@@ -1,10 +1,17 @@
-//! Links, joints and the transforms between them, as constant data.
+//! Links, joints and the transforms between them, as constant data; what they weigh and look like, as in URDF.
+
+mod body;
+mod graph;
+mod urdf;
+
+pub use body::{Collision, Geometry, Inertial, Material, Visual};
+pub use graph::{GraphFormat, graph};
 
 use crate::message::Frame;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// A robot's links and joints, in the order of their declaration; the first link is the root.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Topology {
     /// The links.
     pub links: &'static [Link],
@@ -13,7 +20,7 @@ pub struct Topology {
 }
 
 /// A rigid body.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
     /// Its name, and that of its frame.
     pub name: &'static str,
@@ -21,10 +28,16 @@ pub struct Link {
     pub parent_joint: Option<usize>,
     /// Takes points from this link to the root, if only fixed joints lie between.
     pub root_from_link: Option<Transform>,
+    /// What it weighs.
+    pub inertial: Option<Inertial>,
+    /// What it looks like.
+    pub visuals: &'static [Visual],
+    /// What it must not run into.
+    pub collisions: &'static [Collision],
 }
 
 /// What connects two links.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
     /// Its name.
     pub name: &'static str,
@@ -35,11 +48,44 @@ pub struct Joint {
     /// The number of the link that it carries.
     pub child: usize,
     /// Takes points from the joint's frame, which is the child's at rest, to the parent's.
-    pub parent_from_joint: Transform,
+    pub parent_from_joint: Origin,
     /// The axis of motion in the joint's frame, of unit length; for a planar joint the plane's normal.
     pub axis: Option<[f64; 3]>,
     /// How far, fast and strongly it moves.
     pub limit: Option<Limit>,
+    /// How it resists.
+    pub dynamics: Option<Dynamics>,
+    /// The joint that it follows.
+    pub mimic: Option<Mimic>,
+    /// What stands between it and its motor.
+    pub transmission: Option<Transmission>,
+}
+
+/// How a joint resists being moved: N·m·s/rad and N·m where it turns, N·s/m and N where it slides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dynamics {
+    /// Resistance for each unit of velocity.
+    pub damping: f64,
+    /// Resistance to the first motion.
+    pub friction: f64,
+}
+
+/// A joint that follows another: `position = multiplier · other + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mimic {
+    /// The number of the joint it follows.
+    pub joint: usize,
+    /// How far it moves for each unit of the other.
+    pub multiplier: f64,
+    /// Its position where the other's is 0; rad or m.
+    pub offset: f64,
+}
+
+/// A gear between a motor and a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transmission {
+    /// Turns of the motor for one of the joint.
+    pub reduction: f64,
 }
 
 /// How a joint moves (URDF's types).
@@ -59,6 +105,20 @@ pub enum JointKind {
     Floating,
 }
 
+impl JointKind {
+    /// Its name in URDF.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fixed => "fixed",
+            Self::Revolute => "revolute",
+            Self::Continuous => "continuous",
+            Self::Prismatic => "prismatic",
+            Self::Planar => "planar",
+            Self::Floating => "floating",
+        }
+    }
+}
+
 /// The limits of a joint: rad, rad/s, N·m where it turns, m, m/s, N where it slides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
@@ -70,6 +130,27 @@ pub struct Limit {
     pub velocity: Option<f64>,
     /// Largest torque or force.
     pub effort: Option<f64>,
+}
+
+/// A transform as URDF writes it: a translation, and angles about fixed axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Origin {
+    /// Translation, m.
+    pub xyz: [f64; 3],
+    /// Angles in rad about the fixed axes x, y, z in this order: R = Rz(yaw) Ry(pitch) Rx(roll).
+    pub rpy: [f64; 3],
+}
+
+impl Origin {
+    /// No motion at all.
+    pub const IDENTITY: Self = Self { xyz: [0.0; 3], rpy: [0.0; 3] };
+
+    /// The same as an isometry.
+    pub fn isometry(&self) -> Isometry3<f64> {
+        let [roll, pitch, yaw] = self.rpy;
+        let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        Isometry3::from_parts(Translation3::from(Vector3::from(self.xyz)), rotation)
+    }
 }
 
 /// A rotation and a translation as plain numbers, so that they can be constants.

@@ -20,6 +20,7 @@ mod literal;
 mod options;
 mod robot_impl;
 mod stub;
+mod topology;
 mod types;
 mod wiring;
 

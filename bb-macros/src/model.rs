@@ -7,7 +7,10 @@ mod rigid;
 pub(crate) use resolve::resolve;
 pub(crate) use rigid::Rigid;
 
-use crate::parse::{self, Axis, Component, JointKind, Limit, Origin, Output, Path, Quantity, Setting};
+use crate::parse::{
+    self, Axis, Component, Dynamics, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity, Setting,
+    Shape, Transmission,
+};
 use proc_macro2::Ident;
 use syn::{Attribute, Visibility};
 
@@ -39,6 +42,9 @@ pub(crate) struct Link {
     pub(crate) name: Ident,
     /// The joint that carries it; none for a root.
     pub(crate) joint: Option<JointId>,
+    pub(crate) inertials: Vec<Inertial>,
+    pub(crate) visuals: Vec<Shape>,
+    pub(crate) collisions: Vec<Shape>,
 }
 
 #[derive(Clone, Debug)]
@@ -51,6 +57,9 @@ pub(crate) struct Joint {
     pub(crate) origins: Vec<Origin>,
     pub(crate) axes: Vec<Axis>,
     pub(crate) limits: Vec<Limit>,
+    pub(crate) dynamics: Vec<Dynamics>,
+    pub(crate) mimics: Vec<Mimic>,
+    pub(crate) transmissions: Vec<Transmission>,
 }
 
 /// Where a sensor is mounted.
@@ -103,8 +112,10 @@ pub(crate) struct Input {
     pub(crate) driver: Option<Ident>,
     pub(crate) optional: bool,
     pub(crate) within: Option<Quantity>,
-    /// None if no publisher has that path.
+    /// None if no publisher has that path, or several end in it.
     pub(crate) source: Option<PublisherId>,
+    /// The publishers whose paths end in it, if they are several.
+    pub(crate) candidates: Vec<PublisherId>,
 }
 
 #[derive(Clone, Debug)]
@@ -164,6 +175,6 @@ impl Estimator {
 impl std::convert::From<parse::Input> for Input {
     fn from(input: parse::Input) -> Self {
         let parse::Input { word, name, path, driver, optional, within } = input;
-        Self { word, name, path, driver, optional, within, source: None }
+        Self { word, name, path, driver, optional, within, source: None, candidates: Vec::new() }
     }
 }

@@ -1,6 +1,7 @@
 //! Tokens to a tree. Parsing never fails: what cannot be read is reported, skipped, and leaves the tree incomplete.
 
 mod block;
+mod body;
 mod component;
 mod estimator;
 mod input;
@@ -8,14 +9,16 @@ mod joint;
 mod link;
 mod output;
 mod quantity;
+mod record;
 mod robot;
 mod sensor;
 mod setting;
 
+pub(crate) use body::{Geometry, Inertial, Shape};
 pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
 pub(crate) use input::{Input, Path};
-pub(crate) use joint::{Axis, Joint, JointKind, Limit, Origin};
+pub(crate) use joint::{Axis, Dynamics, Joint, JointKind, Limit, Mimic, Origin, Transmission};
 pub(crate) use link::Link;
 pub(crate) use output::Output;
 pub(crate) use quantity::Quantity;

@@ -21,6 +21,12 @@ impl Dimension {
     pub(crate) const ANGULAR_VELOCITY: Self = Self([0, 0, -1, 0, 0, 1]);
     pub(crate) const FORCE: Self = Self([1, 1, -2, 0, 0, 0]);
     pub(crate) const TORQUE: Self = Self([2, 1, -2, 0, 0, 0]);
+    pub(crate) const MASS: Self = Self([0, 1, 0, 0, 0, 0]);
+    pub(crate) const MOMENT_OF_INERTIA: Self = Self([2, 1, 0, 0, 0, 0]);
+    /// N·s/m
+    pub(crate) const LINEAR_DAMPING: Self = Self([0, 1, -1, 0, 0, 0]);
+    /// N·m·s/rad
+    pub(crate) const ANGULAR_DAMPING: Self = Self([2, 1, -1, 0, 0, -1]);
 
     /// With its article, for messages.
     pub(crate) fn name(self) -> String {
@@ -64,6 +70,8 @@ const NAMED: &[([i8; 6], &str)] = &[
     ([2, 1, -2, 0, 0, 0], "a torque"),
     ([2, 1, -3, 0, 0, 0], "a power"),
     ([2, 1, 0, 0, 0, 0], "a moment of inertia"),
+    ([0, 1, -1, 0, 0, 0], "a damping per velocity"),
+    ([2, 1, -1, 0, 0, -1], "a damping per angular velocity"),
     ([-1, 1, -2, 0, 0, 0], "a pressure"),
     ([2, 1, -3, -1, 0, 0], "a voltage"),
     ([0, 1, -2, -1, 0, 0], "a magnetic field"),

@@ -7,7 +7,9 @@ mod declared_publishers;
 mod dimensions;
 mod distinct_paths;
 mod joint_geometry;
+mod link_bodies;
 mod link_nested_input;
+mod mimicked_joints;
 mod no_cycles;
 mod one_driver;
 mod one_root;
@@ -28,6 +30,8 @@ const RULES: &[Rule] = &[
     unique_names::check,
     one_root::check,
     joint_geometry::check,
+    mimicked_joints::check,
+    link_bodies::check,
     dimensions::check,
     sensor_nested_input::check,
     link_nested_input::check,

@@ -12,6 +12,8 @@ pub struct EstimatorDeclaration {
     pub frame: Frame,
     /// Its inputs, in the order of their declaration; a nested estimator's only one is its sensor.
     pub inputs: &'static [InputDeclaration],
+    /// The paths it publishes at: one per declared output, or its own.
+    pub outputs: &'static [&'static str],
 }
 
 /// One input as declared.

@@ -1,9 +1,9 @@
 //! What `robot!` implements.
 
-use super::{Builder, Source, StartError, Startup};
-use crate::node::AnyNode;
+use super::{Builder, SensorDeclaration, Source, StartError, Startup};
+use crate::node::{AnyNode, EstimatorDeclaration};
 use crate::pubsub::AnyTopic;
-use crate::topology::Topology;
+use crate::topology::{GraphFormat, Topology, graph};
 use std::sync::Arc;
 
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
@@ -12,6 +12,10 @@ pub trait Robot: Sized + Send + Sync + 'static {
     const NAME: &'static str;
     /// Its links and joints.
     const TOPOLOGY: &'static Topology;
+    /// Its sensors, in the order of their declaration.
+    const SENSORS: &'static [SensorDeclaration];
+    /// Its estimators, in the order of their declaration.
+    const ESTIMATORS: &'static [EstimatorDeclaration];
 
     /// The options of all components.
     #[doc(hidden)]
@@ -48,6 +52,16 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic>;
     #[doc(hidden)]
     fn all_nodes(wiring: &Self::Wiring) -> Vec<&dyn AnyNode>;
+
+    /// Its links and joints as a URDF file.
+    fn to_urdf() -> String {
+        Self::TOPOLOGY.to_urdf(Self::NAME)
+    }
+
+    /// Its topology and dataflow as a picture, in Mermaid or DOT.
+    fn graph(format: GraphFormat) -> String {
+        graph(format, Self::TOPOLOGY, Self::SENSORS, Self::ESTIMATORS)
+    }
 
     /// Assembles the robot: options may be changed and topics subscribed to before it starts.
     fn builder() -> Builder<Self> {

@@ -1,10 +1,8 @@
-//! What was declared, as constant data: sensors, estimators with their inputs, and the topology with all fixed joints
-//! multiplied out.
+//! What was declared, as constant data: sensors, and estimators with their inputs.
 
 use super::literal::{nanos, option, transform};
-use super::path_text;
-use crate::model::{Joint, Mount, Robot, Sensor};
-use crate::parse::{JointKind, Limit, Quantity};
+use super::{path_text, topology};
+use crate::model::{Mount, Robot, Sensor};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -15,7 +13,7 @@ pub(super) fn declarations(verified: &Verified<'_>) -> TokenStream {
     let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor));
     let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, id));
     let (sensor_count, estimator_count) = (robot.sensors.len(), robot.estimators.len());
-    let topology = topology(robot);
+    let topology = topology::topology(robot);
     quote! {
         static SENSORS: [::bb_core::__private::SensorDeclaration; #sensor_count] = [#(#sensors),*];
         static ESTIMATORS: [::bb_core::__private::EstimatorDeclaration; #estimator_count] = [#(#estimators),*];
@@ -40,7 +38,7 @@ fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
 }
 
 /// The transform to the root, if only fixed joints lie between.
-fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
+pub(super) fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
     let route = robot.route_to_root(mount).filter(|route| route.moving.is_empty());
     option(route.map(|route| transform(route.transform)))
 }
@@ -68,10 +66,13 @@ fn estimator_declaration(verified: &Verified<'_>, id: usize) -> TokenStream {
         input_declaration(index, &name, &path, driver, optional, &tolerance, &frame_from_input)
     });
     let inputs = nested.into_iter().chain(declared);
+    let outputs = estimator.publishers.iter().filter_map(|publisher| robot.publishers.get(*publisher));
+    let outputs = outputs.map(|publisher| path_text(&publisher.path));
     quote!(::bb_core::__private::EstimatorDeclaration {
         path: #path,
         frame: ::bb_core::__private::Frame::new(#frame),
         inputs: &[#(#inputs),*],
+        outputs: &[#(#outputs),*],
     })
 }
 
@@ -101,62 +102,4 @@ fn input_declaration(
         tolerance_nanos: #tolerance,
         frame_from_input: #frame_from_input,
     })
-}
-
-fn topology(robot: &Robot) -> TokenStream {
-    let links = robot.links.iter().enumerate().map(|(id, link)| {
-        let name = link.name.to_string();
-        let joint = option(link.joint.map(|joint| quote!(#joint)));
-        let root = root_from(robot, Mount::Link(id));
-        quote!(::bb_core::__private::Link { name: #name, parent_joint: #joint, root_from_link: #root })
-    });
-    let joints = robot.joints.iter().enumerate().map(|(id, data)| joint(robot, id, data));
-    quote!(::bb_core::__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
-}
-
-fn joint(robot: &Robot, id: usize, joint: &Joint) -> TokenStream {
-    let name = joint.name.to_string();
-    let kind = joint_kind(joint.kind);
-    let parent = joint.parent;
-    let child = joint.children.first().copied().unwrap_or_default();
-    let parent_from_joint = transform(robot.parent_from_joint(id));
-    let axis = option(joint.axes.first().map(|axis| {
-        let length = axis.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
-        let direction = axis.direction.map(|value| value / length);
-        quote!([#(#direction),*])
-    }));
-    let limit = option(joint.limits.first().map(limit));
-    quote!(::bb_core::__private::Joint {
-        name: #name,
-        kind: ::bb_core::__private::JointKind::#kind,
-        parent: #parent,
-        child: #child,
-        parent_from_joint: #parent_from_joint,
-        axis: #axis,
-        limit: #limit,
-    })
-}
-
-fn limit(limit: &Limit) -> TokenStream {
-    let value = |quantity: &Option<Quantity>| {
-        option(quantity.as_ref().map(|quantity| {
-            let value = quantity.value;
-            quote!(#value)
-        }))
-    };
-    let (lower, upper, velocity, effort) =
-        (value(&limit.lower), value(&limit.upper), value(&limit.velocity), value(&limit.effort));
-    quote!(::bb_core::__private::Limit { lower: #lower, upper: #upper, velocity: #velocity, effort: #effort })
-}
-
-/// The name of a joint's kind in `bb_core`.
-fn joint_kind(kind: JointKind) -> TokenStream {
-    match kind {
-        JointKind::Fixed => quote!(Fixed),
-        JointKind::Revolute => quote!(Revolute),
-        JointKind::Continuous => quote!(Continuous),
-        JointKind::Prismatic => quote!(Prismatic),
-        JointKind::Planar => quote!(Planar),
-        JointKind::Floating => quote!(Floating),
-    }
 }

@@ -35,6 +35,8 @@ pub(super) fn robot_impl(robot: &Robot, name: &Ident) -> TokenStream {
         impl ::bb_core::Robot for #name {
             const NAME: &'static str = #text;
             const TOPOLOGY: &'static ::bb_core::__private::Topology = &TOPOLOGY;
+            const SENSORS: &'static [::bb_core::__private::SensorDeclaration] = &SENSORS;
+            const ESTIMATORS: &'static [::bb_core::__private::EstimatorDeclaration] = &ESTIMATORS;
 
             type Options = Options;
             type Topics = Topics;

@@ -36,15 +36,16 @@ impl Robot {
     fn add_link(&mut self, link: parse::Link, joint: Option<JointId>, above: &[Ident]) -> LinkId {
         let id = self.links.len();
         let path = below(above, &link.name);
-        self.links.push(Link { name: link.name, joint });
-        for sensor in link.sensors {
+        let parse::Link { name, sensors, estimators, joints, inertials, visuals, collisions } = link;
+        self.links.push(Link { name, joint, inertials, visuals, collisions });
+        for sensor in sensors {
             self.add_sensor(sensor, Mount::Link(id), &path);
         }
-        for estimator in link.estimators {
+        for estimator in estimators {
             let own = texts("estimator", &below(&path, &estimator.name));
             self.add_estimator(estimator, Home::Link(id), own);
         }
-        for joint in link.joints {
+        for joint in joints {
             self.add_joint(joint, id, &path);
         }
         id
@@ -53,9 +54,32 @@ impl Robot {
     fn add_joint(&mut self, joint: parse::Joint, parent: LinkId, above: &[Ident]) {
         let id = self.joints.len();
         let path = below(above, &joint.name);
-        let parse::Joint { name, kind, kind_word, origins, axes, limits, sensors, links } = joint;
-        let children = Vec::new();
-        self.joints.push(Joint { name, kind, kind_word, parent, children, origins, axes, limits });
+        let parse::Joint {
+            name,
+            kind,
+            kind_word,
+            origins,
+            axes,
+            limits,
+            dynamics,
+            mimics,
+            transmissions,
+            sensors,
+            links,
+        } = joint;
+        self.joints.push(Joint {
+            name,
+            kind,
+            kind_word,
+            parent,
+            children: Vec::new(),
+            origins,
+            axes,
+            limits,
+            dynamics,
+            mimics,
+            transmissions,
+        });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Joint(id), &path);
         }
@@ -111,13 +135,24 @@ impl Robot {
         self.publishers.len() - 1
     }
 
+    /// Finds what each input names: by its whole path, or by the end of one that no other has.
     fn resolve_inputs(&mut self) {
-        let mut by_path = HashMap::new();
+        let mut by_path: HashMap<String, Vec<usize>> = HashMap::new();
+        let mut whole: HashMap<String, usize> = HashMap::new();
         for (id, publisher) in self.publishers.iter().enumerate() {
-            by_path.entry(publisher.path.join("::")).or_insert(id);
+            whole.entry(publisher.path.join("::")).or_insert(id);
+            for start in 0..publisher.path.len() {
+                by_path.entry(publisher.path[start..].join("::")).or_default().push(id);
+            }
         }
         for input in self.estimators.iter_mut().flat_map(|estimator| &mut estimator.inputs) {
-            input.source = by_path.get(&input.path.text()).copied();
+            let path = input.path.text();
+            let candidates = by_path.get(&path).map_or(&[][..], Vec::as_slice);
+            input.source = match (whole.get(&path), candidates) {
+                (Some(id), _) | (None, [id]) => Some(*id),
+                _ => None,
+            };
+            input.candidates = if input.source.is_none() { candidates.to_vec() } else { Vec::new() };
         }
     }
 }

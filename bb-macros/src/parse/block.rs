@@ -21,6 +21,12 @@ const WORDS: &[&str] = &[
     "origin",
     "axis",
     "limit",
+    "dynamics",
+    "mimic",
+    "transmission",
+    "inertial",
+    "visual",
+    "collision",
 ];
 
 /// Words that stand in the language but are not built yet.
@@ -33,12 +39,6 @@ const PLANNED: &[&str] = &[
     "actuator",
     "bridge",
     "topology",
-    "inertial",
-    "visual",
-    "collision",
-    "dynamics",
-    "transmission",
-    "mimic",
     "latency_budget",
     "lost_after",
     "recover_after",

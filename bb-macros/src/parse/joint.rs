@@ -1,8 +1,10 @@
 //! `joint pan: revolute { origin: { … }; axis: z; limit: { … }; sensor … link head { … } }`
 
 mod geometry;
+mod mechanics;
 
 pub(crate) use geometry::{Axis, Limit, Origin};
+pub(crate) use mechanics::{Dynamics, Mimic, Transmission};
 
 use super::block::{Head, braced, items, semicolon, unexpected};
 use super::component::name;
@@ -22,6 +24,9 @@ pub(crate) struct Joint {
     pub(crate) origins: Vec<Origin>,
     pub(crate) axes: Vec<Axis>,
     pub(crate) limits: Vec<Limit>,
+    pub(crate) dynamics: Vec<Dynamics>,
+    pub(crate) mimics: Vec<Mimic>,
+    pub(crate) transmissions: Vec<Transmission>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) links: Vec<Link>,
 }
@@ -58,6 +63,9 @@ impl JointKind {
     }
 }
 
+/// What a joint holds.
+const WORDS: &[&str] = &["origin", "axis", "limit", "dynamics", "mimic", "transmission", "sensor", "link"];
+
 impl Joint {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
@@ -70,6 +78,9 @@ impl Joint {
             origins: Vec::new(),
             axes: Vec::new(),
             limits: Vec::new(),
+            dynamics: Vec::new(),
+            mimics: Vec::new(),
+            transmissions: Vec::new(),
             sensors: Vec::new(),
             links: Vec::new(),
         };
@@ -87,10 +98,13 @@ impl Joint {
             "origin" => self.origins.push(Origin::parse(head, input, diagnostics)?),
             "axis" => self.axes.push(Axis::parse(head, input, diagnostics)?),
             "limit" => self.limits.push(Limit::parse(head, input, diagnostics)?),
+            "dynamics" => self.dynamics.push(Dynamics::parse(head, input, diagnostics)?),
+            "mimic" => self.mimics.push(Mimic::parse(head, input, diagnostics)?),
+            "transmission" => self.transmissions.push(Transmission::parse(head, input, diagnostics)?),
             "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
             "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
             _ => {
-                return Err(unexpected(&head.word, "a joint", &["origin", "axis", "limit", "sensor", "link"]));
+                return Err(unexpected(&head.word, "a joint", WORDS));
             }
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use super::block::{Head, braced, items, semicolon, unexpected};
 use super::component::name;
-use super::{Estimator, Joint, Sensor};
+use super::{Estimator, Inertial, Joint, Sensor, Shape};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
@@ -13,12 +13,26 @@ pub(crate) struct Link {
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) estimators: Vec<Estimator>,
     pub(crate) joints: Vec<Joint>,
+    pub(crate) inertials: Vec<Inertial>,
+    pub(crate) visuals: Vec<Shape>,
+    pub(crate) collisions: Vec<Shape>,
 }
+
+/// What a link holds.
+const WORDS: &[&str] = &["sensor", "estimator", "joint", "inertial", "visual", "collision"];
 
 impl Link {
     pub(super) fn parse(head: &Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        let mut link = Self { name, sensors: Vec::new(), estimators: Vec::new(), joints: Vec::new() };
+        let mut link = Self {
+            name,
+            sensors: Vec::new(),
+            estimators: Vec::new(),
+            joints: Vec::new(),
+            inertials: Vec::new(),
+            visuals: Vec::new(),
+            collisions: Vec::new(),
+        };
         if input.peek(syn::token::Brace) {
             let body = braced(input)?;
             items(&body, diagnostics, |head, input, diagnostics| link.item(head, input, diagnostics));
@@ -33,9 +47,10 @@ impl Link {
             "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
             "estimator" => self.estimators.push(Estimator::parse(head, input, diagnostics)?),
             "joint" => self.joints.push(Joint::parse(head, input, diagnostics)?),
-            _ => {
-                return Err(unexpected(&head.word, "a link", &["sensor", "estimator", "joint"]));
-            }
+            "inertial" => self.inertials.push(Inertial::parse(head, input, diagnostics)?),
+            "visual" => self.visuals.push(Shape::parse(head, input, diagnostics)?),
+            "collision" => self.collisions.push(Shape::parse(head, input, diagnostics)?),
+            _ => return Err(unexpected(&head.word, "a link", WORDS)),
         }
         Ok(())
     }

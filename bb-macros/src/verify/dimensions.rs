@@ -6,13 +6,16 @@
 //! The options of components are checked against their types by `bb_core`.
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{Joint, Robot};
-use crate::parse::{JointKind, Quantity};
+use crate::model::{Joint, Link, Robot};
+use crate::parse::{Geometry, JointKind, Origin, Quantity};
 use crate::units::Dimension;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for rate in robot.sensors.iter().flat_map(|sensor| &sensor.rates) {
         expect(Dimension::FREQUENCY, "200 Hz", &rate.quantity, diagnostics);
+    }
+    for link in &robot.links {
+        body(link, diagnostics);
     }
     for joint in &robot.joints {
         geometry(joint, diagnostics);
@@ -27,14 +30,44 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
+fn origin(origin: &Origin, diagnostics: &mut Diagnostics) {
+    for length in origin.xyz.iter().flatten() {
+        expect(Dimension::LENGTH, "0.1 m", length, diagnostics);
+    }
+    for angle in origin.rpy.iter().flatten() {
+        expect(Dimension::ANGLE, "90 deg", angle, diagnostics);
+    }
+}
+
+fn body(link: &Link, diagnostics: &mut Diagnostics) {
+    for inertial in &link.inertials {
+        inertial.origin.iter().for_each(|place| origin(place, diagnostics));
+        inertial.mass.iter().for_each(|mass| expect(Dimension::MASS, "1 kg", mass, diagnostics));
+        for moment in inertial.inertia.iter().flatten() {
+            expect(Dimension::MOMENT_OF_INERTIA, "0.1 kg*m^2", moment, diagnostics);
+        }
+    }
+    for shape in link.visuals.iter().chain(&link.collisions) {
+        shape.origin.iter().for_each(|place| origin(place, diagnostics));
+        for (_, geometry) in &shape.geometries {
+            let (lengths, factors): (Vec<&Quantity>, Vec<&Quantity>) = match geometry {
+                Geometry::Box(size) => (size.iter().collect(), Vec::new()),
+                Geometry::Cylinder { radius, length } => (radius.iter().chain(length).collect(), Vec::new()),
+                Geometry::Sphere { radius } => (radius.iter().collect(), Vec::new()),
+                Geometry::Mesh { scale, .. } => (Vec::new(), scale.iter().flatten().collect()),
+            };
+            lengths.iter().for_each(|length| expect(Dimension::LENGTH, "0.1 m", length, diagnostics));
+            factors.iter().for_each(|factor| expect(Dimension::NONE, "1", factor, diagnostics));
+        }
+        for part in shape.material.iter().flat_map(|material| material.color.iter().flatten()) {
+            expect(Dimension::NONE, "0.5", part, diagnostics);
+        }
+    }
+}
+
 fn geometry(joint: &Joint, diagnostics: &mut Diagnostics) {
-    for origin in &joint.origins {
-        for length in origin.xyz.iter().flatten() {
-            expect(Dimension::LENGTH, "0.1 m", length, diagnostics);
-        }
-        for angle in origin.rpy.iter().flatten() {
-            expect(Dimension::ANGLE, "90 deg", angle, diagnostics);
-        }
+    for place in &joint.origins {
+        origin(place, diagnostics);
     }
     for component in joint.axes.iter().flat_map(|axis| &axis.components) {
         expect(Dimension::NONE, "1", component, diagnostics);
@@ -45,6 +78,22 @@ fn geometry(joint: &Joint, diagnostics: &mut Diagnostics) {
     } else {
         ((Dimension::LENGTH, "0.1 m"), (Dimension::VELOCITY, "0.1 m/s"), (Dimension::FORCE, "5 N"))
     };
+    for dynamics in &joint.dynamics {
+        let (damping, example) = if turns {
+            (Dimension::ANGULAR_DAMPING, "0.1 N*m*s/rad")
+        } else {
+            (Dimension::LINEAR_DAMPING, "0.1 N*s/m")
+        };
+        dynamics.damping.iter().for_each(|value| expect(damping, example, value, diagnostics));
+        dynamics.friction.iter().for_each(|value| expect(effort.0, effort.1, value, diagnostics));
+    }
+    for mimic in &joint.mimics {
+        mimic.multiplier.iter().for_each(|value| expect(Dimension::NONE, "2", value, diagnostics));
+        mimic.offset.iter().for_each(|value| expect(position.0, position.1, value, diagnostics));
+    }
+    for reduction in joint.transmissions.iter().filter_map(|transmission| transmission.reduction.as_ref()) {
+        expect(Dimension::NONE, "50", reduction, diagnostics);
+    }
     // A fixed joint's limit is a fault of its own.
     for limit in joint.limits.iter().filter(|_| joint.kind != JointKind::Fixed) {
         let expected = [

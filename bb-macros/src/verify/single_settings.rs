@@ -10,10 +10,16 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for sensor in &robot.sensors {
         once(sensor.rates.iter().map(|rate| &rate.word), diagnostics);
     }
+    for link in &robot.links {
+        once(link.inertials.iter().map(|inertial| &inertial.word), diagnostics);
+    }
     for joint in &robot.joints {
         once(joint.origins.iter().map(|origin| &origin.word), diagnostics);
         once(joint.axes.iter().map(|axis| &axis.word), diagnostics);
         once(joint.limits.iter().map(|limit| &limit.word), diagnostics);
+        once(joint.dynamics.iter().map(|dynamics| &dynamics.word), diagnostics);
+        once(joint.mimics.iter().map(|mimic| &mimic.word), diagnostics);
+        once(joint.transmissions.iter().map(|transmission| &transmission.word), diagnostics);
     }
     for estimator in robot.estimators.iter().filter(|estimator| !estimator.is_nested()) {
         once(estimator.sync_tolerances.iter().map(|tolerance| &tolerance.word), diagnostics);

@@ -1,9 +1,9 @@
 //! Where a joint stands, about what it moves, and how far.
 
 use crate::diagnostics::{Diagnostics, Place};
-use crate::names::did_you_mean;
 use crate::parse::Quantity;
-use crate::parse::block::{Head, braced, semicolon};
+use crate::parse::block::{Head, semicolon};
+use crate::parse::record::{array, record};
 use proc_macro2::Ident;
 use syn::Token;
 use syn::ext::IdentExt;
@@ -40,26 +40,40 @@ pub(crate) struct Limit {
 
 impl Origin {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let mut origin = Self { word: head.word, xyz: None, rpy: None };
+        input.parse::<Token![:]>()?;
+        let origin = Self::parse_value(head.word, input)?;
+        semicolon(input, "`origin`", diagnostics);
+        Ok(origin)
+    }
+
+    /// Reads `{ xyz: […], rpy: […] }`.
+    pub(in crate::parse) fn parse_value(word: Ident, input: ParseStream<'_>) -> syn::Result<Self> {
+        let mut origin = Self { word, xyz: None, rpy: None };
         record(input, &["xyz", "rpy"], |field, input| {
-            let triple = triple(input)?;
-            match field {
-                "xyz" => origin.xyz = Some(triple),
-                _ => origin.rpy = Some(triple),
+            let triple = array(input)?;
+            if field == "xyz" {
+                origin.xyz = Some(triple);
+            } else {
+                origin.rpy = Some(triple);
             }
             Ok(())
         })?;
-        semicolon(input, "`origin`", diagnostics);
         Ok(origin)
     }
 }
 
 impl Axis {
+    /// The direction at unit length; one that has it already is kept as it is.
+    pub(crate) fn unit(&self) -> [f64; 3] {
+        let length = self.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
+        if (length - 1.0).abs() < 1e-12 { self.direction } else { self.direction.map(|value| value / length) }
+    }
+
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         input.parse::<Token![:]>()?;
         let start = input.span();
         let (direction, components, end) = if input.peek(syn::token::Bracket) {
-            let components = triple(input)?;
+            let components = array::<3>(input)?;
             let direction = components.each_ref().map(|component| component.value);
             (direction, components.to_vec(), start)
         } else {
@@ -87,10 +101,11 @@ const AXIS: &str = "expected `x`, `y`, `z`, one of them with `-`, or `[a, b, c]`
 
 impl Limit {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        input.parse::<Token![:]>()?;
         let mut limit = Self { word: head.word, lower: None, upper: None, velocity: None, effort: None };
         record(input, &["lower", "upper", "velocity", "effort"], |field, input| {
             let quantity = Some(Quantity::parse(input)?);
-            match field {
+            match &*field.to_string() {
                 "lower" => limit.lower = quantity,
                 "upper" => limit.upper = quantity,
                 "velocity" => limit.velocity = quantity,
@@ -101,44 +116,4 @@ impl Limit {
         semicolon(input, "`limit`", diagnostics);
         Ok(limit)
     }
-}
-
-/// Reads `: { field: value, … }`.
-fn record(
-    input: ParseStream<'_>,
-    fields: &[&str],
-    mut value: impl FnMut(&str, ParseStream<'_>) -> syn::Result<()>,
-) -> syn::Result<()> {
-    input.parse::<Token![:]>()?;
-    let content = braced(input)?;
-    let mut seen: Vec<String> = Vec::new();
-    while !content.is_empty() {
-        let word = content.call(Ident::parse_any)?;
-        let name = word.to_string();
-        if !fields.contains(&&*name) {
-            let hint = did_you_mean(&name, fields.iter().copied());
-            let message = format!("expected {}{hint}", crate::names::one_of(fields));
-            return Err(syn::Error::new(word.span(), message));
-        }
-        if seen.contains(&name) {
-            return Err(syn::Error::new(word.span(), format!("`{name}` stands here twice; leave one out")));
-        }
-        content.parse::<Token![:]>()?;
-        value(&name, &content)?;
-        seen.push(name);
-        if !content.is_empty() {
-            content.parse::<Token![,]>()?;
-        }
-    }
-    Ok(())
-}
-
-fn triple(input: ParseStream<'_>) -> syn::Result<[Quantity; 3]> {
-    let content;
-    let bracket = syn::bracketed!(content in input);
-    let quantities: Vec<Quantity> = content.parse_terminated(Quantity::parse, Token![,])?.into_iter().collect();
-    let count = quantities.len();
-    quantities
-        .try_into()
-        .map_err(|_| syn::Error::new(bracket.span.open(), format!("expected three values, found {count}")))
 }

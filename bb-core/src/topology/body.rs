@@ -1,0 +1,71 @@
+//! What a link weighs, looks like and occupies: URDF's `inertial`, `visual` and `collision`.
+
+use super::Origin;
+
+/// Mass and moments of inertia.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertial {
+    /// Takes points from the frame of the moments, at the centre of mass, to the link's.
+    pub link_from_inertia: Origin,
+    /// kg
+    pub mass: f64,
+    /// kg·m²: xx, xy, xz, yy, yz, zz.
+    pub inertia: [f64; 6],
+}
+
+/// A shape to be seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Visual {
+    /// Takes points from the shape's frame to the link's.
+    pub link_from_shape: Origin,
+    /// The shape.
+    pub geometry: Geometry,
+    /// Its colour.
+    pub material: Option<Material>,
+}
+
+/// A shape that must not run into others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Collision {
+    /// Takes points from the shape's frame to the link's.
+    pub link_from_shape: Origin,
+    /// The shape.
+    pub geometry: Geometry,
+}
+
+/// A shape about the origin of its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Geometry {
+    /// Lengths along x, y and z, m.
+    Box([f64; 3]),
+    /// Along z.
+    Cylinder {
+        /// m
+        radius: f64,
+        /// m
+        length: f64,
+    },
+    /// A ball.
+    Sphere {
+        /// m
+        radius: f64,
+    },
+    /// A file.
+    Mesh {
+        /// Its name, as URDF has it: `package://…` or a path.
+        file: &'static str,
+        /// Factors along x, y and z.
+        scale: [f64; 3],
+    },
+}
+
+/// A colour by name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Its name, empty if it has none.
+    pub name: &'static str,
+    /// Red, green, blue, opacity, each from 0 to 1.
+    pub color: Option<[f64; 4]>,
+    /// The file of its picture.
+    pub texture: Option<&'static str>,
+}

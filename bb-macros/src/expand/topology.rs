@@ -1,0 +1,172 @@
+//! Links and joints as constant data, with all fixed joints multiplied out.
+
+use super::declarations::root_from;
+use super::literal::option;
+use crate::model::{Joint, Link, Mount, Robot};
+use crate::parse::{Dynamics, Geometry, Inertial, JointKind, Limit, Mimic, Origin, Quantity, Shape};
+use proc_macro2::TokenStream;
+use quote::quote;
+use syn::LitStr;
+
+/// A `bb_core::topology::Topology`.
+pub(super) fn topology(robot: &Robot) -> TokenStream {
+    let links = robot.links.iter().enumerate().map(|(id, data)| link(robot, id, data));
+    let joints = robot.joints.iter().map(|data| joint(robot, data));
+    quote!(::bb_core::__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
+}
+
+fn link(robot: &Robot, id: usize, link: &Link) -> TokenStream {
+    let name = link.name.to_string();
+    let joint = option(link.joint.map(|joint| quote!(#joint)));
+    let root = root_from(robot, Mount::Link(id));
+    let inertial = option(link.inertials.first().map(inertial));
+    let visuals = link.visuals.iter().map(visual);
+    let collisions = link.collisions.iter().map(collision);
+    quote!(::bb_core::__private::Link {
+        name: #name,
+        parent_joint: #joint,
+        root_from_link: #root,
+        inertial: #inertial,
+        visuals: &[#(#visuals),*],
+        collisions: &[#(#collisions),*],
+    })
+}
+
+fn joint(robot: &Robot, joint: &Joint) -> TokenStream {
+    let name = joint.name.to_string();
+    let kind = joint_kind(joint.kind);
+    let parent = joint.parent;
+    let child = joint.children.first().copied().unwrap_or_default();
+    let parent_from_joint = origin(joint.origins.first());
+    let axis = option(joint.axes.first().map(|axis| {
+        let direction = axis.unit();
+        quote!([#(#direction),*])
+    }));
+    let limit = option(joint.limits.first().map(limit));
+    let dynamics = option(joint.dynamics.first().map(dynamics));
+    let mimic = option(joint.mimics.first().and_then(|data| mimic(robot, data)));
+    let reduction = joint.transmissions.first().and_then(|transmission| transmission.reduction.as_ref());
+    let transmission = option(reduction.map(|reduction| {
+        let reduction = reduction.value;
+        quote!(::bb_core::__private::Transmission { reduction: #reduction })
+    }));
+    quote!(::bb_core::__private::Joint {
+        name: #name,
+        kind: ::bb_core::__private::JointKind::#kind,
+        parent: #parent,
+        child: #child,
+        parent_from_joint: #parent_from_joint,
+        axis: #axis,
+        limit: #limit,
+        dynamics: #dynamics,
+        mimic: #mimic,
+        transmission: #transmission,
+    })
+}
+
+/// As declared, so that URDF gets the same numbers.
+fn origin(origin: Option<&Origin>) -> TokenStream {
+    let Some(origin) = origin else { return quote!(::bb_core::__private::Origin::IDENTITY) };
+    let (xyz, rpy) = (values(origin.xyz.as_ref(), 0.0), values(origin.rpy.as_ref(), 0.0));
+    quote!(::bb_core::__private::Origin { xyz: [#(#xyz),*], rpy: [#(#rpy),*] })
+}
+
+fn limit(limit: &Limit) -> TokenStream {
+    let value = |quantity: &Option<Quantity>| {
+        option(quantity.as_ref().map(|quantity| {
+            let value = quantity.value;
+            quote!(#value)
+        }))
+    };
+    let (lower, upper, velocity, effort) =
+        (value(&limit.lower), value(&limit.upper), value(&limit.velocity), value(&limit.effort));
+    quote!(::bb_core::__private::Limit { lower: #lower, upper: #upper, velocity: #velocity, effort: #effort })
+}
+
+fn dynamics(dynamics: &Dynamics) -> TokenStream {
+    let (damping, friction) = (value(dynamics.damping.as_ref(), 0.0), value(dynamics.friction.as_ref(), 0.0));
+    quote!(::bb_core::__private::Dynamics { damping: #damping, friction: #friction })
+}
+
+fn mimic(robot: &Robot, mimic: &Mimic) -> Option<TokenStream> {
+    let joint = robot.joints.iter().position(|joint| Some(&joint.name) == mimic.joint.as_ref())?;
+    let (multiplier, offset) = (value(mimic.multiplier.as_ref(), 1.0), value(mimic.offset.as_ref(), 0.0));
+    Some(quote!(::bb_core::__private::Mimic { joint: #joint, multiplier: #multiplier, offset: #offset }))
+}
+
+fn inertial(inertial: &Inertial) -> TokenStream {
+    let (link_from_inertia, mass) = (origin(inertial.origin.as_ref()), value(inertial.mass.as_ref(), 0.0));
+    let moments = inertial.inertia.each_ref().map(|moment| value(moment.as_ref(), 0.0));
+    quote!(::bb_core::__private::Inertial {
+        link_from_inertia: #link_from_inertia,
+        mass: #mass,
+        inertia: [#(#moments),*],
+    })
+}
+
+fn visual(shape: &Shape) -> TokenStream {
+    let (link_from_shape, geometry) = (origin(shape.origin.as_ref()), geometry(shape));
+    let material = option(shape.material.as_ref().map(|material| {
+        let name = material.name.as_ref().map_or(String::new(), LitStr::value);
+        let texture = option(material.texture.as_ref().map(|texture| quote!(#texture)));
+        let color = option(material.color.as_ref().map(|color| {
+            let color = color.each_ref().map(|part| part.value);
+            quote!([#(#color),*])
+        }));
+        quote!(::bb_core::__private::Material { name: #name, color: #color, texture: #texture })
+    }));
+    quote!(::bb_core::__private::Visual {
+        link_from_shape: #link_from_shape,
+        geometry: #geometry,
+        material: #material,
+    })
+}
+
+fn collision(shape: &Shape) -> TokenStream {
+    let (link_from_shape, geometry) = (origin(shape.origin.as_ref()), geometry(shape));
+    quote!(::bb_core::__private::Collision { link_from_shape: #link_from_shape, geometry: #geometry })
+}
+
+/// A verified shape has exactly one geometry, with all that it needs.
+fn geometry(shape: &Shape) -> TokenStream {
+    let none = Geometry::Sphere { radius: None };
+    match shape.geometries.first().map_or(&none, |(_, geometry)| geometry) {
+        Geometry::Box(size) => {
+            let size = size.each_ref().map(|length| length.value);
+            quote!(::bb_core::__private::Geometry::Box([#(#size),*]))
+        }
+        Geometry::Cylinder { radius, length } => {
+            let (radius, length) = (value(radius.as_ref(), 0.0), value(length.as_ref(), 0.0));
+            quote!(::bb_core::__private::Geometry::Cylinder { radius: #radius, length: #length })
+        }
+        Geometry::Sphere { radius } => {
+            let radius = value(radius.as_ref(), 0.0);
+            quote!(::bb_core::__private::Geometry::Sphere { radius: #radius })
+        }
+        Geometry::Mesh { file, scale } => {
+            let file = file.as_ref().map_or(String::new(), LitStr::value);
+            let scale = values(scale.as_ref(), 1.0);
+            quote!(::bb_core::__private::Geometry::Mesh { file: #file, scale: [#(#scale),*] })
+        }
+    }
+}
+
+fn value(quantity: Option<&Quantity>, default: f64) -> f64 {
+    quantity.map_or(default, |quantity| quantity.value)
+}
+
+fn values(triple: Option<&[Quantity; 3]>, default: f64) -> [f64; 3] {
+    triple.map_or([default; 3], |triple| triple.each_ref().map(|quantity| quantity.value))
+}
+
+/// The name of a joint's kind in `bb_core`.
+fn joint_kind(kind: JointKind) -> TokenStream {
+    match kind {
+        JointKind::Fixed => quote!(Fixed),
+        JointKind::Revolute => quote!(Revolute),
+        JointKind::Continuous => quote!(Continuous),
+        JointKind::Prismatic => quote!(Prismatic),
+        JointKind::Planar => quote!(Planar),
+        JointKind::Floating => quote!(Floating),
+    }
+}

@@ -1,0 +1,48 @@
+//! Values in braces and brackets: `{ field: value, … }` and `[a, b, c]`.
+
+use super::Quantity;
+use super::block::braced;
+use crate::names::{did_you_mean, one_of};
+use proc_macro2::Ident;
+use syn::Token;
+use syn::ext::IdentExt;
+use syn::parse::ParseStream;
+
+/// Reads `{ field: value, … }`; each of `fields` may stand in it once, in any order. `value` gets each field's name.
+pub(super) fn record(
+    input: ParseStream<'_>,
+    fields: &[&str],
+    mut value: impl FnMut(&Ident, ParseStream<'_>) -> syn::Result<()>,
+) -> syn::Result<()> {
+    let content = braced(input)?;
+    let mut seen: Vec<Ident> = Vec::new();
+    while !content.is_empty() {
+        let name = content.call(Ident::parse_any)?;
+        let text = name.to_string();
+        if !fields.contains(&&*text) {
+            let hint = did_you_mean(&text, fields.iter().copied());
+            return Err(syn::Error::new(name.span(), format!("expected {}{hint}", one_of(fields))));
+        }
+        if seen.contains(&name) {
+            return Err(syn::Error::new(name.span(), format!("`{name}` stands here twice; leave one out")));
+        }
+        content.parse::<Token![:]>()?;
+        value(&name, &content)?;
+        seen.push(name);
+        if !content.is_empty() {
+            content.parse::<Token![,]>()?;
+        }
+    }
+    Ok(())
+}
+
+/// Reads `[a, b, …]`, exactly `N` of them.
+pub(super) fn array<const N: usize>(input: ParseStream<'_>) -> syn::Result<[Quantity; N]> {
+    let content;
+    let bracket = syn::bracketed!(content in input);
+    let quantities: Vec<Quantity> = content.parse_terminated(Quantity::parse, Token![,])?.into_iter().collect();
+    let count = quantities.len();
+    quantities
+        .try_into()
+        .map_err(|_| syn::Error::new(bracket.span.open(), format!("expected {N} values, found {count}")))
+}
