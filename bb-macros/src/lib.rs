@@ -3,7 +3,7 @@
 //! A robot goes through four phases, each in the folder of its name:
 //!
 //! 1. `parse`: tokens to a tree. Never fails: what it cannot read it reports and skips.
-//! 2. `model`: the tree to plain data in which paths are resolved to what they name.
+//! 2. `urdf`: links and joints of a URDF file, if the robot names one, put under the tree. `model`: the tree to plain data in which paths are resolved to what they name.
 //! 3. `verify`: the rules of the language, one a file. Gives a `verify::Verified` only if all hold.
 //! 4. `expand`: a verified robot to its wiring; one that failed to stubs, so that one mistake gives one message.
 
@@ -16,6 +16,7 @@ mod model;
 mod names;
 mod parse;
 mod units;
+mod urdf;
 mod verify;
 
 #[cfg(test)]
@@ -31,13 +32,14 @@ pub fn robot(tokens: TokenStream) -> TokenStream {
 fn pipeline(tokens: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
     let mut diagnostics = diagnostics::Diagnostics::default();
     let tree = parse::robot(tokens, &mut diagnostics);
+    let (tree, tracked) = urdf::graft(tree, &mut diagnostics);
     let robot = model::resolve(tree);
     let expansion = match verify::verify(&robot, &mut diagnostics) {
         Some(verified) => expand::robot(&verified),
         None => expand::stub(&robot),
     };
     let errors = diagnostics.into_tokens();
-    quote::quote!(#errors #expansion)
+    quote::quote!(#errors #tracked #expansion)
 }
 
 /// Makes a struct or an enum the payload of messages. See the trait.

@@ -40,6 +40,8 @@ pub(crate) struct Robot {
 #[derive(Clone, Debug)]
 pub(crate) struct Link {
     pub(crate) name: Ident,
+    /// Its name at run time; differs from the identifier only where a URDF's name is none.
+    pub(crate) label: String,
     /// The joint that carries it; none for a root.
     pub(crate) joint: Option<JointId>,
     pub(crate) inertials: Vec<Inertial>,
@@ -50,6 +52,10 @@ pub(crate) struct Link {
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
     pub(crate) name: Ident,
+    /// Its name at run time, as a link's.
+    pub(crate) label: String,
+    /// Whether it comes from a URDF, whose reader has checked it and where a limit may be a single position.
+    pub(crate) from_urdf: bool,
     pub(crate) kind: JointKind,
     pub(crate) kind_word: Ident,
     pub(crate) parent: LinkId,
@@ -159,8 +165,8 @@ impl Robot {
     pub(crate) fn frame_name(&self, mount: Mount) -> String {
         match mount {
             Mount::Robot => String::new(),
-            Mount::Link(link) => self.links.get(link).map_or(String::new(), |link| link.name.to_string()),
-            Mount::Joint(joint) => self.joints.get(joint).map_or(String::new(), |joint| joint.name.to_string()),
+            Mount::Link(link) => self.links.get(link).map_or(String::new(), |link| link.label.clone()),
+            Mount::Joint(joint) => self.joints.get(joint).map_or(String::new(), |joint| joint.label.clone()),
         }
     }
 }

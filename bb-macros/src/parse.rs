@@ -13,8 +13,9 @@ mod record;
 mod robot;
 mod sensor;
 mod setting;
+mod topology;
 
-pub(crate) use body::{Geometry, Inertial, Shape};
+pub(crate) use body::{Geometry, Inertial, Material, Shape};
 pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
 pub(crate) use input::{Input, Path};
@@ -25,6 +26,7 @@ pub(crate) use quantity::Quantity;
 pub(crate) use robot::Robot;
 pub(crate) use sensor::Sensor;
 pub(crate) use setting::Setting;
+pub(crate) use topology::{JointAddition, Topology};
 
 use crate::diagnostics::Diagnostics;
 use proc_macro2::TokenStream;

@@ -16,7 +16,7 @@ pub(super) fn topology(robot: &Robot) -> TokenStream {
 }
 
 fn link(robot: &Robot, id: usize, link: &Link) -> TokenStream {
-    let name = link.name.to_string();
+    let name = &link.label;
     let joint = option(link.joint.map(|joint| quote!(#joint)));
     let root = root_from(robot, Mount::Link(id));
     let inertial = option(link.inertials.first().map(inertial));
@@ -33,7 +33,7 @@ fn link(robot: &Robot, id: usize, link: &Link) -> TokenStream {
 }
 
 fn joint(robot: &Robot, joint: &Joint) -> TokenStream {
-    let name = joint.name.to_string();
+    let name = &joint.label;
     let kind = joint_kind(joint.kind);
     let parent = joint.parent;
     let child = joint.children.first().copied().unwrap_or_default();

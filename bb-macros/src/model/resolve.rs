@@ -10,7 +10,7 @@ use syn::Visibility;
 
 /// Resolves what can be resolved; what cannot be is left out of the references for the rules to report.
 pub(crate) fn resolve(tree: parse::Robot) -> Robot {
-    let parse::Robot { attributes, visibility, name, sensors, links, complete } = tree;
+    let parse::Robot { attributes, visibility, name, sensors, links, topologies: _, joints: _, complete } = tree;
     let mut robot = Robot {
         attributes,
         visibility: visibility.unwrap_or(Visibility::Inherited),
@@ -36,8 +36,9 @@ impl Robot {
     fn add_link(&mut self, link: parse::Link, joint: Option<JointId>, above: &[Ident]) -> LinkId {
         let id = self.links.len();
         let path = below(above, &link.name);
-        let parse::Link { name, sensors, estimators, joints, inertials, visuals, collisions } = link;
-        self.links.push(Link { name, joint, inertials, visuals, collisions });
+        let parse::Link { name, label, sensors, estimators, joints, inertials, visuals, collisions } = link;
+        let label = label.unwrap_or_else(|| name.to_string());
+        self.links.push(Link { name, label, joint, inertials, visuals, collisions });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Link(id), &path);
         }
@@ -56,6 +57,7 @@ impl Robot {
         let path = below(above, &joint.name);
         let parse::Joint {
             name,
+            label,
             kind,
             kind_word,
             origins,
@@ -67,8 +69,12 @@ impl Robot {
             sensors,
             links,
         } = joint;
+        let from_urdf = label.is_some();
+        let label = label.unwrap_or_else(|| name.to_string());
         self.joints.push(Joint {
             name,
+            label,
+            from_urdf,
             kind,
             kind_word,
             parent,

@@ -10,6 +10,7 @@ use syn::{Attribute, Token};
 /// All words of the language that start an item: where reading can start anew.
 const WORDS: &[&str] = &[
     "sensors",
+    "topology",
     "link",
     "joint",
     "sensor",
@@ -38,7 +39,6 @@ const PLANNED: &[&str] = &[
     "controller",
     "actuator",
     "bridge",
-    "topology",
     "latency_budget",
     "lost_after",
     "recover_after",

@@ -19,6 +19,8 @@ use syn::parse::ParseStream;
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
     pub(crate) name: Ident,
+    /// Its name as a URDF has it, which need not be an identifier.
+    pub(crate) label: Option<String>,
     pub(crate) kind: JointKind,
     pub(crate) kind_word: Ident,
     pub(crate) origins: Vec<Origin>,
@@ -52,10 +54,14 @@ impl JointKind {
         ("floating", Self::Floating),
     ];
 
+    /// The kind of that name.
+    pub(crate) fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind)
+    }
+
     fn parse(word: &Ident) -> syn::Result<Self> {
         let name = word.to_string();
-        let found = Self::ALL.into_iter().find(|(known, _)| *known == name);
-        found.map(|(_, kind)| kind).ok_or_else(|| {
+        Self::of(&name).ok_or_else(|| {
             let known = Self::ALL.map(|(known, _)| known);
             let hint = did_you_mean(&name, known);
             syn::Error::new(word.span(), format!("unknown type of joint; expected {}{hint}", one_of(&known)))
@@ -73,6 +79,7 @@ impl Joint {
         let kind_word = input.call(Ident::parse_any)?;
         let mut joint = Self {
             name,
+            label: None,
             kind: JointKind::parse(&kind_word)?,
             kind_word,
             origins: Vec::new(),

@@ -10,6 +10,8 @@ use syn::parse::ParseStream;
 #[derive(Clone, Debug)]
 pub(crate) struct Link {
     pub(crate) name: Ident,
+    /// Its name as a URDF has it, which need not be an identifier.
+    pub(crate) label: Option<String>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) estimators: Vec<Estimator>,
     pub(crate) joints: Vec<Joint>,
@@ -26,6 +28,7 @@ impl Link {
         let name = name(input, &head.word)?;
         let mut link = Self {
             name,
+            label: None,
             sensors: Vec::new(),
             estimators: Vec::new(),
             joints: Vec::new(),

@@ -1,7 +1,7 @@
 //! `robot Rover; sensors { … } link base { … }`
 
 use super::block::{Head, braced, items, semicolon, unexpected};
-use super::{Link, Sensor};
+use super::{JointAddition, Link, Sensor, Topology};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::{Ident, Span};
 use syn::ext::IdentExt;
@@ -17,6 +17,10 @@ pub(crate) struct Robot {
     pub(crate) name: Option<Ident>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) links: Vec<Link>,
+    /// `topology: urdf("…");`
+    pub(crate) topologies: Vec<Topology>,
+    /// What is declared onto joints of the URDF.
+    pub(crate) joints: Vec<JointAddition>,
     /// Whether everything could be read; if not, what is missing may have been declared.
     pub(crate) complete: bool,
 }
@@ -63,7 +67,9 @@ impl Robot {
                     Ok(())
                 });
             }
-            _ => return Err(unexpected(&head.word, "a robot", &["link", "sensors"])),
+            "topology" => self.topologies.push(Topology::parse(head, input, diagnostics)?),
+            "joint" => self.joints.push(JointAddition::parse(&head, input, diagnostics)?),
+            _ => return Err(unexpected(&head.word, "a robot", &["link", "sensors", "topology"])),
         }
         Ok(())
     }

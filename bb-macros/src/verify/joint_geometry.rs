@@ -9,7 +9,8 @@ use crate::model::{Joint, Robot};
 use crate::parse::{JointKind, Limit};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    for joint in &robot.joints {
+    // The reader of a URDF reports these with their lines.
+    for joint in robot.joints.iter().filter(|joint| !joint.from_urdf) {
         axis(joint, robot.complete, diagnostics);
         limit(joint, robot.complete, diagnostics);
     }

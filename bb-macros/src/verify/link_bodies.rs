@@ -1,5 +1,5 @@
-//! An inertial has a mass and its three main moments; a visual or a collision has exactly one shape with its sizes. All
-//! of them are positive.
+//! An inertial has a mass and its three main moments; a visual or a collision has exactly one shape with its sizes. None
+//! of them is negative.
 //!
 //! Right: `inertial: { mass: 2 kg, inertia: { xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 } };`
 //! Wrong: `visual: { cylinder: { radius: 0.1 m } };`
@@ -39,7 +39,7 @@ fn shape(shape: &Shape, diagnostics: &mut Diagnostics) {
         );
     }
     match geometry {
-        Geometry::Box(size) => size.iter().for_each(|length| positive(length, diagnostics)),
+        Geometry::Box(size) => size.iter().for_each(|length| not_negative(length, diagnostics)),
         Geometry::Cylinder { radius, length } => {
             needed(word, "a cylinder", "radius", radius.as_ref(), diagnostics);
             needed(word, "a cylinder", "length", length.as_ref(), diagnostics);
@@ -54,13 +54,13 @@ fn shape(shape: &Shape, diagnostics: &mut Diagnostics) {
 
 fn needed(word: &Ident, what: &str, name: &str, value: Option<&Quantity>, diagnostics: &mut Diagnostics) {
     match value {
-        Some(value) => positive(value, diagnostics),
+        Some(value) => not_negative(value, diagnostics),
         None => diagnostics.error(word, format!("{what} needs `{name}`")),
     }
 }
 
-fn positive(quantity: &Quantity, diagnostics: &mut Diagnostics) {
-    if quantity.value <= 0.0 {
-        diagnostics.at(quantity.place, "this must be more than 0".into());
+fn not_negative(quantity: &Quantity, diagnostics: &mut Diagnostics) {
+    if quantity.value < 0.0 {
+        diagnostics.at(quantity.place, "this must not be negative".into());
     }
 }

@@ -1,4 +1,4 @@
-//! Rates, tolerances and the limits of speed and effort are positive.
+//! Rates and tolerances are positive, limits of speed and effort not negative.
 //!
 //! Right: `rate: 200 Hz;`
 //! Wrong: `rate: 0 Hz;`
@@ -27,7 +27,9 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
     for limit in robot.joints.iter().flat_map(|joint| &joint.limits) {
         for quantity in limit.velocity.iter().chain(&limit.effort) {
-            positive(quantity, f64::MAX, "", diagnostics);
+            if quantity.value < 0.0 {
+                diagnostics.at(quantity.place, "this must not be negative".into());
+            }
         }
     }
 }

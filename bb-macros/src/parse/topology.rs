@@ -1,0 +1,62 @@
+//! `topology: urdf("robot.urdf");`, and what is declared onto the joints that it brings: `joint elbow { sensor … }`.
+
+use super::Sensor;
+use super::block::{Head, braced, items, semicolon, unexpected};
+use super::component::name;
+use crate::diagnostics::{Diagnostics, Place};
+use proc_macro2::Ident;
+use syn::ext::IdentExt;
+use syn::parse::ParseStream;
+use syn::{LitStr, Token};
+
+/// Where links and joints come from.
+#[derive(Clone, Debug)]
+pub(crate) struct Topology {
+    pub(crate) word: Ident,
+    /// The file, relative to the crate's `Cargo.toml`.
+    pub(crate) file: LitStr,
+    /// `urdf("…")`
+    pub(crate) place: Place,
+}
+
+/// What is declared onto a joint of the URDF.
+#[derive(Clone, Debug)]
+pub(crate) struct JointAddition {
+    pub(crate) name: Ident,
+    pub(crate) sensors: Vec<Sensor>,
+}
+
+impl Topology {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        input.parse::<Token![:]>()?;
+        let format = input.call(Ident::parse_any)?;
+        if format != "urdf" {
+            return Err(syn::Error::new(format.span(), "expected `urdf(\"file.urdf\")`"));
+        }
+        let content;
+        let parenthesis = syn::parenthesized!(content in input);
+        let file: LitStr = content.parse()?;
+        let place = Place { start: format.span(), end: parenthesis.span.close() };
+        semicolon(input, "`topology`", diagnostics);
+        Ok(Self { word: head.word, file, place })
+    }
+}
+
+impl JointAddition {
+    pub(super) fn parse(head: &Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        let mut joint = Self { name: name(input, &head.word)?, sensors: Vec::new() };
+        if input.peek(Token![:]) {
+            let message = "a joint stands in the link that it is mounted on; only joints of a URDF are named here";
+            return Err(input.error(message));
+        }
+        let body = braced(input)?;
+        items(&body, diagnostics, |head, input, diagnostics| {
+            if head.word != "sensor" {
+                return Err(unexpected(&head.word, "a joint of a URDF", &["sensor"]));
+            }
+            joint.sensors.push(Sensor::parse(head, input, diagnostics)?);
+            Ok(())
+        });
+        Ok(joint)
+    }
+}
