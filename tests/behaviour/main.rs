@@ -10,3 +10,4 @@ mod outputs;
 mod real_time;
 mod simulation;
 mod subscriptions;
+mod topology;
