@@ -4,13 +4,12 @@ mod geometry;
 
 pub(crate) use geometry::{Axis, Limit, Origin};
 
-use super::block::{Head, braced, items, semicolon, unexpected};
+use super::block::{Head, braced, colon, items, semicolon, unexpected};
 use super::component::name;
 use super::{Link, Sensor};
 use crate::diagnostics::Diagnostics;
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::Ident;
-use syn::Token;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
@@ -61,11 +60,15 @@ impl JointKind {
 impl Joint {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        input.parse::<Token![:]>()?;
-        let kind_word = input.call(Ident::parse_any)?;
+        colon(input, &name, "the type of the joint")?;
+        let place = input.span();
+        let kind_word = input
+            .call(Ident::parse_any)
+            .map_err(|_| syn::Error::new(place, "expected the type of the joint, as in `fixed` or `revolute`"))?;
+        let kind = JointKind::parse(&kind_word);
         let mut joint = Self {
             name,
-            kind: JointKind::parse(&kind_word)?,
+            kind: kind.clone().unwrap_or(JointKind::Fixed),
             kind_word,
             origins: Vec::new(),
             axes: Vec::new(),
@@ -78,6 +81,12 @@ impl Joint {
             items(&body, diagnostics, |head, input, diagnostics| joint.item(head, input, diagnostics));
         } else {
             semicolon(input, &format!("`{}`", joint.name), diagnostics);
+        }
+        if let Err(error) = kind {
+            // What it carries is known all the same; whether it needs an axis and a limit is not.
+            diagnostics.syntax(&error);
+            joint.axes.clear();
+            joint.limits.clear();
         }
         Ok(joint)
     }

@@ -3,7 +3,7 @@
 use crate::diagnostics::{Diagnostics, Place};
 use crate::names::did_you_mean;
 use crate::parse::Quantity;
-use crate::parse::block::{Head, braced, semicolon};
+use crate::parse::block::{Head, braced, colon, place_since, semicolon};
 use proc_macro2::Ident;
 use syn::Token;
 use syn::ext::IdentExt;
@@ -41,7 +41,7 @@ pub(crate) struct Limit {
 impl Origin {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let mut origin = Self { word: head.word, xyz: None, rpy: None };
-        record(input, &["xyz", "rpy"], |field, input| {
+        record(&origin.word.clone(), input, &["xyz", "rpy"], |field, input| {
             let triple = triple(input)?;
             match field {
                 "xyz" => origin.xyz = Some(triple),
@@ -56,12 +56,12 @@ impl Origin {
 
 impl Axis {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
-        let start = input.span();
-        let (direction, components, end) = if input.peek(syn::token::Bracket) {
+        colon(input, &head.word, "a direction")?;
+        let (start, place) = (input.cursor(), input.span());
+        let (direction, components) = if input.peek(syn::token::Bracket) {
             let components = triple(input)?;
             let direction = components.each_ref().map(|component| component.value);
-            (direction, components.to_vec(), start)
+            (direction, components.to_vec())
         } else {
             let sign = if input.peek(Token![-]) {
                 input.parse::<Token![-]>()?;
@@ -69,17 +69,18 @@ impl Axis {
             } else {
                 1.0
             };
-            let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(start, AXIS))?;
+            let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, AXIS))?;
             let direction = match &*word.to_string() {
                 "x" => [sign, 0.0, 0.0],
                 "y" => [0.0, sign, 0.0],
                 "z" => [0.0, 0.0, sign],
                 _ => return Err(syn::Error::new(word.span(), AXIS)),
             };
-            (direction, Vec::new(), word.span())
+            (direction, Vec::new())
         };
+        let place = place_since(start, input);
         semicolon(input, "`axis`", diagnostics);
-        Ok(Self { word: head.word, direction, components, place: Place { start, end } })
+        Ok(Self { word: head.word, direction, components, place })
     }
 }
 
@@ -88,7 +89,7 @@ const AXIS: &str = "expected `x`, `y`, `z`, one of them with `-`, or `[a, b, c]`
 impl Limit {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let mut limit = Self { word: head.word, lower: None, upper: None, velocity: None, effort: None };
-        record(input, &["lower", "upper", "velocity", "effort"], |field, input| {
+        record(&limit.word.clone(), input, &["lower", "upper", "velocity", "effort"], |field, input| {
             let quantity = Some(Quantity::parse(input)?);
             match field {
                 "lower" => limit.lower = quantity,
@@ -105,25 +106,27 @@ impl Limit {
 
 /// Reads `: { field: value, … }`.
 fn record(
+    word: &Ident,
     input: ParseStream<'_>,
     fields: &[&str],
     mut value: impl FnMut(&str, ParseStream<'_>) -> syn::Result<()>,
 ) -> syn::Result<()> {
-    input.parse::<Token![:]>()?;
+    colon(input, word, "its fields in braces")?;
     let content = braced(input)?;
     let mut seen: Vec<String> = Vec::new();
     while !content.is_empty() {
-        let word = content.call(Ident::parse_any)?;
+        let place = content.span();
+        let expected = format!("expected {}", crate::names::one_of(fields));
+        let word = content.call(Ident::parse_any).map_err(|_| syn::Error::new(place, &expected))?;
         let name = word.to_string();
         if !fields.contains(&&*name) {
             let hint = did_you_mean(&name, fields.iter().copied());
-            let message = format!("expected {}{hint}", crate::names::one_of(fields));
-            return Err(syn::Error::new(word.span(), message));
+            return Err(syn::Error::new(word.span(), format!("{expected}{hint}")));
         }
         if seen.contains(&name) {
             return Err(syn::Error::new(word.span(), format!("`{name}` stands here twice; leave one out")));
         }
-        content.parse::<Token![:]>()?;
+        colon(&content, &word, "a value")?;
         value(&name, &content)?;
         seen.push(name);
         if !content.is_empty() {
@@ -140,5 +143,5 @@ fn triple(input: ParseStream<'_>) -> syn::Result<[Quantity; 3]> {
     let count = quantities.len();
     quantities
         .try_into()
-        .map_err(|_| syn::Error::new(bracket.span.open(), format!("expected three values, found {count}")))
+        .map_err(|_| syn::Error::new(bracket.span.join(), format!("expected three values, found {count}")))
 }
