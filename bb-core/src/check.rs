@@ -9,5 +9,7 @@ mod options;
 mod text;
 
 pub use find::{find_input, find_nested, find_output};
-pub use names::{Declared, check_dynamic, check_input, check_inputs, check_nested, check_output, check_outputs};
+pub use names::{
+    check_dynamic, check_input, check_inputs, check_nested, check_optional, check_output, check_outputs,
+};
 pub use options::{Given, check_option, check_required};

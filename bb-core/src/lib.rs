@@ -67,11 +67,11 @@ pub mod prelude {
 pub mod __private {
     pub use crate::__stub_robot as stub_robot;
     pub use crate::check::{
-        Declared, Given, check_dynamic, check_input, check_inputs, check_nested, check_option, check_output,
+        Given, check_dynamic, check_input, check_inputs, check_nested, check_option, check_optional, check_output,
         check_outputs, check_required, find_input, find_nested, find_output,
     };
     pub use crate::component::{
-        Dimension, FieldIndex, Input, InputAt, InputField, OptionField, OutputAt, Range, Slot, SyncMiss,
+        Dimension, FieldIndex, FromText, Input, InputAt, InputField, OptionField, OutputAt, Range, Slot, SyncMiss,
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{AnyNode, EstimatorDeclaration, InputDeclaration, Node};

@@ -116,7 +116,7 @@ pub(crate) struct Input {
     pub(crate) name: Ident,
     pub(crate) path: Path,
     pub(crate) driver: Option<Ident>,
-    pub(crate) optional: bool,
+    pub(crate) optional: Option<Ident>,
     pub(crate) within: Option<Quantity>,
     /// None if no publisher has that path, or several end in it.
     pub(crate) source: Option<PublisherId>,

@@ -1,5 +1,7 @@
 //! Names: the nearest one to a misspelt one, and the case of identifiers.
 
+use proc_macro2::Ident;
+
 /// The candidate nearest to `name`, if one is near enough to be meant.
 pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = name.chars().count() / 3 + 1;
@@ -8,7 +10,9 @@ pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a s
         let longest = name.chars().count().max(candidate.chars().count());
         (distance <= limit && distance < longest).then_some((distance, candidate))
     });
-    near.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
+    // Of two that are equally near, the one that differs in case alone.
+    near.min_by_key(|(distance, candidate)| (*distance, !candidate.eq_ignore_ascii_case(name)))
+        .map(|(_, candidate)| candidate)
 }
 
 /// `; did you mean …?`, or nothing.
@@ -55,6 +59,13 @@ pub(crate) fn snake_case(name: &str) -> String {
     snake
 }
 
+/// The name of the module with a robot's handles; none if the type's name leaves none that can be used.
+pub(crate) fn module_name(name: &Ident) -> Option<String> {
+    let (name, module) = (name.to_string(), snake_case(&name.to_string()));
+    let is_keyword = syn::parse_str::<Ident>(&module).is_err();
+    (module != name && !is_keyword).then_some(module)
+}
+
 /// Puts words into a sentence: `` `a`, `b` or `c` ``.
 pub(crate) fn one_of(words: &[&str]) -> String {
     let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
@@ -74,6 +85,7 @@ mod tests {
         assert_eq!(nearest("estimtor", ["sensor", "estimator", "joint"]), Some("estimator"));
         assert_eq!(nearest("gnss", ["imu", "wheels"]), None);
         assert_eq!(nearest("a", ["b"]), None);
+        assert_eq!(nearest("hz", ["h", "Hz"]), Some("Hz"));
         assert_eq!(distance("kitten", "sitting"), 3);
         assert_eq!(distance("dge", "deg"), 1);
     }
@@ -83,5 +95,13 @@ mod tests {
         assert_eq!(snake_case("Rover"), "rover");
         assert_eq!(snake_case("TwoImus"), "two_imus");
         assert_eq!(snake_case("IMURig"), "imurig");
+    }
+
+    #[test]
+    fn a_robot_needs_a_name_that_leaves_one_for_its_module() {
+        let module = |name| module_name(&Ident::new(name, proc_macro2::Span::call_site()));
+        assert_eq!(module("Rover"), Some("rover".into()));
+        assert_eq!(module("rover"), None);
+        assert_eq!(module("Match"), None);
     }
 }

@@ -29,17 +29,24 @@ pub(crate) use setting::Setting;
 pub(crate) use topology::{JointAddition, Topology};
 
 use crate::diagnostics::Diagnostics;
-use proc_macro2::TokenStream;
+use proc_macro2::{Delimiter, Group, Span, TokenStream, TokenTree};
 use syn::parse::{ParseStream, Parser};
 
 /// The tree of a robot, with errors for what could not be read.
 pub(crate) fn robot(tokens: TokenStream, diagnostics: &mut Diagnostics) -> Robot {
     let mut robot = Robot::default();
+    // What is missing at the end is reported at the last token, not at the whole macro.
+    let end = tokens.clone().into_iter().last().map_or_else(Span::call_site, |token| token.span());
+    let mut whole = Group::new(Delimiter::Brace, tokens);
+    whole.set_span(end);
     let parser = |input: ParseStream<'_>| {
-        robot.parse(input, diagnostics);
+        robot.parse(&block::braced(input)?, diagnostics);
         Ok(())
     };
-    if let Err(error) = parser.parse2(tokens) {
+    // syn reports what is left unread in brackets; where reading it has failed is reported already.
+    if let Err(error) = parser.parse2(TokenTree::from(whole).into())
+        && !diagnostics.any()
+    {
         diagnostics.syntax(&error);
     }
     robot.complete = !diagnostics.any();

@@ -137,7 +137,7 @@ impl Unit {
 
     /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` belongs to the symbol behind it alone.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
-        let first = factor(input, input.call(Ident::parse_any)?)?;
+        let first = factor(input, symbol(input)?)?;
         Self::ONE.times(first, 1).rest(input)
     }
 
@@ -157,7 +157,7 @@ impl Unit {
             } else {
                 return Ok(self);
             };
-            self = self.times(factor(input, input.call(Ident::parse_any)?)?, sign);
+            self = self.times(factor(input, symbol(input)?)?, sign);
         }
     }
 
@@ -167,21 +167,31 @@ impl Unit {
     }
 }
 
+fn symbol(input: ParseStream<'_>) -> syn::Result<Ident> {
+    let place = input.span();
+    input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, "expected a unit, as in `m` or `deg/s`"))
+}
+
 /// A symbol with its exponent, if it has one: `s`, `s^2`.
 fn factor(input: ParseStream<'_>, symbol: Ident) -> syn::Result<Unit> {
     let name = symbol.to_string();
     let Some((_, dimension, factor)) = UNITS.iter().find(|(unit, ..)| *unit == name) else {
-        let hint = crate::names::did_you_mean(&name, UNITS.iter().map(|(unit, ..)| *unit));
-        return Err(syn::Error::new(symbol.span(), format!("unknown unit `{name}`{hint}")));
+        let hint = match crate::names::nearest(&name, UNITS.iter().map(|(unit, ..)| *unit)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "units are symbols, as in `m`, `s`, `deg` or `Hz`".to_owned(),
+        };
+        return Err(syn::Error::new(symbol.span(), format!("unknown unit `{name}`; {hint}")));
     };
     let unit = Unit { dimension: Dimension(*dimension), factor: *factor };
     if !input.peek(Token![^]) {
         return Ok(unit);
     }
     input.parse::<Token![^]>()?;
-    let literal: LitInt = input.parse()?;
+    let place = input.span();
+    let expected = "expected an exponent from 1 to 9";
+    let literal: LitInt = input.parse().map_err(|_| syn::Error::new(place, expected))?;
     let exponent = literal.base10_parse::<u8>().ok().filter(|exponent| (1..=9).contains(exponent));
-    let exponent = exponent.ok_or_else(|| syn::Error::new(literal.span(), "expected an exponent from 1 to 9"))?;
+    let exponent = exponent.ok_or_else(|| syn::Error::new(literal.span(), expected))?;
     let power = (0..exponent).fold(Unit::ONE, |power, _| power.times(unit, 1));
     Ok(power)
 }

@@ -35,18 +35,23 @@ pub const fn check_output<O: Outputs>(estimator: &str, name: &str) {
     unknown(start.push("; it emits "), O::FIELDS, name)
 }
 
-/// An input as declared in `robot!`.
-#[derive(Clone, Copy, Debug)]
-pub struct Declared {
-    /// Its name.
-    pub name: &'static str,
-    /// Whether it is `optional`.
-    pub optional: bool,
+/// That the algorithm can do without the input `name`, which is declared as optional.
+#[track_caller]
+pub const fn check_optional<I: Inputs>(estimator: &str, name: &str) {
+    let fields = I::FIELDS;
+    let mut index = 0;
+    while index < fields.len() {
+        if equal(fields[index].name, name) && !fields[index].optional {
+            let text = Text::new("").name(estimator).push(" cannot do without its input ").name(name);
+            panic!("{}", text.push("; leave out `optional`").as_str())
+        }
+        index += 1;
+    }
 }
 
-/// That every input the algorithm cannot do without is declared, and none of them as optional.
+/// That every input the algorithm cannot do without is among the `declared`.
 #[track_caller]
-pub const fn check_inputs<I: Inputs>(estimator: &str, declared: &[Declared]) {
+pub const fn check_inputs<I: Inputs>(estimator: &str, declared: &[&str]) {
     if !I::KNOWN {
         return;
     }
@@ -54,7 +59,7 @@ pub const fn check_inputs<I: Inputs>(estimator: &str, declared: &[Declared]) {
     let mut misspelt = false;
     let mut number = 0;
     while number < declared.len() {
-        misspelt = misspelt || find_input::<I>(declared[number].name) == UNKNOWN_INDEX;
+        misspelt = misspelt || find_input::<I>(declared[number]) == UNKNOWN_INDEX;
         number += 1;
     }
     if fields.is_empty() && declared.len() > 1 {
@@ -67,13 +72,7 @@ pub const fn check_inputs<I: Inputs>(estimator: &str, declared: &[Declared]) {
         let mut found = field.optional;
         let mut number = 0;
         while number < declared.len() {
-            if equal(declared[number].name, field.name) {
-                found = true;
-                if declared[number].optional && !field.optional {
-                    let text = Text::new("").name(estimator).push(" cannot do without its input ").name(field.name);
-                    panic!("{}", text.push("; leave out `optional`").as_str())
-                }
-            }
+            found = found || equal(declared[number], field.name);
             number += 1;
         }
         // A misspelt name is reported as such, and may stand for this one.

@@ -65,7 +65,7 @@ const fn check_dimension(component: &str, field: OptionField, given: Given) {
         }
         (Some(expected), None) if given.number.is_some() => {
             let text = Text::new("expected ").push(expected.name).push(", found a number without a unit; ");
-            panic!("{}", text.push("write it with one, as in ").push(field.unit).as_str())
+            panic!("{}", text.push("write it with one, as in `1 ").push(field.unit).push("`").as_str())
         }
         (None, Some(found)) => {
             let text = Text::new("expected a plain value, found ").push(found.name).push("; leave the unit out");

@@ -88,3 +88,17 @@ impl Options for NoOptions {
         Ok(())
     }
 }
+
+/// What a text given as an option may become: whatever is `From<&'static str>`, as `String` and `PathBuf` are.
+#[diagnostic::on_unimplemented(message = "expected `{Self}`, found a text", label = "a text, not `{Self}`")]
+pub trait FromText {
+    /// It.
+    fn from_text(text: &'static str) -> Self;
+}
+
+#[diagnostic::do_not_recommend]
+impl<T: From<&'static str>> FromText for T {
+    fn from_text(text: &'static str) -> Self {
+        text.into()
+    }
+}

@@ -161,7 +161,7 @@ fn plain(expression: &Expr) -> String {
 pub(crate) fn into_if_text(value: &Expr) -> TokenStream {
     match value {
         Expr::Lit(literal) if matches!(literal.lit, Lit::Str(_)) => {
-            quote_spanned!(literal.span()=> ::core::convert::Into::into(#literal))
+            quote_spanned!(literal.span()=> ::bb_core::__private::FromText::from_text(#literal))
         }
         other => quote!(#other),
     }

@@ -72,10 +72,7 @@ fn inputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
     if estimator.is_nested() {
         return spanned_call(place, quote!(::bb_core::__private::check_nested::<#taken>), quote!(#name));
     }
-    let declared = estimator.inputs.iter().map(|input| {
-        let (name, optional) = (input.name.to_string(), input.optional);
-        quote!(::bb_core::__private::Declared { name: #name, optional: #optional })
-    });
+    let declared = estimator.inputs.iter().map(|input| input.name.to_string());
     let needed =
         spanned_call(place, quote!(::bb_core::__private::check_inputs::<#taken>), quote!(#name, &[#(#declared),*]));
     let known = estimator.inputs.iter().map(|input| {
@@ -83,7 +80,12 @@ fn inputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
         let place = Place::of(&input.name);
         spanned_call(place, quote!(::bb_core::__private::check_input::<#taken>), quote!(#name, #input_name))
     });
-    known.chain([needed]).collect()
+    let optional = estimator.inputs.iter().filter_map(|input| {
+        let (input_name, place) = (input.name.to_string(), Place::of(input.optional.as_ref()?));
+        let check = quote!(::bb_core::__private::check_optional::<#taken>);
+        Some(spanned_call(place, check, quote!(#name, #input_name)))
+    });
+    known.chain(optional).chain([needed]).collect()
 }
 
 /// The declared outputs are the algorithm's, and one of several outputs has some declared.

@@ -57,7 +57,7 @@ fn estimator_declaration(verified: &Verified<'_>, id: usize) -> TokenStream {
         let name = input.name.to_string();
         let path = robot.publishers.get(*source).map_or(String::new(), |publisher| path_text(&publisher.path));
         let driver = input.driver.is_some() || !several;
-        let optional = input.optional;
+        let optional = input.optional.is_some();
         let tolerance = option(input.within.as_ref().or(synchronous).map(|tolerance| {
             let tolerance = nanos(tolerance.value);
             quote!(#tolerance)

@@ -8,7 +8,7 @@ use super::literal::ident;
 use super::types::Types;
 use super::{docs, path_text};
 use crate::model::{EstimatorId, PublisherId, Robot, SensorId};
-use crate::names::snake_case;
+use crate::names::module_name;
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
@@ -31,9 +31,9 @@ struct Module {
 #[derive(Clone, Copy)]
 enum Handle {
     Sensor(SensorId),
-    /// An estimator of one output, and its publisher.
+    /// An estimator that publishes at its own path, and that publisher.
     Estimator(EstimatorId, PublisherId),
-    /// An estimator of several outputs.
+    /// An estimator that publishes below its path only.
     Several(EstimatorId),
     Output(EstimatorId, PublisherId),
 }
@@ -46,9 +46,12 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
         }
     }
     for (id, estimator) in robot.estimators.iter().enumerate() {
-        match (estimator.publishers.as_slice(), estimator.outputs.is_empty()) {
-            ([publisher], true) => root.add(&estimator.path, &estimator.name, Handle::Estimator(id, *publisher)),
-            _ => root.add(&estimator.path, &estimator.name, Handle::Several(id)),
+        let is_own = |publisher: &PublisherId| {
+            robot.publishers.get(*publisher).is_some_and(|publisher| publisher.path == estimator.path)
+        };
+        match estimator.publishers.iter().copied().find(is_own) {
+            Some(publisher) => root.add(&estimator.path, &estimator.name, Handle::Estimator(id, publisher)),
+            None => root.add(&estimator.path, &estimator.name, Handle::Several(id)),
         }
         for (output, publisher) in estimator.outputs.iter().zip(&estimator.publishers) {
             if let Some(path) = robot.publishers.get(*publisher).map(|publisher| &publisher.path) {
@@ -56,7 +59,9 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
             }
         }
     }
-    let module = ident(&snake_case(&name.to_string()));
+    let Some(module) = module_name(name).map(|module| ident(&module)) else {
+        return TokenStream::new();
+    };
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
     let content = root.tokens(robot, name, accessors, 1);
     quote! {

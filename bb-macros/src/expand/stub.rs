@@ -16,6 +16,7 @@ pub(crate) fn stub(robot: &Robot) -> TokenStream {
     let handles = handles(robot, name, Accessors::Stub);
     let text = name.to_string();
     quote! {
+        #[allow(non_camel_case_types)]
         #definition
         #aliases
         ::bb_core::__private::stub_robot!(#name, #text);

@@ -1,8 +1,9 @@
 //! The contents of braces, item by item, and how to go on behind one that cannot be read.
 
-use crate::diagnostics::Diagnostics;
+use crate::diagnostics::{Diagnostics, Place};
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::{Delimiter, Ident, TokenTree};
+use syn::buffer::Cursor;
 use syn::ext::IdentExt;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{Attribute, Token};
@@ -67,7 +68,7 @@ pub(super) fn items(
             let _: syn::Result<Token![;]> = input.parse();
             continue;
         }
-        let result = head(input).and_then(|head| item(head, input, diagnostics));
+        let result = head(input, diagnostics).and_then(|head| item(head, input, diagnostics));
         if let Err(error) = result {
             diagnostics.syntax(&error);
             skip(input);
@@ -88,10 +89,36 @@ pub(super) fn semicolon(input: ParseStream<'_>, behind: &str, diagnostics: &mut 
         let _: syn::Result<Token![;]> = input.parse();
         return;
     }
-    let error = input.error(format!("expected `;` behind {behind}"));
-    diagnostics.syntax(&error);
-    let starts_an_item = input.fork().call(Ident::parse_any).is_ok_and(|word| WORDS.contains(&&*word.to_string()));
-    if !starts_an_item {
+    diagnostics.at(input.span(), format!("expected `;` behind {behind}"));
+    skip_to_item(input);
+}
+
+/// Reads the `:` behind `name`, in front of `what`.
+pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Result<()> {
+    let place = input.span();
+    let colon: syn::Result<Token![:]> = input.parse();
+    colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} behind `{name}`")))
+}
+
+/// The tokens from `start` up to where `input` stands.
+pub(super) fn place_since(start: Cursor<'_>, input: ParseStream<'_>) -> Place {
+    let (mut cursor, mut place) = (start, Place::from(input.span()));
+    while cursor != input.cursor()
+        && let Some((token, next)) = cursor.token_tree()
+    {
+        let start = if cursor == start { token.span() } else { place.start };
+        place = Place { start, end: token.span() };
+        cursor = next;
+    }
+    place
+}
+
+/// Skips to the next item, unless one starts here.
+pub(super) fn skip_to_item(input: ParseStream<'_>) {
+    let ahead = input.fork();
+    let word = ahead.call(Attribute::parse_outer).and_then(|_| ahead.call(Ident::parse_any));
+    let word = word.map(|word| word.to_string());
+    if !word.is_ok_and(|word| WORDS.contains(&&*word) || PLANNED.contains(&&*word)) {
         skip(input);
     }
 }
@@ -110,9 +137,20 @@ pub(super) fn unexpected(word: &Ident, place: &str, allowed: &[&str]) -> syn::Er
     syn::Error::new(word.span(), message)
 }
 
-fn head(input: ParseStream<'_>) -> syn::Result<Head> {
+fn head(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Head> {
     let attributes = input.call(Attribute::parse_outer)?;
-    Ok(Head { attributes, word: input.call(Ident::parse_any)? })
+    for attribute in attributes.iter().filter(|attribute| !attribute.path().is_ident("doc")) {
+        let message = "only doc comments can stand before a part of a robot; leave this attribute out";
+        diagnostics.error(attribute, message.into());
+    }
+    let place = input.span();
+    let word = input.call(Ident::parse_any).map_err(|_| {
+        syn::Error::new(
+            place,
+            "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`",
+        )
+    })?;
+    Ok(Head { attributes, word })
 }
 
 /// Skips to behind the next `;` or `{ … }` of this level.

@@ -1,12 +1,12 @@
 //! What a link weighs, looks like and occupies: `inertial`, `visual` and `collision`, with URDF's meaning.
 
-use super::block::{Head, semicolon};
+use super::block::{Head, colon, semicolon};
 use super::record::{array, record};
 use super::{Origin, Quantity};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
+use syn::LitStr;
 use syn::parse::ParseStream;
-use syn::{LitStr, Token};
 
 /// `inertial: { mass: 1.2 kg, origin: { … }, inertia: { xx: 0.1 kg*m^2, yy: …, zz: …, xy: … } };`
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ const MOMENTS: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 
 impl Inertial {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "its fields in braces")?;
         let mut inertial = Self { word: head.word, origin: None, mass: None, inertia: Default::default() };
         record(input, &["mass", "origin", "inertia"], |field, input| {
             match &*field.to_string() {
@@ -74,7 +74,7 @@ impl Inertial {
 
 impl Shape {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "its fields in braces")?;
         let fields = ["origin", "box", "cylinder", "sphere", "mesh", "material"];
         // A collision is not to be seen.
         let fields = if head.word == "visual" { &fields[..] } else { &fields[..5] };

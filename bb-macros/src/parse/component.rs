@@ -1,7 +1,7 @@
 //! What is declared by name and type: `imu: Bmi270(bus = 1) { … }`.
 
 use super::Quantity;
-use super::block::{Head, braced, semicolon};
+use super::block::{Head, braced, colon, semicolon};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::parse::{ParseBuffer, ParseStream};
@@ -42,8 +42,8 @@ impl<'a> Declared<'a> {
     /// Reads what stands behind the word.
     pub(super) fn parse(head: Head, input: ParseStream<'a>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        input.parse::<Token![:]>()?;
-        let component = Component::parse(input)?;
+        colon(input, &name, "a type")?;
+        let component = Component::parse(input, diagnostics)?;
         let body = if input.peek(syn::token::Brace) {
             Some(braced(input)?)
         } else {
@@ -61,14 +61,17 @@ pub(super) fn name(input: ParseStream<'_>, word: &Ident) -> syn::Result<Ident> {
 }
 
 impl Component {
-    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+    fn parse(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let kind = path_of_type(input)?;
         let mut options = Vec::new();
         if input.peek(syn::token::Paren) {
             let content;
             syn::parenthesized!(content in input);
-            let parsed = content.parse_terminated(ComponentOption::parse, Token![,])?;
-            options.extend(parsed);
+            // Options that cannot be read leave the component known.
+            match content.parse_terminated(ComponentOption::parse, Token![,]) {
+                Ok(parsed) => options.extend(parsed),
+                Err(error) => diagnostics.syntax(&error),
+            }
         }
         Ok(Self { kind, options })
     }
@@ -99,8 +102,12 @@ fn path_of_type(input: ParseStream<'_>) -> syn::Result<syn::Path> {
 impl ComponentOption {
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let place = input.span();
-        let name = input.parse().map_err(|_| syn::Error::new(place, "expected an option, as in `name = value`"))?;
-        input.parse::<Token![=]>()?;
+        let name: Ident =
+            input.parse().map_err(|_| syn::Error::new(place, "expected an option, as in `name = value`"))?;
+        let place = input.span();
+        let equals: syn::Result<Token![=]> = input.parse();
+        equals
+            .map_err(|_| syn::Error::new(place, format!("expected `=` and a value behind the option `{name}`")))?;
         Ok(Self { name, value: OptionValue::parse(input)? })
     }
 }
@@ -131,11 +138,16 @@ fn plain_number(expression: &Expr) -> Option<Option<f64>> {
     match expression {
         Expr::Unary(unary) => plain_number(&unary.expr).map(|number| number.map(|number| -number)),
         Expr::Lit(literal) => match &literal.lit {
-            syn::Lit::Int(number) if RUST.contains(&number.suffix()) => Some(number.base10_parse().ok()),
-            syn::Lit::Float(number) if RUST.contains(&number.suffix()) => Some(number.base10_parse().ok()),
+            syn::Lit::Int(number) if RUST.contains(&number.suffix()) => Some(finite(number.base10_digits())),
+            syn::Lit::Float(number) if RUST.contains(&number.suffix()) => Some(finite(number.base10_digits())),
             _ => None,
         },
         Expr::Binary(binary) => plain_number(&binary.left).map(|_| None),
         _ => Some(None),
     }
+}
+
+/// The number, if it is one that a double can hold.
+fn finite(digits: &str) -> Option<f64> {
+    digits.parse().ok().filter(|number: &f64| number.is_finite())
 }

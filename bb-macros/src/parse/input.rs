@@ -1,7 +1,7 @@
 //! `input gnss: sensor::base_link::gnss, optional, within: 250 ms;`
 
 use super::Quantity;
-use super::block::{Head, semicolon};
+use super::block::{Head, colon, semicolon};
 use super::component::name;
 use crate::diagnostics::{Diagnostics, Place};
 use crate::names::did_you_mean;
@@ -16,9 +16,9 @@ pub(crate) struct Input {
     pub(crate) word: Ident,
     pub(crate) name: Ident,
     pub(crate) path: Path,
-    /// Each word `driver`; more than one is harmless.
+    /// The word `driver`; more than one is harmless, as is more than one `optional`.
     pub(crate) driver: Option<Ident>,
-    pub(crate) optional: bool,
+    pub(crate) optional: Option<Ident>,
     pub(crate) within: Option<Quantity>,
 }
 
@@ -40,45 +40,52 @@ impl Path {
     }
 
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
-        let mut segments = vec![input.call(Ident::parse_any)?];
+        let mut segments = vec![Self::segment(input)?];
         while input.peek(Token![::]) {
             input.parse::<Token![::]>()?;
-            segments.push(input.call(Ident::parse_any)?);
+            segments.push(Self::segment(input)?);
         }
         Ok(Self(segments))
+    }
+
+    fn segment(input: ParseStream<'_>) -> syn::Result<Ident> {
+        let place = input.span();
+        input
+            .call(Ident::parse_any)
+            .map_err(|_| syn::Error::new(place, "expected the path of a publisher, as in `sensor::base_link::imu`"))
     }
 }
 
 impl Input {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        input.parse::<Token![:]>()?;
-        let place = input.span();
-        let path = Path::parse(input).map_err(|_| {
-            syn::Error::new(place, "expected the path of a publisher, as in `sensor::base_link::imu`")
-        })?;
-        let mut parsed = Self { word: head.word, name, path, driver: None, optional: false, within: None };
+        colon(input, &name, "the path of a publisher")?;
+        let path = Path::parse(input)?;
+        let mut parsed = Self { word: head.word, name, path, driver: None, optional: None, within: None };
         while input.peek(Token![,]) {
             input.parse::<Token![,]>()?;
-            parsed.property(input)?;
+            parsed.property(input, diagnostics)?;
         }
         semicolon(input, &format!("`{}`", parsed.name), diagnostics);
         Ok(parsed)
     }
 
-    fn property(&mut self, input: ParseStream<'_>) -> syn::Result<()> {
-        let word = input.call(Ident::parse_any)?;
+    fn property(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+        const EXPECTED: &str = "expected `driver`, `optional` or `within: …`";
+        let place = input.span();
+        let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, EXPECTED))?;
         match &*word.to_string() {
             "driver" => self.driver = Some(word),
-            "optional" => self.optional = true,
+            "optional" => self.optional = Some(word),
             "within" => {
-                input.parse::<Token![:]>()?;
-                self.within = Some(Quantity::parse(input)?);
+                colon(input, &word, "a time")?;
+                if self.within.replace(Quantity::parse(input)?).is_some() {
+                    diagnostics.error(&word, "`within` stands here twice; leave one out".into());
+                }
             }
             other => {
                 let hint = did_you_mean(other, ["driver", "optional", "within"]);
-                let message = format!("expected `driver`, `optional` or `within: …`{hint}");
-                return Err(syn::Error::new(word.span(), message));
+                return Err(syn::Error::new(word.span(), format!("{EXPECTED}{hint}")));
             }
         }
         Ok(())

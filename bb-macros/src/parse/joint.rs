@@ -6,13 +6,12 @@ mod mechanics;
 pub(crate) use geometry::{Axis, Limit, Origin};
 pub(crate) use mechanics::{Dynamics, Mimic, Transmission};
 
-use super::block::{Head, braced, items, semicolon, unexpected};
+use super::block::{Head, braced, colon, items, semicolon, unexpected};
 use super::component::name;
 use super::{Link, Sensor};
 use crate::diagnostics::Diagnostics;
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::Ident;
-use syn::Token;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
@@ -75,12 +74,16 @@ const WORDS: &[&str] = &["origin", "axis", "limit", "dynamics", "mimic", "transm
 impl Joint {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        input.parse::<Token![:]>()?;
-        let kind_word = input.call(Ident::parse_any)?;
+        colon(input, &name, "the type of the joint")?;
+        let place = input.span();
+        let kind_word = input
+            .call(Ident::parse_any)
+            .map_err(|_| syn::Error::new(place, "expected the type of the joint, as in `fixed` or `revolute`"))?;
+        let kind = JointKind::parse(&kind_word);
         let mut joint = Self {
             name,
             label: None,
-            kind: JointKind::parse(&kind_word)?,
+            kind: kind.clone().unwrap_or(JointKind::Fixed),
             kind_word,
             origins: Vec::new(),
             axes: Vec::new(),
@@ -96,6 +99,12 @@ impl Joint {
             items(&body, diagnostics, |head, input, diagnostics| joint.item(head, input, diagnostics));
         } else {
             semicolon(input, &format!("`{}`", joint.name), diagnostics);
+        }
+        if let Err(error) = kind {
+            // What it carries is known all the same; whether it needs an axis and a limit is not.
+            diagnostics.syntax(&error);
+            joint.axes.clear();
+            joint.limits.clear();
         }
         Ok(joint)
     }

@@ -1,5 +1,6 @@
 //! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also glued, `20ms`.
 
+use super::block::place_since;
 use crate::diagnostics::Place;
 use crate::units::{Dimension, Unit};
 use proc_macro2::{Ident, Span};
@@ -32,14 +33,15 @@ impl Quantity {
 
     /// Reads a number, and the unit if one follows.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
-        let start = input.span();
+        let start = input.cursor();
         let sign = if input.peek(Token![-]) {
             input.parse::<Token![-]>()?;
             -1.0
         } else {
             1.0
         };
-        let literal: Lit = input.parse().map_err(|_| input.error("expected a number with its unit"))?;
+        let place = input.span();
+        let literal: Lit = input.parse().map_err(|_| syn::Error::new(place, "expected a number with its unit"))?;
         let (digits, suffix) = match &literal {
             Lit::Int(literal) => {
                 let text = literal.to_string();
@@ -55,7 +57,6 @@ impl Quantity {
         };
         let number = digits.parse::<f64>().ok().filter(|number| number.is_finite());
         let number = number.ok_or_else(|| syn::Error::new(literal.span(), "this number is too large"))?;
-        let before = input.span();
         let unit = if !suffix.is_empty() {
             Some(Unit::with_suffix(&suffix_ident(&suffix, literal.span())?, input)?)
         } else if input.peek(Ident::peek_any) {
@@ -63,15 +64,12 @@ impl Quantity {
         } else {
             None
         };
-        // The last token of a unit of several is not known; its first is near enough.
-        let end = if unit.is_some() && suffix.is_empty() { before } else { literal.span() };
         let (dimension, factor) = unit.map_or((Dimension::NONE, 1.0), |unit| (unit.dimension, unit.factor));
-        Ok(Self {
-            value: sign * scaled(number, factor),
-            dimension,
-            has_unit: unit.is_some(),
-            place: Place { start, end },
-        })
+        let value = sign * scaled(number, factor);
+        if !value.is_finite() {
+            return Err(syn::Error::new(literal.span(), "this number is too large"));
+        }
+        Ok(Self { value, dimension, has_unit: unit.is_some(), place: place_since(start, input) })
     }
 }
 

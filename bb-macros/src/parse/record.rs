@@ -1,7 +1,7 @@
 //! Values in braces and brackets: `{ field: value, … }` and `[a, b, c]`.
 
 use super::Quantity;
-use super::block::braced;
+use super::block::{braced, colon};
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::Ident;
 use syn::Token;
@@ -17,16 +17,18 @@ pub(super) fn record(
     let content = braced(input)?;
     let mut seen: Vec<Ident> = Vec::new();
     while !content.is_empty() {
-        let name = content.call(Ident::parse_any)?;
+        let place = content.span();
+        let expected = format!("expected {}", one_of(fields));
+        let name = content.call(Ident::parse_any).map_err(|_| syn::Error::new(place, &expected))?;
         let text = name.to_string();
         if !fields.contains(&&*text) {
             let hint = did_you_mean(&text, fields.iter().copied());
-            return Err(syn::Error::new(name.span(), format!("expected {}{hint}", one_of(fields))));
+            return Err(syn::Error::new(name.span(), format!("{expected}{hint}")));
         }
         if seen.contains(&name) {
             return Err(syn::Error::new(name.span(), format!("`{name}` stands here twice; leave one out")));
         }
-        content.parse::<Token![:]>()?;
+        colon(&content, &name, "a value")?;
         value(&name, &content)?;
         seen.push(name);
         if !content.is_empty() {
@@ -44,5 +46,5 @@ pub(super) fn array<const N: usize>(input: ParseStream<'_>) -> syn::Result<[Quan
     let count = quantities.len();
     quantities
         .try_into()
-        .map_err(|_| syn::Error::new(bracket.span.open(), format!("expected {N} values, found {count}")))
+        .map_err(|_| syn::Error::new(bracket.span.join(), format!("expected {N} values, found {count}")))
 }

@@ -1,6 +1,6 @@
 //! `robot Rover; sensors { … } link base { … }`
 
-use super::block::{Head, braced, items, semicolon, unexpected};
+use super::block::{Head, braced, items, semicolon, skip_to_item, unexpected};
 use super::{JointAddition, Link, Sensor, Topology};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::{Ident, Span};
@@ -29,11 +29,12 @@ impl Robot {
     pub(super) fn parse(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) {
         if let Err(error) = self.header(input, diagnostics) {
             diagnostics.syntax(&error);
+            skip_to_item(input);
         }
         items(input, diagnostics, |head, input, diagnostics| self.item(head, input, diagnostics));
     }
 
-    /// `pub robot Rover;` If it is not there, nothing is consumed but what belongs to it.
+    /// `pub robot Rover;` If it is not there, nothing is consumed.
     fn header(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
         const EXPECTED: &str = "expected the robot's name first, as in `robot Rover;`";
         if input.is_empty() {

@@ -1,10 +1,9 @@
 //! A setting: a word, a colon and a quantity.
 
 use super::Quantity;
-use super::block::{Head, semicolon};
+use super::block::{Head, colon, semicolon};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
-use syn::Token;
 use syn::parse::ParseStream;
 
 /// `rate: 200 Hz;`
@@ -17,7 +16,7 @@ pub(crate) struct Setting {
 impl Setting {
     /// Reads what stands behind the word.
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "a value")?;
         let quantity = Quantity::parse(input)?;
         semicolon(input, &format!("`{}`", head.word), diagnostics);
         Ok(Self { word: head.word, quantity })

@@ -72,12 +72,8 @@ fn geometry(joint: &Joint, diagnostics: &mut Diagnostics) {
     for component in joint.axes.iter().flat_map(|axis| &axis.components) {
         expect(Dimension::NONE, "1", component, diagnostics);
     }
+    let [position, velocity, effort] = of_limit(joint.kind);
     let turns = matches!(joint.kind, JointKind::Revolute | JointKind::Continuous);
-    let (position, velocity, effort) = if turns {
-        ((Dimension::ANGLE, "90 deg"), (Dimension::ANGULAR_VELOCITY, "60 deg/s"), (Dimension::TORQUE, "5 N*m"))
-    } else {
-        ((Dimension::LENGTH, "0.1 m"), (Dimension::VELOCITY, "0.1 m/s"), (Dimension::FORCE, "5 N"))
-    };
     for dynamics in &joint.dynamics {
         let (damping, example) = if turns {
             (Dimension::ANGULAR_DAMPING, "0.1 N*m*s/rad")
@@ -107,6 +103,15 @@ fn geometry(joint: &Joint, diagnostics: &mut Diagnostics) {
                 expect(dimension, example, quantity, diagnostics);
             }
         }
+    }
+}
+
+/// The dimensions of position, velocity and effort, with an example of each.
+pub(super) fn of_limit(kind: JointKind) -> [(Dimension, &'static str); 3] {
+    if matches!(kind, JointKind::Revolute | JointKind::Continuous) {
+        [(Dimension::ANGLE, "90 deg"), (Dimension::ANGULAR_VELOCITY, "60 deg/s"), (Dimension::TORQUE, "5 N*m")]
+    } else {
+        [(Dimension::LENGTH, "0.1 m"), (Dimension::VELOCITY, "0.1 m/s"), (Dimension::FORCE, "5 N")]
     }
 }
 

@@ -3,8 +3,9 @@
 //! Right: `output pose; output velocity: [nav, velocity];`
 //! Wrong: `output pose; output velocity: [estimator, base, fused, pose];`
 
-use crate::diagnostics::Diagnostics;
-use crate::model::{From, Publisher, Robot};
+use crate::diagnostics::{Diagnostics, Place};
+use crate::model::{EstimatorId, From, Publisher, Robot};
+use crate::parse::Output;
 use proc_macro2::Ident;
 use std::collections::HashMap;
 
@@ -14,12 +15,29 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let Some(first) = taken.insert(&publisher.path, publisher) else {
             continue;
         };
-        // Siblings of one name are reported as such.
-        if let (Some(name), true) =
-            (output(robot, publisher), output(robot, first).is_some() || explicit(robot, publisher))
+        // Where one of the two has been put there by its output's path, that path is the one to change. Two that are
+        // there by their names are outputs of one estimator; or siblings of one name, which are reported as such.
+        match (explicit(robot, publisher).or(explicit(robot, first)), output(robot, publisher)) {
+            (Some(place), _) => {
+                let path = publisher.path.join("::");
+                diagnostics.at(place, format!("something else publishes at `{path}`; choose another path"));
+            }
+            (None, Some(output)) if estimator(publisher) == estimator(first) => {
+                let message = format!("an output `{}` stands here already; leave one out", output.name);
+                diagnostics.error(&output.name, message);
+            }
+            (None, _) => {}
+        }
+    }
+    // An estimator has a handle at its own path, even if it publishes below that path only.
+    for publisher in &robot.publishers {
+        let own = robot.estimators.iter().enumerate().find(|(_, estimator)| estimator.path == publisher.path);
+        if let (Some((id, own)), Some(place)) = (own, explicit(robot, publisher))
+            && estimator(publisher) != Some(id)
+            && !own.outputs.is_empty()
         {
-            let path = publisher.path.join("::");
-            diagnostics.error(name, format!("something publishes at `{path}` already; choose another path"));
+            let message = format!("the estimator `{}` stands at this path; choose another path", own.name);
+            diagnostics.at(place, message);
         }
     }
     for estimator in robot.estimators.iter().filter(|estimator| !estimator.is_nested()) {
@@ -34,21 +52,23 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// The name of the declared output behind a publisher.
-fn output<'a>(robot: &'a Robot, publisher: &Publisher) -> Option<&'a Ident> {
+/// The declared output behind a publisher.
+fn output<'a>(robot: &'a Robot, publisher: &Publisher) -> Option<&'a Output> {
     let From::Estimator(estimator, Some(output)) = publisher.from else {
         return None;
     };
-    Some(&robot.estimators.get(estimator)?.outputs.get(output)?.name)
+    robot.estimators.get(estimator)?.outputs.get(output)
 }
 
-fn explicit(robot: &Robot, publisher: &Publisher) -> bool {
-    let From::Estimator(estimator, Some(output)) = publisher.from else {
-        return false;
-    };
-    robot
-        .estimators
-        .get(estimator)
-        .and_then(|estimator| estimator.outputs.get(output))
-        .is_some_and(|output| output.path.is_some())
+/// Where the path of a publisher is written out, if it is.
+fn explicit(robot: &Robot, publisher: &Publisher) -> Option<Place> {
+    let path = output(robot, publisher)?.path.as_ref()?;
+    Some(Place { start: path.first()?.span(), end: path.last()?.span() })
+}
+
+fn estimator(publisher: &Publisher) -> Option<EstimatorId> {
+    match publisher.from {
+        From::Estimator(estimator, _) => Some(estimator),
+        From::Sensor(_) => None,
+    }
 }

@@ -1,5 +1,6 @@
 //! Revolute, prismatic, continuous and planar joints have an axis; revolute and prismatic ones a limit with lower
-//! below upper; a fixed joint has neither. (A floating joint moves freely: no axis either.)
+//! below upper; a fixed joint has neither. (A floating joint moves freely: no axis either.) An origin is not so far
+//! away that the transforms between joints could no longer be multiplied out.
 //!
 //! Right: `joint pan: revolute { axis: z; limit: { lower: -90 deg, upper: 90 deg }; link head { } }`
 //! Wrong: `joint pan: revolute { link head { } }`
@@ -7,12 +8,25 @@
 use crate::diagnostics::Diagnostics;
 use crate::model::{Joint, Robot};
 use crate::parse::{JointKind, Limit};
+use crate::units::Dimension;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // The reader of a URDF reports these with their lines.
     for joint in robot.joints.iter().filter(|joint| !joint.from_urdf) {
         axis(joint, robot.complete, diagnostics);
         limit(joint, robot.complete, diagnostics);
+        origin(joint, diagnostics);
+    }
+}
+
+/// A light year.
+const FARTHEST_M: f64 = 9.46e15;
+
+fn origin(joint: &Joint, diagnostics: &mut Diagnostics) {
+    for length in joint.origins.iter().filter_map(|origin| origin.xyz.as_ref()).flatten() {
+        if length.dimension == Dimension::LENGTH && length.value.abs() > FARTHEST_M {
+            diagnostics.at(length.place, "this is farther than a light year; bring it nearer".into());
+        }
     }
 }
 
@@ -25,7 +39,9 @@ fn axis(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
         }
         Some(axis) => {
             let length = axis.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
-            if !(length.is_finite() && length > 1e-9) {
+            // A unit is a fault of its own.
+            let is_plain = axis.components.iter().all(|component| !component.has_unit);
+            if is_plain && !(length.is_finite() && length > 1e-9) {
                 diagnostics.at(axis.place, "this axis has no direction; give it a component that is not 0".into());
             }
         }

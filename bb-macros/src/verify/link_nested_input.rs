@@ -4,15 +4,21 @@
 //! Wrong: `link base { estimator pose: Eskf(); }`
 
 use crate::diagnostics::Diagnostics;
-use crate::model::Robot;
+use crate::model::{Mount, Robot};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     let missing = robot.estimators.iter().filter(|estimator| !estimator.is_nested() && estimator.inputs.is_empty());
+    let example = robot
+        .sensors
+        .iter()
+        .find(|sensor| sensor.mount != Mount::Robot)
+        .and_then(|sensor| robot.publishers.get(sensor.publisher));
+    let example = example.map_or("sensor::base::imu".to_owned(), |publisher| publisher.path.join("::"));
     for estimator in missing.filter(|_| robot.complete) {
         let name = &estimator.name;
         let message = format!(
-            "the estimator `{name}` on a link has no input; declare one, as in `input imu: sensor::{}::imu;`",
-            robot.links.first().map_or("base".to_owned(), |link| link.name.to_string())
+            "the estimator `{name}` on a link has no input; declare one, as in `input {}: {example};`",
+            example.rsplit("::").next().unwrap_or_default()
         );
         diagnostics.error(name, message);
     }

@@ -40,9 +40,14 @@ fn visit(
         };
         if state.get(source) == Some(&State::Open) {
             let start = path.iter().position(|open| *open == source).unwrap_or(0);
-            // The path leads from consumer to publisher; messages flow the other way.
-            let cycle = cycle(robot, path.iter().skip(start).rev().copied());
-            let message = format!("`{}` depends on itself: {cycle}; leave out one of these inputs", estimator.name);
+            let name = &estimator.name;
+            let message = if source == id {
+                format!("`{name}` takes what it publishes; name another publisher")
+            } else {
+                // The path leads from consumer to publisher; messages flow the other way.
+                let cycle = cycle(robot, path.iter().skip(start).rev().copied());
+                format!("`{name}` depends on itself: {cycle}; leave out one of these inputs")
+            };
             diagnostics.at(input.path.place(), message);
         } else {
             visit(robot, source, state, path, diagnostics);
@@ -52,10 +57,9 @@ fn visit(
     state[id] = State::Done;
 }
 
-/// `a → b → a`, in the direction in which messages flow.
+/// `` `a` → `b` → `a` ``, in the direction in which messages flow.
 fn cycle(robot: &Robot, estimators: impl Iterator<Item = EstimatorId>) -> String {
     let names: Vec<String> =
         estimators.filter_map(|id| Some(format!("`{}`", robot.estimators.get(id)?.name))).collect();
-    let first = names.last().cloned();
-    first.iter().chain(&names).cloned().collect::<Vec<_>>().join(" → ")
+    names.iter().chain(names.first()).cloned().collect::<Vec<_>>().join(" → ")
 }

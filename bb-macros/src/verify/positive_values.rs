@@ -1,11 +1,13 @@
-//! Rates and tolerances are positive, limits of speed and effort not negative.
+//! Rates, tolerances and the limits of speed and effort are positive. (A URDF's limits of speed and effort may be 0.)
 //!
 //! Right: `rate: 200 Hz;`
 //! Wrong: `rate: 0 Hz;`
 
+use super::dimensions::of_limit;
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
-use crate::parse::Quantity;
+use crate::parse::{JointKind, Quantity};
+use crate::units::Dimension;
 
 /// Beyond it a period is less than a nanosecond.
 const HIGHEST_RATE_HZ: f64 = 1e9;
@@ -14,27 +16,42 @@ const LONGEST_TIME_S: f64 = 9.2e9;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for rate in robot.sensors.iter().flat_map(|sensor| &sensor.rates) {
-        positive(&rate.quantity, HIGHEST_RATE_HZ, "1 GHz", diagnostics);
-        if rate.quantity.value > 0.0 && 1.0 / rate.quantity.value > LONGEST_TIME_S {
-            diagnostics.at(rate.quantity.place, "this rate is too low: less than once in 292 years".into());
+        let rate = &rate.quantity;
+        positive(rate, Dimension::FREQUENCY, HIGHEST_RATE_HZ, "1 GHz", diagnostics);
+        if rate.dimension == Dimension::FREQUENCY && rate.value > 0.0 && 1.0 / rate.value > LONGEST_TIME_S {
+            diagnostics.at(rate.place, "this rate is too low; it must be more than once in 292 years".into());
         }
     }
     for estimator in &robot.estimators {
         let tolerances = estimator.sync_tolerances.iter().map(|tolerance| &tolerance.quantity);
         for time in tolerances.chain(estimator.inputs.iter().filter_map(|input| input.within.as_ref())) {
-            positive(time, LONGEST_TIME_S, "292 years", diagnostics);
+            positive(time, Dimension::TIME, LONGEST_TIME_S, "292 years", diagnostics);
         }
     }
-    for limit in robot.joints.iter().flat_map(|joint| &joint.limits) {
-        for quantity in limit.velocity.iter().chain(&limit.effort) {
-            if quantity.value < 0.0 {
-                diagnostics.at(quantity.place, "this must not be negative".into());
+    // A fixed joint's limit is a fault of its own.
+    for joint in robot.joints.iter().filter(|joint| joint.kind != JointKind::Fixed && !joint.from_urdf) {
+        let [_, (velocity, _), (effort, _)] = of_limit(joint.kind);
+        for limit in &joint.limits {
+            for (quantity, dimension) in [(&limit.velocity, velocity), (&limit.effort, effort)] {
+                if let Some(quantity) = quantity {
+                    positive(quantity, dimension, f64::MAX, "", diagnostics);
+                }
             }
         }
     }
 }
 
-fn positive(quantity: &Quantity, highest: f64, highest_text: &str, diagnostics: &mut Diagnostics) {
+/// A quantity of another dimension is a fault of its own.
+fn positive(
+    quantity: &Quantity,
+    dimension: Dimension,
+    highest: f64,
+    highest_text: &str,
+    diagnostics: &mut Diagnostics,
+) {
+    if quantity.dimension != dimension {
+        return;
+    }
     if quantity.value <= 0.0 {
         diagnostics.at(quantity.place, "this must be more than 0".into());
     } else if quantity.value > highest {

@@ -1,14 +1,24 @@
-//! A setting that holds for a whole block stands in it once.
+//! A setting that holds for a whole block stands in it once, and an option in its parentheses.
 //!
 //! Wrong: `sensor imu: A() { rate: 100 Hz; rate: 200 Hz; }`
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
 use proc_macro2::Ident;
+use std::collections::HashSet;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for sensor in &robot.sensors {
         once(sensor.rates.iter().map(|rate| &rate.word), diagnostics);
+    }
+    let sensors = robot.sensors.iter().map(|sensor| &sensor.component);
+    for component in sensors.chain(robot.estimators.iter().map(|estimator| &estimator.component)) {
+        let mut given = HashSet::new();
+        for name in component.options.iter().map(|option| &option.name) {
+            if !given.insert(name.to_string()) {
+                diagnostics.error(name, twice(name));
+            }
+        }
     }
     for link in &robot.links {
         once(link.inertials.iter().map(|inertial| &inertial.word), diagnostics);
@@ -28,6 +38,10 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
 
 fn once<'a>(words: impl Iterator<Item = &'a Ident>, diagnostics: &mut Diagnostics) {
     for extra in words.skip(1) {
-        diagnostics.error(extra, format!("`{extra}` stands here twice; leave one out"));
+        diagnostics.error(extra, twice(extra));
     }
+}
+
+fn twice(word: &Ident) -> String {
+    format!("`{word}` stands here twice; leave one out")
 }

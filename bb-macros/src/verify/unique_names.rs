@@ -5,15 +5,20 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::{Home, Mount, Robot};
-use crate::names::snake_case;
+use crate::names::{module_name, snake_case};
 use proc_macro2::Ident;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     if let Some(name) = &robot.name
-        && *name == snake_case(&name.to_string())
+        && module_name(name).is_none()
     {
-        let message = format!("`{name}` would be both the robot's type and its module; write it in camel case");
+        let module = snake_case(&name.to_string());
+        let message = if *name == module {
+            format!("`{name}` would be both the robot's type and its module; write it in camel case")
+        } else {
+            format!("the robot's module would be `{module}`, a keyword; choose another name than `{name}`")
+        };
         diagnostics.error(name, message);
     }
     let mut bodies = Names::new("the links and joints of the robot");
@@ -21,14 +26,14 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         bodies.add(name, diagnostics);
     }
     let mut siblings: HashMap<Place, Names> = HashMap::new();
-    // Joints are siblings of the sensors and estimators of their link, links of the sensors of their joint.
+    // Joints are siblings of the sensors and estimators of their link, links of the sensors of their joint, and the
+    // root of the sensors of the robot: what is below them shares their path.
     for joint in &robot.joints {
         siblings.entry(Place::Link(joint.parent)).or_insert_with(Names::of_siblings).know(&joint.name);
     }
     for link in &robot.links {
-        if let Some(joint) = link.joint {
-            siblings.entry(Place::Joint(joint)).or_insert_with(Names::of_siblings).know(&link.name);
-        }
+        let place = link.joint.map_or(Place::Robot, Place::Joint);
+        siblings.entry(place).or_insert_with(Names::of_siblings).know(&link.name);
     }
     let sensors = robot.sensors.iter().map(|sensor| (Place::of_mount(sensor.mount), &sensor.name));
     let estimators = robot.estimators.iter().map(|estimator| (Place::of_home(estimator.home), &estimator.name));
@@ -66,11 +71,13 @@ impl Place {
 struct Names<'a> {
     scope: &'static str,
     first: HashMap<String, &'a Ident>,
+    /// The names whose first place has been reported.
+    reported: HashSet<String>,
 }
 
 impl<'a> Names<'a> {
     fn new(scope: &'static str) -> Self {
-        Self { scope, first: HashMap::new() }
+        Self { scope, first: HashMap::new(), reported: HashSet::new() }
     }
 
     fn of_siblings() -> Self {
@@ -88,7 +95,9 @@ impl<'a> Names<'a> {
             Some(first) => {
                 let message = format!("the name `{name}` is taken among {}; choose another", self.scope);
                 diagnostics.error(name, message);
-                diagnostics.error(first, format!("`{name}` is declared here first"));
+                if self.reported.insert(name.to_string()) {
+                    diagnostics.error(first, format!("`{name}` is declared here first"));
+                }
             }
         }
     }

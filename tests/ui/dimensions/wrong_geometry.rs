@@ -1,7 +1,6 @@
 //! Angles and lengths the wrong way round, an axis with a unit, a limit of the wrong kind of joint.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     robot Rover;

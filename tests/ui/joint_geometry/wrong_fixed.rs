@@ -1,7 +1,6 @@
 //! A fixed joint neither turns nor slides.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     robot Rover;

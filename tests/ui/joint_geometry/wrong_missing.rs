@@ -1,7 +1,6 @@
 //! Joints that move without an axis, without a limit, with half of one.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     robot Rover;

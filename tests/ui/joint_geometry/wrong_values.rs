@@ -1,7 +1,6 @@
 //! A limit the wrong way round, an axis without direction.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     robot Rover;

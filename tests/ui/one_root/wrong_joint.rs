@@ -1,7 +1,6 @@
 //! A joint that carries nothing, and one that carries two links.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     robot Rover;

@@ -1,7 +1,6 @@
 //! A joint that cannot move.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     robot Rover;

@@ -16,7 +16,6 @@ robot! {
             input feild: sensor::base::field;
         }
         estimator motion: Motion() { input imu: sensor::base::right; output velocty; }
-        estimator guessed: Heading() { input imu: sensor::base::imu; }
         estimator far: Tilt() { input imu: sensor::base::pan::head::imu; }
         joint pan: continuous {
             axis: z;

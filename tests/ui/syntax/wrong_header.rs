@@ -1,7 +1,6 @@
 //! A name where the word belongs.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     pub struct Rover;

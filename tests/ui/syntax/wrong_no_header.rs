@@ -1,7 +1,6 @@
 //! A robot without a name.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     link base {

@@ -1,4 +1,4 @@
-//! Names without a type, and without a name.
+//! Names without a type, types without a name, and one sensor that is right.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;
@@ -12,6 +12,7 @@ robot! {
         estimator { }
         joint pan { link head { } }
         joint tilt: turning { link nose { } }
+        sensor good: Magnetometer();
     }
 }
 

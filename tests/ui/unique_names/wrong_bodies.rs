@@ -1,7 +1,6 @@
 //! Links and joints are unique in the whole robot: they name its frames.
 
 use bb_core::prelude::*;
-use bb_ui_tests::*;
 
 robot! {
     robot Rover;

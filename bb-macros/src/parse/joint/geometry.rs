@@ -2,7 +2,7 @@
 
 use crate::diagnostics::{Diagnostics, Place};
 use crate::parse::Quantity;
-use crate::parse::block::{Head, semicolon};
+use crate::parse::block::{Head, colon, place_since, semicolon};
 use crate::parse::record::{array, record};
 use proc_macro2::Ident;
 use syn::Token;
@@ -40,7 +40,7 @@ pub(crate) struct Limit {
 
 impl Origin {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "its fields in braces")?;
         let origin = Self::parse_value(head.word, input)?;
         semicolon(input, "`origin`", diagnostics);
         Ok(origin)
@@ -70,12 +70,12 @@ impl Axis {
     }
 
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
-        let start = input.span();
-        let (direction, components, end) = if input.peek(syn::token::Bracket) {
+        colon(input, &head.word, "a direction")?;
+        let (start, place) = (input.cursor(), input.span());
+        let (direction, components) = if input.peek(syn::token::Bracket) {
             let components = array::<3>(input)?;
             let direction = components.each_ref().map(|component| component.value);
-            (direction, components.to_vec(), start)
+            (direction, components.to_vec())
         } else {
             let sign = if input.peek(Token![-]) {
                 input.parse::<Token![-]>()?;
@@ -83,17 +83,18 @@ impl Axis {
             } else {
                 1.0
             };
-            let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(start, AXIS))?;
+            let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, AXIS))?;
             let direction = match &*word.to_string() {
                 "x" => [sign, 0.0, 0.0],
                 "y" => [0.0, sign, 0.0],
                 "z" => [0.0, 0.0, sign],
                 _ => return Err(syn::Error::new(word.span(), AXIS)),
             };
-            (direction, Vec::new(), word.span())
+            (direction, Vec::new())
         };
+        let place = place_since(start, input);
         semicolon(input, "`axis`", diagnostics);
-        Ok(Self { word: head.word, direction, components, place: Place { start, end } })
+        Ok(Self { word: head.word, direction, components, place })
     }
 }
 
@@ -101,7 +102,7 @@ const AXIS: &str = "expected `x`, `y`, `z`, one of them with `-`, or `[a, b, c]`
 
 impl Limit {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "its fields in braces")?;
         let mut limit = Self { word: head.word, lower: None, upper: None, velocity: None, effort: None };
         record(input, &["lower", "upper", "velocity", "effort"], |field, input| {
             let quantity = Some(Quantity::parse(input)?);

@@ -2,10 +2,9 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::parse::Quantity;
-use crate::parse::block::{Head, semicolon};
+use crate::parse::block::{Head, colon, semicolon};
 use crate::parse::record::record;
 use proc_macro2::Ident;
-use syn::Token;
 use syn::parse::ParseStream;
 
 /// `dynamics: { damping: 0.1 N*m*s/rad, friction: 0.2 N*m };`
@@ -35,7 +34,7 @@ pub(crate) struct Transmission {
 
 impl Dynamics {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "its fields in braces")?;
         let mut dynamics = Self { word: head.word, damping: None, friction: None };
         record(input, &["damping", "friction"], |field, input| {
             let quantity = Some(Quantity::parse(input)?);
@@ -53,7 +52,7 @@ impl Dynamics {
 
 impl Mimic {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "its fields in braces")?;
         let mut mimic = Self { word: head.word, joint: None, multiplier: None, offset: None };
         record(input, &["joint", "multiplier", "offset"], |field, input| {
             match &*field.to_string() {
@@ -70,7 +69,7 @@ impl Mimic {
 
 impl Transmission {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        input.parse::<Token![:]>()?;
+        colon(input, &head.word, "its fields in braces")?;
         let mut transmission = Self { word: head.word, reduction: None };
         record(input, &["reduction"], |_, input| {
             transmission.reduction = Some(Quantity::parse(input)?);

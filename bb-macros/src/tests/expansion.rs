@@ -1,0 +1,79 @@
+//! The expansion of a robot: it is Rust, it says what is to be checked of types, and its size is linear.
+
+use super::{diagnostics, sensing, tokens};
+use crate::pipeline;
+
+/// Everything that the language has.
+pub(super) const WHOLE: &str = r#"
+    /// A rover.
+    pub robot Rover;
+    sensors { sensor battery: Battery(); }
+    /// The body.
+    link base {
+        /// It measures.
+        sensor imu: drivers::Bmi270<2>(bus = "i2c-1", rate = 2 * K, scale = 2000 deg/s, gain = -0.5) {
+            rate: 200 Hz;
+            estimator tilt: Madgwick<Imu>(beta = 0.1);
+        }
+        sensor field: Magnetometer() { rate: 50Hz; }
+        estimator heading: Heading() {
+            input imu: sensor::base::imu, driver;
+            input field: sensor::base::mount::mast::field, optional, within: 250 ms;
+            sync_tolerance: 20 ms;
+            output out;
+            output rate: [nav, rate];
+        }
+        joint mount: fixed {
+            origin: { xyz: [0.2 m, 0 m, -90 cm], rpy: [0 deg, 90 deg, 1 rad] };
+            link mast { sensor field: Magnetometer(); }
+        }
+        joint pan: revolute {
+            axis: -z;
+            limit: { lower: -90 deg, upper: 90 deg, velocity: 60 deg/s, effort: 5 N*m };
+            sensor encoder: Encoder(id = 3);
+            link head { sensor imu: Bmi270(); }
+        }
+        estimator far: Far() { input imu: sensor::base::pan::head::imu; }
+    }
+"#;
+
+#[test]
+fn a_right_robot_expands_to_rust() {
+    assert!(diagnostics(tokens(WHOLE)).is_empty(), "{:?}", super::faults(WHOLE));
+    let file = syn::parse2::<syn::File>(pipeline(tokens(WHOLE)));
+    assert!(file.is_ok(), "{:?}", file.err());
+}
+
+#[test]
+fn an_input_across_a_moving_joint_is_left_to_the_type() {
+    let expansion = pipeline(tokens(WHOLE)).to_string();
+    // `far` spans the joint `pan`; `heading` spans only the fixed `mount`.
+    assert_eq!(expansion.matches("check_dynamic").count(), 1);
+    assert!(expansion.contains(r#""imu" , "pan" , "revolute""#));
+}
+
+#[test]
+fn numbers_that_no_double_holds_are_no_panic() {
+    let robot = sensing("sensor x: A(a = 1e999, b = -1e999, c = 1e999 + 1.0, d = 0xFFFF_FFFF_FFFF_FFFF_FFFF);");
+    assert!(syn::parse2::<syn::File>(pipeline(tokens(&robot))).is_ok());
+}
+
+/// A robot with `count` estimators in a chain, all names of one length.
+fn chain(count: usize) -> String {
+    let estimators = (0..count).map(|number| {
+        let source =
+            if number == 0 { "sensor::base::imu".into() } else { format!("estimator::base::e{:04}", number - 1) };
+        format!("estimator e{number:04}: Tilt(gain = 0.1) {{ input imu: {source}; }}\n")
+    });
+    sensing(&estimators.collect::<String>())
+}
+
+#[test]
+fn the_expansion_is_linear_in_size() {
+    let bytes = |count| pipeline(tokens(&chain(count))).to_string().len() as f64;
+    let none = bytes(0);
+    let each = [10, 100, 1000].map(|count| (bytes(count) - none) / f64::from(count as i32));
+    for bytes in each {
+        assert!((bytes / each[0] - 1.0).abs() < 0.2, "bytes per estimator at 10, 100 and 1000: {each:?}");
+    }
+}

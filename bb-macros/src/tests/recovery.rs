@@ -1,0 +1,191 @@
+//! Parse errors, and that one mistake hides no other and makes no other.
+
+use super::{base, faults, places, sensing, tokens, wrong};
+
+#[test]
+fn words() {
+    wrong(
+        &base("senor imu: A();"),
+        &[("senor", "unknown word `senor`; a link holds `sensor`, `estimator` or `joint`; did you mean `sensor`?")],
+    );
+    wrong(
+        &base("sensor imu: A() { on_lost: stop; }"),
+        &[("on_lost", "`on_lost` is not supported yet; a sensor holds `rate` or `estimator`")],
+    );
+    wrong(
+        &base("rate: 5 Hz;"),
+        &[("rate", "`rate` does not belong in a link, which holds `sensor`, `estimator` or `joint`")],
+    );
+    wrong(
+        &base("5; #[cfg(test)] sensor imu: A();"),
+        &[
+            ("5", "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`"),
+            ("#[cfg(test)]", "only doc comments can stand before a part of a robot; leave this attribute out"),
+        ],
+    );
+}
+
+#[test]
+fn headers() {
+    let expected = "expected the robot's name first, as in `robot Rover;`";
+    wrong("", &[("", expected)]);
+    wrong("link base;", &[("link", expected)]);
+    wrong(
+        "/// Doc.\n link base { wheel; }",
+        &[("link", expected), ("wheel", "unknown word `wheel`; a link holds `sensor`, `estimator` or `joint`")],
+    );
+    wrong("pub struct Rover; link base;", &[("struct", expected)]);
+    wrong("robo Rover; link base;", &[("robo", expected)]);
+    wrong("robot; link base;", &[(";", "expected the name of this `robot`")]);
+    wrong("robot 5; link base;", &[("5", "expected the name of this `robot`")]);
+    wrong("robot Rover { link base; }", &[("{", "expected `;` behind the robot's name")]);
+    // What is missing at the end is missing at the last token, of which a group is known by its last character.
+    for robot in ["robot", "robot Rover", "pub", "#[doc = \"\"]", "robot Rover; link"] {
+        let places = places(robot);
+        assert!(
+            matches!(&places[..], [place] if !place.is_empty() && robot.ends_with(place)),
+            "{robot}: {places:?}"
+        );
+    }
+}
+
+#[test]
+fn semicolons() {
+    wrong(
+        "robot Rover link base { sensor imu: A() { rate: 5 Hz } sensor mag: B() sensor other: C(); }",
+        &[
+            ("link", "expected `;` behind the robot's name"),
+            ("}", "expected `;` behind `rate`"),
+            ("sensor", "expected `;` behind `mag`"),
+        ],
+    );
+    wrong(
+        &base("sensor imu: A() 5 6 7; sensor mag: B() { rat: 5 Hz; }"),
+        &[
+            ("5", "expected `;` behind `imu`"),
+            ("rat", "unknown word `rat`; a sensor holds `rate` or `estimator`; did you mean `rate`?"),
+        ],
+    );
+}
+
+#[test]
+fn declarations() {
+    wrong(
+        &base("sensor imu; sensor mag: ; sensor: A(); joint j; joint k: spin { link a; } estimator t = T();"),
+        &[
+            (";", "expected `:` and a type behind `imu`"),
+            (";", "expected a type: that of a sensor or of an estimator"),
+            (":", "expected the name of this `sensor`"),
+            (";", "expected `:` and the type of the joint behind `j`"),
+            (
+                "spin",
+                "unknown type of joint; expected `fixed`, `revolute`, `continuous`, `prismatic`, `planar` or `floating`",
+            ),
+            ("=", "expected `:` and a type behind `t`"),
+        ],
+    );
+    wrong(
+        &base("sensor a: A(5); sensor b: A(x: 5); sensor c: A(x = K y = 6); sensor d: A(,);"),
+        &[
+            ("5", "expected an option, as in `name = value`"),
+            (":", "expected `=` and a value behind the option `x`"),
+            ("y", "expected `,`"),
+            (",", "expected an option, as in `name = value`"),
+        ],
+    );
+    wrong(
+        &sensing(
+            "estimator h: H() { input a: ; input b: sensor::, driver; input c: sensor::base::imu, fast; output o: []; }",
+        ),
+        &[
+            (";", "expected the path of a publisher, as in `sensor::base_link::imu`"),
+            (",", "expected the path of a publisher, as in `sensor::base_link::imu`"),
+            ("fast", "expected `driver`, `optional` or `within: …`"),
+            ("[]", "a path has at least one name, as in `[nav, velocity]`"),
+        ],
+    );
+}
+
+#[test]
+fn numbers() {
+    for (number, place, message) in [
+        ("200 hz", "hz", "unknown unit `hz`; did you mean `Hz`?"),
+        ("200hz", "200hz", "unknown unit `hz`; did you mean `Hz`?"),
+        ("200 degrees", "degrees", "unknown unit `degrees`; units are symbols, as in `m`, `s`, `deg` or `Hz`"),
+        ("0x20 Hz", "0x20", "a number in hexadecimal, octal or binary takes no unit; write it in decimal"),
+        ("1 m/", ";", "expected a unit, as in `m` or `deg/s`"),
+        ("1 m^x", "x", "expected an exponent from 1 to 9"),
+        ("1 m^10", "10", "expected an exponent from 1 to 9"),
+        ("1e999 Hz", "1e999", "this number is too large"),
+        ("1e308 kHz", "1e308", "this number is too large"),
+        ("fast", "fast", "expected a number with its unit"),
+        ("\"5 Hz\"", "\"5 Hz\"", "expected a number with its unit"),
+        ("", ";", "expected a number with its unit"),
+    ] {
+        wrong(&base(&format!("sensor imu: A() {{ rate: {number}; }}")), &[(place, message)]);
+    }
+}
+
+#[test]
+fn geometry() {
+    let joint = |content| base(&format!("joint j: revolute {{ {content} link a; }}"));
+    wrong(&joint("axis: up;"), &[("up", "expected `x`, `y`, `z`, one of them with `-`, or `[a, b, c]`")]);
+    wrong(&joint("axis: [1, 2];"), &[("[1, 2]", "expected three values, found 2")]);
+    wrong(&joint("origin: { xzy: [0 m, 0 m, 0 m] };"), &[("xzy", "expected `xyz` or `rpy`; did you mean `xyz`?")]);
+    wrong(&joint("limit: { lower: -1 rad; upper: 1 rad };"), &[(";", "expected `,`")]);
+    wrong(&joint("limit: { lower = -1 rad };"), &[("=", "expected `:` and a value behind `lower`")]);
+    wrong(&joint("limit { lower: -1 rad };"), &[("{", "expected `:` and its fields in braces behind `limit`")]);
+}
+
+#[test]
+fn what_is_not_read_makes_no_further_faults() {
+    // The unread sensor may be what the input names, the unread link what the joint lacks, the unread limit its limit.
+    for content in [
+        "sensor imu Imu(); estimator t: T() { input imu: sensor::base::imu; }",
+        "joint pan: fixed { lnk head { } }",
+        "joint pan: revolute { axis: z; limit: { lower: }; link head; }",
+        "estimator t: T() { inptu imu: sensor::base::imu; }",
+        "sensor i: A(); estimator h: H() { input a: sensor::base::i; input b: sensor::base::i, drivr; }",
+        "joint pan: revolut { axis: z; limit: { lower: -1 deg, upper: 1 deg }; link head; }",
+        "sensor imu: Imu(bus 5) { rate: 5 Hz; } estimator t: T() { input imu: sensor::base::imu; }",
+    ] {
+        assert_eq!(faults(&base(content)).len(), 1, "{content}: {:?}", faults(&base(content)));
+    }
+    assert_eq!(places("robot Rover; lnik base { }"), ["lnik"]);
+}
+
+#[test]
+fn faults_of_all_phases_are_reported_together() {
+    let robot = sensing(
+        "sensor gnss: Gnss() { rate: 5 hz; }
+         sensor odom: Odom() { rate: 0 Hz; estimator t: T() { input imu: sensor::base::imu; } }
+         estimator h: H() { input a: sensor::base::imu, driver; input a: sensor::base::mag; sync_tolerance: 20 m; }
+         joint pan: revolut { link head; }
+         joint tilt: fixed { axis: z; link nose; }",
+    );
+    assert_eq!(places(&robot), ["hz", "revolut", "axis", "20 m", "input", "0 Hz", "a"]);
+}
+
+#[test]
+fn a_robot_with_mistakes_keeps_its_type_and_handles() {
+    let robot = sensing(
+        "sensor imu2: A() { estimator tilt: T() { input x: a; } }
+         estimator h: H() { input a: sensor::base::inu, driver; sync_tolerance: 20 m; output x: [nav, heading]; }
+         joint pan: revolut { link head { sensor cam: C(5); } }",
+    );
+    let expansion = crate::pipeline(tokens(&robot)).to_string();
+    for kept in [
+        "struct Rover ;",
+        "mod rover {",
+        "const imu :",
+        "const imu2 :",
+        "const tilt :",
+        "const h :",
+        "const heading :",
+        "mod pan {",
+        "const cam :",
+    ] {
+        assert!(expansion.contains(kept), "`{kept}` is not in {expansion}");
+    }
+    assert_eq!(expansion.matches("compile_error").count(), faults(&robot).len());
+}
