@@ -22,7 +22,8 @@ pub(super) fn record(
         let name = content.call(Ident::parse_any).map_err(|_| syn::Error::new(place, &expected))?;
         let text = name.to_string();
         if !fields.contains(&&*text) {
-            let hint = did_you_mean(&text, fields.iter().copied());
+            // One field is no choice.
+            let hint = if fields.len() > 1 { did_you_mean(&text, fields.iter().copied()) } else { String::new() };
             return Err(syn::Error::new(name.span(), format!("{expected}{hint}")));
         }
         if seen.contains(&name) {

@@ -6,7 +6,10 @@ use super::{base, faults, places, sensing, tokens, wrong};
 fn words() {
     wrong(
         &base("senor imu: A();"),
-        &[("senor", "unknown word `senor`; a link holds `sensor`, `estimator` or `joint`; did you mean `sensor`?")],
+        &[(
+            "senor",
+            "unknown word `senor`; a link holds `sensor`, `estimator`, `joint`, `inertial`, `visual` or `collision`; did you mean `sensor`?",
+        )],
     );
     wrong(
         &base("sensor imu: A() { on_lost: stop; }"),
@@ -14,7 +17,10 @@ fn words() {
     );
     wrong(
         &base("rate: 5 Hz;"),
-        &[("rate", "`rate` does not belong in a link, which holds `sensor`, `estimator` or `joint`")],
+        &[(
+            "rate",
+            "`rate` does not belong in a link, which holds `sensor`, `estimator`, `joint`, `inertial`, `visual` or `collision`",
+        )],
     );
     wrong(
         &base("5; #[cfg(test)] sensor imu: A();"),
@@ -32,7 +38,13 @@ fn headers() {
     wrong("link base;", &[("link", expected)]);
     wrong(
         "/// Doc.\n link base { wheel; }",
-        &[("link", expected), ("wheel", "unknown word `wheel`; a link holds `sensor`, `estimator` or `joint`")],
+        &[
+            ("link", expected),
+            (
+                "wheel",
+                "unknown word `wheel`; a link holds `sensor`, `estimator`, `joint`, `inertial`, `visual` or `collision`",
+            ),
+        ],
     );
     wrong("pub struct Rover; link base;", &[("struct", expected)]);
     wrong("robo Rover; link base;", &[("robo", expected)]);
@@ -130,7 +142,7 @@ fn numbers() {
 fn geometry() {
     let joint = |content| base(&format!("joint j: revolute {{ {content} link a; }}"));
     wrong(&joint("axis: up;"), &[("up", "expected `x`, `y`, `z`, one of them with `-`, or `[a, b, c]`")]);
-    wrong(&joint("axis: [1, 2];"), &[("[1, 2]", "expected three values, found 2")]);
+    wrong(&joint("axis: [1, 2];"), &[("[1, 2]", "expected 3 values, found 2")]);
     wrong(&joint("origin: { xzy: [0 m, 0 m, 0 m] };"), &[("xzy", "expected `xyz` or `rpy`; did you mean `xyz`?")]);
     wrong(&joint("limit: { lower: -1 rad; upper: 1 rad };"), &[(";", "expected `,`")]);
     wrong(&joint("limit: { lower = -1 rad };"), &[("=", "expected `:` and a value behind `lower`")]);

@@ -207,10 +207,15 @@ fn single_input_tolerance() {
 fn declared_publishers() {
     let tilt = |path| sensing(&format!("estimator t: T() {{ input imu: {path}; }}"));
     right(&tilt("sensor::base::imu"));
+    // The end of a path will do where no other has it.
+    right(&tilt("base::mag"));
+    right(&tilt("imu"));
+    let two = "sensor imu: A() { estimator t: T(); } sensor mag: B() { estimator t: T(); }";
+    let message = "`t` may be `sensor::base::imu::t` or `sensor::base::mag::t`; write more of the path";
+    wrong(&base(&format!("{two} estimator e: T() {{ input a: t; }}")), &[("t", message)]);
     for (path, near) in [
         ("sensor::base::inu", "sensor::base::imu"),
         ("sensor::bas::imu", "sensor::base::imu"),
-        ("base::mag", "sensor::base::mag"),
         ("sensor :: base :: mga", "sensor::base::mag"),
     ] {
         let message = format!("nothing publishes at `{}`; did you mean `{near}`?", path.replace(' ', ""));

@@ -9,7 +9,6 @@ robot! {
         sensor imu: Bmi270(bus = "i2c-1");
         estimator a: Tilt() { input imu: sensor::base::inu; }
         estimator b: Tilt() { input imu: sensors::base::imu; }
-        estimator c: Tilt() { input imu: imu; }
     }
 }
 
