@@ -30,10 +30,10 @@ robot! {
 fn nothing_is_allocated_from_publish_to_output() -> Result<(), StartError> {
     let builder = TwoImus::builder();
     let attitude = builder.subscribe(two_imus::estimator::base::attitude);
-    let simulation = builder.simulate()?;
+    let mut simulation = builder.simulate()?;
     let imu = Imu::new([0.0, 0.0, 0.1].into(), [0.0, 0.0, 9.81].into());
     let field = MagneticField::new([0.0, 20e-6, -40e-6].into());
-    let publish = |millis: i64| {
+    let mut publish = |millis: i64| {
         let time = MonotonicTime::from_nanos(millis * 1_000_000);
         simulation.publish(two_imus::sensor::base::magnetic, time, field);
         simulation.publish(two_imus::sensor::base::inertial, time, imu);
@@ -43,7 +43,7 @@ fn nothing_is_allocated_from_publish_to_output() -> Result<(), StartError> {
     };
     publish(0);
     assert!(attitude.try_recv().is_some());
-    let allocations = allocation_counter::measure(|| (1..=1000).for_each(publish));
+    let allocations = allocation_counter::measure(|| (1..=1000).for_each(&mut publish));
     assert_eq!(attitude.drain().count(), 1000);
     assert_eq!(allocations.count_total, 0);
     Ok(())

@@ -81,7 +81,14 @@ impl Sensor for BagImu {
         if options.magnetometer {
             topics.push(topic(options.magnetometer_topic, MAGNETIC_FIELD)?);
         }
-        Ok(Self { messages: bag.messages(&topics)?, pending: None })
+        let mut bag = Self { messages: bag.messages(&topics)?, pending: None };
+        // The first sample, to know when the recording starts.
+        let _first = bag.read(MonotonicTime::ZERO)?;
+        Ok(bag)
+    }
+
+    fn starts_at(&self) -> Option<MonotonicTime> {
+        self.pending.as_ref().map(|(time, _)| *time)
     }
 
     /// Gives the sample that waits once the next one is there, with the readings of the magnetometer that came up to

@@ -14,8 +14,8 @@ mod startup;
 mod stop;
 
 pub use builder::Builder;
-pub(crate) use error::caught;
 pub use error::{ComponentFault, StartError};
+pub(crate) use error::{Failed, caught, retire};
 pub use handle::{Configurable, EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Publisher, SensorHandle};
 pub use report::Report;
 pub use robot::Robot;

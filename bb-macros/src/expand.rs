@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! pub struct Rover;                         // the robot's type
+//! impl Rover { pub fn builder() … }         // so that no trait need be in scope
 //! type __RoverS0 = Bmi270;                  // one alias per component: its type is named once
 //! const _: () = {
 //!     …                                     // constants that check type facts at the user's tokens
-//!     static SENSORS, ESTIMATORS, TOPOLOGY  // what was declared, as data
-//!     struct Options, Topics, Wiring        // a field per component, publisher, estimator
-//!     impl Wiring { fn p0(&self, …) }       // what lies downstream of each publisher, by direct calls
+//!     static __SENSORS, __ESTIMATORS, …     // what was declared, as data
+//!     struct __Options, __Topics, __Wiring  // a field per component, publisher, estimator
+//!     impl __Wiring { fn p0(&self, …) }     // what lies downstream of each publisher, by direct calls
 //!     impl Robot for Rover { … }
 //! };
 //! pub mod rover { … }                       // a handle per publisher, at its path
@@ -18,6 +19,7 @@ mod declarations;
 mod handles;
 mod literal;
 mod options;
+mod order;
 mod robot_impl;
 mod stub;
 mod topology;
@@ -42,7 +44,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let declarations = declarations::declarations(verified);
     let options = options::options(robot, name);
     let wiring = wiring::wiring(verified);
-    let implementation = robot_impl::robot_impl(robot, name);
+    let implementation = robot_impl::robot_impl(verified);
     let handles = handles::handles(robot, name, handles::Accessors::Wired);
     quote! {
         #definition
@@ -66,6 +68,14 @@ fn definition(robot: &Robot, name: &Ident) -> TokenStream {
         #(#attributes)*
         #[derive(Clone, Copy, Debug)]
         #visibility struct #name;
+
+        impl #name {
+            /// Assembles the robot: options may be changed and topics subscribed to before it starts.
+            #[allow(dead_code)]
+            #visibility fn builder() -> ::bb_core::Builder<Self> {
+                <Self as ::bb_core::Robot>::builder()
+            }
+        }
     }
 }
 

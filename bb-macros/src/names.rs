@@ -1,6 +1,7 @@
 //! Names: the nearest one to a misspelt one, and the case of identifiers.
 
 use proc_macro2::Ident;
+use syn::ext::IdentExt;
 
 /// The candidate nearest to `name`, if one is near enough to be meant.
 pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -64,6 +65,11 @@ pub(crate) fn module_name(name: &Ident) -> Option<String> {
     let (name, module) = (name.to_string(), snake_case(&name.to_string()));
     let is_keyword = syn::parse_str::<Ident>(&module).is_err();
     (module != name && !is_keyword).then_some(module)
+}
+
+/// The name of an identifier at run time: without the `r#` that lets a keyword be one.
+pub(crate) fn text(ident: &Ident) -> String {
+    ident.unraw().to_string()
 }
 
 /// Puts words into a sentence: `` `a`, `b` or `c` ``.

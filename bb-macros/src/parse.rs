@@ -15,7 +15,9 @@ mod sensor;
 mod setting;
 mod topology;
 
-pub(crate) use body::{Geometry, Inertial, Material, Shape};
+#[cfg(feature = "urdf")]
+pub(crate) use body::Material;
+pub(crate) use body::{Geometry, Inertial, Shape};
 pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
 pub(crate) use input::{Input, Path};

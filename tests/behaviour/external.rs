@@ -25,7 +25,10 @@ fn two_publishing_threads_lose_nothing_and_keep_the_order_of_each() -> Result<()
     let running = builder.start()?;
     running.publish(fed::sensor::base::b, at(0), Number(0.0));
     std::thread::scope(|scope| {
-        scope.spawn(|| (1..=COUNT).for_each(|n| running.publish(fed::sensor::base::a, at(n), Number(n as f64))));
+        scope.spawn(|| {
+            (1..=COUNT)
+                .for_each(|n| running.publish(fed::sensor::base::a, MonotonicTime::from_nanos(n), Number(n as f64)))
+        });
         scope.spawn(|| (1..=COUNT).for_each(|n| running.publish(fed::sensor::base::b, at(n), Number(n as f64))));
     });
     let report = running.stop();
@@ -45,7 +48,7 @@ fn two_publishing_threads_lose_nothing_and_keep_the_order_of_each() -> Result<()
 fn messages_carry_frame_origin_and_time() -> Result<(), StartError> {
     let builder = Fed::builder();
     let a = builder.subscribe(fed::sensor::base::a);
-    let simulation = builder.simulate()?;
+    let mut simulation = builder.simulate()?;
     simulation.publish(fed::sensor::base::a, at(7), Number(1.0));
     let message = a.try_recv().expect("it was published");
     assert_eq!((message.frame.name(), message.origin.robot, message.monotonic_time), ("base", "Fed", at(7)));

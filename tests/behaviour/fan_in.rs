@@ -41,7 +41,7 @@ fn dropped(run: &Run, input: &str, reason: DropReason) -> u64 {
 
 #[test]
 fn nothing_is_dispatched_before_every_required_input_has_arrived() -> Result<(), StartError> {
-    let run = start()?;
+    let mut run = start()?;
     run.0.publish(fan_in::sensor::base::a, at(0), Number(1.0));
     assert!(run.1.try_recv().is_none());
     assert_eq!(dropped(&run, "second", DropReason::SyncMiss), 1);
@@ -55,7 +55,7 @@ fn nothing_is_dispatched_before_every_required_input_has_arrived() -> Result<(),
 
 #[test]
 fn an_input_is_new_once() -> Result<(), StartError> {
-    let run = start()?;
+    let mut run = start()?;
     run.0.publish(fan_in::sensor::base::b, at(0), Number(2.0));
     run.0.publish(fan_in::sensor::base::c, at(0), Number(5.0));
     for (millis, is_new) in [(1, true), (2, false)] {
@@ -72,7 +72,7 @@ fn an_input_is_new_once() -> Result<(), StartError> {
 
 #[test]
 fn a_dropped_dispatch_leaves_the_inputs_new() -> Result<(), StartError> {
-    let run = start()?;
+    let mut run = start()?;
     run.0.publish(fan_in::sensor::base::c, at(0), Number(5.0));
     run.0.publish(fan_in::sensor::base::a, at(0), Number(1.0));
     run.0.publish(fan_in::sensor::base::b, at(1), Number(2.0));
@@ -84,7 +84,7 @@ fn a_dropped_dispatch_leaves_the_inputs_new() -> Result<(), StartError> {
 
 #[test]
 fn an_input_older_than_the_tolerance_drops_the_dispatch_and_a_newer_one_never_does() -> Result<(), StartError> {
-    let run = start()?;
+    let mut run = start()?;
     run.0.publish(fan_in::sensor::base::b, at(100), Number(2.0));
     run.0.publish(fan_in::sensor::base::a, at(110), Number(1.0));
     assert!(run.1.try_recv().is_some(), "10 ms are within 10 ms");
@@ -99,7 +99,7 @@ fn an_input_older_than_the_tolerance_drops_the_dispatch_and_a_newer_one_never_do
 
 #[test]
 fn without_a_tolerance_any_age_will_do() -> Result<(), StartError> {
-    let (simulation, _) = start()?;
+    let (mut simulation, _) = start()?;
     let seen = simulation.subscribe(fan_in::estimator::base::any_age);
     simulation.publish(fan_in::sensor::base::b, at(0), Number(2.0));
     simulation.publish(fan_in::sensor::base::a, at(1_000_000), Number(1.0));
@@ -109,23 +109,23 @@ fn without_a_tolerance_any_age_will_do() -> Result<(), StartError> {
 
 #[test]
 fn an_optional_input_that_is_missing_or_too_old_is_none_and_drops_nothing() -> Result<(), StartError> {
-    let run = start()?;
-    let third = |millis| {
+    let mut run = start()?;
+    let third = |run: &mut Run, millis| {
         run.0.publish(fan_in::sensor::base::b, at(millis), Number(2.0));
         run.0.publish(fan_in::sensor::base::a, at(millis), Number(1.0));
         run.1.try_recv().map(|seen| seen.third)
     };
-    assert_eq!(third(0), Some(-1.0));
+    assert_eq!(third(&mut run, 0), Some(-1.0));
     run.0.publish(fan_in::sensor::base::c, at(0), Number(7.0));
-    assert_eq!(third(50), Some(7.0), "within: 50 ms goes before sync_tolerance: 10 ms");
-    assert_eq!(third(51), Some(-1.0));
+    assert_eq!(third(&mut run, 50), Some(7.0), "within: 50 ms goes before sync_tolerance: 10 ms");
+    assert_eq!(third(&mut run, 51), Some(-1.0));
     assert_eq!(dropped(&run, "third", DropReason::SyncMiss), 0);
     Ok(())
 }
 
 #[test]
 fn messages_out_of_order_and_non_finite_ones_are_dropped_and_counted_by_input() -> Result<(), StartError> {
-    let run = start()?;
+    let mut run = start()?;
     run.0.publish(fan_in::sensor::base::b, at(5), Number(2.0));
     run.0.publish(fan_in::sensor::base::b, at(4), Number(9.0));
     run.0.publish(fan_in::sensor::base::b, at(5), Number(f64::NAN));
@@ -143,7 +143,7 @@ fn messages_out_of_order_and_non_finite_ones_are_dropped_and_counted_by_input() 
 
 #[test]
 fn absurd_stamps_are_survived() -> Result<(), StartError> {
-    let run = start()?;
+    let mut run = start()?;
     let (first, last) = (MonotonicTime::from_nanos(i64::MIN), MonotonicTime::MAX);
     run.0.publish(fan_in::sensor::base::b, first, Number(2.0));
     run.0.publish(fan_in::sensor::base::a, last, Number(1.0));
@@ -151,5 +151,72 @@ fn absurd_stamps_are_survived() -> Result<(), StartError> {
     run.0.publish(fan_in::sensor::base::b, last, Number(2.0));
     run.0.publish(fan_in::sensor::base::a, last, Number(1.0));
     assert_eq!(run.1.drain().count(), 1);
+    Ok(())
+}
+
+/// A sensor whose second stamp is far ahead of the clock.
+#[derive(Debug)]
+pub(crate) struct Skewed(i64);
+
+impl Sensor for Skewed {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(0))
+    }
+
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        self.0 += 1;
+        let stamp = if self.0 == 2 { MonotonicTime::MAX } else { now };
+        Ok(Reading::at(stamp, Number(self.0 as f64)))
+    }
+}
+
+robot! {
+    robot Skew;
+    link base { sensor skewed: Skewed() { rate: 10 Hz; estimator scaled: crate::components::Scale(factor = 1.0); } }
+}
+
+#[test]
+fn a_stamp_from_the_future_is_dropped_and_does_not_disable_the_input() -> Result<(), StartError> {
+    let builder = Skew::builder();
+    let scaled = builder.subscribe(skew::sensor::base::skewed::scaled);
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(350));
+    assert_eq!(scaled.drain().map(|number| number.0).collect::<Vec<_>>(), [1.0, 3.0, 4.0]);
+    let report = simulation.report();
+    let input = &report.estimator("sensor/base/skewed/scaled").expect("it is declared").inputs[0];
+    assert_eq!(input.dropped(DropReason::ClockSkew), 1);
+    Ok(())
+}
+
+robot! {
+    robot Diamond;
+    link base {
+        sensor a: crate::components::Counter() { rate: 100 Hz; }
+        // Declared before what it depends on, which hangs on a child link.
+        estimator both: Snapshot() {
+            input driver: sensor::base::a, driver;
+            input second: estimator::base::mount::mast::derived;
+            input third: sensor::base::a, optional;
+            sync_tolerance: 1 ms;
+        }
+        joint mount: fixed {
+            link mast {
+                estimator derived: crate::components::Scale(factor = 10.0) { input number: sensor::base::a; }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_derived_from_a_message_arrives_before_those_that_take_both() -> Result<(), StartError> {
+    let builder = Diamond::builder();
+    let both = builder.subscribe(diamond::estimator::base::both);
+    let mut simulation = builder.simulate()?;
+    simulation.run_to_end();
+    let seen: Vec<_> = both.drain().map(|seen| (seen.driver, seen.second, seen.third, seen.third_is_new)).collect();
+    assert_eq!(seen, [0.0, 1.0, 2.0, 3.0, 4.0].map(|number| (number, 10.0 * number, number, true)));
     Ok(())
 }

@@ -140,3 +140,155 @@ fn stopping_terminates_estimators_and_ends_subscriptions() -> Result<(), StartEr
     assert!(first.recv().is_none());
     Ok(())
 }
+
+/// A payload whose own code panics.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cursed(u32);
+
+impl bb_core::Finite for Cursed {
+    fn is_finite(&self) -> bool {
+        assert!(self.0 < 3, "cursed");
+        true
+    }
+}
+
+impl Payload for Cursed {
+    const NAME: &'static str = "Cursed";
+}
+
+static CURSE_TERMINATED: AtomicUsize = AtomicUsize::new(0);
+
+/// Publishes it, and says how often it was closed.
+#[derive(Debug)]
+pub(crate) struct Curse(u32);
+
+impl Sensor for Curse {
+    type Options = NoOptions;
+    type Output = Cursed;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(0))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Cursed>, Fault> {
+        self.0 += 1;
+        Ok(if self.0 > 5 { Reading::finished() } else { Reading::now(Cursed(self.0)) })
+    }
+
+    fn terminate(&mut self) {
+        CURSE_TERMINATED.fetch_add(1, Ordering::SeqCst);
+    }
+}
+
+/// Takes it.
+#[derive(Debug)]
+pub(crate) struct Taker;
+
+impl Estimator for Taker {
+    type Options = NoOptions;
+    type Input = Cursed;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, cursed: &Stamped<Cursed>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(f64::from(cursed.0))))
+    }
+}
+
+robot! {
+    robot Haunted;
+    link base {
+        sensor curse: Curse() { rate: 1 kHz; estimator taker: Taker(); }
+        sensor late: Broken() { rate: 10 Hz; }
+        sensor never: Refusing();
+    }
+}
+
+/// Options of [`Refusing`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct RefusingOptions {
+    #[option(default = true)]
+    pub(crate) starts: bool,
+}
+
+/// A sensor that may not start.
+#[derive(Debug)]
+pub(crate) struct Refusing;
+
+impl Sensor for Refusing {
+    type Options = RefusingOptions;
+    type Output = Number;
+
+    fn init(options: RefusingOptions, _: &SensorContext) -> Result<Self, Fault> {
+        if options.starts { Ok(Self) } else { Err(Fault::new("no device")) }
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::finished())
+    }
+}
+
+#[test]
+fn a_payload_that_panics_stops_the_estimator_that_takes_it_and_not_its_sensor() -> Result<(), StartError> {
+    let mut running = Haunted::builder().start()?;
+    running.wait();
+    let report = running.stop();
+    let taker = report.estimator("sensor/base/curse/taker").expect("it is declared");
+    assert_eq!(taker.stopped.as_deref(), Some("panicked: cursed"));
+    assert_eq!((taker.emitted, taker.inputs[0].dropped(DropReason::Stopped)), (2, 2));
+    assert_eq!(report.topic("sensor/base/curse").map(|topic| topic.published), Some(5));
+
+    // What had started when another component did not is stopped in order.
+    let before = CURSE_TERMINATED.load(Ordering::SeqCst);
+    let mut builder = Haunted::builder();
+    builder.options(haunted::sensor::base::never).starts = false;
+    let error = builder.simulate().expect_err("it does not start").to_string();
+    assert_eq!(error, "sensor/base/never cannot start: no device");
+    assert_eq!(CURSE_TERMINATED.load(Ordering::SeqCst), before + 1);
+    Ok(())
+}
+
+/// An estimator that takes its time.
+#[derive(Debug)]
+pub(crate) struct Busy;
+
+impl Estimator for Busy {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        BUSY.store(1, Ordering::SeqCst);
+        while BUSY.load(Ordering::SeqCst) == 1 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(Reply::none())
+    }
+}
+
+static BUSY: AtomicUsize = AtomicUsize::new(0);
+
+robot! {
+    robot Slow;
+    link base { sensor numbers: Counter() { rate: 1 kHz; estimator busy: Busy(); } }
+}
+
+#[test]
+fn a_report_does_not_wait_for_a_busy_estimator() -> Result<(), StartError> {
+    let running = Slow::builder().start()?;
+    while BUSY.load(Ordering::SeqCst) == 0 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // Would never come back if it waited: the estimator goes on only after it.
+    let report = running.report();
+    assert_eq!(report.estimator("sensor/base/numbers/busy").map(|busy| busy.dispatched), Some(1));
+    BUSY.store(2, Ordering::SeqCst);
+    Ok(())
+}

@@ -36,9 +36,9 @@ impl<const MOVING: bool> Estimator for Surveyor<MOVING> {
     const HANDLES_MOVING_JOINTS: bool = MOVING;
 
     fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
-        let far = context.frame_from_input("far");
+        let far = context.frame_from_input("far")?;
         Ok(Self(Origins {
-            near: context.frame_from_input("near").translation.vector,
+            near: context.frame_from_input("near")?.translation.vector,
             far: far.translation.vector,
             far_x: far.rotation * Vector3::x(),
         }))

@@ -6,6 +6,7 @@ mod external;
 mod fan_in;
 mod faults;
 mod frames;
+mod hygiene;
 mod outputs;
 mod real_time;
 mod simulation;

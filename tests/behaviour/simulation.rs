@@ -88,3 +88,95 @@ fn a_sensor_that_stops_virtual_time_is_stopped_and_named() -> Result<(), StartEr
     assert!(faults[1].message.contains("declare `rate`"), "{}", faults[1]);
     Ok(())
 }
+
+robot! {
+    robot Ahead;
+    link base {
+        sensor rated: Counter(count = 100) { rate: 100 Hz; }
+        sensor fed: External<Number>();
+        // The driver is declared first; what it needs beside it is read before it all the same.
+        sensor driver: Counter(count = 10) { rate: 10 Hz; }
+        sensor other: Counter(count = 10) { rate: 10 Hz; }
+        estimator both: crate::components::Snapshot() {
+            input driver: sensor::base::driver, driver;
+            input second: sensor::base::other;
+            sync_tolerance: 1 ms;
+        }
+    }
+}
+
+#[test]
+fn publishing_ahead_of_time_loses_no_reading_and_doubles_none() -> Result<(), StartError> {
+    let builder = Ahead::builder();
+    let rated = builder.subscribe(ahead::sensor::base::rated);
+    let mut simulation = builder.simulate()?;
+    simulation.run_for(Duration::from_millis(5));
+    simulation.publish(ahead::sensor::base::fed, at(35), Number(0.0));
+    simulation.run_until(at(60));
+    let times: Vec<_> = rated.drain().map(|number| number.monotonic_time).collect();
+    assert_eq!(times, [0, 10, 20, 30, 40, 50, 60].map(at));
+    Ok(())
+}
+
+#[test]
+fn of_sensors_due_at_once_the_driver_is_read_last() -> Result<(), StartError> {
+    let builder = Ahead::builder();
+    let both = builder.subscribe(ahead::estimator::base::both);
+    let mut simulation = builder.simulate()?;
+    simulation.run_to_end();
+    assert_eq!(both.drain().filter(|seen| seen.driver == seen.second).count(), 10);
+    Ok(())
+}
+
+/// Plays two messages with stamps of its own.
+#[derive(Debug)]
+pub(crate) struct Recording(u8);
+
+const MADE_AT: MonotonicTime = MonotonicTime::from_nanos(1_600_000_000_000_000_000);
+
+impl Sensor for Recording {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(0))
+    }
+
+    fn starts_at(&self) -> Option<MonotonicTime> {
+        Some(MADE_AT)
+    }
+
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        self.0 += 1;
+        if self.0 > 2 {
+            return Ok(Reading::finished());
+        }
+        Ok(Reading::at(now, Number(f64::from(self.0))).next_at(now + Duration::from_millis(20)))
+    }
+}
+
+robot! {
+    robot Replay;
+    link base {
+        sensor rated: Counter(count = 3) { rate: 100 Hz; }
+        sensor recording: Recording() { estimator scaled: Scale(factor = 1.0); }
+    }
+}
+
+#[test]
+fn virtual_time_starts_with_a_recording_and_real_time_refuses_one() -> Result<(), StartError> {
+    let builder = Replay::builder();
+    let (rated, scaled) = (
+        builder.subscribe(replay::sensor::base::rated),
+        builder.subscribe(replay::sensor::base::recording::scaled),
+    );
+    let mut simulation = builder.simulate()?;
+    simulation.run_to_end();
+    assert_eq!(rated.try_recv().map(|number| number.monotonic_time), Some(MADE_AT));
+    assert_eq!(scaled.drain().count(), 2);
+    let mut running = Replay::builder().start()?;
+    running.wait();
+    let faults = running.stop().faults;
+    assert!(faults.len() == 1 && faults[0].message.contains("needs virtual time"), "{faults:?}");
+    Ok(())
+}

@@ -37,3 +37,61 @@ async fn a_subscription_can_be_awaited() -> Result<(), StartError> {
     assert!(numbers.recv_async().await.is_none());
     Ok(())
 }
+
+#[test]
+fn waiting_ends_when_the_robot_does_not_start_and_when_it_stops_for_every_waiting_thread() -> Result<(), StartError>
+{
+    let mut builder = Talker::builder();
+    builder.options(talker::sensor::numbers::scaled).factor = f64::NAN;
+    let never = builder.subscribe(talker::sensor::numbers);
+    assert!(builder.start().is_err());
+    assert!(never.recv().is_none());
+
+    let builder = Talker::builder();
+    let waited = builder.subscribe_with(talker::sensor::numbers::scaled, Overflow::KeepLatest);
+    let mut running = builder.start()?;
+    running.wait();
+    waited.drain().for_each(drop);
+    std::thread::scope(|scope| {
+        let waiting: Vec<_> = (0..3).map(|_| scope.spawn(|| waited.recv().is_none())).collect();
+        running.stop();
+        assert!(waiting.into_iter().all(|thread| thread.join().is_ok_and(|ended| ended)));
+    });
+    Ok(())
+}
+
+#[test]
+fn a_waker_may_drop_its_subscription_and_ask_for_a_report() -> Result<(), StartError> {
+    use std::future::Future;
+    use std::pin::pin;
+    use std::sync::{Arc, Mutex};
+    use std::task::{Context as TaskContext, Poll, Wake};
+
+    struct Meddler(Mutex<Option<Subscription<Number>>>);
+    impl Wake for Meddler {
+        fn wake(self: Arc<Self>) {
+            drop(self.0.lock().map(|mut other| other.take()));
+        }
+    }
+
+    let builder = Talker::builder();
+    let (mut watched, other) =
+        (builder.subscribe(talker::sensor::numbers), builder.subscribe(talker::sensor::numbers));
+    let meddler = Arc::new(Meddler(Mutex::new(Some(other))));
+    let waker = Arc::clone(&meddler).into();
+    {
+        let next = pin!(watched.recv_async());
+        assert!(matches!(next.poll(&mut TaskContext::from_waker(&waker)), Poll::Pending));
+    }
+    let mut simulation = builder.simulate()?;
+    simulation.run_to_end();
+    assert!(meddler.0.lock().is_ok_and(|other| other.is_none()));
+    assert_eq!(watched.drain().count(), 10);
+    Ok(())
+}
+
+#[test]
+fn an_absurd_capacity_is_bounded() {
+    let all = Overflow::DropOldest { capacity: usize::MAX };
+    drop(Talker::builder().subscribe_with(talker::sensor::numbers, all));
+}

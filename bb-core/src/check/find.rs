@@ -23,6 +23,9 @@ pub const fn find_input<I: Inputs>(name: &str) -> usize {
 /// do without.
 pub const fn find_nested<I: Inputs>() -> usize {
     let fields = I::FIELDS;
+    if fields.len() == 1 {
+        return 0;
+    }
     let mut only = None;
     let mut index = 0;
     while index < fields.len() {

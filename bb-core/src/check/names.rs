@@ -1,6 +1,6 @@
 //! Whether declared inputs and outputs are the algorithm's, by name.
 
-use super::find::{find_input, find_output};
+use super::find::{find_input, find_nested, find_output};
 use super::text::{Text, equal, nearest};
 use crate::component::{Inputs, Outputs};
 use crate::stub::UNKNOWN_INDEX;
@@ -85,19 +85,25 @@ pub const fn check_inputs<I: Inputs>(estimator: &str, declared: &[&str]) {
     }
 }
 
-/// That a nested estimator has one input at most that it cannot do without: its sensor.
+/// That a nested estimator has exactly one input that it cannot do without, or only one: its sensor.
 #[track_caller]
 pub const fn check_nested<I: Inputs>(estimator: &str) {
+    if !I::KNOWN || find_nested::<I>() != UNKNOWN_INDEX {
+        return;
+    }
     let fields = I::FIELDS;
     let (mut needed, mut index) = (0, 0);
     while index < fields.len() {
         needed += if fields[index].optional { 0 } else { 1 };
         index += 1;
     }
-    if needed > 1 {
-        let text = Text::new("").name(estimator).push(" needs several inputs, and a nested estimator has one; ");
-        panic!("{}", text.push("declare it on the link, with an `input` for each").as_str())
-    }
+    let text = Text::new("").name(estimator);
+    let text = if needed > 1 {
+        text.push(" needs several inputs, and a nested estimator has one; ")
+    } else {
+        text.push(" needs none of its several inputs, and which of them the sensor feeds cannot be told; ")
+    };
+    panic!("{}", text.push("declare it on the link, with an `input` for each").as_str())
 }
 
 /// That an algorithm of several outputs has at least one declared.

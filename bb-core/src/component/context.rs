@@ -1,5 +1,6 @@
 //! What a component is told when it starts.
 
+use super::Fault;
 use crate::message::Frame;
 use crate::node::EstimatorDeclaration;
 use crate::run::{SensorDeclaration, StopSignal};
@@ -31,13 +32,17 @@ impl Context {
 
     /// Takes points from the frame of `input` to the frame of the output: the product of the fixed joints between.
     ///
-    /// The identity where the two are one frame, where the input has no frame (a robot-level sensor), and across a
-    /// moving joint, which only an estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span.
+    /// The identity where the two are one frame, and where the input has no frame (a robot-level sensor). A moving joint,
+    /// which only an estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span, counts as it stands at zero.
+    ///
+    /// # Errors
+    /// No input of that name is declared.
     ///
     /// [`Estimator::HANDLES_MOVING_JOINTS`]: super::Estimator::HANDLES_MOVING_JOINTS
-    pub fn frame_from_input(&self, input: &str) -> Isometry3<f64> {
+    pub fn frame_from_input(&self, input: &str) -> Result<Isometry3<f64>, Fault> {
         let declared = self.declaration.inputs.iter().find(|declared| declared.name == input);
-        declared.map_or_else(Isometry3::identity, |declared| declared.frame_from_input.isometry())
+        let declared = declared.ok_or_else(|| Fault::new(format!("no input `{input}` is declared")))?;
+        Ok(declared.frame_from_input.isometry())
     }
 
     /// The same for the driver, or for the only input.

@@ -63,7 +63,7 @@ pub trait Estimator: Sized + Send + 'static {
     /// What keeps it from going on; it is stopped and the fault is reported.
     fn handle_input(&mut self, input: <Self::Input as Inputs>::View<'_>) -> Result<Reply<Self::Output>, Fault>;
 
-    /// Cleans up, before it stops.
+    /// Cleans up, before it stops, also after an error; not after a panic.
     fn terminate(&mut self) {}
 }
 

@@ -63,7 +63,13 @@ pub trait Sensor: Sized + Send + 'static {
     /// What keeps it from going on; it is stopped and the fault is reported.
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
 
-    /// Closes the device, before it stops.
+    /// When it is to be read first; none: at once. A recording gives the stamp of its first message: virtual time
+    /// starts at the earliest of all.
+    fn starts_at(&self) -> Option<MonotonicTime> {
+        None
+    }
+
+    /// Closes the device, before it stops; not after a panic.
     fn terminate(&mut self) {}
 }
 

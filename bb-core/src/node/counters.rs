@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Why a message or a dispatch was dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum DropReason {
     /// The driver arrived, and this input had not yet, or was too old.
     SyncMiss,
@@ -12,13 +13,18 @@ pub enum DropReason {
     OutOfOrder,
     /// The message held a NaN or an infinity.
     NonFinite,
+    /// The message's stamp was more than a second ahead of the clock.
+    ClockSkew,
     /// The estimator has stopped.
     Stopped,
 }
 
+const REASONS: usize = DropReason::ALL.len();
+
 impl DropReason {
     /// All reasons.
-    pub const ALL: [Self; 4] = [Self::SyncMiss, Self::OutOfOrder, Self::NonFinite, Self::Stopped];
+    pub const ALL: &'static [Self] =
+        &[Self::SyncMiss, Self::OutOfOrder, Self::NonFinite, Self::ClockSkew, Self::Stopped];
 
     /// As people read it.
     pub const fn name(self) -> &'static str {
@@ -26,6 +32,7 @@ impl DropReason {
             Self::SyncMiss => "sync miss",
             Self::OutOfOrder => "out of order",
             Self::NonFinite => "non-finite",
+            Self::ClockSkew => "clock skew",
             Self::Stopped => "stopped",
         }
     }
@@ -50,7 +57,7 @@ impl Count {
 #[derive(Debug, Default)]
 pub(super) struct InputCounters {
     pub(super) received: Count,
-    pub(super) dropped: [Count; DropReason::ALL.len()],
+    pub(super) dropped: [Count; REASONS],
 }
 
 #[derive(Debug, Default)]
@@ -82,7 +89,7 @@ impl Counters {
             name: declared.name,
             source: declared.source,
             received: counters.received.get(),
-            dropped: DropReason::ALL.map(|reason| counters.dropped[reason as usize].get()),
+            dropped: counters.dropped.each_ref().map(Count::get),
         });
         EstimatorStatistics {
             path: declaration.path,
@@ -97,6 +104,7 @@ impl Counters {
 
 /// What an estimator has counted since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct EstimatorStatistics {
     /// Its path.
     pub path: &'static str,
@@ -114,6 +122,7 @@ pub struct EstimatorStatistics {
 
 /// What an input has counted since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct InputStatistics {
     /// Its name.
     pub name: &'static str,
@@ -121,7 +130,7 @@ pub struct InputStatistics {
     pub source: &'static str,
     /// Messages that arrived, the dropped ones included.
     pub received: u64,
-    dropped: [u64; DropReason::ALL.len()],
+    dropped: [u64; REASONS],
 }
 
 impl InputStatistics {

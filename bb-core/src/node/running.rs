@@ -5,25 +5,40 @@ use super::counters::Counters;
 use super::{DropReason, EstimatorDeclaration, EstimatorStatistics, InputDeclaration};
 use crate::component::{Context, Estimator, Fault, InputAt, Inputs, Options, Reply, SyncMiss};
 use crate::message::{Stamp, Stamped};
-use crate::run::{StartError, Startup, caught};
+use crate::run::{Failed, StartError, Startup, caught, retire};
+use crate::time::Clock;
 use std::fmt;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
 
 /// One estimator with its fan-in and its counters. A message is handled on the thread that publishes it; a second
 /// thread waits its turn, so that there is one writer at a time and the order of each input is kept.
 pub struct Node<E: Estimator> {
     declaration: &'static EstimatorDeclaration,
     template: Stamp,
+    clock: Clock,
     counters: Counters,
+    /// Why it has stopped. Apart from the state, so that it can be asked while the estimator is busy.
+    stopped: Mutex<Option<String>>,
+    /// No message is handled any more.
+    closing: AtomicBool,
     state: Mutex<State<E>>,
 }
 
 struct State<E: Estimator> {
     /// None once it has stopped.
     estimator: Option<E>,
-    stopped: Option<String>,
     cache: <E::Input as Inputs>::Cache,
     admission: Admission,
+}
+
+/// What became of a message.
+enum Handled<O> {
+    Refused(DropReason),
+    Stored,
+    Missed(SyncMiss),
+    Ran(Reply<O>),
 }
 
 impl<E: Estimator> Node<E> {
@@ -39,14 +54,16 @@ impl<E: Estimator> Node<E> {
         let refused = |fault: Fault| StartError::component(declaration.path, fault);
         options.validate().map_err(|message| refused(Fault::new(message)))?;
         let context = Context { robot: startup.robot(), declaration };
-        let estimator = caught(|| E::init(options, &context)).map_err(refused)?;
+        let estimator = caught(|| E::init(options, &context)).map_err(|failed| refused(failed.fault))?;
         Ok(Self {
             declaration,
             template: Stamp { frame: declaration.frame, origin: startup.origin(), ..Stamp::default() },
+            clock: startup.clock().clone(),
             counters: Counters::new(declaration),
+            stopped: Mutex::new(None),
+            closing: AtomicBool::new(false),
             state: Mutex::new(State {
                 estimator: Some(estimator),
-                stopped: None,
                 cache: Default::default(),
                 admission: Admission::new(declaration.inputs.len()),
             }),
@@ -81,33 +98,40 @@ impl<E: Estimator> Node<E> {
             return;
         };
         let mut state = self.lock();
-        let State { estimator, cache, admission, .. } = &mut *state;
+        let State { estimator, cache, admission } = &mut *state;
         self.counters.inputs[input].received.increment();
-        let Some(running) = estimator else {
+        let Some(running) = estimator.as_mut().filter(|_| !self.closing.load(Ordering::Relaxed)) else {
             return self.counters.drop(input, DropReason::Stopped);
         };
-        if let Err(reason) = admission.admit(input, message) {
-            return self.refuse(declared, reason, message.monotonic_time.as_nanos());
-        }
-        if !declared.driver {
-            if let Some(slot) = <E::Input as InputAt<I>>::slot(cache) {
-                slot.store(message);
+        // All of the user's code at once: the payload's, the cache's clone and the estimator. After a panic the
+        // estimator is dropped, so that nothing sees what was left half done.
+        let handled = caught(|| {
+            if let Err(reason) = admission.admit(input, message, &self.clock) {
+                return Ok(Handled::Refused(reason));
             }
-            return;
-        }
-        let view = match <E::Input as InputAt<I>>::snapshot(cache, message) {
-            Ok(view) => view,
-            Err(miss) => return self.miss(miss),
-        };
-        self.counters.dispatched.increment();
-        // The estimator is dropped after a panic, so nothing sees what the panic left half done.
-        match caught(|| running.handle_input(view)) {
-            Ok(reply) => {
+            if !declared.driver {
+                if let Some(slot) = <E::Input as InputAt<I>>::slot(cache) {
+                    slot.store(message);
+                }
+                return Ok(Handled::Stored);
+            }
+            let view = match <E::Input as InputAt<I>>::snapshot(cache, message) {
+                Ok(view) => view,
+                Err(miss) => return Ok(Handled::Missed(miss)),
+            };
+            self.counters.dispatched.increment();
+            running.handle_input(view).map(Handled::Ran)
+        });
+        match handled {
+            Ok(Handled::Ran(reply)) => {
                 let stamp =
                     Stamp { monotonic_time: message.monotonic_time, wall_time: message.wall_time, ..self.template };
                 self.complete(reply, stamp, emit);
             }
-            Err(fault) => self.stop(&mut state, &fault),
+            Ok(Handled::Stored) => {}
+            Ok(Handled::Refused(reason)) => self.refuse(declared, reason, message.monotonic_time.as_nanos()),
+            Ok(Handled::Missed(miss)) => self.miss(miss),
+            Err(failed) => self.fail(&mut state, failed),
         }
     }
 
@@ -143,19 +167,43 @@ impl<E: Estimator> Node<E> {
     }
 
     #[cold]
-    fn stop(&self, state: &mut State<E>, fault: &Fault) {
+    fn fail(&self, state: &mut State<E>, Failed { fault, panicked }: Failed) {
+        self.stopped_by(&fault);
+        if let Some(estimator) = state.estimator.take() {
+            // What goes wrong from here on follows from the fault that is known.
+            let _ = retire(estimator, panicked, E::terminate);
+        }
+    }
+
+    fn stopped_by(&self, fault: &Fault) {
         tracing::error!(estimator = self.declaration.path, %fault, "estimator stopped");
-        state.stopped = Some(fault.to_string());
-        // Its own drop may panic as well.
-        let estimator = state.estimator.take();
-        let _ = caught(|| {
-            drop(estimator);
-            Ok(())
-        });
+        *self.stopped.lock().unwrap_or_else(PoisonError::into_inner) = Some(fault.to_string());
     }
 
     fn lock(&self) -> MutexGuard<'_, State<E>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The state, once the estimator is no longer busy; none after `deadline`.
+    fn lock_until(&self, deadline: Instant) -> Option<MutexGuard<'_, State<E>>> {
+        loop {
+            match self.state.try_lock() {
+                Ok(state) => return Some(state),
+                Err(TryLockError::Poisoned(poisoned)) => return Some(poisoned.into_inner()),
+                Err(TryLockError::WouldBlock) if Instant::now() >= deadline => return None,
+                Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(1)),
+            }
+        }
+    }
+}
+
+impl<E: Estimator> Drop for Node<E> {
+    /// Of a robot that did not start.
+    fn drop(&mut self) {
+        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if let Some(estimator) = state.estimator.take() {
+            let _ = retire(estimator, false, E::terminate);
+        }
     }
 }
 
@@ -167,27 +215,33 @@ impl<E: Estimator> fmt::Debug for Node<E> {
 
 /// What all running estimators have in common.
 pub trait AnyNode {
-    /// What it has counted.
+    /// Its path.
+    fn path(&self) -> &'static str;
+    /// What it has counted; also while it is busy.
     fn statistics(&self) -> EstimatorStatistics;
-    /// Lets the estimator clean up and drops it; messages that still come are counted as dropped.
-    fn terminate(&self);
+    /// Lets the estimator clean up and drops it; messages that still come are counted as dropped. False if it is still
+    /// busy at `deadline`; it is then left as it is.
+    fn terminate(&self, deadline: Instant) -> bool;
 }
 
 impl<E: Estimator> AnyNode for Node<E> {
+    fn path(&self) -> &'static str {
+        self.declaration.path
+    }
+
     fn statistics(&self) -> EstimatorStatistics {
-        let stopped = self.lock().stopped.clone();
+        let stopped = self.stopped.lock().unwrap_or_else(PoisonError::into_inner).clone();
         self.counters.statistics(self.declaration, stopped)
     }
 
-    fn terminate(&self) {
-        let mut state = self.lock();
-        if let Some(mut estimator) = state.estimator.take()
-            && let Err(fault) = caught(move || {
-                estimator.terminate();
-                Ok(())
-            })
-        {
-            self.stop(&mut state, &fault);
+    fn terminate(&self, deadline: Instant) -> bool {
+        self.closing.store(true, Ordering::Relaxed);
+        let Some(mut state) = self.lock_until(deadline) else { return false };
+        let estimator = state.estimator.take();
+        drop(state);
+        if let Some(fault) = estimator.and_then(|estimator| retire(estimator, false, E::terminate)) {
+            self.stopped_by(&fault);
         }
+        true
     }
 }

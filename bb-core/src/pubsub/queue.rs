@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 pub enum Overflow {
     /// Keeps so many messages; then the oldest makes room, and the loss is counted.
     DropOldest {
-        /// How many are kept; at least one.
+        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`]. The room is made at once.
         capacity: usize,
     },
     /// Keeps the newest alone; the loss of the others is counted.
@@ -24,9 +24,12 @@ impl Default for Overflow {
 }
 
 impl Overflow {
+    /// The largest capacity of a subscription.
+    pub const MAX_CAPACITY: usize = 1 << 20;
+
     fn capacity(self) -> usize {
         match self {
-            Self::DropOldest { capacity } => capacity.max(1),
+            Self::DropOldest { capacity } => capacity.clamp(1, Self::MAX_CAPACITY),
             Self::KeepLatest => 1,
         }
     }
@@ -68,11 +71,21 @@ impl<M> Queue<M> {
     pub(super) fn close(&self) {
         let mut state = self.lock();
         state.closed = true;
-        self.wake(state);
+        let waker = state.waker.take();
+        drop(state);
+        // Several threads may wait for the same subscription, and none of them will get a message any more.
+        self.arrived.notify_all();
+        if let Some(waker) = waker {
+            waker.wake();
+        }
     }
 
     pub(super) fn pop(&self) -> Option<M> {
         self.lock().messages.pop_front()
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.lock().messages.len()
     }
 
     pub(super) fn lagged(&self) -> u64 {

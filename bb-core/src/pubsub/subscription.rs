@@ -52,9 +52,9 @@ impl<T> Subscription<T> {
         RecvAsync(self)
     }
 
-    /// The messages that wait now.
+    /// The messages that wait now; those that arrive meanwhile are left.
     pub fn drain(&self) -> impl Iterator<Item = Stamped<T>> + '_ {
-        std::iter::from_fn(|| self.try_recv())
+        (0..self.queue.len()).map_while(|_| self.try_recv())
     }
 
     /// How many messages were lost because this subscriber was slow.

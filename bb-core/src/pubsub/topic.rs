@@ -8,7 +8,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// Where the messages of one publisher are subscribed to.
+/// Where the messages of one publisher are subscribed to. Dropping it tells its subscribers that no more will come.
 pub struct Topic<T> {
     path: &'static str,
     published: AtomicU64,
@@ -18,14 +18,16 @@ pub struct Topic<T> {
 }
 
 pub(super) struct Subscribers<T> {
-    queues: Vec<Arc<Queue<Stamped<T>>>>,
+    /// Replaced as a whole, so that a publisher takes it along and holds no lock while it wakes subscribers: whatever
+    /// they do on that thread may subscribe and unsubscribe.
+    queues: Arc<[Arc<Queue<Stamped<T>>>]>,
     closed: bool,
 }
 
-impl<T: Payload> Topic<T> {
+impl<T> Topic<T> {
     /// A topic that nobody listens to yet.
     pub fn new(path: &'static str) -> Self {
-        let subscribers = Subscribers { queues: Vec::new(), closed: false };
+        let subscribers = Subscribers { queues: Arc::new([]), closed: false };
         Self {
             path,
             published: AtomicU64::new(0),
@@ -34,6 +36,32 @@ impl<T: Payload> Topic<T> {
         }
     }
 
+    /// Listens from now on, until the subscription is dropped.
+    pub fn subscribe(&self, overflow: Overflow) -> Subscription<T> {
+        let queue = Arc::new(Queue::new(overflow));
+        let mut subscribers = lock(&self.subscribers);
+        if subscribers.closed {
+            queue.close();
+        } else {
+            subscribers.queues = subscribers.queues.iter().chain([&queue]).map(Arc::clone).collect();
+            self.listening.store(subscribers.queues.len(), Ordering::Release);
+        }
+        Subscription::new(self.path, queue, Arc::downgrade(&self.subscribers))
+    }
+
+    fn close(&self) {
+        let mut subscribers = lock(&self.subscribers);
+        subscribers.closed = true;
+        let queues = std::mem::replace(&mut subscribers.queues, Arc::new([]));
+        self.listening.store(0, Ordering::Release);
+        drop(subscribers);
+        for queue in queues.iter() {
+            queue.close();
+        }
+    }
+}
+
+impl<T: Payload> Topic<T> {
     /// Hands a clone of `message` to everybody who listens.
     #[inline]
     pub fn publish(&self, message: &Stamped<T>) {
@@ -44,36 +72,30 @@ impl<T: Payload> Topic<T> {
     }
 
     fn deliver(&self, message: &Stamped<T>) {
-        let subscribers = self.lock();
-        for queue in &subscribers.queues {
+        let queues = {
+            let subscribers = lock(&self.subscribers);
+            // Subscriptions that were dropped have left the list by themselves; here the count follows it.
+            self.listening.store(subscribers.queues.len(), Ordering::Release);
+            Arc::clone(&subscribers.queues)
+        };
+        for queue in queues.iter() {
             queue.push(message.clone());
         }
-        // Subscriptions that were dropped have left the list by themselves; here the count follows it.
-        self.listening.store(subscribers.queues.len(), Ordering::Release);
     }
+}
 
-    /// Listens from now on, until the subscription is dropped.
-    pub fn subscribe(&self, overflow: Overflow) -> Subscription<T> {
-        let queue = Arc::new(Queue::new(overflow));
-        let mut subscribers = self.lock();
-        if subscribers.closed {
-            queue.close();
-        } else {
-            subscribers.queues.push(Arc::clone(&queue));
-            self.listening.store(subscribers.queues.len(), Ordering::Release);
-        }
-        Subscription::new(self.path, queue, Arc::downgrade(&self.subscribers))
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Subscribers<T>> {
-        lock(&self.subscribers)
+impl<T> Drop for Topic<T> {
+    fn drop(&mut self) {
+        self.close();
     }
 }
 
 /// Takes `queue` off the list of its topic, if that is still there.
 pub(super) fn leave<T>(topic: &Weak<Mutex<Subscribers<T>>>, queue: &Arc<Queue<Stamped<T>>>) {
     if let Some(subscribers) = topic.upgrade() {
-        lock(&subscribers).queues.retain(|other| !Arc::ptr_eq(other, queue));
+        let mut subscribers = lock(&subscribers);
+        let others = subscribers.queues.iter().filter(|other| !Arc::ptr_eq(other, queue)).map(Arc::clone);
+        subscribers.queues = others.collect();
     }
 }
 
@@ -101,22 +123,18 @@ impl<T: Payload> AnyTopic for Topic<T> {
             path: self.path,
             payload: T::NAME,
             published: self.published.load(Ordering::Relaxed),
-            subscribers: self.lock().queues.len(),
+            subscribers: lock(&self.subscribers).queues.len(),
         }
     }
 
     fn close(&self) {
-        let mut subscribers = self.lock();
-        subscribers.closed = true;
-        for queue in subscribers.queues.drain(..) {
-            queue.close();
-        }
-        self.listening.store(0, Ordering::Release);
+        Topic::close(self);
     }
 }
 
 /// What a topic has counted since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TopicStatistics {
     /// Its path.
     pub path: &'static str,

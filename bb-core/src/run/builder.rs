@@ -7,6 +7,7 @@ use crate::pubsub::{Overflow, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// The wiring with its estimators, and the sensors that feed it.
 type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
@@ -48,7 +49,7 @@ impl<R: Robot> Builder<R> {
         Running::start(machine, sources)
     }
 
-    /// Starts the robot on virtual time, from zero: nothing moves until the caller runs it.
+    /// Starts the robot on virtual time, from zero or from the first stamp of a recording: nothing moves until the caller runs it.
     ///
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
@@ -64,7 +65,7 @@ impl<R: Robot> Builder<R> {
         match R::sources(&machine.wiring, self.options, &machine.startup) {
             Ok(sources) => Ok((machine, sources)),
             Err(error) => {
-                machine.terminate();
+                machine.terminate(Instant::now());
                 Err(error)
             }
         }

@@ -53,13 +53,39 @@ impl fmt::Display for ComponentFault {
 
 impl std::error::Error for ComponentFault {}
 
+/// What a user's code did instead of what it was called for.
+pub(crate) struct Failed {
+    pub(crate) fault: Fault,
+    /// It panicked, and may have left anything half done.
+    pub(crate) panicked: bool,
+}
+
 /// Calls a user's code; a panic in it becomes a fault.
 #[inline]
-pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Failed> {
     match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(result) => result,
-        Err(panic) => Err(of_panic(&*panic)),
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(fault)) => Err(Failed { fault, panicked: false }),
+        Err(panic) => Err(Failed { fault: of_panic(&*panic), panicked: true }),
     }
+}
+
+/// Lets a component clean up and drops it, whatever it does meanwhile; one that has panicked is dropped as it is. Gives
+/// what went wrong.
+pub(crate) fn retire<C>(mut component: C, panicked: bool, terminate: impl FnOnce(&mut C)) -> Option<Fault> {
+    let terminated = if panicked {
+        Ok(())
+    } else {
+        caught(|| {
+            terminate(&mut component);
+            Ok(())
+        })
+    };
+    let dropped = caught(|| {
+        drop(component);
+        Ok(())
+    });
+    terminated.and(dropped).err().map(|failed| failed.fault)
 }
 
 #[cold]

@@ -7,6 +7,7 @@ use crate::message::Stamp;
 use crate::pubsub::{Overflow, Subscription};
 use crate::time::MonotonicTime;
 use std::sync::Arc;
+use std::time::Instant;
 
 pub(super) struct Machine<R: Robot> {
     pub(super) wiring: Arc<R::Wiring>,
@@ -37,13 +38,16 @@ impl<R: Robot> Machine<R> {
         Report { topics: topics.iter().map(|topic| topic.statistics()).collect(), estimators, faults }
     }
 
-    /// Stops the estimators and tells the subscribers that no more will come.
-    pub(super) fn terminate(&self) {
-        for node in R::all_nodes(&self.wiring) {
-            node.terminate();
-        }
+    /// Tells the subscribers that no more will come and stops the estimators. One that is still busy at `deadline` is
+    /// left behind and reported as a fault.
+    pub(super) fn terminate(&self, deadline: Instant) {
         for topic in R::all_topics(R::wired_topics(&self.wiring)) {
             topic.close();
+        }
+        for node in R::all_nodes(&self.wiring) {
+            if !node.terminate(deadline) {
+                self.startup.faults.add(node.path(), "did not come back from its input in time".into());
+            }
         }
     }
 }

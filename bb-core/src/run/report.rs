@@ -7,6 +7,7 @@ use std::fmt;
 
 /// Counts since the start. `Display` prints them as a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Report {
     /// Every publisher.
     pub topics: Vec<TopicStatistics>,
@@ -49,7 +50,7 @@ impl fmt::Display for Report {
         }
         for estimator in &self.estimators {
             for input in &estimator.inputs {
-                for reason in DropReason::ALL.into_iter().filter(|reason| input.dropped(*reason) > 0) {
+                for reason in DropReason::ALL.iter().copied().filter(|reason| input.dropped(*reason) > 0) {
                     let (path, name, dropped) = (estimator.path, input.name, input.dropped(reason));
                     writeln!(f, "{path}: {dropped} dropped for `{name}`: {}", reason.name())?;
                 }

@@ -17,7 +17,7 @@ pub struct Running<R: Robot> {
     threads: Vec<(&'static str, JoinHandle<()>)>,
 }
 
-/// How long a sensor may take to come back from its last read after the robot was told to stop.
+/// How long sensors, and then estimators, may take to come back after the robot was told to stop.
 const STOP_WITHIN: Duration = Duration::from_secs(5);
 
 impl<R: Robot> Running<R> {
@@ -62,13 +62,13 @@ impl<R: Robot> Running<R> {
 
     /// Waits until every sensor has finished: for recordings, and simulated sensors that end.
     pub fn wait(&mut self) {
-        for (_, thread) in self.threads.drain(..) {
-            let _ = thread.join();
+        for (path, thread) in std::mem::take(&mut self.threads) {
+            self.join(path, thread);
         }
     }
 
-    /// Stops sensors, then estimators, tells the subscribers, and gives the last report. A sensor that does not come
-    /// back from its read within 5 s is left behind and reported as a fault.
+    /// Tells the subscribers, stops sensors, then estimators, and gives the last report. What does not come back from
+    /// its code, first of all sensors and then of all estimators, within 5 s is left behind and reported as a fault.
     pub fn stop(mut self) -> Report {
         self.shut_down();
         self.machine.report()
@@ -77,23 +77,29 @@ impl<R: Robot> Running<R> {
     fn shut_down(&mut self) {
         self.machine.startup.stop.set();
         let deadline = Instant::now() + STOP_WITHIN;
-        for (path, thread) in self.threads.drain(..) {
+        for (path, thread) in std::mem::take(&mut self.threads) {
             while !thread.is_finished() && Instant::now() < deadline {
                 std::thread::sleep(Duration::from_millis(1));
             }
             if thread.is_finished() {
-                // The thread catches what its sensor does; a panic here has been reported there.
-                let _ = thread.join();
+                self.join(path, thread);
             } else {
-                let message = format!("did not come back from its read within {} s", STOP_WITHIN.as_secs());
-                self.machine.startup.faults.add(path, message);
+                let message = "did not come back from its read, or from an estimator downstream, in time";
+                self.machine.startup.faults.add(path, message.into());
             }
         }
-        self.machine.terminate();
+        self.machine.terminate(Instant::now() + STOP_WITHIN);
+    }
+
+    fn join(&self, path: &'static str, thread: JoinHandle<()>) {
+        if thread.join().is_err() {
+            self.machine.startup.faults.add(path, "its thread panicked".into());
+        }
     }
 }
 
 fn drive(mut source: Box<dyn Source>, startup: &Startup) {
+    source.begin();
     while let Some(due) = source.due() {
         let wait = due.duration_since(startup.clock.now());
         if !wait.is_zero() {

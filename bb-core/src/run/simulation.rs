@@ -9,7 +9,7 @@ use crate::time::{Clock, MonotonicTime};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fmt;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A robot on virtual time. Sensors are read in the order of their due times (equal ones in the order of their
 /// declaration), on the caller's thread, as fast as the machine can, so that every run gives the same outputs.
@@ -20,7 +20,12 @@ pub struct Simulation<R: Robot> {
 }
 
 impl<R: Robot> Simulation<R> {
-    pub(super) fn new(machine: Machine<R>, sources: Vec<Box<dyn Source>>) -> Self {
+    pub(super) fn new(machine: Machine<R>, mut sources: Vec<Box<dyn Source>>) -> Self {
+        // A recording starts when it was made, and everything else with it.
+        if let Some(first) = sources.iter().filter_map(|source| source.starts_at()).min() {
+            machine.startup.clock.advance_to(first);
+        }
+        sources.iter_mut().for_each(|source| source.begin());
         let due = sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
         let due = due.collect();
         Self { machine, sources, due }
@@ -67,15 +72,22 @@ impl<R: Robot> Simulation<R> {
         while self.step() {}
     }
 
-    /// Publishes as if `sensor` had measured `payload` at `time`; all estimators downstream run before this returns.
-    pub fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
-        self.clock().advance_to(time);
+    /// Runs everything that is due up to `time`, moves time there, and publishes as if `sensor` had measured `payload`
+    /// then; all estimators downstream run before this returns. A `time` that is over already does not move time: the
+    /// message is late.
+    pub fn publish<S: Sensor>(&mut self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
+        self.run_until(time);
         self.machine.publish(sensor, time, payload);
     }
 
     /// Subscribes from now on, with room for 1024 messages.
     pub fn subscribe<P: Publisher<R>>(&self, publisher: P) -> Subscription<P::Payload> {
-        self.machine.subscribe(publisher, Overflow::default())
+        self.subscribe_with(publisher, Overflow::default())
+    }
+
+    /// Subscribes from now on, and says what happens when the subscriber is slow.
+    pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
+        self.machine.subscribe(publisher, overflow)
     }
 
     /// What it has done so far.
@@ -95,7 +107,8 @@ impl<R: Robot> Simulation<R> {
         for mut source in self.sources.drain(..) {
             source.terminate();
         }
-        self.machine.terminate();
+        // One thread runs all of this, so that nothing can be busy elsewhere.
+        self.machine.terminate(Instant::now());
     }
 }
 

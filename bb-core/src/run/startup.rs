@@ -20,6 +20,10 @@ impl Startup {
         Self { clock, origin, stop: StopSignal::default(), faults: Faults::default() }
     }
 
+    pub(crate) fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
     pub(crate) fn robot(&self) -> &'static str {
         self.origin.robot
     }
@@ -29,13 +33,13 @@ impl Startup {
     }
 }
 
-/// The faults of sensors, in the order they came; each sensor has at most one.
+/// The faults of sensors, and of what did not stop in time, in the order they came.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faults(Arc<Mutex<Vec<ComponentFault>>>);
 
 impl Faults {
     pub(super) fn add(&self, path: &'static str, message: String) {
-        tracing::error!(sensor = path, fault = message, "sensor stopped");
+        tracing::error!(component = path, fault = message, "component stopped");
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(ComponentFault { path, message });
     }
 

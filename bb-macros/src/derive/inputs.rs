@@ -42,19 +42,19 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
     let slots =
         inputs.iter().map(|Field { slot, payload, .. }| quote!(#slot: ::bb_core::__private::Slot<#payload>,));
     let schema = inputs.iter().map(|Field { name, optional, .. }| {
-        let name = name.to_string();
+        let name = crate::names::text(name);
         quote!(::bb_core::__private::InputField { name: #name, optional: #optional },)
     });
     let fields = (0..inputs.len()).map(|index| input_at(name, &inputs, index));
     quote! {
         const _: () = {
             #[derive(Default)]
-            pub struct Cache { #(#slots)* }
+            pub struct __Cache { #(#slots)* }
 
             #[automatically_derived]
             impl ::bb_core::Inputs for #name<'static> {
                 type View<'a> = #name<'a>;
-                type Cache = Cache;
+                type Cache = __Cache;
                 const FIELDS: &'static [::bb_core::__private::InputField] = &[#(#schema)*];
             }
             #(#fields)*
@@ -90,17 +90,17 @@ fn input_at(name: &Ident, inputs: &[Field<'_>], driver: usize) -> TokenStream {
         impl ::bb_core::__private::InputAt<#driver> for #name<'static> {
             type Payload = #payload;
 
-            fn slot(cache: &mut Cache) -> ::core::option::Option<&mut ::bb_core::__private::Slot<#payload>> {
+            fn slot(cache: &mut __Cache) -> ::core::option::Option<&mut ::bb_core::__private::Slot<#payload>> {
                 ::core::option::Option::Some(&mut cache.#slot)
             }
 
             #[inline]
             #[allow(unused_variables)]
             fn snapshot<'a>(
-                cache: &'a mut Cache,
+                cache: &'a mut __Cache,
                 message: &'a ::bb_core::__private::Stamped<#payload>,
             ) -> ::core::result::Result<#name<'a>, ::bb_core::__private::SyncMiss> {
-                let cache: &'a Cache = cache;
+                let cache: &'a __Cache = cache;
                 let time = message.monotonic_time;
                 #misses
                 ::core::result::Result::Ok(#name { #view })

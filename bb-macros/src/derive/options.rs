@@ -17,7 +17,7 @@ pub(crate) fn options(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     for field in named {
         let option = Attribute::read(field, diagnostics);
         let Some(name) = &field.ident else { continue };
-        schema.extend(option.schema(name.to_string(), &fields::doc(&field.attrs)));
+        schema.extend(option.schema(crate::names::text(name), &fields::doc(&field.attrs)));
         let default = option.default_value(field, diagnostics);
         defaults.extend(quote!(#name: #default,));
         checks.extend(option.check(field));

@@ -18,7 +18,7 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
             diagnostics.error(&field.ty, "expected `Option<Payload>`: none when there is nothing to emit".into());
             continue;
         };
-        names.push(field_name.to_string());
+        names.push(crate::names::text(field_name));
         takes.extend(quote! {
             #[automatically_derived]
             impl #generics ::bb_core::__private::OutputAt<#index> for #name #arguments #bounds {

@@ -8,7 +8,7 @@ use syn::{Data, DeriveInput, Fields};
 
 pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
     let name = &item.ident;
-    let text = name.to_string();
+    let text = crate::names::text(name);
     let (generics, arguments, bounds) = item.generics.split_for_impl();
     let finite = match &item.data {
         Data::Struct(data) => arm(&quote!(Self), &data.fields),

@@ -29,7 +29,7 @@ pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
 /// Required options are given; literals have the right dimension and keep their range.
 fn options(component: &Component, options: &TokenStream) -> TokenStream {
     let name = type_name(component);
-    let given = component.options.iter().map(|option| option.name.to_string());
+    let given = component.options.iter().map(|option| crate::names::text(&option.name));
     let fields = quote!(<#options as ::bb_core::Options>::FIELDS);
     let mut checks = spanned_call(
         Place::of(&component.kind),
@@ -59,7 +59,7 @@ fn given_number(given: &ComponentOption) -> Option<(Place, TokenStream)> {
             (Place::of(&**expression), option(None), number.as_ref().copied()?)
         }
     };
-    let name = given.name.to_string();
+    let name = crate::names::text(&given.name);
     let number = option(Some(quote!(#number)));
     Some((place, quote!(::bb_core::__private::Given { name: #name, dimension: #unit, number: #number })))
 }
@@ -72,16 +72,16 @@ fn inputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
     if estimator.is_nested() {
         return spanned_call(place, quote!(::bb_core::__private::check_nested::<#taken>), quote!(#name));
     }
-    let declared = estimator.inputs.iter().map(|input| input.name.to_string());
+    let declared = estimator.inputs.iter().map(|input| crate::names::text(&input.name));
     let needed =
         spanned_call(place, quote!(::bb_core::__private::check_inputs::<#taken>), quote!(#name, &[#(#declared),*]));
     let known = estimator.inputs.iter().map(|input| {
-        let input_name = input.name.to_string();
+        let input_name = crate::names::text(&input.name);
         let place = Place::of(&input.name);
         spanned_call(place, quote!(::bb_core::__private::check_input::<#taken>), quote!(#name, #input_name))
     });
     let optional = estimator.inputs.iter().filter_map(|input| {
-        let (input_name, place) = (input.name.to_string(), Place::of(input.optional.as_ref()?));
+        let (input_name, place) = (crate::names::text(&input.name), Place::of(input.optional.as_ref()?));
         let check = quote!(::bb_core::__private::check_optional::<#taken>);
         Some(spanned_call(place, check, quote!(#name, #input_name)))
     });
@@ -97,7 +97,7 @@ fn outputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
         return spanned_call(place, quote!(::bb_core::__private::check_outputs::<#emitted>), quote!(#name));
     }
     let known = estimator.outputs.iter().map(|output| {
-        let (output_name, place) = (output.name.to_string(), Place::of(&output.name));
+        let (output_name, place) = (crate::names::text(&output.name), Place::of(&output.name));
         spanned_call(place, quote!(::bb_core::__private::check_output::<#emitted>), quote!(#name, #output_name))
     });
     known.collect()
@@ -114,7 +114,7 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
                 continue;
             };
             let (name, kind) = (type_name(&estimator.component), types.estimator(id));
-            let (input_name, joint_name) = (input.name.to_string(), joint.name.to_string());
+            let (input_name, joint_name) = (crate::names::text(&input.name), crate::names::text(&joint.name));
             let joint_kind = joint.kind_word.to_string();
             checks.extend(spanned_call(
                 Place::of(&input.word),

@@ -7,7 +7,7 @@ use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// `static SENSORS`, `ESTIMATORS` and `TOPOLOGY`.
+/// `static __SENSORS`, `__ESTIMATORS` and `__TOPOLOGY`.
 pub(super) fn declarations(verified: &Verified<'_>) -> TokenStream {
     let robot = verified.robot;
     let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor));
@@ -15,9 +15,9 @@ pub(super) fn declarations(verified: &Verified<'_>) -> TokenStream {
     let (sensor_count, estimator_count) = (robot.sensors.len(), robot.estimators.len());
     let topology = topology::topology(robot);
     quote! {
-        static SENSORS: [::bb_core::__private::SensorDeclaration; #sensor_count] = [#(#sensors),*];
-        static ESTIMATORS: [::bb_core::__private::EstimatorDeclaration; #estimator_count] = [#(#estimators),*];
-        static TOPOLOGY: ::bb_core::__private::Topology = #topology;
+        static __SENSORS: [::bb_core::__private::SensorDeclaration; #sensor_count] = [#(#sensors),*];
+        static __ESTIMATORS: [::bb_core::__private::EstimatorDeclaration; #estimator_count] = [#(#estimators),*];
+        static __TOPOLOGY: ::bb_core::__private::Topology = #topology;
     }
 }
 
@@ -54,7 +54,7 @@ fn estimator_declaration(verified: &Verified<'_>, id: usize) -> TokenStream {
     let synchronous = estimator.sync_tolerances.first().map(|tolerance| &tolerance.quantity);
     let several = estimator.inputs.len() > 1;
     let declared = estimator.inputs.iter().zip(sources).enumerate().map(|(index, (input, source))| {
-        let name = input.name.to_string();
+        let name = crate::names::text(&input.name);
         let path = robot.publishers.get(*source).map_or(String::new(), |publisher| path_text(&publisher.path));
         let driver = input.driver.is_some() || !several;
         let optional = input.optional.is_some();

@@ -37,9 +37,10 @@ pub(super) fn nanos(seconds: f64) -> i64 {
 
 /// An identifier of the expansion's own.
 pub(super) fn ident(text: &str) -> Ident {
-    match text.strip_prefix("r#") {
-        Some(raw) => Ident::new_raw(raw, Span::call_site()),
-        None => Ident::new(text, Span::call_site()),
+    match syn::parse_str::<Ident>(text) {
+        Ok(ident) => ident,
+        // A keyword, which was written with `r#`.
+        Err(_) => Ident::new_raw(text, Span::call_site()),
     }
 }
 

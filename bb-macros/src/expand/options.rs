@@ -25,16 +25,17 @@ pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     });
     for (field, options, given, component) in sensors.chain(estimators) {
         fields.extend(quote!(#field: #options,));
-        functions.extend(filled(&field, &options, &given, component));
-        values.extend(quote!(#field: #field(),));
+        functions.extend(filled(&function(&field), &options, &given, component));
+        let function = function(&field);
+        values.extend(quote!(#field: #function(),));
     }
     quote! {
-        pub struct Options { #fields }
+        pub struct __Options { #fields }
 
         #functions
 
-        fn declared_options() -> Options {
-            Options { #values }
+        fn __declared_options() -> __Options {
+            __Options { #values }
         }
     }
 }
@@ -42,7 +43,7 @@ pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
 /// `fn e0() -> … { let mut options = defaults(); options.beta = 0.1; options }`
 ///
 /// The only place that names the type as the user wrote it: that it is none of the kind is reported here.
-fn filled(field: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
+fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
     let settings = component.options.iter().map(|option| {
         let name = &option.name;
         let value = match &option.value {
@@ -53,18 +54,23 @@ fn filled(field: &Ident, options: &TokenStream, given: &TokenStream, component: 
             OptionValue::Expression { expression, .. } => into_if_text(expression),
         };
         // What does not fit is reported at the value; the option's name is pointed at beside it.
-        let receiver = respan(quote!(options.), name.span());
+        let receiver = respan(quote!(__options.), name.span());
         quote!(#receiver #name = #value;)
     });
     let place = Place::of(&component.kind).start;
     let mutability = (!component.options.is_empty()).then(|| quote!(mut));
     // Spanned at the user's type, which rustc points at when a value does not fit.
-    let start = respan(quote!(let #mutability options: #given = ::bb_core::Options::defaults();), place);
+    let start = respan(quote!(let #mutability __options: #given = ::bb_core::Options::defaults();), place);
     quote! {
-        fn #field() -> #options {
+        fn #function() -> #options {
             #start
             #(#settings)*
-            options
+            __options
         }
     }
+}
+
+/// Values are expressions of the user's, so the names around them must be none of his.
+fn function(field: &Ident) -> Ident {
+    format_ident!("__{field}")
 }

@@ -124,7 +124,7 @@ impl<'a> Types<'a> {
     pub(super) fn output_index(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
         let Some(estimator) = self.robot.estimators.get(id) else { return quote!(0) };
         let output = output.and_then(|output| estimator.outputs.get(output));
-        let name = output.map_or("out".to_owned(), |output| output.name.to_string());
+        let name = output.map_or("out".to_owned(), |output| crate::names::text(&output.name));
         let emitted = self.estimator_output(id);
         self.at_estimator(id, quote!(::bb_core::__private::find_output::<#emitted>(#name)))
     }
@@ -135,7 +135,7 @@ impl<'a> Types<'a> {
         let taken = self.estimator_input(id);
         let find = match input.and_then(|input| estimator.inputs.get(input)) {
             Some(input) => {
-                let name = input.name.to_string();
+                let name = crate::names::text(&input.name);
                 quote!(::bb_core::__private::find_input::<#taken>(#name))
             }
             None => quote!(::bb_core::__private::find_nested::<#taken>()),

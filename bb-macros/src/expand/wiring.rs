@@ -1,4 +1,4 @@
-//! `struct Topics`, `struct Wiring` and what lies downstream of each publisher, by direct calls.
+//! `struct __Topics`, `struct __Wiring` and what lies downstream of each publisher, by direct calls.
 //!
 //! ```text
 //! fn p0(&self, message: &Stamped<Imu>) {                       // sensor::base::imu
@@ -11,8 +11,8 @@
 //! ```
 
 use super::literal::respan;
-use super::path_text;
 use super::types::Types;
+use super::{order, path_text};
 use crate::model::{EstimatorId, From, Home, PublisherId};
 use crate::verify::Verified;
 use proc_macro2::{Ident, Span, TokenStream};
@@ -42,15 +42,15 @@ pub(super) fn wiring(verified: &Verified<'_>) -> TokenStream {
         functions.extend(emitted(&types, id, &estimator.publishers, robot.publishers.as_slice()));
     }
     quote! {
-        pub struct Topics { #topics }
-        pub struct Wiring { topics: Topics, #nodes }
+        pub struct __Topics { #topics }
+        pub struct __Wiring { topics: __Topics, #nodes }
         #indices
 
-        fn new_topics() -> Topics {
-            Topics { #new_topics }
+        fn __new_topics() -> __Topics {
+            __Topics { #new_topics }
         }
 
-        impl Wiring { #functions }
+        impl __Wiring { #functions }
     }
 }
 
@@ -62,7 +62,7 @@ pub(super) struct Consumer {
     span: Span,
 }
 
-/// Who takes what each publisher publishes, in the order of declaration.
+/// Who takes what each publisher publishes, in the order in which they are called.
 fn consumers(verified: &Verified<'_>) -> Vec<Vec<Consumer>> {
     let robot = verified.robot;
     let mut consumers: Vec<Vec<Consumer>> = robot.publishers.iter().map(|_| Vec::new()).collect();
@@ -79,6 +79,19 @@ fn consumers(verified: &Verified<'_>) -> Vec<Vec<Consumer>> {
                 list.push(Consumer { estimator: id, input: Some(number), span });
             }
         }
+    }
+    // What an estimator makes of a message comes before those that take both; its driver, after its other inputs.
+    let depths = order::depths(verified);
+    for list in &mut consumers {
+        list.sort_by_key(|consumer| {
+            let estimator = robot.estimators.get(consumer.estimator);
+            let input = consumer.input.and_then(|input| estimator?.inputs.get(input));
+            (
+                depths.get(consumer.estimator).copied(),
+                consumer.estimator,
+                input.is_some_and(|input| input.driver.is_some()),
+            )
+        });
     }
     consumers
 }
@@ -139,5 +152,5 @@ pub(super) fn node(id: EstimatorId) -> Ident {
 
 /// The constant that holds the number of an input in the algorithm's input type.
 pub(super) fn index_name(id: EstimatorId, input: Option<usize>) -> Ident {
-    format_ident!("E{id}_INPUT_{}", input.unwrap_or(0))
+    format_ident!("__E{id}_INPUT_{}", input.unwrap_or(0))
 }

@@ -3,6 +3,7 @@
 use super::{
     Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor, SensorId,
 };
+use crate::names::text;
 use crate::parse;
 use proc_macro2::Ident;
 use std::collections::HashMap;
@@ -37,7 +38,7 @@ impl Robot {
         let id = self.links.len();
         let path = below(above, &link.name);
         let parse::Link { name, label, sensors, estimators, joints, inertials, visuals, collisions } = link;
-        let label = label.unwrap_or_else(|| name.to_string());
+        let label = label.unwrap_or_else(|| text(&name));
         self.links.push(Link { name, label, joint, inertials, visuals, collisions });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Link(id), &path);
@@ -70,7 +71,7 @@ impl Robot {
             links,
         } = joint;
         let from_urdf = label.is_some();
-        let label = label.unwrap_or_else(|| name.to_string());
+        let label = label.unwrap_or_else(|| text(&name));
         self.joints.push(Joint {
             name,
             label,
@@ -103,7 +104,7 @@ impl Robot {
         self.sensors.push(Sensor { attributes, name, mount, component, rates, publisher });
         for estimator in estimators {
             let mut own = path.clone();
-            own.push(estimator.name.to_string());
+            own.push(text(&estimator.name));
             self.add_estimator(estimator, Home::Sensor(id), own);
         }
     }
@@ -166,9 +167,9 @@ impl Robot {
 /// `[a, b]` overrides, `out` is the estimator's own path, any other name stands below it.
 fn output_path(estimator: &[String], output: &parse::Output) -> Vec<String> {
     match &output.path {
-        Some(path) => path.iter().map(ToString::to_string).collect(),
+        Some(path) => path.iter().map(text).collect(),
         None if output.name == "out" => estimator.to_vec(),
-        None => estimator.iter().cloned().chain([output.name.to_string()]).collect(),
+        None => estimator.iter().cloned().chain([text(&output.name)]).collect(),
     }
 }
 
@@ -177,5 +178,5 @@ fn below(above: &[Ident], name: &Ident) -> Vec<Ident> {
 }
 
 fn texts(root: &str, path: &[Ident]) -> Vec<String> {
-    std::iter::once(root.to_owned()).chain(path.iter().map(ToString::to_string)).collect()
+    std::iter::once(root.to_owned()).chain(path.iter().map(text)).collect()
 }

@@ -29,7 +29,7 @@ pub(crate) struct Path(pub(crate) Vec<Ident>);
 impl Path {
     /// The names, joined as in messages: `sensor::base_link::imu`.
     pub(crate) fn text(&self) -> String {
-        self.0.iter().map(ToString::to_string).collect::<Vec<_>>().join("::")
+        self.0.iter().map(crate::names::text).collect::<Vec<_>>().join("::")
     }
 
     pub(crate) fn place(&self) -> Place {

@@ -11,6 +11,7 @@ use syn::{LitStr, Token};
 
 /// Where links and joints come from.
 #[derive(Clone, Debug)]
+#[cfg_attr(not(feature = "urdf"), allow(dead_code, reason = "without the feature only the place is needed"))]
 pub(crate) struct Topology {
     pub(crate) word: Ident,
     /// The file, relative to the crate's `Cargo.toml`.

@@ -41,8 +41,8 @@ impl Estimator for OrientationAverage {
     fn init(options: OrientationAverageOptions, context: &Context) -> Result<Self, Fault> {
         Ok(Self {
             first_weight: options.first_weight,
-            first_from_link: context.frame_from_input("first").rotation.inverse(),
-            second_from_link: context.frame_from_input("second").rotation.inverse(),
+            first_from_link: context.frame_from_input("first")?.rotation.inverse(),
+            second_from_link: context.frame_from_input("second")?.rotation.inverse(),
         })
     }
 

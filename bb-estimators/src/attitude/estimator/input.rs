@@ -42,9 +42,11 @@ impl Frames {
         let turned = |rotation: nalgebra::UnitQuaternion<f64>| {
             (rotation.angle() > 0.0).then(|| rotation.to_rotation_matrix().into_inner())
         };
+        // Without a magnetometer there is nothing to turn.
+        let magnetometer = context.frame_from_input("magnetic_field");
         Self {
             frame_from_imu: turned(context.frame_from_driver().rotation),
-            frame_from_magnetometer: turned(context.frame_from_input("magnetic_field").rotation),
+            frame_from_magnetometer: magnetometer.ok().and_then(|magnetometer| turned(magnetometer.rotation)),
         }
     }
 }

@@ -1,0 +1,70 @@
+//! In which order what is due at one instant happens, so that every estimator gets the newest of all its inputs.
+
+use crate::model::{EstimatorId, From, Home, PublisherId, Robot, SensorId};
+use crate::verify::Verified;
+
+/// How many estimators stand above each one on the longest way to a sensor. Consumers of one publisher are called in
+/// this order: one that also takes what another makes of the same message comes after it.
+pub(super) fn depths(verified: &Verified<'_>) -> Vec<usize> {
+    let mut depths = vec![None; verified.robot.estimators.len()];
+    (0..depths.len()).map(|id| depth(verified, id, &mut depths)).collect()
+}
+
+fn depth(verified: &Verified<'_>, id: EstimatorId, depths: &mut [Option<usize>]) -> usize {
+    if let Some(Some(known)) = depths.get(id) {
+        return *known;
+    }
+    let above = verified.sources.get(id).into_iter().flatten().filter_map(|source| {
+        match verified.robot.publishers.get(*source)?.from {
+            From::Estimator(above, _) => Some(depth(verified, above, depths) + 1),
+            From::Sensor(_) => None,
+        }
+    });
+    let deepest = above.max().unwrap_or(0);
+    if let Some(slot) = depths.get_mut(id) {
+        *slot = Some(deepest);
+    }
+    deepest
+}
+
+/// The sensors in the order in which they are read when several are due at once: one whose message makes an estimator
+/// run comes after those that the estimator takes besides it. Otherwise, and round a circle, by declaration.
+pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
+    let robot = verified.robot;
+    let mut before: Vec<Vec<SensorId>> = vec![Vec::new(); robot.sensors.len()];
+    for (estimator, sources) in robot.estimators.iter().zip(&verified.sources) {
+        let driver = estimator.inputs.iter().zip(sources).find(|(input, _)| input.driver.is_some());
+        let Some(driver) = driver.and_then(|(_, source)| trigger(verified, *source)) else { continue };
+        let others =
+            sources.iter().filter_map(|source| trigger(verified, *source)).filter(|other| *other != driver);
+        if let Some(list) = before.get_mut(driver) {
+            list.extend(others);
+        }
+    }
+    let mut order: Vec<SensorId> = Vec::new();
+    let mut left: Vec<SensorId> = (0..robot.sensors.len()).collect();
+    while !left.is_empty() {
+        let is_free =
+            |id: &SensorId| before.get(*id).is_none_or(|list| list.iter().all(|other| !left.contains(other)));
+        let next = left.iter().position(is_free).unwrap_or(0);
+        order.push(left.remove(next));
+    }
+    order
+}
+
+/// The sensor whose message makes this publisher publish.
+fn trigger(verified: &Verified<'_>, publisher: PublisherId) -> Option<SensorId> {
+    let robot: &Robot = verified.robot;
+    match robot.publishers.get(publisher)?.from {
+        From::Sensor(id) => Some(id),
+        From::Estimator(id, _) => match robot.estimators.get(id)?.home {
+            Home::Sensor(sensor) => Some(sensor),
+            Home::Link(_) => {
+                let estimator = robot.estimators.get(id)?;
+                let mut inputs = estimator.inputs.iter().zip(verified.sources.get(id)?);
+                let driver = inputs.find(|(input, _)| input.driver.is_some() || estimator.inputs.len() == 1);
+                trigger(verified, *driver?.1)
+            }
+        },
+    }
+}
