@@ -74,8 +74,14 @@ impl Sensor for BagImu {
     fn init(options: BagImuOptions, _: &SensorContext) -> Result<Self, Fault> {
         let bag = Bag::open(&options.file)?;
         let topic = |name: String, schema: &str| match name.as_str() {
-            "" => bag.topic_of(schema).map(|topic| topic.name.to_string()),
-            _ => Ok(name),
+            "" => Ok(bag.topic_of(schema)?.name.to_string()),
+            _ => match bag.topics().iter().find(|topic| *topic.name == *name) {
+                Some(topic) if *topic.schema != *schema => {
+                    Err(Fault::new(format!("{name} is {}, and {schema} is needed here", topic.schema)))
+                }
+                // One that is not there is reported where it is read.
+                _ => Ok(name),
+            },
         };
         let mut topics = vec![topic(options.imu_topic, IMU)?];
         if options.magnetometer {

@@ -14,6 +14,6 @@ pub use estimator::{Estimator, Reply};
 pub use external::External;
 pub use fault::Fault;
 pub use inputs::{FieldIndex, Input, InputAt, InputField, Inputs, Slot, SyncMiss};
-pub use options::{Dimension, FromText, NoOptions, OptionField, Options, Range};
+pub use options::{Dimension, FromQuantity, FromText, NoOptions, OptionField, Options, Range};
 pub use outputs::{OutputAt, Outputs};
 pub use sensor::{Next, Reading, Sensor};

@@ -71,7 +71,8 @@ pub mod __private {
         check_outputs, check_required, find_input, find_nested, find_output,
     };
     pub use crate::component::{
-        Dimension, FieldIndex, FromText, Input, InputAt, InputField, OptionField, OutputAt, Range, Slot, SyncMiss,
+        Dimension, FieldIndex, FromQuantity, FromText, Input, InputAt, InputField, OptionField, OutputAt, Range,
+        Slot, SyncMiss,
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{AnyNode, EstimatorDeclaration, InputDeclaration, Node};
@@ -80,7 +81,7 @@ pub mod __private {
         EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, SensorDeclaration, SensorHandle,
         Source, StartError, Startup,
     };
-    pub use crate::stub::{Known, NotProbed, Probe, Unknown, both_known, stub};
+    pub use crate::stub::{Known, NotProbed, Probe, Unknown, as_known, both_known, stub};
     pub use crate::topology::{
         Collision, Dynamics, Geometry, Inertial, Joint, JointKind, Limit, Link, Material, Mimic, Origin, Topology,
         Transform, Transmission, Visual,

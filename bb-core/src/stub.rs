@@ -10,8 +10,9 @@ mod unknown;
 pub(crate) use unknown::UNKNOWN_INDEX;
 pub use unknown::Unknown;
 
-use crate::component::{Estimator, Sensor};
+use crate::component::{Estimator, Inputs, Options, Outputs, Sensor};
 use crate::message::Payload;
+use std::any::Any;
 use std::marker::PhantomData;
 
 /// Tells as a constant whether `T` is a sensor or an estimator: its own constants where it is, else those of
@@ -19,12 +20,19 @@ use std::marker::PhantomData;
 #[derive(Debug)]
 pub struct Probe<T>(PhantomData<fn() -> T>);
 
-impl<T: Sensor> Probe<T> {
+// The bounds of associated types are written out: an implementation that breaks one is reported by itself, and is none.
+impl<T> Probe<T>
+where
+    T: Sensor<Options: Options, Output: Payload>,
+{
     /// `T` is a sensor.
     pub const IS_SENSOR: bool = true;
 }
 
-impl<T: Estimator> Probe<T> {
+impl<T> Probe<T>
+where
+    T: Estimator<Options: Options, Input: Inputs, Output: Outputs>,
+{
     /// `T` is an estimator.
     pub const IS_ESTIMATOR: bool = true;
 }
@@ -56,6 +64,13 @@ impl<T> Known<false> for T {
 /// Whether both payloads are known, so that they must be the same.
 pub const fn both_known<P: Payload, T: Payload>() -> bool {
     P::KNOWN && T::KNOWN
+}
+
+/// The options of a component as the wiring names their type: the same, but for a component that is none.
+pub fn as_known<T: 'static, U: 'static>(options: U) -> T {
+    let mut options = Some(options);
+    let known = (&mut options as &mut dyn Any).downcast_mut::<Option<T>>();
+    known.and_then(Option::take).unwrap_or_else(stub)
 }
 
 /// Stands where a stub would have to give something.

@@ -166,6 +166,12 @@ impl Transform {
     /// No motion at all.
     pub const IDENTITY: Self = Self { translation: [0.0; 3], rotation: [1.0, 0.0, 0.0, 0.0] };
 
+    /// Of an isometry.
+    pub fn of(isometry: &Isometry3<f64>) -> Self {
+        let Quaternion { coords } = *isometry.rotation;
+        Self { translation: isometry.translation.vector.into(), rotation: [coords.w, coords.x, coords.y, coords.z] }
+    }
+
     /// The same as an isometry.
     pub fn isometry(&self) -> Isometry3<f64> {
         let [w, x, y, z] = self.rotation;

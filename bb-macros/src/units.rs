@@ -134,6 +134,7 @@ pub(crate) struct Unit {
 
 impl Unit {
     const ONE: Self = Self { dimension: Dimension::NONE, factor: 1.0 };
+    pub(crate) const SECOND: Self = Self { dimension: Dimension::TIME, factor: 1.0 };
 
     /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` belongs to the symbol behind it alone.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {

@@ -1,9 +1,7 @@
 //! Names of the user's that the expansion must not capture, and names that are keywords.
 
 use crate::components::{Counter, Number};
-use bb_core::prelude::{
-    Context, Estimator, Fault, Input, Inputs, NoOptions, Payload, Reply, StartError, robot,
-};
+use bb_core::prelude::{Context, Estimator, Fault, Input, Inputs, NoOptions, Payload, Reply, StartError, robot};
 
 // The expansion has items of the same purposes beside the options that the user writes.
 #[allow(dead_code)]

@@ -2,9 +2,10 @@
 
 use super::Fault;
 use crate::message::Frame;
-use crate::node::EstimatorDeclaration;
+use crate::node::{EstimatorDeclaration, InputDeclaration};
 use crate::run::{SensorDeclaration, StopSignal};
 use crate::time::Clock;
+use crate::topology::Transform;
 use nalgebra::Isometry3;
 
 /// What an estimator is told when it starts: where it stands in the robot, and where its inputs come from.
@@ -15,6 +16,34 @@ pub struct Context {
 }
 
 impl Context {
+    /// A context of no robot, for tests of an estimator's `init`: an input at each transform given, the first one the
+    /// driver. (Contexts are constants of robots; this one is leaked, a few hundred bytes each time.)
+    ///
+    /// ```
+    /// use bb_core::nalgebra::Isometry3;
+    /// use bb_core::prelude::*;
+    ///
+    /// # fn main() -> Result<(), Fault> {
+    /// let context = Context::for_test(&[("imu", Isometry3::translation(0.0, 0.0, 1.0))]);
+    /// assert_eq!(context.frame_from_input("imu")?.translation.z, 1.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn for_test(inputs: &[(&'static str, Isometry3<f64>)]) -> Self {
+        let inputs = inputs.iter().enumerate().map(|(index, (name, frame_from_input))| InputDeclaration {
+            index,
+            name,
+            source: "test",
+            driver: index == 0,
+            optional: false,
+            tolerance_nanos: None,
+            frame_from_input: Transform::of(frame_from_input),
+        });
+        let inputs: &'static [InputDeclaration] = Vec::leak(inputs.collect());
+        let declaration = EstimatorDeclaration { path: "test", frame: Frame::NONE, inputs, outputs: &[] };
+        Self { robot: "test", declaration: Box::leak(Box::new(declaration)) }
+    }
+
     /// The robot's name.
     pub fn robot(&self) -> &'static str {
         self.robot

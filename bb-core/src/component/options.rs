@@ -1,9 +1,14 @@
 //! Typed options with defaults, ranges, units and docs.
 
+use std::time::Duration;
+
 /// The options of a sensor or an estimator: a plain struct, filled from the parentheses in `robot!`.
 ///
-/// Derive it. Every field has either a default or is `required`; numbers may state a unit, and then a literal in
-/// `robot!` must carry one of that dimension, and a range, which a literal must keep.
+/// Derive it. Every field has either a default or is `required` (its type is then `Default`, which stands in until it is
+/// given). A field may be of any type. An `f64`, an `f32`, a `Duration` or an `Option` of one of these may state a unit:
+/// a literal in `robot!` must then carry one of that dimension, and arrives in SI; a `Duration` is a time without saying
+/// so. A number may state a range, which a literal must keep. Values that are no literals, a constant say, are
+/// taken as they are and validated at the start.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -100,5 +105,42 @@ pub trait FromText {
 impl<T: From<&'static str>> FromText for T {
     fn from_text(text: &'static str) -> Self {
         text.into()
+    }
+}
+
+/// What a number with a unit given as an option may become; a time is a `Duration` as well.
+#[diagnostic::on_unimplemented(
+    message = "a number with a unit cannot be `{Self}`",
+    label = "has a unit",
+    note = "an option with a unit is an `f64`, an `f32`, a `Duration`, or an `Option` of one of these"
+)]
+pub trait FromQuantity {
+    /// From its value in SI.
+    fn from_quantity(value: f64) -> Self;
+}
+
+impl FromQuantity for f64 {
+    fn from_quantity(value: f64) -> Self {
+        value
+    }
+}
+
+impl FromQuantity for f32 {
+    fn from_quantity(value: f64) -> Self {
+        value as Self
+    }
+}
+
+impl FromQuantity for Duration {
+    /// Negative times are 0, and too long ones the longest there is.
+    fn from_quantity(seconds: f64) -> Self {
+        let longest = if seconds > 0.0 { Self::MAX } else { Self::ZERO };
+        Self::try_from_secs_f64(seconds).unwrap_or(longest)
+    }
+}
+
+impl<T: FromQuantity> FromQuantity for Option<T> {
+    fn from_quantity(value: f64) -> Self {
+        Some(T::from_quantity(value))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::EstimatorDeclaration;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Why a message or a dispatch was dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -66,6 +67,7 @@ pub(super) struct Counters {
     pub(super) dispatched: Count,
     pub(super) emitted: Count,
     pub(super) diverged: Count,
+    pub(super) last_divergence: Mutex<Option<&'static str>>,
 }
 
 impl Counters {
@@ -78,6 +80,11 @@ impl Counters {
         if let Some(counters) = self.inputs.get(input) {
             counters.dropped[reason as usize].increment();
         }
+    }
+
+    pub(super) fn diverge(&self, reason: &'static str) {
+        self.diverged.increment();
+        *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason);
     }
 
     pub(super) fn statistics(
@@ -97,6 +104,7 @@ impl Counters {
             dispatched: self.dispatched.get(),
             emitted: self.emitted.get(),
             diverged: self.diverged.get(),
+            last_divergence: *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner),
             stopped,
         }
     }
@@ -116,6 +124,8 @@ pub struct EstimatorStatistics {
     pub emitted: u64,
     /// How often it reported that it has diverged.
     pub diverged: u64,
+    /// What it said the last time.
+    pub last_divergence: Option<&'static str>,
     /// Why it stopped, if it has.
     pub stopped: Option<String>,
 }

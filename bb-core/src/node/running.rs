@@ -139,7 +139,7 @@ impl<E: Estimator> Node<E> {
     fn complete(&self, reply: Reply<E::Output>, stamp: Stamp, emit: impl FnOnce(&mut Option<E::Output>, Stamp)) {
         let Reply { mut output, diverged } = reply;
         if let Some(reason) = diverged {
-            self.counters.diverged.increment();
+            self.counters.diverge(reason);
             tracing::debug!(estimator = self.declaration.path, reason, "diverged");
         }
         if output.is_some() {

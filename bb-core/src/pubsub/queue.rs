@@ -58,14 +58,17 @@ impl<M> Queue<M> {
         Self { state: Mutex::new(state), arrived: Condvar::new(), capacity }
     }
 
-    pub(super) fn push(&self, message: M) {
+    /// Adds a message; true if the oldest had to make room for it.
+    pub(super) fn push(&self, message: M) -> bool {
         let mut state = self.lock();
-        if state.messages.len() == self.capacity {
+        let is_full = state.messages.len() == self.capacity;
+        if is_full {
             state.messages.pop_front();
             state.lagged += 1;
         }
         state.messages.push_back(message);
         self.wake(state);
+        is_full
     }
 
     pub(super) fn close(&self) {

@@ -12,6 +12,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 pub struct Topic<T> {
     path: &'static str,
     published: AtomicU64,
+    /// Messages that slow subscribers did not get.
+    lost: AtomicU64,
     /// How many listen: read before the lock, so that publishing to nobody costs next to nothing.
     listening: AtomicUsize,
     subscribers: Arc<Mutex<Subscribers<T>>>,
@@ -31,6 +33,7 @@ impl<T> Topic<T> {
         Self {
             path,
             published: AtomicU64::new(0),
+            lost: AtomicU64::new(0),
             listening: AtomicUsize::new(0),
             subscribers: Arc::new(Mutex::new(subscribers)),
         }
@@ -78,8 +81,9 @@ impl<T: Payload> Topic<T> {
             self.listening.store(subscribers.queues.len(), Ordering::Release);
             Arc::clone(&subscribers.queues)
         };
-        for queue in queues.iter() {
-            queue.push(message.clone());
+        let lost = queues.iter().map(|queue| u64::from(queue.push(message.clone()))).sum();
+        if lost > 0 {
+            self.lost.fetch_add(lost, Ordering::Relaxed);
         }
     }
 }
@@ -123,6 +127,7 @@ impl<T: Payload> AnyTopic for Topic<T> {
             path: self.path,
             payload: T::NAME,
             published: self.published.load(Ordering::Relaxed),
+            lost: self.lost.load(Ordering::Relaxed),
             subscribers: lock(&self.subscribers).queues.len(),
         }
     }
@@ -142,6 +147,8 @@ pub struct TopicStatistics {
     pub payload: &'static str,
     /// Messages published.
     pub published: u64,
+    /// Messages that subscribers lost because they were slow, or read only after more had come than they keep.
+    pub lost: u64,
     /// Subscriptions that listen now.
     pub subscribers: usize,
 }

@@ -5,8 +5,8 @@ use std::any::Any;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Why a robot does not start: which component, and what keeps it.
-#[derive(Debug)]
+/// Why a robot does not start: which component, and what keeps it. `Debug` prints the same as `Display`, since that is
+/// what a `main` that returns it shows.
 pub struct StartError {
     path: &'static str,
     fault: Fault,
@@ -31,6 +31,12 @@ impl StartError {
 impl fmt::Display for StartError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} cannot start: {}", self.path, self.fault)
+    }
+}
+
+impl fmt::Debug for StartError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

@@ -48,7 +48,13 @@ impl fmt::Display for Report {
         for topic in &self.topics {
             writeln!(f, "{:paths$}  {:payloads$}  {:>9}", topic.path, topic.payload, topic.published)?;
         }
+        for topic in self.topics.iter().filter(|topic| topic.lost > 0) {
+            writeln!(f, "{}: {} lost by slow subscribers", topic.path, topic.lost)?;
+        }
         for estimator in &self.estimators {
+            if let Some(reason) = estimator.last_divergence {
+                writeln!(f, "{}: diverged {} times, last: {reason}", estimator.path, estimator.diverged)?;
+            }
             for input in &estimator.inputs {
                 for reason in DropReason::ALL.iter().copied().filter(|reason| input.dropped(*reason) > 0) {
                     let (path, name, dropped) = (estimator.path, input.name, input.dropped(reason));

@@ -35,10 +35,18 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
         };
         inputs.push(Field { name, slot: format_ident!("f{index}"), payload, optional: inner.is_some() });
     }
-    if diagnostics.any() {
-        return TokenStream::new();
-    }
     let name = &item.ident;
+    if diagnostics.any() {
+        // It takes inputs all the same, so that nothing else has to be said of it.
+        return quote! {
+            impl ::bb_core::Inputs for #name<'static> {
+                type View<'a> = #name<'a>;
+                type Cache = ();
+                const FIELDS: &'static [::bb_core::__private::InputField] = &[];
+                const KNOWN: bool = false;
+            }
+        };
+    }
     let slots =
         inputs.iter().map(|Field { slot, payload, .. }| quote!(#slot: ::bb_core::__private::Slot<#payload>,));
     let schema = inputs.iter().map(|Field { name, optional, .. }| {

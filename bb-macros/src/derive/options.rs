@@ -7,7 +7,7 @@ use crate::units::Unit;
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{DeriveInput, Expr, ExprRange, Field, Lit, LitStr, RangeLimits};
+use syn::{DeriveInput, Expr, ExprRange, ExprUnary, Field, Lit, LitStr, RangeLimits, Type, UnOp};
 
 pub(crate) fn options(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
     let Some(named) = fields::named(item, "Options", diagnostics) else {
@@ -53,6 +53,9 @@ struct Attribute {
 impl Attribute {
     fn read(field: &Field, diagnostics: &mut Diagnostics) -> Self {
         let mut option = Self::default();
+        if is_duration(&field.ty) {
+            option.unit = Some((Unit::SECOND, "s".to_owned()));
+        }
         for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("option")) {
             let result = attribute.parse_nested_meta(|meta| {
                 if meta.path.is_ident("required") {
@@ -106,7 +109,15 @@ impl Attribute {
 
     fn default_value(&self, field: &Field, diagnostics: &mut Diagnostics) -> TokenStream {
         match (&self.default, self.required) {
-            (Some(default), false) => into_if_text(default),
+            (Some(default), false) => {
+                if let (Some(value), Some((start, end, range))) = (literal_number(default), &self.range)
+                    && let (Some(start), Some(end)) = (literal_number(start), literal_number(end))
+                    && !(start..=end).contains(&value)
+                {
+                    diagnostics.error(default, format!("this default is outside the range {range}"));
+                }
+                into_if_text(default)
+            }
             (None, true) => {
                 let kind = &field.ty;
                 quote_spanned!(kind.span()=> <#kind as ::core::default::Default>::default())
@@ -165,4 +176,23 @@ pub(crate) fn into_if_text(value: &Expr) -> TokenStream {
         }
         other => quote!(#other),
     }
+}
+
+/// The number of a literal, with or without a minus.
+fn literal_number(expression: &Expr) -> Option<f64> {
+    match expression {
+        Expr::Unary(ExprUnary { op: UnOp::Neg(_), expr, .. }) => literal_number(expr).map(|number| -number),
+        Expr::Lit(literal) => match &literal.lit {
+            Lit::Int(number) => number.base10_parse().ok(),
+            Lit::Float(number) => number.base10_parse().ok(),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// `Duration`, or an `Option` of it.
+fn is_duration(kind: &Type) -> bool {
+    let kind = fields::wrapped(kind, "Option").unwrap_or(kind);
+    matches!(kind, Type::Path(path) if path.path.segments.last().is_some_and(|last| last.ident == "Duration"))
 }

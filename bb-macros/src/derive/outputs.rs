@@ -3,7 +3,7 @@
 use super::fields;
 use crate::diagnostics::Diagnostics;
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{ToTokens, quote};
 use syn::DeriveInput;
 
 pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
@@ -14,10 +14,15 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     let (generics, arguments, bounds) = item.generics.split_for_impl();
     let (mut names, mut takes) = (Vec::new(), TokenStream::new());
     for (index, field) in named.iter().enumerate() {
-        let (Some(field_name), Some(payload)) = (&field.ident, fields::wrapped(&field.ty, "Option")) else {
+        let Some(field_name) = &field.ident else { continue };
+        let mut payload = fields::wrapped(&field.ty, "Option").map(ToTokens::to_token_stream);
+        let mut take = quote!(emitted.as_mut()?.#field_name.take());
+        if payload.is_none() {
             diagnostics.error(&field.ty, "expected `Option<Payload>`: none when there is nothing to emit".into());
-            continue;
-        };
+            // The field is there all the same, so that nothing else has to be said of it.
+            payload = Some(quote!(::bb_core::__private::Unknown));
+            take = quote!(::bb_core::__private::stub());
+        }
         names.push(crate::names::text(field_name));
         takes.extend(quote! {
             #[automatically_derived]
@@ -25,8 +30,9 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
                 type Payload = #payload;
 
                 #[inline]
+                #[allow(unused_variables)]
                 fn take(emitted: &mut ::core::option::Option<Self>) -> ::core::option::Option<#payload> {
-                    emitted.as_mut()?.#field_name.take()
+                    #take
                 }
             }
         });

@@ -7,7 +7,7 @@ use crate::diagnostics::Place;
 use crate::model::Robot;
 use crate::parse::{Component, OptionValue};
 use proc_macro2::{Ident, TokenStream};
-use quote::{format_ident, quote, quote_spanned};
+use quote::{format_ident, quote};
 
 /// The struct, and `fn declared_options() -> Options`.
 pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
@@ -49,7 +49,7 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
         let value = match &option.value {
             OptionValue::Quantity(quantity) => {
                 let number = quantity.value;
-                quote_spanned!(quantity.place.start=> #number)
+                respan(quote!(::bb_core::__private::FromQuantity::from_quantity(#number)), quantity.place.start)
             }
             OptionValue::Expression { expression, .. } => into_if_text(expression),
         };
@@ -65,7 +65,7 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
         fn #function() -> #options {
             #start
             #(#settings)*
-            __options
+            ::bb_core::__private::as_known(__options)
         }
     }
 }

@@ -3,7 +3,7 @@
 use bb_core::prelude::*;
 
 robot! {
-    robot Box;
+    robot Case;
 
     link body {
         inertial: { mass: 2 kg, inertia: { xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 } };
@@ -13,5 +13,5 @@ robot! {
 }
 
 fn main() {
-    assert!(Box::TOPOLOGY.links[0].inertial.is_some());
+    assert!(Case::TOPOLOGY.links[0].inertial.is_some());
 }

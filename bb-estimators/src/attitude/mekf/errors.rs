@@ -1,0 +1,183 @@
+//! The error state: its mean, its covariance, and the two things a Kalman filter does with them.
+
+use super::window::Window;
+
+/// How many numbers the filter estimates.
+pub(super) const STATES: usize = 18;
+/// Rotation error, world axes, rad: `R_true = exp(θ) R`.
+pub(super) const ROTATION: usize = 0;
+/// Error of the gyroscope's bias, body axes, rad/s.
+pub(super) const BIAS: usize = 3;
+/// Error of the gyroscope's scale and misalignment, a 3×3 matrix row by row, fraction.
+pub(super) const CALIBRATION: usize = 6;
+/// Horizontal velocity, world axes, m/s: the whole of it, not an error.
+pub(super) const VELOCITY: usize = 15;
+/// How much the magnetometer lags the gyroscope, s: the whole of it, not an error.
+pub(super) const LATENCY: usize = 17;
+
+/// Bias and calibration, which the rotation error integrates.
+const GYROSCOPE: usize = CALIBRATION + 9 - BIAS;
+
+/// A variance never falls below this fraction of what one update left of it: rounding cannot make it negative.
+const ROUNDING: f64 = 1e-6;
+
+/// Mean and covariance of the error state. The covariance is kept symmetric to the last bit.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Errors {
+    pub(super) mean: [f64; STATES],
+    covariance: [[f64; STATES]; STATES],
+}
+
+/// Variances that grow with time, per second or for one window.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ProcessNoise {
+    /// rad².
+    pub(super) rotation: f64,
+    /// (rad/s)².
+    pub(super) bias: f64,
+    /// (m/s)².
+    pub(super) velocity: f64,
+}
+
+impl Errors {
+    /// Nothing known, and so sure of it.
+    pub(super) fn new() -> Self {
+        Self { mean: [0.0; STATES], covariance: [[0.0; STATES]; STATES] }
+    }
+
+    /// Forgets what is known of `COUNT` states from `first` on, and of their correlation with all others.
+    pub(super) fn forget<const COUNT: usize>(&mut self, first: usize, variance: f64) {
+        for i in first..first + COUNT {
+            for j in 0..STATES {
+                self.covariance[i][j] = 0.0;
+                self.covariance[j][i] = 0.0;
+            }
+            self.covariance[i][i] = variance;
+        }
+    }
+
+    /// Admits that a state may be wrong by more than was thought.
+    pub(super) fn doubt(&mut self, state: usize, variance: f64) {
+        self.covariance[state][state] += variance;
+    }
+
+    pub(super) fn variance(&self, state: usize) -> f64 {
+        self.covariance[state][state]
+    }
+
+    /// Whether every mean and variance is a number to compute with.
+    pub(super) fn are_sane(&self) -> bool {
+        let variances = (0..STATES).all(|i| (0.0..1e12).contains(&self.covariance[i][i]));
+        variances && self.mean.iter().all(|mean| mean.abs() < 1e9)
+    }
+
+    /// Takes the errors over a window: `x ← Φ x`, `P ← Φ P Φᵀ + Q`.
+    ///
+    /// With F the integral of the specific force in the world frame, R that of the rotation and W that of
+    /// rotation times angular velocity, all of them of the window:
+    ///
+    /// * velocity: `δv ← δv + θ × F`, horizontally,
+    /// * rotation: `θ ← θ - R δb - W δE`.
+    pub(super) fn propagate(&mut self, window: &Window, noise: &ProcessNoise) {
+        let force = &window.force;
+        let turned = [[0.0, force.z, -force.y], [-force.z, 0.0, force.x]];
+        let integrated = window.gyroscope_integrals();
+        self.mix::<2, 3>(VELOCITY, ROTATION, &turned);
+        self.mix::<3, GYROSCOPE>(ROTATION, BIAS, &integrated);
+        for i in 0..3 {
+            self.covariance[ROTATION + i][ROTATION + i] += noise.rotation;
+            self.covariance[BIAS + i][BIAS + i] += noise.bias;
+        }
+        for i in 0..2 {
+            self.covariance[VELOCITY + i][VELOCITY + i] += noise.velocity;
+        }
+    }
+
+    /// Adds `factor` times the states from `source` on to those from `target` on; the two do not overlap.
+    fn mix<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        target: usize,
+        source: usize,
+        factor: &[[f64; COLUMNS]; ROWS],
+    ) {
+        for (i, factor) in factor.iter().enumerate() {
+            let mut row = self.covariance[target + i];
+            for (k, factor) in factor.iter().enumerate() {
+                self.mean[target + i] += factor * self.mean[source + k];
+                for (sum, value) in row.iter_mut().zip(&self.covariance[source + k]) {
+                    *sum += factor * value;
+                }
+            }
+            self.covariance[target + i] = row;
+        }
+        // So far the rows of Φ P; the block on the diagonal takes Φᵀ as well, the rest of the columns mirrors.
+        for i in 0..ROWS {
+            let row = self.covariance[target + i];
+            for (j, factor) in factor.iter().enumerate().skip(i) {
+                let sum: f64 = factor.iter().zip(&row[source..]).map(|(factor, value)| factor * value).sum();
+                // Above the diagonal only: below, the column still lacks the other row's part.
+                self.covariance[target + i][target + j] = row_block(&row, target + j) + sum;
+            }
+        }
+        for i in 0..ROWS {
+            for j in 0..STATES {
+                if (target..target + i).contains(&j) {
+                    self.covariance[target + i][j] = self.covariance[j][target + i];
+                } else if !(target..target + ROWS).contains(&j) {
+                    self.covariance[j][target + i] = self.covariance[target + i][j];
+                }
+            }
+        }
+    }
+
+    /// One scalar measurement: the states times `observation` were seen to differ by `innovation` from zero, up
+    /// to `variance`. The innovation is taken against what is known of the mean here.
+    pub(super) fn update<const COUNT: usize>(
+        &mut self,
+        observation: [(usize, f64); COUNT],
+        measured: f64,
+        variance: f64,
+    ) {
+        let mut gain = [0.0; STATES];
+        let mut expected = 0.0;
+        for (state, factor) in observation {
+            expected += factor * self.mean[state];
+            for (gain, value) in gain.iter_mut().zip(&self.covariance[state]) {
+                *gain += factor * value;
+            }
+        }
+        let total: f64 = variance + observation.iter().map(|(state, factor)| factor * gain[*state]).sum::<f64>();
+        if total.is_nan() || total <= 0.0 {
+            return;
+        }
+        let scale = 1.0 / total;
+        let step = (measured - expected) * scale;
+        for i in 0..STATES {
+            self.mean[i] += gain[i] * step;
+            let least = self.covariance[i][i] * ROUNDING;
+            let scaled = gain[i] * scale;
+            // Symmetric to the last bit: the smaller factor first would be, scaled by either is not.
+            for j in 0..=i {
+                self.covariance[i][j] -= scaled * gain[j];
+            }
+            self.covariance[i][i] = self.covariance[i][i].max(least);
+        }
+        for i in 0..STATES {
+            for j in 0..i {
+                self.covariance[j][i] = self.covariance[i][j];
+            }
+        }
+    }
+
+    /// What the measurement `observation` is expected to vary by.
+    pub(super) fn spread<const COUNT: usize>(&self, observation: &[(usize, f64); COUNT]) -> f64 {
+        let product = |(i, a): &(usize, f64)| -> f64 {
+            observation.iter().map(|(j, b)| a * b * self.covariance[*i][*j]).sum()
+        };
+        observation.iter().map(product).sum()
+    }
+}
+
+fn row_block(row: &[f64; STATES], column: usize) -> f64 {
+    row[column]
+}

@@ -1,0 +1,96 @@
+//! What one window of samples adds up to, in a world frame that is not corrected within it.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::errors::{BIAS, CALIBRATION};
+
+/// A window ends after this many samples: enough to do the filter's work in small pieces, one with each.
+const SAMPLES: u32 = 8;
+
+/// A window ends after this time, s, however few samples it has: corrections wait for its end.
+const LONGEST_S: f64 = 0.1;
+
+/// Integrals over the samples of a window.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Window {
+    samples: u32,
+    /// s.
+    pub(super) duration: f64,
+    /// ∫ R f dt, m/s.
+    pub(super) force: Vector3<f64>,
+    /// ∫ R dt, s.
+    rotation: Matrix3<f64>,
+    /// ∫ R ⊗ ω dt, rad: row i, then the body axis that R takes to i, then the axis of ω.
+    rotation_rate: [[f64; 9]; 3],
+    /// ∫ |ω|² dt, rad²/s.
+    pub(super) squared_rate: f64,
+    /// Σ R m.
+    field: Vector3<f64>,
+    /// Σ R (ω × m).
+    field_rate: Vector3<f64>,
+    fields: u32,
+}
+
+impl Window {
+    pub(super) fn new() -> Self {
+        Self {
+            samples: 0,
+            duration: 0.0,
+            force: Vector3::zeros(),
+            rotation: Matrix3::zeros(),
+            rotation_rate: [[0.0; 9]; 3],
+            squared_rate: 0.0,
+            field: Vector3::zeros(),
+            field_rate: Vector3::zeros(),
+            fields: 0,
+        }
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.samples >= SAMPLES || self.duration >= LONGEST_S
+    }
+
+    /// Adds an inertial sample: means over `dt`, in the middle of which the rotation was `rotation`.
+    pub(super) fn add(&mut self, dt: f64, rotation: &Matrix3<f64>, rate: &Vector3<f64>, force: &Vector3<f64>) {
+        self.samples += 1;
+        self.duration += dt;
+        self.force += rotation * (force * dt);
+        let rotation = rotation * dt;
+        self.rotation += rotation;
+        for (i, row) in self.rotation_rate.iter_mut().enumerate() {
+            for k in 0..3 {
+                for j in 0..3 {
+                    row[3 * k + j] += rotation[(i, k)] * rate[j];
+                }
+            }
+        }
+        self.squared_rate += rate.norm_squared() * dt;
+    }
+
+    /// Adds a magnetic field that was measured with the sensor at `rotation`, turning at `rate`.
+    pub(super) fn add_field(&mut self, rotation: &Matrix3<f64>, rate: &Vector3<f64>, field: &Vector3<f64>) {
+        self.field += rotation * field;
+        self.field_rate += rotation * rate.cross(field);
+        self.fields += 1;
+    }
+
+    /// Means of R m and R (ω × m), if there was a field.
+    pub(super) fn mean_field(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let scale = 1.0 / f64::from(self.fields.max(1));
+        (self.fields > 0).then(|| (self.field * scale, self.field_rate * scale))
+    }
+
+    /// How bias and calibration turn the world in this window, rad per rad/s and rad per fraction.
+    pub(super) fn gyroscope_integrals(&self) -> [[f64; 12]; 3] {
+        let mut integrals = [[0.0; 12]; 3];
+        for (i, row) in integrals.iter_mut().enumerate() {
+            for k in 0..3 {
+                row[k] = -self.rotation[(i, k)];
+            }
+            for (k, value) in self.rotation_rate[i].iter().enumerate() {
+                row[CALIBRATION - BIAS + k] = -value;
+            }
+        }
+        integrals
+    }
+}
