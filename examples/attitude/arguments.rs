@@ -41,6 +41,9 @@ impl Arguments {
             ChosenParams { kind: self.filter, magnetometer: self.axes == "9", ..ChosenParams::default() };
         match (self.beta, self.filter) {
             (Some(_), Kind::Complementary) => Err("--beta belongs to --filter madgwick; leave it out".into()),
+            (Some(beta), _) if !(0.0..=1e3).contains(&beta) => {
+                Err(format!("--beta is {beta}, but must be in 0..=1000 rad/s"))
+            }
             (beta, _) => {
                 params.beta = beta.unwrap_or(params.beta);
                 Ok(params)

@@ -14,6 +14,7 @@ mod simulated;
 use arguments::Arguments;
 use clap::Parser;
 use std::error::Error;
+use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -27,16 +28,27 @@ fn main() -> ExitCode {
     }
 }
 
+/// Prints; a reader that has read enough (`| head`) is no error.
+fn say(text: &str) -> std::io::Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let params = arguments.params()?;
+    if let Some(file) = &arguments.plot {
+        plot::check(file)?;
+    }
     let outcome = match &arguments.data {
         Some(file) => recorded::run(file, arguments, params)?,
         None => simulated::run(params)?,
     };
     if arguments.json {
-        println!("{}", serde_json::to_string(&outcome.summary())?);
+        say(&format!("{}\n", serde_json::to_string(&outcome.summary())?))?;
     } else {
-        print!("{outcome}");
+        say(&outcome.to_string())?;
     }
     if let Some(file) = &arguments.plot {
         plot::plot(file, &outcome)?;

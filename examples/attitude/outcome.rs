@@ -14,6 +14,8 @@ pub(crate) struct Outcome {
     pub(crate) report: Report,
     pub(crate) seconds: f64,
     pub(crate) has_truth: bool,
+    /// Whether there is a magnetometer; without one heading starts anywhere and is no result.
+    pub(crate) has_heading: bool,
 }
 
 /// One estimate over time.
@@ -29,11 +31,13 @@ pub(crate) struct Point {
     pub(crate) truth: Option<UnitQuaternion<f64>>,
 }
 
-/// The object that `--json` prints. Errors are null where there is no truth.
+/// The object that `--json` prints, of the first series. Errors are null where there is no truth.
 #[derive(Serialize)]
 pub(crate) struct Summary {
     filter: &'static str,
     samples: usize,
+    /// How many of them were compared with the truth.
+    scored: usize,
     total_deg: Option<f64>,
     heading_deg: Option<f64>,
     inclination_deg: Option<f64>,
@@ -71,6 +75,7 @@ impl Outcome {
         Summary {
             filter: self.filter.name(),
             samples: first.map_or(0, Series::len),
+            scored: first.map_or(0, |series| series.errors.count() as usize),
             total_deg: rms.map(|rms| rms.total.to_degrees()),
             heading_deg: rms.map(|rms| rms.heading.to_degrees()),
             inclination_deg: rms.map(|rms| rms.inclination.to_degrees()),
@@ -90,12 +95,15 @@ impl fmt::Display for Outcome {
             return writeln!(f, "The recording has no truth to compare with.");
         }
         writeln!(f, "\nError against the truth, RMS in degrees:\n")?;
-        writeln!(f, "{:16} {:>8} {:>8} {:>12} {:>9}", "orientation", "total", "heading", "inclination", "samples")?;
+        writeln!(f, "{:16} {:>8} {:>8} {:>12} {:>9}", "orientation", "total", "heading", "inclination", "scored")?;
         for series in &self.series {
             let Some(rms) = series.errors.rms() else { continue };
             let [total, heading, inclination] = [rms.total, rms.heading, rms.inclination].map(f64::to_degrees);
             let count = series.errors.count();
             writeln!(f, "{:16} {total:8.2} {heading:8.2} {inclination:12.2} {count:9}", series.name)?;
+        }
+        if !self.has_heading {
+            writeln!(f, "\nWith six axes the heading starts anywhere: only the inclination counts.")?;
         }
         Ok(())
     }

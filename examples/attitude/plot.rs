@@ -10,12 +10,13 @@ use std::path::Path;
 
 /// More points than pixels show nothing more.
 const MOST_POINTS: usize = 4000;
-const TRUTH: RGBColor = RGBColor(40, 40, 40);
-const ESTIMATE: RGBColor = RGBColor(0, 110, 220);
+const TRUTH: RGBColor = RGBColor(250, 170, 60);
+const ESTIMATE: RGBColor = RGBColor(0, 80, 170);
 const ERROR: RGBColor = RGBColor(210, 50, 30);
 
 /// Roll, pitch and yaw of the first series, then its errors.
 pub(crate) fn plot(file: &Path, outcome: &Outcome) -> Result<(), Box<dyn Error>> {
+    check(file)?;
     // The font comes along, so that a plot needs nothing of the machine.
     register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
         .map_err(|_| "the plot's font cannot be read")?;
@@ -34,17 +35,40 @@ pub(crate) fn plot(file: &Path, outcome: &Outcome) -> Result<(), Box<dyn Error>>
         };
         let truth = line(series, |point| point.truth.as_ref().map(angle));
         let estimate = line(series, |point| Some(angle(&point.estimate)));
-        panel_of(panel, name, &[("truth", TRUTH, truth), ("estimate", ESTIMATE, estimate)])?;
+        panel_of(
+            panel,
+            name,
+            &[("truth", TRUTH.stroke_width(4), truth), ("estimate", ESTIMATE.stroke_width(1), estimate)],
+        )?;
     }
     if let Some(panel) = panels.get(angles.len()) {
         let error =
             |point: &Point| point.truth.and_then(|truth| OrientationError::between(&point.estimate, &truth));
-        let heading = line(series, |point| error(point).map(|error| error.heading.to_degrees()));
+        let has_heading = outcome.has_heading;
+        let heading =
+            line(series, |point| error(point).filter(|_| has_heading).map(|error| error.heading.to_degrees()));
         let inclination = line(series, |point| error(point).map(|error| error.inclination.to_degrees()));
-        panel_of(panel, "error", &[("heading", ERROR, heading), ("inclination", ESTIMATE, inclination)])?;
+        panel_of(
+            panel,
+            "error",
+            &[("heading", ERROR.stroke_width(1), heading), ("inclination", ESTIMATE.stroke_width(1), inclination)],
+        )?;
     }
-    root.present().map_err(|error| format!("{}: {error}", file.display()))?;
+    root.present().map_err(|error| format!("cannot write {}: {error}", file.display()))?;
     Ok(())
+}
+
+/// Whether a plot can be written there: asked before the run, and told in plain words.
+pub(crate) fn check(file: &Path) -> Result<(), String> {
+    if file.extension().is_none_or(|end| end != "png") {
+        return Err(format!("--plot writes a PNG: call the file {}", file.with_extension("png").display()));
+    }
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            Err(format!("there is no folder {} to plot into", folder.display()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Runs of points without a gap; a jump from one end of the circle to the other is a gap as well.
@@ -65,7 +89,8 @@ fn line(series: &Series, value: impl Fn(&Point) -> Option<f64>) -> Vec<Vec<(f64,
     runs
 }
 
-type Line = (&'static str, RGBColor, Vec<Vec<(f64, f64)>>);
+/// Label, style, runs of points.
+type Line = (&'static str, ShapeStyle, Vec<Vec<(f64, f64)>>);
 
 fn panel_of(
     panel: &DrawingArea<BitMapBackend<'_>, plotters::coord::Shift>,
@@ -90,17 +115,21 @@ fn panel_of(
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
-        .x_desc("time, s")
-        .y_desc(format!("{name}, deg"))
+        .y_desc(format!("{name}, deg over s"))
         .label_style(("sans-serif", 14))
         .draw()?;
-    for (label, color, runs) in lines {
+    for (label, style, runs) in lines {
         let mut labelled = false;
         for run in runs.iter().filter(|run| !run.is_empty()) {
-            let drawn = chart.draw_series(LineSeries::new(run.iter().copied(), color))?;
+            // Thick lines have spikes at sharp turns; dots do not.
+            let drawn = if style.stroke_width > 1 {
+                chart.draw_series(run.iter().map(|point| Circle::new(*point, 2, style.filled())))?
+            } else {
+                chart.draw_series(LineSeries::new(run.iter().copied(), *style))?
+            };
             if !labelled {
-                let color = *color;
-                drawn.label(*label).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color));
+                let style = *style;
+                drawn.label(*label).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
                 labelled = true;
             }
         }

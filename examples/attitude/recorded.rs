@@ -55,5 +55,11 @@ pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> R
     let seconds = started.elapsed().as_secs_f64();
     progress.finish();
     let report = simulation.stop().ok()?;
-    Ok(Outcome { filter: params.kind, series: vec![series], report, seconds, has_truth: truth.is_known() })
+    if series.len() == 0 {
+        return Err(
+            format!("{}: no orientation came out of it; it may hold no sample of the IMU", file.display()).into()
+        );
+    }
+    let (has_truth, has_heading) = (truth.is_known(), params.magnetometer);
+    Ok(Outcome { filter: params.kind, series: vec![series], report, seconds, has_truth, has_heading })
 }

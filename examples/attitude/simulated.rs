@@ -70,5 +70,12 @@ pub(crate) fn run(params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
     progress.finish();
     let report = simulation.stop().ok()?;
     let [base, mast, fused] = series.map(|(_, series)| series);
-    Ok(Outcome { filter: params.kind, series: vec![fused, base, mast], report, seconds, has_truth: true })
+    Ok(Outcome {
+        filter: params.kind,
+        series: vec![fused, base, mast],
+        report,
+        seconds,
+        has_truth: true,
+        has_heading: params.magnetometer,
+    })
 }

@@ -110,13 +110,12 @@ impl Errors {
             }
             self.covariance[target + i] = row;
         }
-        // So far the rows of Φ P; the block on the diagonal takes Φᵀ as well, the rest of the columns mirrors.
+        // So far the rows of Φ P. The block on the diagonal takes Φᵀ as well; the other columns mirror the rows.
         for i in 0..ROWS {
             let row = self.covariance[target + i];
             for (j, factor) in factor.iter().enumerate().skip(i) {
                 let sum: f64 = factor.iter().zip(&row[source..]).map(|(factor, value)| factor * value).sum();
-                // Above the diagonal only: below, the column still lacks the other row's part.
-                self.covariance[target + i][target + j] = row_block(&row, target + j) + sum;
+                self.covariance[target + i][target + j] = row[target + j] + sum;
             }
         }
         for i in 0..ROWS {
@@ -130,8 +129,7 @@ impl Errors {
         }
     }
 
-    /// One scalar measurement: the states times `observation` were seen to differ by `innovation` from zero, up
-    /// to `variance`. The innovation is taken against what is known of the mean here.
+    /// One scalar measurement: `measured` is the states times `observation`, up to `variance`.
     pub(super) fn update<const COUNT: usize>(
         &mut self,
         observation: [(usize, f64); COUNT],
@@ -155,17 +153,11 @@ impl Errors {
         for i in 0..STATES {
             self.mean[i] += gain[i] * step;
             let least = self.covariance[i][i] * ROUNDING;
-            let scaled = gain[i] * scale;
-            // Symmetric to the last bit: the smaller factor first would be, scaled by either is not.
-            for j in 0..=i {
-                self.covariance[i][j] -= scaled * gain[j];
+            for j in 0..STATES {
+                // In this order the two halves round alike.
+                self.covariance[i][j] -= (gain[i] * gain[j]) * scale;
             }
             self.covariance[i][i] = self.covariance[i][i].max(least);
-        }
-        for i in 0..STATES {
-            for j in 0..i {
-                self.covariance[j][i] = self.covariance[i][j];
-            }
         }
     }
 
@@ -176,8 +168,4 @@ impl Errors {
         };
         observation.iter().map(product).sum()
     }
-}
-
-fn row_block(row: &[f64; STATES], column: usize) -> f64 {
-    row[column]
 }
