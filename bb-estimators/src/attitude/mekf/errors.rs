@@ -160,12 +160,4 @@ impl Errors {
             self.covariance[i][i] = self.covariance[i][i].max(least);
         }
     }
-
-    /// What the measurement `observation` is expected to vary by.
-    pub(super) fn spread<const COUNT: usize>(&self, observation: &[(usize, f64); COUNT]) -> f64 {
-        let product = |(i, a): &(usize, f64)| -> f64 {
-            observation.iter().map(|(j, b)| a * b * self.covariance[*i][*j]).sum()
-        };
-        observation.iter().map(product).sum()
-    }
 }

@@ -78,6 +78,11 @@ impl FieldReference {
         norm(self.reference)
     }
 
+    /// In the field's own unit, squared.
+    pub(super) fn squared_norm(&self) -> f64 {
+        self.norm() * self.norm()
+    }
+
     /// Horizontal part of the reference, as a fraction of its norm.
     pub(super) fn horizontal(&self) -> f64 {
         (self.reference[0] / self.norm()).max(crate::attitude::initial::MIN_HORIZONTAL_FRACTION)

@@ -1,0 +1,352 @@
+//! One step of the Kalman filter: strapdown with every sample, the errors once a window.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::GRAVITY;
+use super::errors::{BIAS, CALIBRATION, Errors, LATENCY, ProcessNoise, ROTATION, VELOCITY};
+use super::field::{FieldReference, Verdict};
+use super::measurement::{Heading, Measurements};
+use super::params::MekfParams;
+use super::rest::Rest;
+use super::window::Window;
+use crate::attitude::initial::heading_error;
+use crate::attitude::rotation::{turn, turn_heading, turn_upright};
+use crate::attitude::state::AttitudeState;
+use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
+
+/// Standard deviation of the tilt that one accelerometer sample shows, and of an orientation that was given, rad.
+const INITIAL_TILT: f64 = 0.087;
+
+/// Standard deviation of the heading that one magnetic sample shows indoors, rad.
+const INITIAL_HEADING: f64 = 0.52;
+
+/// How long a velocity lasts, s: the pseudo-measurement of zero has errors correlated over twice this time.
+const VELOCITY_TIME_S: f64 = 0.5;
+
+/// Time constant of the mean square acceleration, s.
+const ACCELERATION_TIME_CONSTANT_S: f64 = 1.0;
+
+/// Velocity at rest, in a mean over a second, m/s: the table trembles.
+const REST_VELOCITY: f64 = 0.05;
+
+/// Noise of the accelerometer, of its scale and of the lever arm's rotation, m/s/√s.
+const ACCELEROMETER_NOISE: f64 = 0.05;
+
+/// What the gyroscope's mean over a second at rest may differ from its bias by, rad/s: 0.1°/s.
+const REST_BIAS: f64 = 1.7e-3;
+
+/// A bias at rest this many standard deviations off has stepped.
+const BIAS_STEP: f64 = 4.0;
+
+/// The greatest difference to the bias that rest is believed for, rad/s: 2°/s, VQF's `biasClip`.
+const MAX_REST_BIAS: f64 = 0.035;
+
+/// How long a disturbance of the field lasts for a body that moves, s.
+const FIELD_TIME_S: f64 = 0.5;
+
+/// Time constant of the mean specific force in the world, s, and its greatest slope: beyond it the tilt is wrong.
+const FORCE_TIME_CONSTANT_S: f64 = 2.0;
+const MAX_FORCE_SLOPE: f64 = 0.577;
+
+/// A heading this far from an undisturbed field contradicts it, rad and standard deviations.
+const CONTRADICTION: f64 = 0.35;
+const CONTRADICTION_DEVIATIONS: f64 = 4.0;
+
+/// The self-calibrating error-state Kalman filter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MekfFilter {
+    params: MekfParams,
+    state: AttitudeState,
+    heading_known: bool,
+    /// rad/s.
+    bias: Vector3<f64>,
+    /// What `angular_velocity` has to lose beyond the bias, as a fraction of itself.
+    calibration: Matrix3<f64>,
+    /// `world_from_body` after the last sample.
+    rotation: Matrix3<f64>,
+    errors: Errors,
+    window: Window,
+    measurements: Measurements,
+    rest: Rest,
+    field: Option<FieldReference>,
+    last_field: Vector3<f64>,
+    squared_acceleration: f64,
+    mean_force: Vector3<f64>,
+}
+
+impl AttitudeFilter for MekfFilter {
+    type Params = MekfParams;
+
+    fn new(params: MekfParams) -> Result<Self, ParamsError> {
+        params.check()?;
+        let mut filter = Self {
+            params,
+            state: AttitudeState::new(params.magnetometer),
+            heading_known: false,
+            bias: Vector3::zeros(),
+            calibration: Matrix3::zeros(),
+            rotation: Matrix3::identity(),
+            errors: Errors::new(),
+            window: Window::new(),
+            measurements: Measurements::none(),
+            rest: Rest::new(&Vector3::zeros(), &Vector3::zeros()),
+            field: None,
+            last_field: Vector3::zeros(),
+            squared_acceleration: 0.0,
+            mean_force: Vector3::new(0.0, 0.0, GRAVITY),
+        };
+        filter.forget_sensors();
+        Ok(filter)
+    }
+
+    fn params(&self) -> &MekfParams {
+        &self.params
+    }
+
+    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError> {
+        let Some(step) = self.state.admit(sample)? else {
+            self.restart(sample);
+            return Ok(());
+        };
+        let measured = &sample.angular_velocity;
+        let rate = measured - self.bias - self.calibration * measured;
+        let mut orientation = turn(&step.world_from_body, &(rate * step.dt_s));
+
+        let bias_deviation = self.errors.variance(BIAS).max(0.0).sqrt();
+        self.rest.add(step.dt_s, measured, &sample.specific_force, &self.bias, bias_deviation);
+        let before = core::mem::replace(&mut self.rotation, *orientation.to_rotation_matrix().matrix());
+        let middle = (before + self.rotation) * 0.5;
+        self.window.add(step.dt_s, &middle, measured, &sample.specific_force);
+        if step.field.is_some()
+            && let Some(field) = sample.magnetic_field
+            && (field != self.last_field || self.rest.is_detected())
+        {
+            // A driver that is faster than the magnetometer repeats its last value, which is then a stale one.
+            self.window.add_field(&self.rotation, &rate, &field);
+            self.last_field = field;
+        }
+
+        if self.window.is_full() {
+            orientation = self.close_window(orientation);
+        } else {
+            self.measurements.take(&mut self.errors);
+        }
+        if !self.heading_known
+            && let Some(direction) = step.field
+            && let Some(error) = heading_error(&(orientation * direction))
+        {
+            orientation = turn_heading(&orientation, error);
+            self.begin(&orientation, INITIAL_HEADING);
+            self.heading_known = true;
+        }
+        self.state.store(orientation, step.field);
+        Ok(())
+    }
+
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError> {
+        self.state.start_at(time_ns, world_from_body)?;
+        self.heading_known = true;
+        if let Some(orientation) = self.state.world_from_body() {
+            self.begin(&orientation, INITIAL_TILT);
+        }
+        Ok(())
+    }
+
+    fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+        self.state.world_from_body()
+    }
+
+    fn reset(&mut self) {
+        if let Ok(new) = Self::new(self.params) {
+            *self = new;
+        }
+    }
+}
+
+impl MekfFilter {
+    /// The gyroscope's bias, rad/s: what it reads more than the angular velocity.
+    pub fn gyroscope_bias(&self) -> Vector3<f64> {
+        self.bias
+    }
+
+    /// The gyroscope's scale and misalignment errors: what it reads is `(1 + E)` times the angular velocity and
+    /// the bias, for small E.
+    pub fn gyroscope_calibration(&self) -> Matrix3<f64> {
+        self.calibration
+    }
+
+    /// How much the magnetometer lags the gyroscope, s.
+    pub fn magnetometer_latency(&self) -> f64 {
+        self.errors.mean[LATENCY]
+    }
+
+    /// After a start from a sample, the first one or the one after a gap.
+    #[cold]
+    fn restart(&mut self, sample: &ImuSample) {
+        let Some(orientation) = self.state.world_from_body() else {
+            return;
+        };
+        let direction = sample.magnetic_field.filter(|_| self.params.magnetometer).map(|field| field.normalize());
+        self.heading_known =
+            direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
+        self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
+        self.begin(&orientation, INITIAL_HEADING);
+    }
+
+    /// Starts the orientation's errors anew; what is known of the sensors stays.
+    fn begin(&mut self, orientation: &UnitQuaternion<f64>, heading_deviation: f64) {
+        // Without a magnetometer there is no heading to be wrong.
+        let heading_deviation = if self.params.magnetometer { heading_deviation } else { 0.0 };
+        self.errors.mean[..CALIBRATION + 9].fill(0.0);
+        self.errors.mean[VELOCITY..VELOCITY + 2].fill(0.0);
+        self.errors.forget::<2>(ROTATION, INITIAL_TILT * INITIAL_TILT);
+        self.errors.forget::<1>(ROTATION + 2, heading_deviation * heading_deviation);
+        self.errors.forget::<2>(VELOCITY, self.params.velocity * self.params.velocity);
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        self.window = Window::new();
+        self.measurements = Measurements::none();
+        self.mean_force = Vector3::new(0.0, 0.0, GRAVITY);
+    }
+
+    /// Doubts what is known of the sensors as at the start.
+    fn forget_sensors(&mut self) {
+        let params = &self.params;
+        let latency = if params.magnetometer { params.magnetometer_latency } else { 0.0 };
+        self.errors.forget::<3>(BIAS, params.initial_bias * params.initial_bias);
+        self.errors.forget::<9>(CALIBRATION, params.calibration_error * params.calibration_error);
+        self.errors.forget::<1>(LATENCY, latency * latency);
+    }
+
+    /// Ends a window: takes the errors to now, corrects by them, and looks at what the window says.
+    fn close_window(&mut self, orientation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        while self.measurements.take(&mut self.errors) {}
+        let window = core::mem::replace(&mut self.window, Window::new());
+        let (params, dt) = (&self.params, window.duration);
+        let rotation_noise = params.gyroscope_noise * params.gyroscope_noise * dt
+            + params.gyroscope_rate_noise * params.gyroscope_rate_noise * window.squared_rate;
+        self.errors.propagate(
+            &window,
+            &ProcessNoise {
+                rotation: rotation_noise,
+                bias: params.bias_drift * params.bias_drift * dt,
+                velocity: ACCELEROMETER_NOISE * ACCELEROMETER_NOISE * dt,
+            },
+        );
+        self.errors.mean[VELOCITY] += window.force.x;
+        self.errors.mean[VELOCITY + 1] += window.force.y;
+        if !self.errors.are_sane() {
+            return self.recover(orientation);
+        }
+
+        let correction = self.correct();
+        let orientation = correction * orientation;
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        let force = correction * window.force;
+        let gain = (dt / FORCE_TIME_CONSTANT_S).min(1.0);
+        self.mean_force += (force * (1.0 / dt) - self.mean_force) * gain;
+        let slope = self.mean_force.x.hypot(self.mean_force.y);
+        if slope > MAX_FORCE_SLOPE * self.mean_force.z {
+            return self.level(orientation);
+        }
+        self.measure(&window, &correction, &force);
+        orientation
+    }
+
+    /// Moves the mean errors into what they are errors of; returns the rotation.
+    fn correct(&mut self) -> UnitQuaternion<f64> {
+        let mean = &mut self.errors.mean;
+        let rotation = Vector3::new(mean[ROTATION], mean[ROTATION + 1], mean[ROTATION + 2]);
+        for i in 0..3 {
+            self.bias[i] += mean[BIAS + i];
+            for k in 0..3 {
+                self.calibration[(i, k)] += mean[CALIBRATION + 3 * i + k];
+            }
+        }
+        mean[..CALIBRATION + 9].fill(0.0);
+        turn(&UnitQuaternion::identity(), &rotation)
+    }
+
+    /// Looks at what a window says, for the samples of the next one to take.
+    fn measure(&mut self, window: &Window, correction: &UnitQuaternion<f64>, force: &Vector3<f64>) {
+        let dt = window.duration;
+        let resting = self.rest.is_detected();
+        let squared = (force.x * force.x + force.y * force.y) / (dt * dt);
+        let gain = (dt / ACCELERATION_TIME_CONSTANT_S).min(1.0);
+        self.squared_acceleration += (squared - self.squared_acceleration) * gain;
+        let velocity_variance = if resting {
+            REST_VELOCITY * REST_VELOCITY / dt
+        } else {
+            let growth = self.params.acceleration_time * self.params.acceleration_time;
+            let squared = self.params.velocity * self.params.velocity + growth * self.squared_acceleration;
+            squared * 2.0 * VELOCITY_TIME_S / dt
+        };
+        let bias = resting.then(|| self.rest_bias(dt));
+        let heading = window.mean_field().and_then(|(field, rate)| {
+            let latency = self.errors.mean[LATENCY];
+            self.heading(dt, &(correction * (field - rate * latency)), &(correction * rate))
+        });
+        self.measurements = Measurements::new(velocity_variance, heading, bias);
+    }
+
+    /// What the gyroscope reads at rest is its bias.
+    fn rest_bias(&mut self, dt: f64) -> (Vector3<f64>, f64) {
+        let difference = self.rest.rate - self.bias;
+        let squared = difference.norm_squared();
+        let expected = self.errors.variance(BIAS) + REST_BIAS * REST_BIAS;
+        if squared > BIAS_STEP * BIAS_STEP * expected {
+            for axis in 0..3 {
+                self.errors.doubt(BIAS + axis, squared);
+            }
+        }
+        let most = (MAX_REST_BIAS * MAX_REST_BIAS / squared.max(1e-12)).min(1.0).sqrt();
+        (difference * most, REST_BIAS * REST_BIAS / dt)
+    }
+
+    /// What the field says about the heading; `field` and what it changes by with the lag are in the world.
+    fn heading(&mut self, dt: f64, field: &Vector3<f64>, rate: &Vector3<f64>) -> Option<Heading> {
+        let squared = field.x * field.x + field.y * field.y;
+        let plane = [squared.sqrt(), field.z];
+        let reference = self.field.get_or_insert_with(|| FieldReference::new(plane));
+        let angle = field.x.atan2(field.y);
+        let deviation = self.errors.variance(ROTATION + 2).max(0.0).sqrt();
+        let contradicts = angle.abs() > CONTRADICTION.max(CONTRADICTION_DEVIATIONS * deviation);
+        let disturbance = match reference.observe(dt, plane, contradicts) {
+            Verdict::Disturbed(variance) => variance,
+            Verdict::HeadingUnknown => {
+                self.errors.doubt(ROTATION + 2, angle * angle);
+                0.0
+            }
+        };
+        let horizontal = reference.horizontal();
+        let usual = self.params.field_disturbance * self.params.field_disturbance;
+        let least = 0.25 * horizontal * horizontal * reference.squared_norm();
+        let rate = (rate.x * field.y - rate.y * field.x) / squared.max(least);
+        Some(Heading {
+            angle: angle + rate * self.errors.mean[LATENCY],
+            slope: reference.vertical() / horizontal,
+            rate,
+            variance: 2.0 * FIELD_TIME_S * (usual + disturbance) / (dt * horizontal * horizontal),
+        })
+    }
+
+    /// The tilt contradicts the mean specific force: starts it anew, and the heading with the next field.
+    #[cold]
+    fn level(&mut self, orientation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        let orientation = turn_upright(&orientation, &self.mean_force);
+        self.begin(&orientation, INITIAL_HEADING);
+        self.forget_sensors();
+        self.heading_known = !self.params.magnetometer;
+        self.field = None;
+        orientation
+    }
+
+    /// Numbers beyond all reason came in, and no knowledge is left: starts anew from the orientation.
+    #[cold]
+    fn recover(&mut self, orientation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        let (state, heading_known) = (self.state.clone(), self.heading_known);
+        self.reset();
+        (self.state, self.heading_known) = (state, heading_known);
+        self.begin(&orientation, INITIAL_HEADING);
+        orientation
+    }
+}

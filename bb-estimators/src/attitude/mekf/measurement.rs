@@ -1,0 +1,71 @@
+//! What a window of samples says about the errors, taken one scalar at a time.
+//!
+//! The errors are those at the end of the window. Their mean is carried along and turned into a correction only
+//! at the end of the next one, so it does not matter when between the two a scalar is taken: one goes with each
+//! sample, and no sample costs much more than another.
+
+use nalgebra::Vector3;
+
+use super::errors::{BIAS, Errors, LATENCY, ROTATION, VELOCITY};
+
+/// Heading, seen by the magnetic field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Heading {
+    /// How far the field is from north, rad, as if the lag were zero to first order.
+    pub(super) angle: f64,
+    /// Vertical over horizontal part of the reference.
+    pub(super) slope: f64,
+    /// What the angle grows by with the lag, rad/s.
+    pub(super) rate: f64,
+    /// rad².
+    pub(super) variance: f64,
+}
+
+/// The measurements of one window that are still to be taken.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Measurements {
+    next: u32,
+    velocity_variance: f64,
+    heading: Option<Heading>,
+    /// What the gyroscope reads at rest, less its known bias, and its variance.
+    bias: Option<(Vector3<f64>, f64)>,
+}
+
+impl Measurements {
+    /// No measurement.
+    pub(super) fn none() -> Self {
+        Self { next: u32::MAX, velocity_variance: 0.0, heading: None, bias: None }
+    }
+
+    /// The velocity is zero up to `velocity_variance`, and more if there is more.
+    pub(super) fn new(
+        velocity_variance: f64,
+        heading: Option<Heading>,
+        bias: Option<(Vector3<f64>, f64)>,
+    ) -> Self {
+        Self { next: 0, velocity_variance, heading, bias }
+    }
+
+    /// Takes the next scalar; `false` if there is none left.
+    pub(super) fn take(&mut self, errors: &mut Errors) -> bool {
+        let taken = self.next;
+        match taken {
+            0 | 1 => errors.update([(VELOCITY + taken as usize, 1.0)], 0.0, self.velocity_variance),
+            2 => {
+                if let Some(heading) = self.heading {
+                    let observation = [(ROTATION + 1, -heading.slope), (ROTATION + 2, 1.0), (LATENCY, heading.rate)];
+                    errors.update(observation, heading.angle, heading.variance);
+                }
+            }
+            3..=5 => {
+                if let Some((bias, variance)) = self.bias {
+                    let axis = taken as usize - 3;
+                    errors.update([(BIAS + axis, 1.0)], bias[axis], variance);
+                }
+            }
+            _ => return false,
+        }
+        self.next += 1;
+        true
+    }
+}
