@@ -94,22 +94,13 @@ macro_rules! __stub_robot {
             type Wiring = ();
             fn options() {}
             fn topics() {}
-            fn wire(
-                _: (),
-                _: &mut (),
-                _: &$crate::__private::Startup,
-            ) -> ::core::result::Result<(), $crate::StartError> {
-                ::core::result::Result::Ok(())
-            }
+            fn wire(_: (), _: &(), _: &$crate::__private::Startup) {}
             fn sources(
                 _: &$crate::__private::Arc<()>,
-                _: (),
+                _: &(),
                 _: &$crate::__private::Startup,
-            ) -> ::core::result::Result<
-                ::std::vec::Vec<::std::boxed::Box<dyn $crate::__private::Source>>,
-                $crate::StartError,
-            > {
-                ::core::result::Result::Ok(::std::vec::Vec::new())
+            ) -> ::std::vec::Vec<::std::boxed::Box<dyn $crate::__private::Source>> {
+                ::std::vec::Vec::new()
             }
             fn wired_topics(_: &()) -> &() {
                 &()

@@ -16,6 +16,7 @@
 
 mod checks;
 mod declarations;
+mod group;
 mod handles;
 mod literal;
 mod options;

@@ -3,9 +3,9 @@
 use super::admission::Admission;
 use super::counters::Counters;
 use super::{DropReason, EstimatorDeclaration, EstimatorStatistics, InputDeclaration};
-use crate::component::{Context, Estimator, Fault, InputAt, Inputs, Options, Reply, SyncMiss};
+use crate::component::{Context, Estimator, Fault, InputAt, Inputs, Reply, SyncMiss};
 use crate::message::{Stamp, Stamped};
-use crate::run::{Failed, StartError, Startup, caught, retire};
+use crate::run::{Failed, Startup, caught, retire};
 use crate::time::Clock;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -42,20 +42,11 @@ enum Handled<O> {
 }
 
 impl<E: Estimator> Node<E> {
-    /// Validates the options and makes the estimator.
-    ///
-    /// # Errors
-    /// Names the estimator and what keeps it from starting.
-    pub fn new(
-        declaration: &'static EstimatorDeclaration,
-        options: E::Options,
-        startup: &Startup,
-    ) -> Result<Self, StartError> {
-        let refused = |fault: Fault| StartError::component(declaration.path, fault);
-        options.validate().map_err(|message| refused(Fault::new(message)))?;
+    /// Makes the estimator; what keeps it from starting is in `startup`.
+    pub fn new(declaration: &'static EstimatorDeclaration, options: &E::Options, startup: &Startup) -> Self {
         let context = Context { robot: startup.robot(), declaration };
-        let estimator = caught(|| E::init(options, &context)).map_err(|failed| refused(failed.fault))?;
-        Ok(Self {
+        let estimator = startup.make(declaration.path, options, |options| E::init(options, &context));
+        Self {
             declaration,
             template: Stamp { frame: declaration.frame, origin: startup.origin(), ..Stamp::default() },
             clock: startup.clock().clone(),
@@ -63,11 +54,11 @@ impl<E: Estimator> Node<E> {
             stopped: Mutex::new(None),
             closing: AtomicBool::new(false),
             state: Mutex::new(State {
-                estimator: Some(estimator),
+                estimator,
                 cache: Default::default(),
                 admission: Admission::new(declaration.inputs.len()),
             }),
-        })
+        }
     }
 
     /// Says which declared input fills field `I`.

@@ -7,7 +7,6 @@ use crate::pubsub::{Overflow, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// The wiring with its estimators, and the sensors that feed it.
 type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
@@ -59,15 +58,13 @@ impl<R: Robot> Builder<R> {
         Ok(Simulation::new(machine, sources))
     }
 
-    fn assemble(mut self, startup: Startup) -> Result<Assembled<R>, StartError> {
-        let wiring = Arc::new(R::wire(self.topics, &mut self.options, &startup)?);
-        let machine = Machine { wiring, startup };
-        match R::sources(&machine.wiring, self.options, &machine.startup) {
-            Ok(sources) => Ok((machine, sources)),
-            Err(error) => {
-                machine.terminate(Instant::now());
-                Err(error)
-            }
+    /// Dropping what has started stops it in order.
+    fn assemble(self, startup: Startup) -> Result<Assembled<R>, StartError> {
+        let wiring = Arc::new(R::wire(self.topics, &self.options, &startup));
+        let sources = R::sources(&wiring, &self.options, &startup);
+        match startup.refusal() {
+            Some(error) => Err(error),
+            None => Ok((Machine { wiring, startup }, sources)),
         }
     }
 }

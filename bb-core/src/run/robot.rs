@@ -1,6 +1,6 @@
 //! What `robot!` implements.
 
-use super::{Builder, SensorDeclaration, Source, StartError, Startup};
+use super::{Builder, SensorDeclaration, Source, Startup};
 use crate::node::{AnyNode, EstimatorDeclaration};
 use crate::pubsub::AnyTopic;
 use crate::topology::{GraphFormat, Topology, graph};
@@ -32,20 +32,12 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn options() -> Self::Options;
     #[doc(hidden)]
     fn topics() -> Self::Topics;
-    /// Starts all estimators.
+    /// Starts all estimators; what cannot start is in `startup`.
     #[doc(hidden)]
-    fn wire(
-        topics: Self::Topics,
-        options: &mut Self::Options,
-        startup: &Startup,
-    ) -> Result<Self::Wiring, StartError>;
-    /// Starts all sensors.
+    fn wire(topics: Self::Topics, options: &Self::Options, startup: &Startup) -> Self::Wiring;
+    /// Starts all sensors; what cannot start is in `startup`.
     #[doc(hidden)]
-    fn sources(
-        wiring: &Arc<Self::Wiring>,
-        options: Self::Options,
-        startup: &Startup,
-    ) -> Result<Vec<Box<dyn Source>>, StartError>;
+    fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, startup: &Startup) -> Vec<Box<dyn Source>>;
     #[doc(hidden)]
     fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
     #[doc(hidden)]

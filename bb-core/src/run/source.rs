@@ -1,10 +1,11 @@
 //! A running sensor: when it is read, and what becomes of a reading.
 
-use super::{Failed, StartError, Startup, caught, retire};
-use crate::component::{Fault, Next, Options, Sensor, SensorContext};
+use super::{Failed, Robot, Startup, caught, retire};
+use crate::component::{Fault, Next, Sensor, SensorContext};
 use crate::message::{Frame, Stamp, Stamped};
 use crate::time::MonotonicTime;
 use crate::topology::Transform;
+use std::sync::Arc;
 
 /// A sensor as declared.
 #[derive(Clone, Copy, Debug)]
@@ -41,38 +42,47 @@ const FARTHEST_NANOS: i64 = 86_400_000_000_000;
 /// Readings at one instant of virtual time before the sensor is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-struct Running<S: Sensor, P> {
+struct Running<R: Robot, S: Sensor, P> {
     /// None once it has stopped.
     sensor: Option<S>,
     declaration: &'static SensorDeclaration,
     startup: Startup,
+    wiring: Arc<R::Wiring>,
     publish: P,
     due: Option<MonotonicTime>,
     at_one_instant: u32,
 }
 
 impl Startup {
-    /// Validates the options and opens the sensor; its readings go to `publish`.
+    /// Opens the sensor and adds it to `sources`; its readings go to `publish`.
     ///
-    /// # Errors
-    /// Names the sensor and what keeps it from starting.
-    pub fn source<S: Sensor>(
+    /// The wiring comes beside the function instead of in a closure: that it may go to another thread is known of every
+    /// robot, and need not be proven anew for each of its sensors.
+    pub fn source<R: Robot, S: Sensor>(
         &self,
         declaration: &'static SensorDeclaration,
-        options: S::Options,
-        publish: impl Fn(&Stamped<S::Output>) + Send + 'static,
-    ) -> Result<Box<dyn Source>, StartError> {
-        let refused = |fault: Fault| StartError::component(declaration.path, fault);
-        options.validate().map_err(|message| refused(Fault::new(message)))?;
+        options: &S::Options,
+        wiring: &Arc<R::Wiring>,
+        publish: impl Fn(&R::Wiring, &Stamped<S::Output>) + Send + 'static,
+        sources: &mut Vec<Box<dyn Source>>,
+    ) {
         let context =
             SensorContext { robot: self.robot(), declaration, clock: self.clock.clone(), stop: self.stop.clone() };
-        let sensor = caught(|| S::init(options, &context)).map_err(|failed| refused(failed.fault))?;
-        let startup = self.clone();
-        Ok(Box::new(Running { sensor: Some(sensor), declaration, startup, publish, due: None, at_one_instant: 0 }))
+        if let Some(sensor) = self.make(declaration.path, options, |options| S::init(options, &context)) {
+            sources.push(Box::new(Running::<R, S, _> {
+                sensor: Some(sensor),
+                declaration,
+                startup: self.clone(),
+                wiring: Arc::clone(wiring),
+                publish,
+                due: None,
+                at_one_instant: 0,
+            }));
+        }
     }
 }
 
-impl<S: Sensor, P: Fn(&Stamped<S::Output>) + Send> Running<S, P> {
+impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Running<R, S, P> {
     /// Reads the sensor once, publishes what it gave, and says when to read it next.
     fn read(&mut self, due: MonotonicTime) -> Result<Option<MonotonicTime>, Fault> {
         let Some(sensor) = &mut self.sensor else { return Ok(None) };
@@ -86,7 +96,7 @@ impl<S: Sensor, P: Fn(&Stamped<S::Output>) + Send> Running<S, P> {
                 frame: self.declaration.frame,
                 origin: self.startup.origin,
             };
-            (self.publish)(&stamp.message(payload));
+            (self.publish)(&self.wiring, &stamp.message(payload));
         }
         self.next_due(reading.next, due, now)
     }
@@ -141,7 +151,7 @@ fn next_on_grid(due: MonotonicTime, period: i64, now: MonotonicTime) -> Monotoni
     if next < now { next.plus_nanos(period) } else { next }
 }
 
-impl<S: Sensor, P: Fn(&Stamped<S::Output>) + Send> Source for Running<S, P> {
+impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Source for Running<R, S, P> {
     fn path(&self) -> &'static str {
         self.declaration.path
     }
@@ -178,7 +188,7 @@ impl<S: Sensor, P: Fn(&Stamped<S::Output>) + Send> Source for Running<S, P> {
     }
 }
 
-impl<S: Sensor, P> Drop for Running<S, P> {
+impl<R: Robot, S: Sensor, P> Drop for Running<R, S, P> {
     /// Of a robot that did not start.
     fn drop(&mut self) {
         if let Some(sensor) = self.sensor.take() {

@@ -1,6 +1,7 @@
 //! What is the same for all components of one start.
 
-use super::{ComponentFault, StopSignal};
+use super::{ComponentFault, StartError, StopSignal, caught};
+use crate::component::{Fault, Options};
 use crate::message::Origin;
 use crate::time::Clock;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,12 +13,41 @@ pub struct Startup {
     pub(super) origin: Origin,
     pub(super) stop: StopSignal,
     pub(super) faults: Faults,
+    /// The first component that could not start; those behind it are not started any more.
+    refusal: Arc<Mutex<Option<StartError>>>,
 }
 
 impl Startup {
     pub(super) fn new(clock: Clock, robot: &'static str) -> Self {
         let origin = Origin { robot, node: "local" };
-        Self { clock, origin, stop: StopSignal::default(), faults: Faults::default() }
+        Self { clock, origin, stop: StopSignal::default(), faults: Faults::default(), refusal: Arc::default() }
+    }
+
+    /// Makes a component with validated options, unless another one could not start; if it cannot start either, that is
+    /// kept.
+    pub(crate) fn make<O: Options, C>(
+        &self,
+        path: &'static str,
+        options: &O,
+        make: impl FnOnce(O) -> Result<C, Fault>,
+    ) -> Option<C> {
+        let mut refusal = self.refusal.lock().unwrap_or_else(PoisonError::into_inner);
+        if refusal.is_some() {
+            return None;
+        }
+        let valid = options.validate().map_err(Fault::new);
+        match valid.and_then(|()| caught(|| make(options.clone())).map_err(|failed| failed.fault)) {
+            Ok(component) => Some(component),
+            Err(fault) => {
+                *refusal = Some(StartError::component(path, fault));
+                None
+            }
+        }
+    }
+
+    /// What kept the robot from starting, if anything did.
+    pub(super) fn refusal(&self) -> Option<StartError> {
+        self.refusal.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     pub(crate) fn clock(&self) -> &Clock {

@@ -5,19 +5,31 @@ use super::{path_text, topology};
 use crate::model::{Mount, Robot, Sensor};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{format_ident, quote};
 
 /// `static __SENSORS`, `__ESTIMATORS` and `__TOPOLOGY`.
 pub(super) fn declarations(verified: &Verified<'_>) -> TokenStream {
     let robot = verified.robot;
-    let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor));
-    let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, id));
-    let (sensor_count, estimator_count) = (robot.sensors.len(), robot.estimators.len());
+    let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor)).collect();
+    let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, id)).collect();
+    let sensors = array("__SENSOR", quote!(::bb_core::__private::SensorDeclaration), sensors);
+    let estimators = array("__ESTIMATOR", quote!(::bb_core::__private::EstimatorDeclaration), estimators);
     let topology = topology::topology(robot);
     quote! {
-        static __SENSORS: [::bb_core::__private::SensorDeclaration; #sensor_count] = [#(#sensors),*];
-        static __ESTIMATORS: [::bb_core::__private::EstimatorDeclaration; #estimator_count] = [#(#estimators),*];
+        #sensors
+        #estimators
         static __TOPOLOGY: ::bb_core::__private::Topology = #topology;
+    }
+}
+
+/// `static __SENSORS: [SensorDeclaration; 2] = [__SENSOR0, __SENSOR1];`, each value in a constant of its own: the time
+/// that rustc takes for one grows with its square.
+fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> TokenStream {
+    let (array, count) = (format_ident!("{name}S"), values.len());
+    let names: Vec<_> = (0..count).map(|number| format_ident!("{name}{number}")).collect();
+    quote! {
+        #(const #names: #kind = #values;)*
+        static #array: [#kind; #count] = [#(#names),*];
     }
 }
 

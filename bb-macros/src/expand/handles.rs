@@ -4,13 +4,16 @@
 //! pub mod rover { pub mod sensor { pub mod base { pub const imu: SensorHandle<Rover, Bmi270> = …; } } }
 //! ```
 
+use super::group;
 use super::literal::ident;
+use super::options::{of_estimator, of_sensor};
 use super::types::Types;
+use super::wiring::topic;
 use super::{docs, path_text};
 use crate::model::{EstimatorId, PublisherId, Robot, SensorId};
 use crate::names::module_name;
 use proc_macro2::{Ident, TokenStream};
-use quote::{format_ident, quote};
+use quote::quote;
 
 /// How handles reach what they name.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -117,12 +120,13 @@ impl Handle {
                 };
                 let (component, frame) = (types.sensor(id), robot.frame_name(sensor.mount));
                 let path = robot.publishers.get(sensor.publisher).map(|publisher| path_text(&publisher.path));
-                let (topic, options) = (format_ident!("p{}", sensor.publisher), format_ident!("s{id}"));
+                let (publish, options) = (topic(sensor.publisher), of_sensor(id));
+                let topic = group::path(sensor.publisher, &publish);
                 let arguments = match accessors {
                     Accessors::Wired => quote!(
                         |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
                         |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options,
-                        |wiring: &<#this as ::bb_core::Robot>::Wiring, message| wiring.#topic(message)
+                        |wiring: &<#this as ::bb_core::Robot>::Wiring, message| wiring.#publish(message)
                     ),
                     Accessors::Stub => {
                         quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub(), |_, _| {})
@@ -138,7 +142,8 @@ impl Handle {
                 };
                 let (component, payload) = (types.estimator(id), types.payload(publisher));
                 let path = Some(path_text(&estimator.path));
-                let (topic, options) = (format_ident!("p{publisher}"), format_ident!("e{id}"));
+                let topic = group::path(publisher, &topic(publisher));
+                let options = of_estimator(robot, id);
                 let arguments = match accessors {
                     Accessors::Wired => {
                         quote!(|topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic, |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options)
@@ -155,7 +160,7 @@ impl Handle {
                     return TokenStream::new();
                 };
                 let (component, path) = (types.estimator(id), Some(path_text(&estimator.path)));
-                let options = format_ident!("e{id}");
+                let options = of_estimator(robot, id);
                 let arguments = match accessors {
                     Accessors::Wired => {
                         quote!(|options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options)
@@ -170,7 +175,7 @@ impl Handle {
                     return TokenStream::new();
                 };
                 let path = robot.publishers.get(publisher).map(|publisher| path_text(&publisher.path));
-                let (payload, topic) = (types.payload(publisher), format_ident!("p{publisher}"));
+                let (payload, topic) = (types.payload(publisher), group::path(publisher, &topic(publisher)));
                 let arguments = match accessors {
                     Accessors::Wired => quote!(|topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic),
                     Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),

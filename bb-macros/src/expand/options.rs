@@ -1,43 +1,54 @@
-//! `struct Options`: the options of every component, at first as declared.
+//! `struct __Options`: the options of every component, at first as declared.
 
+use super::group::{self, Field};
 use super::literal::respan;
 use super::types::{Types, estimator_alias, given, sensor_alias};
 use crate::derive::into_if_text;
 use crate::diagnostics::Place;
-use crate::model::Robot;
+use crate::model::{EstimatorId, Robot, SensorId};
 use crate::parse::{Component, OptionValue};
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-/// The struct, and `fn declared_options() -> Options`.
+/// The structs, and `fn __declared_options() -> __Options`.
 pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     let types = Types::new(robot, name, 0);
-    let (mut fields, mut functions, mut values) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+    let (mut fields, mut functions) = (Vec::new(), TokenStream::new());
     let sensors = robot.sensors.iter().enumerate().map(|(id, sensor)| {
         let given = given(&sensor_alias(name, id));
         let given = types.at_sensor(id, quote!(<#given as ::bb_core::Sensor>::Options));
-        (format_ident!("s{id}"), types.sensor_options(id), given, &sensor.component)
+        (sensor_field(id), types.sensor_options(id), given, &sensor.component)
     });
     let estimators = robot.estimators.iter().enumerate().map(|(id, estimator)| {
         let given = given(&estimator_alias(name, id));
         let given = types.at_estimator(id, quote!(<#given as ::bb_core::Estimator>::Options));
-        (format_ident!("e{id}"), types.estimator_options(id), given, &estimator.component)
+        (estimator_field(id), types.estimator_options(id), given, &estimator.component)
     });
     for (field, options, given, component) in sensors.chain(estimators) {
-        fields.extend(quote!(#field: #options,));
-        functions.extend(filled(&function(&field), &options, &given, component));
         let function = function(&field);
-        values.extend(quote!(#field: #function(),));
+        functions.extend(filled(&function, &options, &given, component));
+        fields.push(Field { name: field, kind: options, value: quote!(#function()) });
     }
-    quote! {
-        pub struct __Options { #fields }
+    let structs = group::structs("__Options", "__declared_options", &fields, &quote!(), &quote!());
+    quote!(#structs #functions)
+}
 
-        #functions
+/// Where the options of a sensor stand in `__Options`: sensors come first.
+pub(super) fn of_sensor(id: SensorId) -> TokenStream {
+    group::path(id, &sensor_field(id))
+}
 
-        fn __declared_options() -> __Options {
-            __Options { #values }
-        }
-    }
+/// Where the options of an estimator stand in `__Options`.
+pub(super) fn of_estimator(robot: &Robot, id: EstimatorId) -> TokenStream {
+    group::path(robot.sensors.len() + id, &estimator_field(id))
+}
+
+fn sensor_field(id: SensorId) -> Ident {
+    format_ident!("s{id}")
+}
+
+fn estimator_field(id: EstimatorId) -> Ident {
+    format_ident!("e{id}")
 }
 
 /// `fn e0() -> … { let mut options = defaults(); options.beta = 0.1; options }`

@@ -1,40 +1,82 @@
 //! `impl Robot`: how all is made, started and listed.
 
+use super::options::{of_estimator, of_sensor};
 use super::order;
 use super::types::Types;
-use super::wiring::{index_name, node};
+use super::wiring::{index_name, start_function, topic};
+use crate::model::SensorId;
 use crate::verify::Verified;
-use proc_macro2::TokenStream;
+use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
     let (robot, name) = (verified.robot, verified.name);
     let text = name.to_string();
     let types = Types::new(robot, name, 0);
-    let new_nodes = robot.estimators.iter().enumerate().map(|(id, estimator)| {
-        let (node, options, kind) = (node(id), format_ident!("e{id}"), types.estimator(id));
+    // A function for each component: one for all would have a way out behind every one of them, and the time to check it
+    // would grow with their square.
+    let starts = robot.estimators.iter().enumerate().map(|(id, estimator)| {
+        let (function, options, kind) = (start_function(id), of_estimator(robot, id), types.estimator(id));
         let inputs = if estimator.is_nested() { 1 } else { estimator.inputs.len() };
         let declared = (0..inputs).map(|input| {
             let index = index_name(id, Some(input));
             quote!(.declare::<{ #index }>(#input))
         });
         quote! {
-            #node: ::bb_core::__private::Node::<#kind>::new(&__ESTIMATORS[#id], ::core::clone::Clone::clone(&options.#options), startup)?
-                #(#declared)*,
+            fn #function(
+                options: &__Options,
+                startup: &::bb_core::__private::Startup,
+            ) -> ::bb_core::__private::Node<#kind> {
+                ::bb_core::__private::Node::<#kind>::new(&__ESTIMATORS[#id], &options.#options, startup)
+                    #(#declared)*
+            }
         }
     });
-    let sensors = order::sensors(verified).into_iter().filter_map(|id| Some((id, robot.sensors.get(id)?)));
-    let sources = sensors.map(|(id, sensor)| {
-        let (options, publish) = (format_ident!("s{id}"), format_ident!("p{}", sensor.publisher));
-        let kind = types.sensor(id);
-        quote! {{
-            let wiring = ::core::clone::Clone::clone(wiring);
-            startup.source::<#kind>(&__SENSORS[#id], options.#options, move |message| wiring.#publish(message))?
-        }}
+    let sources = robot.sensors.iter().enumerate().map(|(id, sensor)| {
+        let (function, options) = (source_function(id), of_sensor(id));
+        let (publish, kind) = (topic(sensor.publisher), types.sensor(id));
+        quote! {
+            fn #function(
+                wiring: &::bb_core::__private::Arc<__Wiring>,
+                options: &__Options,
+                startup: &::bb_core::__private::Startup,
+                sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
+            ) {
+                startup.source::<#name, #kind>(
+                    &__SENSORS[#id],
+                    &options.#options,
+                    wiring,
+                    |wiring: &__Wiring, message| wiring.#publish(message),
+                    sources,
+                );
+            }
+        }
     });
-    let topics = (0..robot.publishers.len()).map(|id| format_ident!("p{id}"));
-    let nodes = (0..robot.estimators.len()).map(node);
+    let functions: TokenStream = starts.chain(sources).collect();
+    // In groups, for the same reason.
+    let order: Vec<SensorId> = order::sensors(verified);
+    let groups = order.chunks(16).enumerate().map(|(number, sensors)| {
+        let (group, functions) =
+            (format_ident!("__open_group_{number}"), sensors.iter().map(|id| source_function(*id)));
+        quote! {
+            fn #group(
+                wiring: &::bb_core::__private::Arc<__Wiring>,
+                options: &__Options,
+                startup: &::bb_core::__private::Startup,
+                sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
+            ) {
+                #(#functions(wiring, options, startup, sources);)*
+            }
+        }
+    });
+    let functions: TokenStream = functions.into_iter().chain(groups.flatten()).collect();
+    let open_sources = (0..order.len().div_ceil(16)).map(|number| {
+        let group = format_ident!("__open_group_{number}");
+        quote!(#group(wiring, options, startup, &mut sources);)
+    });
     quote! {
+        #functions
+
         impl ::bb_core::Robot for #name {
             const NAME: &'static str = #text;
             const TOPOLOGY: &'static ::bb_core::__private::Topology = &__TOPOLOGY;
@@ -53,23 +95,18 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                 __new_topics()
             }
 
-            fn wire(
-                topics: __Topics,
-                options: &mut __Options,
-                startup: &::bb_core::__private::Startup,
-            ) -> ::core::result::Result<__Wiring, ::bb_core::__private::StartError> {
-                ::core::result::Result::Ok(__Wiring { topics, #(#new_nodes)* })
+            fn wire(topics: __Topics, options: &__Options, startup: &::bb_core::__private::Startup) -> __Wiring {
+                __Wiring { topics, nodes: __new_nodes(options, startup) }
             }
 
             fn sources(
                 wiring: &::bb_core::__private::Arc<__Wiring>,
-                options: __Options,
+                options: &__Options,
                 startup: &::bb_core::__private::Startup,
-            ) -> ::core::result::Result<
-                ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
-                ::bb_core::__private::StartError,
-            > {
-                ::core::result::Result::Ok(::std::vec![#(#sources),*])
+            ) -> ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>> {
+                let mut sources = ::std::vec::Vec::new();
+                #(#open_sources)*
+                sources
             }
 
             fn wired_topics(wiring: &__Wiring) -> &__Topics {
@@ -77,12 +114,17 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             }
 
             fn all_topics(topics: &__Topics) -> ::std::vec::Vec<&dyn ::bb_core::__private::AnyTopic> {
-                ::std::vec![#(&topics.#topics),*]
+                __list_topics(topics)
             }
 
             fn all_nodes(wiring: &__Wiring) -> ::std::vec::Vec<&dyn ::bb_core::__private::AnyNode> {
-                ::std::vec![#(&wiring.#nodes),*]
+                __list_nodes(&wiring.nodes)
             }
         }
     }
+}
+
+/// Opens one sensor.
+fn source_function(id: SensorId) -> Ident {
+    format_ident!("__open_{id}")
 }

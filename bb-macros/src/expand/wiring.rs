@@ -2,14 +2,15 @@
 //!
 //! ```text
 //! fn p0(&self, message: &Stamped<Imu>) {                       // sensor::base::imu
-//!     self.topics.p0.publish(message);
-//!     self.n0.receive::<…>(0, feed(message), |emitted, stamp| self.e0(emitted, stamp));
+//!     self.topics.g0.p0.publish(message);
+//!     self.nodes.g0.n0.receive::<…>(0, feed(message), |emitted, stamp| self.e0(emitted, stamp));
 //! }
 //! fn e0(&self, emitted: &mut Option<Orientation>, stamp: Stamp) {
 //!     if let Some(payload) = take(emitted) { self.p1(&stamp.message(payload)); }
 //! }
 //! ```
 
+use super::group::{self, Field};
 use super::literal::respan;
 use super::types::Types;
 use super::{order, path_text};
@@ -22,17 +23,25 @@ pub(super) fn wiring(verified: &Verified<'_>) -> TokenStream {
     let robot = verified.robot;
     let types = Types::new(robot, verified.name, 0);
     let consumers = consumers(verified);
-    let (mut topics, mut new_topics, mut nodes) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
     let (mut indices, mut functions) = (TokenStream::new(), TokenStream::new());
+    let mut topics = Vec::new();
     for (id, publisher) in robot.publishers.iter().enumerate() {
-        let (field, payload, path) = (format_ident!("p{id}"), types.payload(id), path_text(&publisher.path));
-        topics.extend(quote!(#field: ::bb_core::__private::Topic<#payload>,));
-        new_topics.extend(quote!(#field: ::bb_core::__private::Topic::new(#path),));
+        let (payload, path) = (types.payload(id), path_text(&publisher.path));
+        topics.push(Field {
+            name: topic(id),
+            kind: quote!(::bb_core::__private::Topic<#payload>),
+            value: quote!(::bb_core::__private::Topic::new(#path)),
+        });
         functions.extend(published(&types, id, consumers.get(id).map_or(&[], Vec::as_slice)));
     }
+    let mut nodes = Vec::new();
     for (id, estimator) in robot.estimators.iter().enumerate() {
-        let (node, kind) = (node(id), types.estimator(id));
-        nodes.extend(quote!(#node: ::bb_core::__private::Node<#kind>,));
+        let (kind, start) = (types.estimator(id), start_function(id));
+        nodes.push(Field {
+            name: node(id),
+            kind: quote!(::bb_core::__private::Node<#kind>),
+            value: quote!(#start(options, startup)),
+        });
         let inputs: Vec<Option<usize>> =
             if estimator.is_nested() { vec![None] } else { (0..estimator.inputs.len()).map(Some).collect() };
         for input in inputs {
@@ -41,14 +50,19 @@ pub(super) fn wiring(verified: &Verified<'_>) -> TokenStream {
         }
         functions.extend(emitted(&types, id, &estimator.publishers, robot.publishers.as_slice()));
     }
+    let topic_structs = group::structs("__Topics", "__new_topics", &topics, &quote!(), &quote!());
+    let parameters = quote!(options: &__Options, startup: &::bb_core::__private::Startup);
+    let node_structs = group::structs("__Nodes", "__new_nodes", &nodes, &parameters, &quote!(options, startup));
+    let list_topics =
+        group::list("__Topics", "__list_topics", &topics, &quote!(dyn ::bb_core::__private::AnyTopic));
+    let list_nodes = group::list("__Nodes", "__list_nodes", &nodes, &quote!(dyn ::bb_core::__private::AnyNode));
     quote! {
-        pub struct __Topics { #topics }
-        pub struct __Wiring { topics: __Topics, #nodes }
+        pub struct __Wiring { topics: __Topics, nodes: __Nodes }
+        #topic_structs
+        #node_structs
+        #list_topics
+        #list_nodes
         #indices
-
-        fn __new_topics() -> __Topics {
-            __Topics { #new_topics }
-        }
 
         impl __Wiring { #functions }
     }
@@ -98,21 +112,21 @@ fn consumers(verified: &Verified<'_>) -> Vec<Vec<Consumer>> {
 
 /// `fn p0`: publishes, then runs what lies downstream.
 fn published(types: &Types<'_>, id: PublisherId, consumers: &[Consumer]) -> TokenStream {
-    let (name, payload) = (format_ident!("p{id}"), types.payload(id));
+    let (name, payload, topic) = (topic(id), types.payload(id), group::path(id, &topic(id)));
     let calls = consumers.iter().map(|Consumer { estimator, input, span }| {
-        let (node, emit) = (node(*estimator), format_ident!("e{estimator}"));
+        let (node, emit) = (group::path(*estimator, &node(*estimator)), format_ident!("e{estimator}"));
         let (index, number) = (index_name(*estimator, *input), input.unwrap_or(0));
         let taken = types.estimator_input(*estimator);
         let taken = quote!(<#taken as ::bb_core::__private::InputAt<{ #index }>>::Payload);
         let known = quote!({ ::bb_core::__private::both_known::<#payload, #taken>() });
         let feed = quote!(<#payload as ::bb_core::__private::Feeds<#taken, #known>>::feed(message));
         let feed = respan(feed, *span);
-        quote!(self.#node.receive::<{ #index }>(#number, #feed, |emitted, stamp| self.#emit(emitted, stamp));)
+        quote!(self.nodes.#node.receive::<{ #index }>(#number, #feed, |emitted, stamp| self.#emit(emitted, stamp));)
     });
     quote! {
         #[inline]
         fn #name(&self, message: &::bb_core::__private::Stamped<#payload>) {
-            self.topics.#name.publish(message);
+            self.topics.#topic.publish(message);
             #(#calls)*
         }
     }
@@ -144,6 +158,16 @@ fn emitted(
             #(#outputs)*
         }
     }
+}
+
+/// The topic of a publisher, and the function that publishes there.
+pub(super) fn topic(id: PublisherId) -> Ident {
+    format_ident!("p{id}")
+}
+
+/// The function that starts an estimator.
+pub(super) fn start_function(id: EstimatorId) -> Ident {
+    format_ident!("__start_{id}")
 }
 
 pub(super) fn node(id: EstimatorId) -> Ident {
