@@ -9,6 +9,8 @@ mod elements;
 mod graft;
 #[cfg(feature = "urdf")]
 mod read;
+#[cfg(all(test, feature = "urdf"))]
+mod tests;
 
 use crate::diagnostics::Diagnostics;
 use crate::parse::Robot;

@@ -5,7 +5,7 @@ use super::{diagnostics, tokens};
 use crate::pipeline;
 use proc_macro2::{Delimiter, Group, Span, TokenStream, TokenTree};
 
-const ROUNDS: u64 = 2000;
+const ROUNDS: u64 = 5_000;
 
 /// Tokens that are put where they do not belong.
 const STRAY: &str = r#"
