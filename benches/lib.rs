@@ -1,0 +1,1 @@
+//! Benchmarks; each is a bench target of this crate.
