@@ -5,8 +5,8 @@
 //!
 //! | declared as | takes | emits |
 //! |---|---|---|
-//! | `Madgwick(beta = 0.1)`, `Complementary(…)` in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
-//! | `Madgwick<Marg>(…)`, `Complementary<Marg>(…)` in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
+//! | `Mekf(…)`, `Madgwick(beta = 0.1)`, `Complementary(…)` in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
+//! | `Mekf<Marg>(…)`, `Madgwick<Marg>(…)`, `Complementary<Marg>(…)` in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
 //! | `Madgwick<ImuAndMagnetometer>(…)` on a link | `input imu`, driver, and `input magnetic_field`, of two sensors | `Orientation` of the link |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
@@ -26,6 +26,11 @@ pub use simulation::SimulatedImu;
 /// Madgwick's filter as an estimator: of six axes, `Madgwick<Marg>` and `Madgwick<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]
 pub type Madgwick<I = bb_core::payload::Imu> = Attitude<attitude::MadgwickFilter, I>;
+
+/// The self-calibrating Kalman filter as an estimator, the most accurate of all here: of six axes, `Mekf<Marg>` and
+/// `Mekf<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Mekf<I = bb_core::payload::Imu> = Attitude<attitude::MekfFilter, I>;
 
 /// The complementary filter as an estimator: of six axes, `Complementary<Marg>` and
 /// `Complementary<ImuAndMagnetometer>` of nine.

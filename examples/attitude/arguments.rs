@@ -40,7 +40,9 @@ impl Arguments {
         let mut params =
             ChosenParams { kind: self.filter, magnetometer: self.axes == "9", ..ChosenParams::default() };
         match (self.beta, self.filter) {
-            (Some(_), Kind::Complementary) => Err("--beta belongs to --filter madgwick; leave it out".into()),
+            (Some(_), Kind::Complementary | Kind::Mekf) => {
+                Err("--beta belongs to --filter madgwick; leave it out".into())
+            }
             (Some(beta), _) if !(0.0..=1e3).contains(&beta) => {
                 Err(format!("--beta is {beta}, but must be in 0..=1000 rad/s"))
             }

@@ -4,7 +4,7 @@ use bb_core::nalgebra::UnitQuaternion;
 use bb_core::prelude::*;
 use bb_estimators::attitude::{
     Attitude, AttitudeFilter, ComplementaryFilter, ComplementaryParams, ImuSample, MadgwickFilter, MadgwickParams,
-    ParamsError, SampleError,
+    MekfFilter, MekfParams, ParamsError, SampleError,
 };
 use clap::ValueEnum;
 
@@ -15,6 +15,7 @@ pub(crate) type Chosen = Attitude<ChosenFilter, Marg>;
 pub(crate) enum Kind {
     Madgwick,
     Complementary,
+    Mekf,
 }
 
 impl Kind {
@@ -22,6 +23,7 @@ impl Kind {
         match self {
             Self::Madgwick => "madgwick",
             Self::Complementary => "complementary",
+            Self::Mekf => "mekf",
         }
     }
 }
@@ -48,6 +50,7 @@ impl Default for ChosenParams {
 pub(crate) enum Running {
     Madgwick(MadgwickFilter),
     Complementary(ComplementaryFilter),
+    Mekf(Box<MekfFilter>),
 }
 
 /// One of the filters, and what it was made with.
@@ -68,6 +71,10 @@ impl AttitudeFilter for ChosenFilter {
                 let params = ComplementaryParams { magnetometer, ..ComplementaryParams::default() };
                 Running::Complementary(ComplementaryFilter::new(params)?)
             }
+            Kind::Mekf => {
+                let params = MekfParams { magnetometer, ..MekfParams::default() };
+                Running::Mekf(Box::new(MekfFilter::new(params)?))
+            }
         };
         Ok(Self { params, running })
     }
@@ -80,6 +87,7 @@ impl AttitudeFilter for ChosenFilter {
         match &mut self.running {
             Running::Madgwick(filter) => filter.update(sample),
             Running::Complementary(filter) => filter.update(sample),
+            Running::Mekf(filter) => filter.update(sample),
         }
     }
 
@@ -87,6 +95,7 @@ impl AttitudeFilter for ChosenFilter {
         match &mut self.running {
             Running::Madgwick(filter) => filter.start_at(time_ns, world_from_body),
             Running::Complementary(filter) => filter.start_at(time_ns, world_from_body),
+            Running::Mekf(filter) => filter.start_at(time_ns, world_from_body),
         }
     }
 
@@ -94,6 +103,7 @@ impl AttitudeFilter for ChosenFilter {
         match &self.running {
             Running::Madgwick(filter) => filter.world_from_body(),
             Running::Complementary(filter) => filter.world_from_body(),
+            Running::Mekf(filter) => filter.world_from_body(),
         }
     }
 
@@ -101,6 +111,7 @@ impl AttitudeFilter for ChosenFilter {
         match &mut self.running {
             Running::Madgwick(filter) => filter.reset(),
             Running::Complementary(filter) => filter.reset(),
+            Running::Mekf(filter) => filter.reset(),
         }
     }
 }

@@ -4,12 +4,12 @@ use crate::recordings::broad;
 use bb_bags::{BagImu, Truth};
 use bb_core::prelude::*;
 use bb_estimators::attitude::{ErrorStatistics, OrientationError};
-use bb_estimators::{Complementary, Madgwick};
+use bb_estimators::{Complementary, Madgwick, Mekf};
 use std::error::Error;
 use std::path::Path;
 
 robot! {
-    /// Both filters on one recorded IMU, each with nine axes and with six.
+    /// All filters on one recorded IMU, each with nine axes and with six.
     robot Recorded;
 
     link body {
@@ -18,12 +18,14 @@ robot! {
             estimator madgwick_six: Madgwick<Marg>(beta = 0.03, magnetometer = false);
             estimator complementary: Complementary<Marg>();
             estimator complementary_six: Complementary<Marg>(magnetometer = false);
+            estimator mekf: Mekf<Marg>();
+            estimator mekf_six: Mekf<Marg>(magnetometer = false);
         }
     }
 }
 
-/// Total, heading and inclination in degrees of each of the four.
-type Errors = [[f64; 3]; 4];
+/// Total, heading and inclination in degrees of each.
+type Errors = [[f64; 3]; 6];
 
 fn errors(file: &Path) -> Result<Errors, Box<dyn Error>> {
     let truth = Truth::read(&bb_bags::Bag::open(file)?)?;
@@ -34,6 +36,8 @@ fn errors(file: &Path) -> Result<Errors, Box<dyn Error>> {
         builder.subscribe(recorded::sensor::body::imu::madgwick_six),
         builder.subscribe(recorded::sensor::body::imu::complementary),
         builder.subscribe(recorded::sensor::body::imu::complementary_six),
+        builder.subscribe(recorded::sensor::body::imu::mekf),
+        builder.subscribe(recorded::sensor::body::imu::mekf_six),
     ]
     .map(|orientation| (orientation, ErrorStatistics::new()));
     let mut simulation = builder.simulate()?;
@@ -53,8 +57,8 @@ fn errors(file: &Path) -> Result<Errors, Box<dyn Error>> {
         let rms = statistics.rms().ok_or("no sample moves and has truth")?;
         Ok([rms.total, rms.heading, rms.inclination].map(f64::to_degrees))
     };
-    let [a, b, c, d] = filters.map(|(_, statistics)| rms(statistics));
-    let all: Result<Errors, &str> = (|| Ok([a?, b?, c?, d?]))();
+    let [a, b, c, d, e, f] = filters.map(|(_, statistics)| rms(statistics));
+    let all: Result<Errors, &str> = (|| Ok([a?, b?, c?, d?, e?, f?]))();
     Ok(all?)
 }
 
@@ -79,6 +83,8 @@ fn mean_errors_on_broad() -> Result<(), Box<dyn Error>> {
         ("Madgwick, six axes", sums[1], [f64::INFINITY, f64::INFINITY, 1.996]),
         ("complementary, nine axes", sums[2], [3.701, 3.095, 1.801]),
         ("complementary, six axes", sums[3], [f64::INFINITY, f64::INFINITY, 1.801]),
+        ("Kalman filter, nine axes", sums[4], [1.171, 0.968, 0.620]),
+        ("Kalman filter, six axes", sums[5], [f64::INFINITY, f64::INFINITY, 0.621]),
     ];
     for (name, measured, known) in known {
         println!("{name}: total {:.3}, heading {:.3}, inclination {:.3}", measured[0], measured[1], measured[2]);

@@ -3,7 +3,7 @@
 use super::window::Window;
 
 /// How many numbers the filter estimates.
-pub(super) const STATES: usize = 18;
+pub(super) const STATES: usize = 19;
 /// Rotation error, world axes, rad: `R_true = exp(θ) R`.
 pub(super) const ROTATION: usize = 0;
 /// Error of the gyroscope's bias, body axes, rad/s.
@@ -14,6 +14,9 @@ pub(super) const CALIBRATION: usize = 6;
 pub(super) const VELOCITY: usize = 15;
 /// How much the magnetometer lags the gyroscope, s: the whole of it, not an error.
 pub(super) const LATENCY: usize = 17;
+
+/// How much the accelerometer lags the gyroscope, s: the whole of it, not an error.
+pub(super) const FORCE_LATENCY: usize = 18;
 
 /// Bias and calibration, which the rotation error integrates.
 const GYROSCOPE: usize = CALIBRATION + 9 - BIAS;
@@ -76,13 +79,17 @@ impl Errors {
     /// With F the integral of the specific force in the world frame, R that of the rotation and W that of
     /// rotation times angular velocity, all of them of the window:
     ///
-    /// * velocity: `δv ← δv + θ × F`, horizontally,
+    /// * velocity: `v ← v + F + θ × F - τ F'`, horizontally, with F' the integral of rotation times ω × f,
     /// * rotation: `θ ← θ - R δb - W δE`.
     pub(super) fn propagate(&mut self, window: &Window, noise: &ProcessNoise) {
         let force = &window.force;
         let turned = [[0.0, force.z, -force.y], [-force.z, 0.0, force.x]];
+        let lagged = [[-window.force_rate.x], [-window.force_rate.y]];
         let integrated = window.gyroscope_integrals();
         self.mix::<2, 3>(VELOCITY, ROTATION, &turned);
+        self.mix::<2, 1>(VELOCITY, FORCE_LATENCY, &lagged);
+        self.mean[VELOCITY] += force.x;
+        self.mean[VELOCITY + 1] += force.y;
         self.mix::<3, GYROSCOPE>(ROTATION, BIAS, &integrated);
         for i in 0..3 {
             self.covariance[ROTATION + i][ROTATION + i] += noise.rotation;

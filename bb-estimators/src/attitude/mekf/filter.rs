@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::GRAVITY;
-use super::errors::{BIAS, CALIBRATION, Errors, LATENCY, ProcessNoise, ROTATION, VELOCITY};
+use super::errors::{BIAS, CALIBRATION, Errors, FORCE_LATENCY, LATENCY, ProcessNoise, ROTATION, VELOCITY};
 use super::field::{FieldReference, Verdict};
 use super::measurement::{Heading, Measurements};
 use super::params::MekfParams;
@@ -14,26 +14,33 @@ use crate::attitude::rotation::{turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
 
-/// Standard deviation of the tilt that one accelerometer sample shows, and of an orientation that was given, rad.
-const INITIAL_TILT: f64 = 0.087;
+/// Standard deviation of the tilt that one accelerometer sample shows in motion, rad. At rest it is forgotten
+/// within a second.
+const INITIAL_TILT: f64 = 0.35;
+
+/// Standard deviation of an orientation that was given, about every axis, rad.
+const GIVEN: f64 = 0.087;
+
+/// Standard deviation of the velocity at the start, m/s: a hand, a pedestrian.
+const INITIAL_VELOCITY: f64 = 1.0;
 
 /// Standard deviation of the heading that one magnetic sample shows indoors, rad.
-const INITIAL_HEADING: f64 = 0.52;
+const INITIAL_HEADING: f64 = 1.0;
 
 /// How long a velocity lasts, s: the pseudo-measurement of zero has errors correlated over twice this time.
 const VELOCITY_TIME_S: f64 = 0.5;
 
 /// Time constant of the mean square acceleration, s.
-const ACCELERATION_TIME_CONSTANT_S: f64 = 1.0;
+const ACCELERATION_TIME_CONSTANT_S: f64 = 2.0;
 
 /// Velocity at rest, in a mean over a second, m/s: the table trembles.
 const REST_VELOCITY: f64 = 0.05;
 
 /// Noise of the accelerometer, of its scale and of the lever arm's rotation, m/s/√s.
-const ACCELEROMETER_NOISE: f64 = 0.05;
+const ACCELEROMETER_NOISE: f64 = 0.02;
 
-/// What the gyroscope's mean over a second at rest may differ from its bias by, rad/s: 0.1°/s.
-const REST_BIAS: f64 = 1.7e-3;
+/// What the gyroscope's mean over a second at rest may differ from its bias by, rad/s: 0.07°/s.
+const REST_BIAS: f64 = 1.2e-3;
 
 /// A bias at rest this many standard deviations off has stepped.
 const BIAS_STEP: f64 = 4.0;
@@ -44,8 +51,10 @@ const MAX_REST_BIAS: f64 = 0.035;
 /// How long a disturbance of the field lasts for a body that moves, s.
 const FIELD_TIME_S: f64 = 0.5;
 
-/// Time constant of the mean specific force in the world, s, and its greatest slope: beyond it the tilt is wrong.
-const FORCE_TIME_CONSTANT_S: f64 = 2.0;
+/// The specific force in the world is the vertical in the mean over this time, s.
+const FORCE_MEAN_S: f64 = 2.0;
+
+/// The slope of that mean beyond which the tilt is wrong: 30°, more than any motion of that time accelerates by.
 const MAX_FORCE_SLOPE: f64 = 0.577;
 
 /// A heading this far from an undisturbed field contradicts it, rad and standard deviations.
@@ -71,7 +80,9 @@ pub struct MekfFilter {
     field: Option<FieldReference>,
     last_field: Vector3<f64>,
     squared_acceleration: f64,
+    /// ∫ R f dt, m/s, since the mean began, and how long ago that is.
     mean_force: Vector3<f64>,
+    mean_force_s: f64,
 }
 
 impl AttitudeFilter for MekfFilter {
@@ -93,7 +104,8 @@ impl AttitudeFilter for MekfFilter {
             field: None,
             last_field: Vector3::zeros(),
             squared_acceleration: 0.0,
-            mean_force: Vector3::new(0.0, 0.0, GRAVITY),
+            mean_force: Vector3::zeros(),
+            mean_force_s: 0.0,
         };
         filter.forget_sensors();
         Ok(filter)
@@ -116,7 +128,9 @@ impl AttitudeFilter for MekfFilter {
         self.rest.add(step.dt_s, measured, &sample.specific_force, &self.bias, bias_deviation);
         let before = core::mem::replace(&mut self.rotation, *orientation.to_rotation_matrix().matrix());
         let middle = (before + self.rotation) * 0.5;
-        self.window.add(step.dt_s, &middle, measured, &sample.specific_force);
+        self.window.add_rate(step.dt_s, &middle, measured);
+        let rotation = if self.params.force_is_mean { &middle } else { &self.rotation };
+        self.window.add_force(step.dt_s, rotation, &rate, &sample.specific_force);
         if step.field.is_some()
             && let Some(field) = sample.magnetic_field
             && (field != self.last_field || self.rest.is_detected())
@@ -136,7 +150,7 @@ impl AttitudeFilter for MekfFilter {
             && let Some(error) = heading_error(&(orientation * direction))
         {
             orientation = turn_heading(&orientation, error);
-            self.begin(&orientation, INITIAL_HEADING);
+            self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
             self.heading_known = true;
         }
         self.state.store(orientation, step.field);
@@ -147,7 +161,7 @@ impl AttitudeFilter for MekfFilter {
         self.state.start_at(time_ns, world_from_body)?;
         self.heading_known = true;
         if let Some(orientation) = self.state.world_from_body() {
-            self.begin(&orientation, INITIAL_TILT);
+            self.begin(&orientation, GIVEN, GIVEN);
         }
         Ok(())
     }
@@ -187,25 +201,27 @@ impl MekfFilter {
             return;
         };
         let direction = sample.magnetic_field.filter(|_| self.params.magnetometer).map(|field| field.normalize());
-        self.heading_known =
-            direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
+        self.heading_known = direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
         self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
-        self.begin(&orientation, INITIAL_HEADING);
+        self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
     }
 
     /// Starts the orientation's errors anew; what is known of the sensors stays.
-    fn begin(&mut self, orientation: &UnitQuaternion<f64>, heading_deviation: f64) {
+    fn begin(&mut self, orientation: &UnitQuaternion<f64>, tilt_deviation: f64, heading_deviation: f64) {
         // Without a magnetometer there is no heading to be wrong.
         let heading_deviation = if self.params.magnetometer { heading_deviation } else { 0.0 };
-        self.errors.mean[..CALIBRATION + 9].fill(0.0);
+        // All of a window or nothing: one horizontal axis alone would depend on where north is.
+        while self.measurements.take(&mut self.errors) {}
+        self.correct();
         self.errors.mean[VELOCITY..VELOCITY + 2].fill(0.0);
-        self.errors.forget::<2>(ROTATION, INITIAL_TILT * INITIAL_TILT);
+        self.errors.forget::<2>(ROTATION, tilt_deviation * tilt_deviation);
         self.errors.forget::<1>(ROTATION + 2, heading_deviation * heading_deviation);
-        self.errors.forget::<2>(VELOCITY, self.params.velocity * self.params.velocity);
+        self.errors.forget::<2>(VELOCITY, INITIAL_VELOCITY * INITIAL_VELOCITY);
         self.rotation = *orientation.to_rotation_matrix().matrix();
         self.window = Window::new();
         self.measurements = Measurements::none();
-        self.mean_force = Vector3::new(0.0, 0.0, GRAVITY);
+        self.mean_force = Vector3::zeros();
+        self.mean_force_s = 0.0;
     }
 
     /// Doubts what is known of the sensors as at the start.
@@ -215,6 +231,8 @@ impl MekfFilter {
         self.errors.forget::<3>(BIAS, params.initial_bias * params.initial_bias);
         self.errors.forget::<9>(CALIBRATION, params.calibration_error * params.calibration_error);
         self.errors.forget::<1>(LATENCY, latency * latency);
+        let latency = params.accelerometer_latency;
+        self.errors.forget::<1>(FORCE_LATENCY, latency * latency);
     }
 
     /// Ends a window: takes the errors to now, corrects by them, and looks at what the window says.
@@ -232,8 +250,6 @@ impl MekfFilter {
                 velocity: ACCELEROMETER_NOISE * ACCELEROMETER_NOISE * dt,
             },
         );
-        self.errors.mean[VELOCITY] += window.force.x;
-        self.errors.mean[VELOCITY + 1] += window.force.y;
         if !self.errors.are_sane() {
             return self.recover(orientation);
         }
@@ -242,11 +258,14 @@ impl MekfFilter {
         let orientation = correction * orientation;
         self.rotation = *orientation.to_rotation_matrix().matrix();
         let force = correction * window.force;
-        let gain = (dt / FORCE_TIME_CONSTANT_S).min(1.0);
-        self.mean_force += (force * (1.0 / dt) - self.mean_force) * gain;
-        let slope = self.mean_force.x.hypot(self.mean_force.y);
-        if slope > MAX_FORCE_SLOPE * self.mean_force.z {
-            return self.level(orientation);
+        self.mean_force = correction * self.mean_force + force;
+        self.mean_force_s += dt;
+        if self.mean_force_s > FORCE_MEAN_S {
+            let sum = core::mem::replace(&mut self.mean_force, Vector3::zeros());
+            self.mean_force_s = 0.0;
+            if sum.x.hypot(sum.y) > MAX_FORCE_SLOPE * sum.z && sum.norm() > 0.5 * GRAVITY * FORCE_MEAN_S {
+                return self.level(orientation, &sum);
+            }
         }
         self.measure(&window, &correction, &force);
         orientation
@@ -331,9 +350,9 @@ impl MekfFilter {
 
     /// The tilt contradicts the mean specific force: starts it anew, and the heading with the next field.
     #[cold]
-    fn level(&mut self, orientation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-        let orientation = turn_upright(&orientation, &self.mean_force);
-        self.begin(&orientation, INITIAL_HEADING);
+    fn level(&mut self, orientation: UnitQuaternion<f64>, up: &Vector3<f64>) -> UnitQuaternion<f64> {
+        let orientation = turn_upright(&orientation, up);
+        self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
         self.forget_sensors();
         self.heading_known = !self.params.magnetometer;
         self.field = None;
@@ -346,7 +365,7 @@ impl MekfFilter {
         let (state, heading_known) = (self.state.clone(), self.heading_known);
         self.reset();
         (self.state, self.heading_known) = (state, heading_known);
-        self.begin(&orientation, INITIAL_HEADING);
+        self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
         orientation
     }
 }

@@ -38,11 +38,7 @@ impl Measurements {
     }
 
     /// The velocity is zero up to `velocity_variance`, and more if there is more.
-    pub(super) fn new(
-        velocity_variance: f64,
-        heading: Option<Heading>,
-        bias: Option<(Vector3<f64>, f64)>,
-    ) -> Self {
+    pub(super) fn new(velocity_variance: f64, heading: Option<Heading>, bias: Option<(Vector3<f64>, f64)>) -> Self {
         Self { next: 0, velocity_variance, heading, bias }
     }
 
@@ -53,7 +49,8 @@ impl Measurements {
             0 | 1 => errors.update([(VELOCITY + taken as usize, 1.0)], 0.0, self.velocity_variance),
             2 => {
                 if let Some(heading) = self.heading {
-                    let observation = [(ROTATION + 1, -heading.slope), (ROTATION + 2, 1.0), (LATENCY, heading.rate)];
+                    let observation =
+                        [(ROTATION + 1, -heading.slope), (ROTATION + 2, 1.0), (LATENCY, heading.rate)];
                     errors.update(observation, heading.angle, heading.variance);
                 }
             }

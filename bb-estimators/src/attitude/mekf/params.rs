@@ -20,15 +20,15 @@ pub struct MekfParams {
     /// Small: trusts the calibration that it finds, which then has to be constant. Large: fast rotation is
     /// forgotten like noise. From 0 to 1.
     ///
-    /// Unit: √s (rad/√s per rad/s). Default: 5e-4. Source: 0.05 % over half a second, as data sheets give the
-    /// nonlinearity.
+    /// Unit: √s (rad/√s per rad/s). Default: 9e-4. Source: data sheets give a nonlinearity of 0.1 %, here of
+    /// motion that changes about once a second.
     #[cfg_attr(feature = "runtime", option(default = Self::default().gyroscope_rate_noise, range = 0.0..=1.0))]
     pub gyroscope_rate_noise: f64,
     /// Standard deviation of the gyroscope's bias at the start.
     ///
     /// Small: a larger bias is found late. Large: an acceleration at the start is taken for one. From 0 to 1.
     ///
-    /// Unit: rad/s. Default: 0.0087, 0.5°/s. Source: VQF's `biasSigmaInit`.
+    /// Unit: rad/s. Default: 0.0175, 1°/s. Source: data sheets; VQF's `biasSigmaInit` is 0.5°/s.
     #[cfg_attr(feature = "runtime", option(default = Self::default().initial_bias, range = 0.0..=1.0, unit = "rad/s"))]
     pub initial_bias: f64,
     /// How fast the bias wanders: its standard deviation after a second.
@@ -44,7 +44,7 @@ pub struct MekfParams {
     /// 0: takes the gyroscope as calibrated, and its scale error tilts fast rotation. Large: accelerations are
     /// taken for scale errors. From 0 to 0.5.
     ///
-    /// Unit: none. Default: 0.005. Source: factory calibration of MEMS gyroscopes, 0.1–1 %.
+    /// Unit: none. Default: 0.004. Source: factory calibration of MEMS gyroscopes, 0.1–1 %.
     #[cfg_attr(feature = "runtime", option(default = Self::default().calibration_error, range = 0.0..=0.5))]
     pub calibration_error: f64,
     /// The velocity of slow motion, horizontally. It stays bounded, so accelerations have no mean.
@@ -64,6 +64,23 @@ pub struct MekfParams {
     /// Unit: s. Default: 0.1. Source: motion by hand at 1 to 2 Hz.
     #[cfg_attr(feature = "runtime", option(default = Self::default().acceleration_time, range = 0.0..=100.0, unit = "s"))]
     pub acceleration_time: f64,
+    /// How much the accelerometer may lag the gyroscope, standard deviation. The lag is estimated; it may be
+    /// negative.
+    ///
+    /// 0: takes them as simultaneous. Large: accelerations are taken for a lag. From 0 to 1.
+    ///
+    /// Unit: s. Default: 0.001. Source: the two low-pass filters of one chip differ by a millisecond or two.
+    #[cfg_attr(feature = "runtime", option(default = Self::default().accelerometer_latency, range = 0.0..=1.0, unit = "s"))]
+    pub accelerometer_latency: f64,
+    /// Whether a specific force is the mean over the time since the last sample, as the angular velocity is, or
+    /// the value at its stamp.
+    ///
+    /// The wrong one of the two is an error of half a sample's rotation in the tilt of fast motion, of which the
+    /// estimated lag takes what it can.
+    ///
+    /// Unit: none. Default: on. Source: sensors sample fast and give out means, or low-pass to that effect.
+    #[cfg_attr(feature = "runtime", option(default = Self::default().force_is_mean))]
+    pub force_is_mean: bool,
     /// How much the magnetometer may lag the gyroscope, standard deviation. The lag is estimated.
     ///
     /// 0: takes them as simultaneous, and fast rotation turns the heading. Large: found sooner, less sure. From
@@ -94,12 +111,14 @@ impl Default for MekfParams {
     fn default() -> Self {
         Self {
             gyroscope_noise: 1.7e-4,
-            gyroscope_rate_noise: 5e-4,
-            initial_bias: 0.0087,
+            gyroscope_rate_noise: 9e-4,
+            initial_bias: 0.0175,
             bias_drift: 1.4e-4,
-            calibration_error: 0.005,
+            calibration_error: 0.004,
             velocity: 0.2,
             acceleration_time: 0.1,
+            accelerometer_latency: 1e-3,
+            force_is_mean: true,
             magnetometer_latency: 0.01,
             field_disturbance: 0.1,
             magnetometer: true,
@@ -116,6 +135,7 @@ impl MekfParams {
         accept("calibration_error", self.calibration_error, (0.0, 0.5), "")?;
         accept("velocity", self.velocity, (1e-3, 1e3), "m/s")?;
         accept("acceleration_time", self.acceleration_time, (0.0, 100.0), "s")?;
+        accept("accelerometer_latency", self.accelerometer_latency, (0.0, 1.0), "s")?;
         accept("magnetometer_latency", self.magnetometer_latency, (0.0, 1.0), "s")?;
         accept("field_disturbance", self.field_disturbance, (1e-4, 100.0), "")
     }

@@ -18,6 +18,8 @@ pub(super) struct Window {
     pub(super) duration: f64,
     /// ∫ R f dt, m/s.
     pub(super) force: Vector3<f64>,
+    /// ∫ R (ω × f) dt, m/s².
+    pub(super) force_rate: Vector3<f64>,
     /// ∫ R dt, s.
     rotation: Matrix3<f64>,
     /// ∫ R ⊗ ω dt, rad: row i, then the body axis that R takes to i, then the axis of ω.
@@ -37,6 +39,7 @@ impl Window {
             samples: 0,
             duration: 0.0,
             force: Vector3::zeros(),
+            force_rate: Vector3::zeros(),
             rotation: Matrix3::zeros(),
             rotation_rate: [[0.0; 9]; 3],
             squared_rate: 0.0,
@@ -50,11 +53,23 @@ impl Window {
         self.samples >= SAMPLES || self.duration >= LONGEST_S
     }
 
-    /// Adds an inertial sample: means over `dt`, in the middle of which the rotation was `rotation`.
-    pub(super) fn add(&mut self, dt: f64, rotation: &Matrix3<f64>, rate: &Vector3<f64>, force: &Vector3<f64>) {
+    /// Adds a specific force that was measured with the sensor at `rotation`, turning at `rate`.
+    pub(super) fn add_force(
+        &mut self,
+        dt: f64,
+        rotation: &Matrix3<f64>,
+        rate: &Vector3<f64>,
+        force: &Vector3<f64>,
+    ) {
+        let force = force * dt;
+        self.force += rotation * force;
+        self.force_rate += rotation * rate.cross(&force);
+    }
+
+    /// Adds an angular velocity, the mean over `dt`, in the middle of which the rotation was `rotation`.
+    pub(super) fn add_rate(&mut self, dt: f64, rotation: &Matrix3<f64>, rate: &Vector3<f64>) {
         self.samples += 1;
         self.duration += dt;
-        self.force += rotation * (force * dt);
         let rotation = rotation * dt;
         self.rotation += rotation;
         for (i, row) in self.rotation_rate.iter_mut().enumerate() {
@@ -84,11 +99,12 @@ impl Window {
     pub(super) fn gyroscope_integrals(&self) -> [[f64; 12]; 3] {
         let mut integrals = [[0.0; 12]; 3];
         for (i, row) in integrals.iter_mut().enumerate() {
-            for k in 0..3 {
-                row[k] = -self.rotation[(i, k)];
+            let (bias, calibration) = row.split_at_mut(CALIBRATION - BIAS);
+            for (k, value) in bias.iter_mut().enumerate() {
+                *value = -self.rotation[(i, k)];
             }
-            for (k, value) in self.rotation_rate[i].iter().enumerate() {
-                row[CALIBRATION - BIAS + k] = -value;
+            for (value, integral) in calibration.iter_mut().zip(&self.rotation_rate[i]) {
+                *value = -integral;
             }
         }
         integrals
