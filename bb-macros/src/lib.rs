@@ -3,7 +3,8 @@
 //! A robot goes through four phases, each in the folder of its name:
 //!
 //! 1. `parse`: tokens to a tree. Never fails: what it cannot read it reports and skips.
-//! 2. `urdf`: links and joints of a URDF file, if the robot names one, put under the tree. `model`: the tree to plain data in which paths are resolved to what they name.
+//! 2. `urdf`: links and joints of a URDF file, if the robot names one, put under the tree. `model`: the tree to plain data
+//!    in which paths are resolved to what they name.
 //! 3. `verify`: the rules of the language, one a file. Gives a `verify::Verified` only if all hold.
 //! 4. `expand`: a verified robot to its wiring; one that failed to stubs, so that one mistake gives one message.
 
@@ -22,7 +23,7 @@ mod verify;
 #[cfg(test)]
 mod tests;
 
-/// Declares a robot; documented where `bb-core` re-exports it.
+#[allow(missing_docs, reason = "documented where bb-core re-exports it")]
 #[proc_macro]
 pub fn robot(tokens: TokenStream) -> TokenStream {
     pipeline(tokens.into()).into()
