@@ -270,8 +270,11 @@ impl<'a, 'input> Reader<'a, 'input> {
         let [number] = self.numbers::<1>(node, name)?;
         const NEVER_NEGATIVE: [&str; 9] =
             ["value", "ixx", "iyy", "izz", "velocity", "effort", "radius", "length", "damping"];
-        // Moments that come out of a computation may miss 0 by a rounding.
-        if number < -1e-12 && NEVER_NEGATIVE.contains(&name) {
+        if number < 0.0 && NEVER_NEGATIVE.contains(&name) {
+            // Moments that come out of a computation may miss 0 by a rounding.
+            if number > -1e-12 {
+                return Some(self.quantity(0.0, dimension));
+            }
             self.fault(node, &format!("{name}={number} must not be negative"));
         }
         Some(self.quantity(number, dimension))

@@ -72,6 +72,15 @@ fn what_is_no_xml_is_reported_where_it_breaks() {
 }
 
 #[test]
+fn a_moment_that_misses_zero_by_a_rounding_is_zero() {
+    let link = root(
+        "<robot name=\"r\"><link name=\"a\"><inertial><mass value=\"1\"/><inertia ixx=\"-5e-20\"/></inertial></link></robot>",
+    );
+    let moment = link.map(|link| link.inertials[0].inertia[0].as_ref().map(|moment| moment.value));
+    assert_eq!(moment.ok().flatten(), Some(0.0));
+}
+
+#[test]
 fn names_become_identifiers() {
     let link = root("<robot name=\"r\"><link name=\"3 fingers-loop\"/></robot>").map(|link| link.name.to_string());
     assert_eq!(link.ok().as_deref(), Some("_3_fingers_loop"));
