@@ -48,7 +48,8 @@ impl<R: Robot> Builder<R> {
         Running::start(machine, sources)
     }
 
-    /// Starts the robot on virtual time, from zero or from the first stamp of a recording: nothing moves until the caller runs it.
+    /// Starts the robot on virtual time, from zero or from the first stamp of a recording: nothing moves until the caller
+    /// runs it.
     ///
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
