@@ -6,10 +6,11 @@
 //! | what | where |
 //! |---|---|
 //! | messages: a payload with its time, frame and origin | [`message`], [`payload`] |
-//! | what a user implements: [`Sensor`], [`Estimator`], and the derives for options, inputs, outputs, payloads | [`component`] |
+//! | what a user implements: [`Sensor`], [`Estimator`], [`Actuator`], [`Controller`], [`Bridge`], [`Command`], and the derives for options, inputs, outputs, payloads | [`component`] |
 //! | time, real or virtual | [`time`] |
 //! | links, joints and the transforms between them | [`topology`] |
-//! | a running estimator: fan-in, drops, counters | [`node`] |
+//! | a running estimator: fan-in, health, drops, counters | [`node`] |
+//! | states, commands, parameters, safety | [`control`] |
 //! | subscriptions | [`pubsub`] |
 //! | start, run, stop | [`run`] |
 //!
@@ -19,6 +20,7 @@
 extern crate self as bb_core;
 
 pub mod component;
+pub mod control;
 pub mod message;
 pub mod node;
 pub mod payload;
@@ -34,14 +36,23 @@ mod stub;
 pub use bb_macros::robot;
 pub use bb_macros::{Inputs, Options, Outputs, Payload};
 pub use component::{
-    Context, Estimator, Fault, Input, Inputs, Options, Outputs, Reading, Reply, Sensor, SensorContext,
+    Actuator, ActuatorContext, Bridge, Context, Controller, Estimator, Fault, HandleCall, HandleCast, Info, Input,
+    Inputs, Options, Outputs, Reading, Reply, Request, Sensor, SensorContext, ServiceContext,
+};
+pub use control::{
+    Command, CommandContext, Execution, Outcome, ParameterError, ParameterValue, Refusal, Role, Safety,
 };
 pub use message::{Finite, Frame, Origin, Payload, Stamped};
-pub use pubsub::{Overflow, Subscription};
+pub use node::{HealthReason, HealthState, HealthTransition};
+pub use pubsub::{DynamicMessage, DynamicSubscription, Overflow, Select, Subscription};
 pub use run::{
-    Builder, EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, Running, SensorHandle,
-    Simulation, StartError,
+    ActuatorHandle, Builder, Bus, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Live, OutputHandle,
+    ParameterHandle, Report, Robot, Running, SensorHandle, Simulation, StartError,
 };
+/// Handles of the topics that every robot has: subscribe to them as to any other.
+pub mod system {
+    pub use crate::run::{Health, SafetyErrors, SafetyState, StateMachine};
+}
 pub use time::{Clock, MonotonicTime, WallTime};
 
 pub use nalgebra;
@@ -49,13 +60,17 @@ pub use nalgebra;
 /// Everything a file that declares or runs a robot needs: `use bb_core::prelude::*;`.
 pub mod prelude {
     pub use crate::component::{
-        Context, Estimator, External, Fault, Input, NoOptions, Reading, Reply, Sensor, SensorContext,
+        Actuator, ActuatorContext, Bridge, Context, Controller, Estimator, External, Fault, HandleCall, HandleCast,
+        Info, Input, NoOptions, Reading, Reply, Request, Sensor, SensorContext, ServiceContext,
     };
+    pub use crate::control::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Role, Safety};
     pub use crate::message::Stamped;
+    pub use crate::node::{HealthReason, HealthState, HealthTransition};
     pub use crate::payload::*;
-    pub use crate::pubsub::{Overflow, Subscription};
+    pub use crate::pubsub::{Overflow, Select, Subscription};
     pub use crate::robot;
-    pub use crate::run::{Robot, Running, Simulation, StartError};
+    pub use crate::run::{Live, Robot, Running, Simulation, StartError};
+    pub use crate::system;
     pub use crate::time::{Clock, MonotonicTime, WallTime};
     // The traits and the derives of the same names.
     pub use crate::{Inputs, Options, Outputs, Payload};
@@ -72,16 +87,26 @@ pub mod __private {
     };
     pub use crate::component::{
         Dimension, FieldIndex, FromQuantity, FromText, Input, InputAt, InputField, OptionField, OutputAt, Range,
-        Slot, SyncMiss,
+        Slot, SyncMiss, declare,
+    };
+    pub use crate::control::{
+        Binding, Cancel, CategoryDeclaration, Command, CommandDeclaration, FromParameter, ParameterDeclaration,
+        ParameterDefault, ParameterValues, Prepared,
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
-    pub use crate::node::{AnyNode, EstimatorDeclaration, InputDeclaration, Node};
+    pub use crate::node::{
+        AnyIsland, EstimatorDeclaration, HealthDeclaration, InputDeclaration, Island, Node, Shore, Turn,
+        WorkerDeclaration,
+    };
     pub use crate::pubsub::{AnyTopic, Topic};
     pub use crate::run::{
-        EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Report, Robot, SensorDeclaration, SensorHandle,
-        Source, StartError, Startup,
+        ActuatorDeclaration, ActuatorHandle, ActuatorNode, AnyActuator, AsBridge, AsController, AsSensor,
+        BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle, IslandOf,
+        OutputHandle, ParameterHandle, Periodic, Report, Robot, SensorDeclaration, SensorHandle, Source,
+        StartError, Startup,
     };
     pub use crate::stub::{Known, NotProbed, Probe, Unknown, as_known, both_known, stub};
+    pub use crate::time::MonotonicTime;
     pub use crate::topology::{
         Collision, Dynamics, Geometry, Inertial, Joint, JointKind, Limit, Link, Material, Mimic, Origin, Topology,
         Transform, Transmission, Visual,

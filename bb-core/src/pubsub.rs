@@ -1,9 +1,11 @@
 //! Publish and subscribe. A slow subscriber never slows a publisher and never grows without bound.
 
+mod dynamic;
 mod queue;
 mod subscription;
 mod topic;
 
+pub use dynamic::{DynamicMessage, DynamicSubscription, Select};
 pub use queue::Overflow;
 pub use subscription::{RecvAsync, Subscription};
-pub use topic::{AnyTopic, Topic, TopicStatistics};
+pub use topic::{AnyTopic, SubscriberStatistics, Topic, TopicStatistics};

@@ -1,10 +1,15 @@
 //! A robot that runs: assembled by a [`Builder`], driven by real sensors in threads ([`Running`]) or on virtual time
 //! by whoever calls it ([`Simulation`]).
 
+mod actuator;
+mod agenda;
 mod builder;
+mod bus;
 mod error;
 mod handle;
+mod live;
 mod machine;
+mod periodic;
 mod report;
 mod robot;
 mod running;
@@ -12,15 +17,27 @@ mod simulation;
 mod source;
 mod startup;
 mod stop;
+mod supervision;
+mod threads;
 
+pub use actuator::{ActuatorDeclaration, ActuatorError, ActuatorNode, AnyActuator};
 pub use builder::Builder;
+pub use bus::{ActuatorLink, Bus};
 pub use error::{ComponentFault, StartError};
 pub(crate) use error::{Failed, caught, retire};
-pub use handle::{Configurable, EstimatorHandle, EstimatorOfSeveralHandle, OutputHandle, Publisher, SensorHandle};
+pub use handle::{
+    ActuatorHandle, BridgeHandle, CommandHandle, Configurable, ControllerHandle, EstimatorHandle,
+    EstimatorOfSeveralHandle, Health, OutputHandle, ParameterHandle, Publisher, SafetyErrors, SafetyState,
+    SensorHandle, StateMachine, Visitable,
+};
+pub use live::Live;
+pub use periodic::{AsBridge, AsController, AsSensor, Periodic};
 pub use report::Report;
-pub use robot::Robot;
+pub use robot::{IslandOf, Robot};
 pub use running::Running;
 pub use simulation::Simulation;
 pub use source::{SensorDeclaration, Source};
 pub use startup::Startup;
-pub(crate) use stop::StopSignal;
+pub use stop::StopSignal;
+pub(crate) use supervision::Verdict;
+pub use supervision::{Supervision, Supervisor};

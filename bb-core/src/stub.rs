@@ -89,6 +89,13 @@ macro_rules! __stub_robot {
                 &$crate::topology::Topology { links: &[], joints: &[] };
             const SENSORS: &'static [$crate::__private::SensorDeclaration] = &[];
             const ESTIMATORS: &'static [$crate::__private::EstimatorDeclaration] = &[];
+            const ACTUATORS: &'static [$crate::__private::ActuatorDeclaration] = &[];
+            const SERVICES: &'static [$crate::__private::SensorDeclaration] = &[];
+            const STATES: &'static [&'static str] = &[];
+            const CATEGORIES: &'static [$crate::__private::CategoryDeclaration] = &[];
+            const COMMANDS: &'static [$crate::__private::CommandDeclaration] = &[];
+            const PARAMETERS: &'static [$crate::__private::ParameterDeclaration] = &[];
+            const ISLANDS: &'static [$crate::__private::IslandOf<()>] = &[];
             type Options = ();
             type Topics = ();
             type Wiring = ();
@@ -108,7 +115,10 @@ macro_rules! __stub_robot {
             fn all_topics(_: &()) -> ::std::vec::Vec<&dyn $crate::__private::AnyTopic> {
                 ::std::vec::Vec::new()
             }
-            fn all_nodes(_: &()) -> ::std::vec::Vec<&dyn $crate::__private::AnyNode> {
+            fn all_actuators(_: &()) -> ::std::vec::Vec<&dyn $crate::__private::AnyActuator> {
+                ::std::vec::Vec::new()
+            }
+            fn commands(_: &()) -> ::std::vec::Vec<$crate::__private::Prepared> {
                 ::std::vec::Vec::new()
             }
         }

@@ -7,7 +7,8 @@
 //! const _: () = {
 //!     …                                     // constants that check type facts at the user's tokens
 //!     static __SENSORS, __ESTIMATORS, …     // what was declared, as data
-//!     struct __Options, __Topics, __Wiring  // a field per component, publisher, estimator
+//!     struct __Options, __Topics, __Wiring  // a field per component, publisher, island
+//!     struct __Island0 { … }                // estimators that always run together
 //!     impl __Wiring { fn p0(&self, …) }     // what lies downstream of each publisher, by direct calls
 //!     impl Robot for Rover { … }
 //! };
@@ -18,6 +19,7 @@ mod checks;
 mod declarations;
 mod group;
 mod handles;
+mod islands;
 mod literal;
 mod options;
 mod order;
@@ -42,9 +44,10 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let definition = definition(robot, name);
     let aliases = types::aliases(robot, name);
     let checks = checks::checks(verified);
-    let declarations = declarations::declarations(verified);
+    let islands = islands::Islands::of(verified);
+    let declarations = declarations::declarations(verified, &islands);
     let options = options::options(robot, name);
-    let wiring = wiring::wiring(verified);
+    let wiring = wiring::wiring(verified, &islands);
     let implementation = robot_impl::robot_impl(verified);
     let handles = handles::handles(robot, name, handles::Accessors::Wired);
     quote! {

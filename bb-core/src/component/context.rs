@@ -1,21 +1,35 @@
 //! What a component is told when it starts.
 
-use super::Fault;
+use super::{Fault, Request};
+use crate::control::Control;
 use crate::message::Frame;
 use crate::node::{EstimatorDeclaration, InputDeclaration};
 use crate::run::{SensorDeclaration, StopSignal};
-use crate::time::Clock;
+use crate::time::{Clock, MonotonicTime};
 use crate::topology::Transform;
 use nalgebra::Isometry3;
+use std::cell::RefCell;
+use std::sync::Arc;
 
 /// What an estimator is told when it starts: where it stands in the robot, and where its inputs come from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Context {
-    pub(crate) robot: &'static str,
-    pub(crate) declaration: &'static EstimatorDeclaration,
+    robot: &'static str,
+    declaration: &'static EstimatorDeclaration,
+    now: MonotonicTime,
+    requests: RefCell<Vec<Request>>,
 }
 
 impl Context {
+    pub(crate) fn new(robot: &'static str, declaration: &'static EstimatorDeclaration, now: MonotonicTime) -> Self {
+        Self { robot, declaration, now, requests: RefCell::default() }
+    }
+
+    /// Takes what was asked for.
+    pub(crate) fn into_requests(self) -> Vec<Request> {
+        self.requests.into_inner()
+    }
+
     /// A context of no robot, for tests of an estimator's `init`: an input at each transform given, the first one the
     /// driver. (Contexts are constants of robots; this one is leaked, a few hundred bytes each time.)
     ///
@@ -37,11 +51,12 @@ impl Context {
             driver: index == 0,
             optional: false,
             tolerance_nanos: None,
+            stale_after_nanos: None,
             frame_from_input: Transform::of(frame_from_input),
         });
         let inputs: &'static [InputDeclaration] = Vec::leak(inputs.collect());
-        let declaration = EstimatorDeclaration { path: "test", frame: Frame::NONE, inputs, outputs: &[] };
-        Self { robot: "test", declaration: Box::leak(Box::new(declaration)) }
+        let declaration = EstimatorDeclaration { path: "test", inputs, ..EstimatorDeclaration::NONE };
+        Self::new("test", Box::leak(Box::new(declaration)), MonotonicTime::ZERO)
     }
 
     /// The robot's name.
@@ -74,6 +89,21 @@ impl Context {
         Ok(declared.frame_from_input.isometry())
     }
 
+    /// The time now.
+    pub fn now(&self) -> MonotonicTime {
+        self.now
+    }
+
+    /// Asks for a timer, a tick, a timeout or a continue, from the start on.
+    pub fn request(&self, request: Request) {
+        self.requests.borrow_mut().push(request);
+    }
+
+    /// What has been asked for: for tests.
+    pub fn requests(&self) -> Vec<Request> {
+        self.requests.borrow().clone()
+    }
+
     /// The same for the driver, or for the only input.
     pub fn frame_from_driver(&self) -> Isometry3<f64> {
         let driver = self.declaration.inputs.iter().find(|declared| declared.driver);
@@ -88,9 +118,16 @@ pub struct SensorContext {
     pub(crate) declaration: &'static SensorDeclaration,
     pub(crate) clock: Clock,
     pub(crate) stop: StopSignal,
+    pub(crate) control: Control,
 }
 
 impl SensorContext {
+    /// Registers what makes its hardware safe when the robot is disarmed: a lidar's motor, a laser. All callbacks run at
+    /// the same time, and must have come back within 5 s; one that fails leads to the safety state `error`.
+    pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
+        self.control.on_disarm(self.declaration.path, Arc::new(hook));
+    }
+
     /// The robot's name.
     pub fn robot(&self) -> &'static str {
         self.robot

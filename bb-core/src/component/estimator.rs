@@ -1,6 +1,6 @@
 //! The contract of an estimator.
 
-use super::{Context, Fault, Inputs, Options, Outputs};
+use super::{Context, Fault, Info, Inputs, Options, Outputs, Request};
 
 /// Consumes messages and emits derived state. See the crate's README for one from scratch.
 ///
@@ -51,20 +51,86 @@ pub trait Estimator: Sized + Send + 'static {
     /// Whether it asks for the joints' positions itself, so that its inputs may span moving joints.
     const HANDLES_MOVING_JOINTS: bool = false;
 
+    /// Whether [`Reply::diverged`] may come of it. It says so here, so that `on_degraded` where nothing else can degrade it
+    /// is no mistake.
+    const REPORTS_DIVERGENCE: bool = false;
+
     /// Makes it, at the start and at every restart.
     ///
     /// # Errors
-    /// What keeps it from starting; the robot then does not start.
+    /// What keeps it from starting: at the start, the robot then does not start; at a restart, it is tried again later.
+    /// A [`Fault::skip`] leaves it out and lets the robot start.
     fn init(options: Self::Options, context: &Context) -> Result<Self, Fault>;
 
     /// Handles one message, or the snapshot of all inputs when the driver has arrived.
     ///
     /// # Errors
-    /// What keeps it from going on; it is stopped and the fault is reported.
+    /// What keeps it from going on; the fault is reported, and it is started anew from a clean state.
     fn handle_input(&mut self, input: <Self::Input as Inputs>::View<'_>) -> Result<Reply<Self::Output>, Fault>;
 
-    /// Cleans up, before it stops, also after an error; not after a panic.
+    /// Handles a timer, a tick or a timeout that it has asked for. What it emits is stamped with the time now.
+    ///
+    /// # Errors
+    /// As for [`handle_input`](Self::handle_input).
+    fn handle_info(&mut self, info: Info) -> Result<Reply<Self::Output>, Fault> {
+        let _ = info;
+        Ok(Reply::none())
+    }
+
+    /// Goes on with work of which it has asked to do more, before anything else happens to it.
+    ///
+    /// # Errors
+    /// As for [`handle_input`](Self::handle_input).
+    fn handle_continue(&mut self, step: u32) -> Result<Reply<Self::Output>, Fault> {
+        let _ = step;
+        Ok(Reply::none())
+    }
+
+    /// Takes new options, validated, after a parameter that they are bound to has changed. Unless it is written, the
+    /// estimator is made anew with them.
+    ///
+    /// # Errors
+    /// As for [`handle_input`](Self::handle_input).
+    fn handle_options(&mut self, options: Self::Options, context: &Context) -> Result<(), Fault> {
+        *self = Self::init(options, context)?;
+        Ok(())
+    }
+
+    /// Cleans up, before it stops or is started anew, also after an error; not after a panic.
     fn terminate(&mut self) {}
+}
+
+/// An estimator that answers requests of type `Q`; one may implement it for several.
+///
+/// Sent with [`Running::call`](crate::Running::call) or [`Simulation::call`](crate::Simulation::call).
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not answer requests of type `{Q}`",
+    label = "no `HandleCall<{Q}>`"
+)]
+pub trait HandleCall<Q>: Estimator {
+    /// What it answers.
+    type Response;
+
+    /// Answers, and may emit outputs beside.
+    ///
+    /// # Errors
+    /// As for [`handle_input`](Estimator::handle_input); the caller is told as well.
+    fn handle_call(&mut self, request: Q) -> Result<(Self::Response, Reply<Self::Output>), Fault>;
+}
+
+/// An estimator that takes one-way requests of type `Q`; one may implement it for several.
+///
+/// Sent with [`Running::cast`](crate::Running::cast) or [`Simulation::cast`](crate::Simulation::cast).
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not take requests of type `{Q}`",
+    label = "no `HandleCast<{Q}>`"
+)]
+pub trait HandleCast<Q>: Estimator {
+    /// Takes it.
+    ///
+    /// # Errors
+    /// As for [`handle_input`](Estimator::handle_input).
+    fn handle_cast(&mut self, request: Q) -> Result<Reply<Self::Output>, Fault>;
 }
 
 /// What a callback gives back: outputs or none, and whether the estimate has diverged.
@@ -73,23 +139,35 @@ pub trait Estimator: Sized + Send + 'static {
 pub struct Reply<O> {
     pub(crate) output: Option<O>,
     pub(crate) diverged: Option<&'static str>,
+    pub(crate) request: Option<Request>,
 }
 
 impl<O> Reply<O> {
     /// Nothing to emit this time.
     pub fn none() -> Self {
-        Self { output: None, diverged: None }
+        Self { output: None, diverged: None, request: None }
     }
 
     /// Emits `output`.
     pub fn emit(output: O) -> Self {
-        Self { output: Some(output), diverged: None }
+        Self { output: Some(output), diverged: None, request: None }
     }
 
     /// Reports that the estimate is not to be trusted, and why. Outputs go out all the same.
     pub fn diverged(mut self, reason: &'static str) -> Self {
         self.diverged = Some(reason);
         self
+    }
+
+    /// Asks for a timer, a tick, a timeout or a continue as well. One request a reply: the last one holds.
+    pub fn and(mut self, request: Request) -> Self {
+        self.request = Some(request);
+        self
+    }
+
+    /// What is asked for.
+    pub fn request(&self) -> Option<Request> {
+        self.request
     }
 
     /// What is to be emitted.
@@ -110,6 +188,6 @@ impl<O> Reply<O> {
 
 impl<O> From<Option<O>> for Reply<O> {
     fn from(output: Option<O>) -> Self {
-        Self { output, diverged: None }
+        Self { output, diverged: None, request: None }
     }
 }

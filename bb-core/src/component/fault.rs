@@ -17,30 +17,54 @@ use std::fmt;
 /// }
 /// assert_eq!(open("").unwrap_err().to_string(), "no port is set");
 /// ```
-pub struct Fault(Box<dyn Error + Send + Sync>);
+pub struct Fault {
+    error: Box<dyn Error + Send + Sync>,
+    pub(crate) then: Then,
+}
+
+/// What becomes of the component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Then {
+    /// It is started anew.
+    Restart,
+    /// It stays as it is: what is wrong does not heal.
+    Stay,
+    /// It was not to be started in the first place.
+    Skip,
+}
 
 impl Fault {
     /// A fault with a message of its own.
     pub fn new(message: impl Into<String>) -> Self {
-        Self(message.into().into())
+        Self::from(message.into())
+    }
+
+    /// A fault that a restart does not heal, such as a file that is broken: the component stays stopped.
+    pub fn permanent(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self { error: error.into(), then: Then::Stay }
+    }
+
+    /// From `init`: the component is not needed here, and the robot does without it.
+    pub fn skip(reason: impl Into<String>) -> Self {
+        Self { error: reason.into().into(), then: Then::Skip }
     }
 
     /// The error it was made of.
     pub fn as_error(&self) -> &(dyn Error + Send + Sync + 'static) {
-        &*self.0
+        &*self.error
     }
 }
 
 impl<E: Into<Box<dyn Error + Send + Sync>>> From<E> for Fault {
     fn from(error: E) -> Self {
-        Self(error.into())
+        Self { error: error.into(), then: Then::Restart }
     }
 }
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.0)?;
-        let mut cause = self.0.source();
+        write!(f, "{}", self.error)?;
+        let mut cause = self.error.source();
         while let Some(error) = cause {
             write!(f, ": {error}")?;
             cause = error.source();

@@ -6,7 +6,7 @@
 
 use crate::Payload;
 use crate::message::Stamped;
-use crate::node::InputDeclaration;
+use crate::node::{EstimatorDeclaration, InputDeclaration};
 use crate::time::MonotonicTime;
 use std::cell::Cell;
 use std::ops::Deref;
@@ -204,5 +204,17 @@ impl<T: Payload> Slot<T> {
     pub fn require(&self, time: MonotonicTime) -> Result<Input<'_, T>, SyncMiss> {
         let input = self.declaration.map_or(usize::MAX, |declaration| declaration.index);
         self.take(time).ok_or(SyncMiss { input, age_nanos: None })
+    }
+}
+
+/// Says which declared input of an estimator fills field `I`.
+#[doc(hidden)]
+pub fn declare<const I: FieldIndex, T: InputAt<I>>(
+    cache: &mut T::Cache,
+    estimator: &'static EstimatorDeclaration,
+    input: usize,
+) {
+    if let (Some(slot), Some(declared)) = (T::slot(cache), estimator.inputs.get(input)) {
+        slot.declare(declared);
     }
 }

@@ -60,7 +60,8 @@ pub trait Sensor: Sized + Send + 'static {
     /// A read that waits must come back now and then with [`Reading::nothing`], so that the robot can stop.
     ///
     /// # Errors
-    /// What keeps it from going on; it is stopped and the fault is reported.
+    /// What keeps it from going on; the fault is reported, and it is started anew from a clean state. A
+    /// [`Fault::permanent`] leaves it stopped.
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
 
     /// When it is to be read first; none: at once. A recording gives the stamp of its first message: virtual time
@@ -69,7 +70,17 @@ pub trait Sensor: Sized + Send + 'static {
         None
     }
 
-    /// Closes the device, before it stops; not after a panic.
+    /// Takes new options, validated, after a parameter that they are bound to has changed. Unless it is written, the
+    /// sensor is made anew with them.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read).
+    fn handle_options(&mut self, options: Self::Options, context: &SensorContext) -> Result<(), Fault> {
+        *self = Self::init(options, context)?;
+        Ok(())
+    }
+
+    /// Closes the device, before it stops or is started anew; not after a panic.
     fn terminate(&mut self) {}
 }
 

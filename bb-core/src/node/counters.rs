@@ -1,6 +1,7 @@
 //! What a running estimator counts.
 
-use super::EstimatorDeclaration;
+use super::latency::{Latency, LatencyStatistics};
+use super::{EstimatorDeclaration, HealthState};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -16,8 +17,10 @@ pub enum DropReason {
     NonFinite,
     /// The message's stamp was more than a second ahead of the clock.
     ClockSkew,
-    /// The estimator has stopped.
+    /// The estimator does not run: it has stopped, or waits for its restart.
     Stopped,
+    /// The estimator was busy, and its inbox full.
+    Overflow,
 }
 
 const REASONS: usize = DropReason::ALL.len();
@@ -25,7 +28,7 @@ const REASONS: usize = DropReason::ALL.len();
 impl DropReason {
     /// All reasons.
     pub const ALL: &'static [Self] =
-        &[Self::SyncMiss, Self::OutOfOrder, Self::NonFinite, Self::ClockSkew, Self::Stopped];
+        &[Self::SyncMiss, Self::OutOfOrder, Self::NonFinite, Self::ClockSkew, Self::Stopped, Self::Overflow];
 
     /// As people read it.
     pub const fn name(self) -> &'static str {
@@ -35,6 +38,7 @@ impl DropReason {
             Self::NonFinite => "non-finite",
             Self::ClockSkew => "clock skew",
             Self::Stopped => "stopped",
+            Self::Overflow => "inbox full",
         }
     }
 }
@@ -48,6 +52,10 @@ pub(crate) struct Count(AtomicU64);
 impl Count {
     pub(crate) fn increment(&self) {
         self.0.store(self.0.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+
+    pub(super) fn set(&self, value: u64) {
+        self.0.store(value, Ordering::Relaxed);
     }
 
     pub(crate) fn get(&self) -> u64 {
@@ -67,6 +75,10 @@ pub(super) struct Counters {
     pub(super) dispatched: Count,
     pub(super) emitted: Count,
     pub(super) diverged: Count,
+    pub(super) restarts: Count,
+    pub(super) transitions: Count,
+    /// How long callbacks took, in nanoseconds; measured where a latency budget is declared.
+    pub(super) latency: Latency,
     pub(super) last_divergence: Mutex<Option<&'static str>>,
 }
 
@@ -90,6 +102,7 @@ impl Counters {
     pub(super) fn statistics(
         &self,
         declaration: &EstimatorDeclaration,
+        health: HealthState,
         stopped: Option<String>,
     ) -> EstimatorStatistics {
         let inputs = declaration.inputs.iter().zip(&self.inputs).map(|(declared, counters)| InputStatistics {
@@ -104,6 +117,10 @@ impl Counters {
             dispatched: self.dispatched.get(),
             emitted: self.emitted.get(),
             diverged: self.diverged.get(),
+            restarts: self.restarts.get(),
+            transitions: self.transitions.get(),
+            health,
+            latency: self.latency.statistics(),
             last_divergence: *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner),
             stopped,
         }
@@ -124,9 +141,17 @@ pub struct EstimatorStatistics {
     pub emitted: u64,
     /// How often it reported that it has diverged.
     pub diverged: u64,
+    /// How often it was started anew.
+    pub restarts: u64,
+    /// How often its health has changed.
+    pub transitions: u64,
+    /// Its health.
+    pub health: HealthState,
+    /// How long its callbacks took; measured where a `latency_budget` is declared.
+    pub latency: LatencyStatistics,
     /// What it said the last time.
     pub last_divergence: Option<&'static str>,
-    /// Why it stopped, if it has.
+    /// Why it does not run, if it does not.
     pub stopped: Option<String>,
 }
 

@@ -14,6 +14,72 @@ pub struct EstimatorDeclaration {
     pub inputs: &'static [InputDeclaration],
     /// The paths it publishes at: one per declared output, or its own.
     pub outputs: &'static [&'static str],
+    /// The number of the island that it runs in.
+    pub island: usize,
+    /// The number of its supervisor, see [`Supervisor`](crate::run::Supervisor).
+    pub supervisor: usize,
+    /// What is declared of its health.
+    pub health: HealthDeclaration,
+    /// Whether it has a thread of its own.
+    pub worker: Option<WorkerDeclaration>,
+}
+
+impl EstimatorDeclaration {
+    /// One with nothing declared.
+    pub(crate) const NONE: Self = Self {
+        path: "",
+        frame: Frame::NONE,
+        inputs: &[],
+        outputs: &[],
+        island: 0,
+        supervisor: 0,
+        health: HealthDeclaration::NONE,
+        worker: None,
+    };
+}
+
+/// The settings of an estimator's health.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HealthDeclaration {
+    /// How long a callback may take.
+    pub latency_budget_nanos: Option<i64>,
+    /// After how long without input it is lost.
+    pub lost_after_nanos: Option<i64>,
+    /// After how many good completions in a row it is healthy again: at least 1.
+    pub recover_after: u32,
+    /// The number of the command that is started when it degrades.
+    pub on_degraded: Option<usize>,
+    /// … when it is lost.
+    pub on_lost: Option<usize>,
+    /// … when it is healthy again.
+    pub on_recovered: Option<usize>,
+}
+
+impl HealthDeclaration {
+    /// Nothing declared.
+    pub const NONE: Self = Self {
+        latency_budget_nanos: None,
+        lost_after_nanos: None,
+        recover_after: 1,
+        on_degraded: None,
+        on_lost: None,
+        on_recovered: None,
+    };
+}
+
+impl Default for HealthDeclaration {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+/// `runs_on: worker`: how its thread runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WorkerDeclaration {
+    /// The real-time priority of its thread, 1 to 99.
+    pub priority: Option<u8>,
+    /// The core that it runs on.
+    pub core: Option<usize>,
 }
 
 /// One input as declared.
@@ -31,6 +97,8 @@ pub struct InputDeclaration {
     pub optional: bool,
     /// How much older than the driver it may be; none: any age will do.
     pub tolerance_nanos: Option<i64>,
+    /// How old it may be when it arrives, by the clock; for the driver.
+    pub stale_after_nanos: Option<i64>,
     /// Takes points from its frame to the output's.
     pub frame_from_input: Transform,
 }

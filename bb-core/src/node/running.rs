@@ -1,36 +1,60 @@
-//! One running estimator.
+//! One running estimator: what comes in, what goes out, and what becomes of it when it fails.
 
 use super::admission::Admission;
-use super::counters::Counters;
-use super::{DropReason, EstimatorDeclaration, EstimatorStatistics, InputDeclaration};
-use crate::component::{Context, Estimator, Fault, InputAt, Inputs, Reply, SyncMiss};
+use super::health::{Event, Health};
+use super::shared::SharedNode;
+use super::timers::Timers;
+use super::{DropReason, EstimatorDeclaration, HealthReason, HealthState, HealthTransition, InputDeclaration};
+use crate::component::{
+    Context, Estimator, Fault, HandleCall, HandleCast, InputAt, Inputs, Reply, Request, SyncMiss, Then,
+};
+use crate::control::Binding;
 use crate::message::{Stamp, Stamped};
-use crate::run::{Failed, Startup, caught, retire};
-use crate::time::Clock;
+use crate::run::{Failed, Startup, Verdict, caught, retire};
+use crate::time::{Clock, MonotonicTime};
+use std::any::Any;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
-use std::time::{Duration, Instant};
 
-/// One estimator with its fan-in and its counters. A message is handled on the thread that publishes it; a second
-/// thread waits its turn, so that there is one writer at a time and the order of each input is kept.
+/// One estimator with its fan-in, its health and its timers. Its island's lock sees to it that one thread at a time is in
+/// here.
 pub struct Node<E: Estimator> {
     declaration: &'static EstimatorDeclaration,
     template: Stamp,
     clock: Clock,
-    counters: Counters,
-    /// Why it has stopped. Apart from the state, so that it can be asked while the estimator is busy.
-    stopped: Mutex<Option<String>>,
-    /// No message is handled any more.
-    closing: AtomicBool,
-    state: Mutex<State<E>>,
-}
-
-struct State<E: Estimator> {
-    /// None once it has stopped.
+    shared: SharedNode,
+    startup: Startup,
+    /// None while it does not run.
     estimator: Option<E>,
     cache: <E::Input as Inputs>::Cache,
     admission: Admission,
+    health: Health,
+    /// When the last input was let in.
+    last_input: MonotonicTime,
+    timers: Timers,
+    /// When its island is next woken for it.
+    scheduled: Option<MonotonicTime>,
+    /// What it asked for in `init`, until the run begins.
+    requested: Vec<Request>,
+    has_begun: bool,
+    restart: Restart,
+    recipe: Recipe<E>,
+}
+
+/// What it is made of, at the start and at every restart.
+struct Recipe<E: Estimator> {
+    options: E::Options,
+    binding: Binding<E::Options>,
+    cache: fn() -> <E::Input as Inputs>::Cache,
+}
+
+/// What is known of its failures.
+#[derive(Clone, Copy, Debug, Default)]
+struct Restart {
+    /// When it is made anew, if it is.
+    at: Option<MonotonicTime>,
+    /// How often in a row it has failed.
+    attempt: u32,
+    failed_at: MonotonicTime,
 }
 
 /// What became of a message.
@@ -41,63 +65,86 @@ enum Handled<O> {
     Ran(Reply<O>),
 }
 
+/// What [`Node::turn`] has done.
+#[derive(Debug)]
+pub enum Turn {
+    /// Nothing is due.
+    Idle,
+    /// Something was, and emitted nothing.
+    Quiet,
+    /// Something was, and emitted.
+    Emitted(Stamp),
+}
+
+/// A one-way request, as it waits.
+type Cast<E> = Box<dyn FnOnce(&mut E) -> Result<Reply<<E as Estimator>::Output>, Fault> + Send>;
+
 impl<E: Estimator> Node<E> {
-    /// Makes the estimator; what keeps it from starting is in `startup`.
-    pub fn new(declaration: &'static EstimatorDeclaration, options: &E::Options, startup: &Startup) -> Self {
-        let context = Context { robot: startup.robot(), declaration };
-        let estimator = startup.make(declaration.path, options, |options| E::init(options, &context));
+    /// Makes the estimator; what keeps it from starting is in `startup`. `cache` makes the slots of its inputs, and
+    /// `binding` puts parameters into its options.
+    pub fn new(
+        number: usize,
+        options: &E::Options,
+        binding: Binding<E::Options>,
+        cache: fn() -> <E::Input as Inputs>::Cache,
+        startup: &Startup,
+    ) -> Self {
+        let shared = startup.node(number);
+        let declaration = shared.declaration();
+        let now = startup.clock().now();
+        let context = Context::new(startup.robot(), declaration, now);
+        let made = startup.make(declaration.path, options, binding, |options| E::init(options, &context));
+        startup.bind_node(&shared, options, binding);
+        if let Err(reason) = &made {
+            shared.set_stopped(Some(reason.clone()));
+        }
         Self {
             declaration,
             template: Stamp { frame: declaration.frame, origin: startup.origin(), ..Stamp::default() },
             clock: startup.clock().clone(),
-            counters: Counters::new(declaration),
-            stopped: Mutex::new(None),
-            closing: AtomicBool::new(false),
-            state: Mutex::new(State {
-                estimator,
-                cache: Default::default(),
-                admission: Admission::new(declaration.inputs.len()),
-            }),
+            shared,
+            startup: startup.clone(),
+            estimator: made.ok(),
+            cache: cache(),
+            admission: Admission::new(declaration.inputs.len()),
+            health: Health::default(),
+            last_input: now,
+            timers: Timers::default(),
+            scheduled: None,
+            requested: context.into_requests(),
+            has_begun: false,
+            restart: Restart::default(),
+            recipe: Recipe { options: options.clone(), binding, cache },
         }
     }
 
-    /// Says which declared input fills field `I`.
-    pub fn declare<const I: usize>(self, input: usize) -> Self
+    /// Takes a message of the declared input number `input`, which is the algorithm's field `I`, that arrived at `now`. If
+    /// it is the driver and all is well, the estimator runs; the stamp of what it put into `emitted`, if anything.
+    #[inline]
+    pub fn receive<const I: usize>(
+        &mut self,
+        input: usize,
+        message: &Stamped<<E::Input as InputAt<I>>::Payload>,
+        now: MonotonicTime,
+        emitted: &mut Option<E::Output>,
+    ) -> Option<Stamp>
     where
         E::Input: InputAt<I>,
     {
-        if let Some(declared) = self.declaration.inputs.get(input)
-            && let Some(slot) = E::Input::slot(&mut self.lock().cache)
-        {
-            slot.declare(declared);
-        }
-        self
-    }
-
-    /// Takes a message of the declared input number `input`, which is the algorithm's field `I`. If it is the driver
-    /// and all is well, the estimator runs and `emit` gets what it emitted.
-    #[inline]
-    pub fn receive<const I: usize>(
-        &self,
-        input: usize,
-        message: &Stamped<<E::Input as InputAt<I>>::Payload>,
-        emit: impl FnOnce(&mut Option<E::Output>, Stamp),
-    ) where
-        E::Input: InputAt<I>,
-    {
-        let Some(declared) = self.declaration.inputs.get(input) else {
-            return;
+        let declared = self.declaration.inputs.get(input)?;
+        let counters = self.shared.counters();
+        counters.inputs[input].received.increment();
+        let Some(running) = &mut self.estimator else {
+            counters.drop(input, DropReason::Stopped);
+            return None;
         };
-        let mut state = self.lock();
-        let State { estimator, cache, admission } = &mut *state;
-        self.counters.inputs[input].received.increment();
-        let Some(running) = estimator.as_mut().filter(|_| !self.closing.load(Ordering::Relaxed)) else {
-            return self.counters.drop(input, DropReason::Stopped);
-        };
+        let (admission, cache, clock) = (&mut self.admission, &mut self.cache, &self.clock);
+        let budget = self.declaration.health.latency_budget_nanos;
+        let mut start = MonotonicTime::ZERO;
         // All of the user's code at once: the payload's, the cache's clone and the estimator. After a panic the
         // estimator is dropped, so that nothing sees what was left half done.
         let handled = caught(|| {
-            if let Err(reason) = admission.admit(input, message, &self.clock) {
+            if let Err(reason) = admission.admit(input, message, now) {
                 return Ok(Handled::Refused(reason));
             }
             if !declared.driver {
@@ -110,80 +157,363 @@ impl<E: Estimator> Node<E> {
                 Ok(view) => view,
                 Err(miss) => return Ok(Handled::Missed(miss)),
             };
-            self.counters.dispatched.increment();
+            counters.dispatched.increment();
+            if budget.is_some() {
+                start = clock.now();
+            }
             running.handle_input(view).map(Handled::Ran)
         });
         match handled {
             Ok(Handled::Ran(reply)) => {
+                self.arrived(declared, now);
+                let mut bad = match budget {
+                    Some(budget) => self.overrun(budget, start),
+                    None => None,
+                };
+                if let Some(limit) = declared.stale_after_nanos
+                    && now.nanos_since(message.monotonic_time) > limit
+                {
+                    bad = bad.or(Some(HealthReason::StaleInput));
+                }
                 let stamp =
                     Stamp { monotonic_time: message.monotonic_time, wall_time: message.wall_time, ..self.template };
-                self.complete(reply, stamp, emit);
+                self.complete(reply, bad, declared.source, stamp, now, emitted)
             }
-            Ok(Handled::Stored) => {}
-            Ok(Handled::Refused(reason)) => self.refuse(declared, reason, message.monotonic_time.as_nanos()),
-            Ok(Handled::Missed(miss)) => self.miss(miss),
-            Err(failed) => self.fail(&mut state, failed),
+            Ok(Handled::Stored) => {
+                self.arrived(declared, now);
+                None
+            }
+            Ok(Handled::Refused(reason)) => {
+                self.refuse(declared, reason, message.monotonic_time.as_nanos());
+                None
+            }
+            Ok(Handled::Missed(miss)) => {
+                self.arrived(declared, now);
+                self.miss(miss, now);
+                None
+            }
+            Err(failed) => {
+                self.fail(failed, now);
+                None
+            }
+        }
+    }
+
+    /// Whether it has asked to go on at once.
+    #[inline]
+    pub fn is_unfinished(&self) -> bool {
+        self.timers.continue_with.is_some()
+    }
+
+    /// Does one thing that is due, if any is.
+    pub fn turn(&mut self, now: MonotonicTime, emitted: &mut Option<E::Output>) -> Turn {
+        self.begin(now);
+        if self.shared.take_restart() {
+            self.leave_for_restart(now);
+        }
+        if self.estimator.is_none() {
+            if self.restart.at.is_some_and(|at| at <= now) {
+                self.make_anew(now);
+                return Turn::Quiet;
+            }
+            self.schedule();
+            return Turn::Idle;
+        }
+        if let Some(step) = self.timers.continue_with.take() {
+            return self.run(now, emitted, |estimator| estimator.handle_continue(step));
+        }
+        if self.shared.take_changed_options() {
+            self.change_options(now);
+            return Turn::Quiet;
+        }
+        if let Some(cast) = self.shared.take_cast() {
+            return match cast.downcast::<Cast<E>>() {
+                Ok(cast) => self.run(now, emitted, *cast),
+                Err(_) => Turn::Quiet,
+            };
+        }
+        if self.lost_at().is_some_and(|at| at <= now) {
+            let source = self.declaration.inputs.iter().find(|input| input.driver);
+            self.judge(Event::Silence, source.map_or("", |input| input.source), now);
+            return Turn::Quiet;
+        }
+        if let Some(info) = self.timers.take(now) {
+            return self.run(now, emitted, |estimator| estimator.handle_info(info));
+        }
+        self.schedule();
+        Turn::Idle
+    }
+
+    /// Answers a request; the stamp of what it put into `emitted`, if anything.
+    pub(crate) fn call<Q>(
+        &mut self,
+        request: Q,
+        now: MonotonicTime,
+        emitted: &mut Option<E::Output>,
+    ) -> (Result<E::Response, Fault>, Option<Stamp>)
+    where
+        E: HandleCall<Q>,
+    {
+        let mut response = Err(Fault::new(format!("{} does not run", self.declaration.path)));
+        if self.estimator.is_none() {
+            return (response, None);
+        }
+        let turn = self.run(now, emitted, |estimator| {
+            let (answer, reply) = estimator.handle_call(request)?;
+            response = Ok(answer);
+            Ok(reply)
+        });
+        match turn {
+            Turn::Emitted(stamp) => (response, Some(stamp)),
+            Turn::Idle | Turn::Quiet if self.estimator.is_none() => {
+                (Err(Fault::new(format!("{} failed at this call", self.declaration.path))), None)
+            }
+            Turn::Idle | Turn::Quiet => (response, None),
+        }
+    }
+
+    /// A one-way request of type `Q`, as it is left for [`Self::turn`].
+    pub(crate) fn cast<Q: Send + 'static>(request: Q) -> Box<dyn Any + Send>
+    where
+        E: HandleCast<Q>,
+    {
+        let cast: Cast<E> = Box::new(|estimator| estimator.handle_cast(request));
+        Box::new(cast)
+    }
+
+    /// Lets the estimator clean up and drops it; messages that still come are counted as dropped.
+    pub fn terminate(&mut self) {
+        self.restart.at = None;
+        if let Some(fault) = self.estimator.take().and_then(|estimator| retire(estimator, false, E::terminate)) {
+            self.startup.fault(self.declaration.path, &fault);
+            self.shared.set_stopped(Some(fault.to_string()));
+        }
+    }
+
+    /// Any callback but `handle_input`.
+    fn run(
+        &mut self,
+        now: MonotonicTime,
+        emitted: &mut Option<E::Output>,
+        callback: impl FnOnce(&mut E) -> Result<Reply<E::Output>, Fault>,
+    ) -> Turn {
+        let Some(running) = &mut self.estimator else { return Turn::Quiet };
+        let start = self.clock.now();
+        match caught(|| callback(running)) {
+            Ok(reply) => {
+                let bad = self.declaration.health.latency_budget_nanos;
+                let bad = bad.and_then(|budget| self.overrun(budget, start));
+                let stamp = Stamp { monotonic_time: now, wall_time: self.clock.wall_at(now), ..self.template };
+                let path = self.declaration.path;
+                self.complete(reply, bad, path, stamp, now, emitted).map_or(Turn::Quiet, Turn::Emitted)
+            }
+            Err(failed) => {
+                self.fail(failed, now);
+                Turn::Quiet
+            }
         }
     }
 
     #[inline]
-    fn complete(&self, reply: Reply<E::Output>, stamp: Stamp, emit: impl FnOnce(&mut Option<E::Output>, Stamp)) {
-        let Reply { mut output, diverged } = reply;
+    fn complete(
+        &mut self,
+        reply: Reply<E::Output>,
+        bad: Option<HealthReason>,
+        source: &'static str,
+        stamp: Stamp,
+        now: MonotonicTime,
+        emitted: &mut Option<E::Output>,
+    ) -> Option<Stamp> {
+        let Reply { output, diverged, request } = reply;
+        self.timers.happened();
+        if let Some(request) = request {
+            self.timers.request(request, now);
+            self.schedule();
+        }
+        if bad.is_some() || diverged.is_some() || self.health.state != HealthState::Healthy {
+            self.assess(bad, diverged, source, now);
+        }
+        *emitted = output;
+        emitted.is_some().then(|| {
+            self.shared.counters().emitted.increment();
+            stamp
+        })
+    }
+
+    #[cold]
+    fn assess(
+        &mut self,
+        bad: Option<HealthReason>,
+        diverged: Option<&'static str>,
+        source: &'static str,
+        now: MonotonicTime,
+    ) {
         if let Some(reason) = diverged {
-            self.counters.diverge(reason);
+            self.shared.counters().diverge(reason);
             tracing::debug!(estimator = self.declaration.path, reason, "diverged");
         }
-        if output.is_some() {
-            self.counters.emitted.increment();
-            emit(&mut output, stamp);
+        let bad = bad.or(diverged.map(|_| HealthReason::Diverged));
+        self.judge(bad.map_or(Event::Good, Event::Bad), source, now);
+    }
+
+    /// Measures a callback that has a budget; the reason if it took longer.
+    fn overrun(&self, budget_nanos: i64, start: MonotonicTime) -> Option<HealthReason> {
+        let mut elapsed = self.clock.now().nanos_since(start);
+        if self.clock.is_virtual() {
+            elapsed = elapsed.saturating_add(self.shared.pretended_latency_nanos());
+        }
+        self.shared.counters().latency.add(elapsed.max(0) as u64);
+        (elapsed > budget_nanos).then_some(HealthReason::LatencyOverrun)
+    }
+
+    /// An input was let in.
+    #[inline]
+    fn arrived(&mut self, input: &InputDeclaration, now: MonotonicTime) {
+        self.last_input = now;
+        if self.health.state == HealthState::Lost {
+            self.judge(Event::Input, input.source, now);
+            self.schedule();
         }
     }
 
     #[cold]
+    fn judge(&mut self, event: Event, source: &'static str, time: MonotonicTime) {
+        let from = self.health.state;
+        let Some((to, reason)) = self.health.on(event, self.declaration.health.recover_after) else { return };
+        self.shared.set_health(to);
+        self.shared.counters().transitions.increment();
+        let transition = HealthTransition { estimator: self.declaration.path, source, from, to, reason, time };
+        self.startup.health_changed(transition, self.declaration.health.command(from, to));
+    }
+
+    #[cold]
     fn refuse(&self, input: &InputDeclaration, reason: DropReason, time_nanos: i64) {
-        self.counters.drop(input.index, reason);
+        self.shared.counters().drop(input.index, reason);
         let (estimator, input, reason) = (self.declaration.path, input.name, reason.name());
         tracing::debug!(estimator, input, reason, time_nanos, "message dropped");
     }
 
     #[cold]
-    fn miss(&self, miss: SyncMiss) {
-        self.counters.drop(miss.input, DropReason::SyncMiss);
-        let Some(input) = self.declaration.inputs.get(miss.input) else {
-            return;
-        };
+    fn miss(&mut self, miss: SyncMiss, now: MonotonicTime) {
+        self.shared.counters().drop(miss.input, DropReason::SyncMiss);
+        let Some(input) = self.declaration.inputs.get(miss.input) else { return };
         let (age_nanos, tolerance_nanos) = (miss.age_nanos, input.tolerance_nanos);
-        let (estimator, input) = (self.declaration.path, input.name);
-        tracing::debug!(estimator, input, age_nanos, tolerance_nanos, "dispatch dropped for sync");
+        let estimator = self.declaration.path;
+        tracing::debug!(estimator, input = input.name, age_nanos, tolerance_nanos, "dispatch dropped for sync");
+        self.judge(Event::Bad(HealthReason::SyncMiss), input.source, now);
     }
 
     #[cold]
-    fn fail(&self, state: &mut State<E>, Failed { fault, panicked }: Failed) {
-        self.stopped_by(&fault);
-        if let Some(estimator) = state.estimator.take() {
+    fn fail(&mut self, Failed { fault, panicked }: Failed, now: MonotonicTime) {
+        self.startup.fault(self.declaration.path, &fault);
+        self.shared.set_stopped(Some(fault.to_string()));
+        if let Some(estimator) = self.estimator.take() {
             // What goes wrong from here on follows from the fault that is known.
             let _ = retire(estimator, panicked, E::terminate);
         }
+        self.judge(Event::Bad(HealthReason::Restarted), self.declaration.path, now);
+        if fault.then == Then::Restart {
+            self.plan_restart(now);
+        }
     }
 
-    fn stopped_by(&self, fault: &Fault) {
-        tracing::error!(estimator = self.declaration.path, %fault, "estimator stopped");
-        *self.stopped.lock().unwrap_or_else(PoisonError::into_inner) = Some(fault.to_string());
+    /// Asks its supervisor.
+    fn plan_restart(&mut self, now: MonotonicTime) {
+        let supervisors = self.startup.supervisors();
+        if now.duration_since(self.restart.failed_at) > supervisors.calm() {
+            self.restart.attempt = 0;
+        }
+        let backoff = supervisors.backoff(self.restart.attempt);
+        let verdict = supervisors.failed(self.declaration.supervisor, now);
+        self.restart = Restart {
+            at: (verdict != Verdict::GiveUp).then(|| now + backoff),
+            attempt: self.restart.attempt.saturating_add(1),
+            failed_at: now,
+        };
+        self.startup.carry_out(verdict, self.declaration.path, now);
+        self.schedule();
     }
 
-    fn lock(&self) -> MutexGuard<'_, State<E>> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Its supervisor starts it anew, though it has not failed.
+    fn leave_for_restart(&mut self, now: MonotonicTime) {
+        if let Some(estimator) = self.estimator.take() {
+            let _ = retire(estimator, false, E::terminate);
+            self.restart.at = Some(now);
+        }
     }
 
-    /// The state, once the estimator is no longer busy; none after `deadline`.
-    fn lock_until(&self, deadline: Instant) -> Option<MutexGuard<'_, State<E>>> {
-        loop {
-            match self.state.try_lock() {
-                Ok(state) => return Some(state),
-                Err(TryLockError::Poisoned(poisoned)) => return Some(poisoned.into_inner()),
-                Err(TryLockError::WouldBlock) if Instant::now() >= deadline => return None,
-                Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(1)),
+    #[cold]
+    fn make_anew(&mut self, now: MonotonicTime) {
+        let Recipe { options, binding, cache } = &self.recipe;
+        let context = Context::new(self.startup.robot(), self.declaration, now);
+        let options = self.startup.bound(options, *binding);
+        let made = options.and_then(|options| caught(|| E::init(options, &context)).map_err(|failed| failed.fault));
+        self.restart.at = None;
+        match made {
+            Ok(estimator) => {
+                self.estimator = Some(estimator);
+                self.cache = cache();
+                self.timers = Timers::default();
+                self.last_input = now;
+                self.shared.counters().restarts.increment();
+                self.shared.set_stopped(None);
+                tracing::info!(estimator = self.declaration.path, "started anew");
+                for request in context.into_requests() {
+                    self.timers.request(request, now);
+                }
+                self.schedule();
             }
+            Err(fault) => self.fail(Failed { fault, panicked: false }, now),
+        }
+    }
+
+    fn change_options(&mut self, now: MonotonicTime) {
+        let Some(estimator) = &mut self.estimator else { return };
+        let context = Context::new(self.startup.robot(), self.declaration, now);
+        let options = self.startup.bound(&self.recipe.options, self.recipe.binding);
+        let changed = match options {
+            Ok(options) => caught(|| estimator.handle_options(options, &context)),
+            Err(fault) => Err(Failed { fault, panicked: false }),
+        };
+        match changed {
+            Ok(()) => {
+                for request in context.into_requests() {
+                    self.timers.request(request, now);
+                }
+                self.schedule();
+            }
+            Err(failed) => self.fail(failed, now),
+        }
+    }
+
+    /// The first turn: time may have been set to a recording's after it was made.
+    fn begin(&mut self, now: MonotonicTime) {
+        if !self.has_begun {
+            self.has_begun = true;
+            self.last_input = now;
+            for request in std::mem::take(&mut self.requested) {
+                self.timers.request(request, now);
+            }
+        }
+        self.scheduled = self.scheduled.filter(|scheduled| *scheduled > now);
+    }
+
+    fn lost_at(&self) -> Option<MonotonicTime> {
+        let after = self.declaration.health.lost_after_nanos?;
+        (self.health.state != HealthState::Lost).then(|| self.last_input.plus_nanos(after))
+    }
+
+    /// Has the island woken when something is due next.
+    fn schedule(&mut self) {
+        let next = match &self.estimator {
+            Some(_) => self.timers.next().into_iter().chain(self.lost_at()).min(),
+            None => self.restart.at,
+        };
+        if let Some(next) = next
+            && self.scheduled.is_none_or(|scheduled| next < scheduled)
+        {
+            self.scheduled = Some(next);
+            self.startup.agenda().wake_at(next, self.declaration.island);
         }
     }
 }
@@ -191,8 +521,7 @@ impl<E: Estimator> Node<E> {
 impl<E: Estimator> Drop for Node<E> {
     /// Of a robot that did not start.
     fn drop(&mut self) {
-        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
-        if let Some(estimator) = state.estimator.take() {
+        if let Some(estimator) = self.estimator.take() {
             let _ = retire(estimator, false, E::terminate);
         }
     }
@@ -201,38 +530,5 @@ impl<E: Estimator> Drop for Node<E> {
 impl<E: Estimator> fmt::Debug for Node<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Node").field("path", &self.declaration.path).finish_non_exhaustive()
-    }
-}
-
-/// What all running estimators have in common.
-pub trait AnyNode {
-    /// Its path.
-    fn path(&self) -> &'static str;
-    /// What it has counted; also while it is busy.
-    fn statistics(&self) -> EstimatorStatistics;
-    /// Lets the estimator clean up and drops it; messages that still come are counted as dropped. False if it is still
-    /// busy at `deadline`; it is then left as it is.
-    fn terminate(&self, deadline: Instant) -> bool;
-}
-
-impl<E: Estimator> AnyNode for Node<E> {
-    fn path(&self) -> &'static str {
-        self.declaration.path
-    }
-
-    fn statistics(&self) -> EstimatorStatistics {
-        let stopped = self.stopped.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        self.counters.statistics(self.declaration, stopped)
-    }
-
-    fn terminate(&self, deadline: Instant) -> bool {
-        self.closing.store(true, Ordering::Relaxed);
-        let Some(mut state) = self.lock_until(deadline) else { return false };
-        let estimator = state.estimator.take();
-        drop(state);
-        if let Some(fault) = estimator.and_then(|estimator| retire(estimator, false, E::terminate)) {
-            self.stopped_by(&fault);
-        }
-        true
     }
 }

@@ -1,6 +1,8 @@
 //! The bounded queue between a topic and one subscriber.
 
+use super::SubscriberStatistics;
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
@@ -40,6 +42,8 @@ pub(super) struct Queue<M> {
     state: Mutex<State<M>>,
     arrived: Condvar,
     capacity: usize,
+    /// Nobody reads it any more.
+    abandoned: AtomicBool,
 }
 
 #[derive(Debug)]
@@ -55,7 +59,7 @@ impl<M> Queue<M> {
     pub(super) fn new(overflow: Overflow) -> Self {
         let capacity = overflow.capacity();
         let state = State { messages: VecDeque::with_capacity(capacity), lagged: 0, closed: false, waker: None };
-        Self { state: Mutex::new(state), arrived: Condvar::new(), capacity }
+        Self { state: Mutex::new(state), arrived: Condvar::new(), capacity, abandoned: AtomicBool::new(false) }
     }
 
     /// Adds a message; true if the oldest had to make room for it.
@@ -80,6 +84,25 @@ impl<M> Queue<M> {
         self.arrived.notify_all();
         if let Some(waker) = waker {
             waker.wake();
+        }
+    }
+
+    /// Says that nobody reads it any more.
+    pub(super) fn abandon(&self) {
+        self.abandoned.store(true, Ordering::Release);
+    }
+
+    pub(super) fn is_abandoned(&self) -> bool {
+        self.abandoned.load(Ordering::Acquire)
+    }
+
+    pub(super) fn statistics(&self, is_typed: bool) -> SubscriberStatistics {
+        let state = self.lock();
+        SubscriberStatistics {
+            is_typed,
+            waiting: state.messages.len(),
+            capacity: self.capacity,
+            lost: state.lagged,
         }
     }
 

@@ -1,9 +1,11 @@
 //! One publisher's end: who listens to it.
 
+use super::dynamic::Tap;
 use super::queue::Queue;
-use super::{Overflow, Subscription};
+use super::{DynamicMessage, Overflow, Subscription};
 use crate::Payload;
 use crate::message::Stamped;
+use std::any::Any;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -23,13 +25,21 @@ pub(super) struct Subscribers<T> {
     /// Replaced as a whole, so that a publisher takes it along and holds no lock while it wakes subscribers: whatever
     /// they do on that thread may subscribe and unsubscribe.
     queues: Arc<[Arc<Queue<Stamped<T>>>]>,
+    /// Those who do not know the payload.
+    taps: Arc<[Arc<Queue<DynamicMessage>>]>,
     closed: bool,
+}
+
+impl<T> Subscribers<T> {
+    fn count(&self) -> usize {
+        self.queues.len() + self.taps.len()
+    }
 }
 
 impl<T> Topic<T> {
     /// A topic that nobody listens to yet.
     pub fn new(path: &'static str) -> Self {
-        let subscribers = Subscribers { queues: Arc::new([]), closed: false };
+        let subscribers = Subscribers { queues: Arc::new([]), taps: Arc::new([]), closed: false };
         Self {
             path,
             published: AtomicU64::new(0),
@@ -47,7 +57,7 @@ impl<T> Topic<T> {
             queue.close();
         } else {
             subscribers.queues = subscribers.queues.iter().chain([&queue]).map(Arc::clone).collect();
-            self.listening.store(subscribers.queues.len(), Ordering::Release);
+            self.listening.store(subscribers.count(), Ordering::Release);
         }
         Subscription::new(self.path, queue, Arc::downgrade(&self.subscribers))
     }
@@ -55,6 +65,7 @@ impl<T> Topic<T> {
     fn close(&self) {
         let mut subscribers = lock(&self.subscribers);
         subscribers.closed = true;
+        subscribers.taps = Arc::new([]);
         let queues = std::mem::replace(&mut subscribers.queues, Arc::new([]));
         self.listening.store(0, Ordering::Release);
         drop(subscribers);
@@ -75,13 +86,21 @@ impl<T: Payload> Topic<T> {
     }
 
     fn deliver(&self, message: &Stamped<T>) {
-        let queues = {
-            let subscribers = lock(&self.subscribers);
+        let (queues, taps) = {
+            let mut subscribers = lock(&self.subscribers);
+            if subscribers.taps.iter().any(|tap| tap.is_abandoned()) {
+                subscribers.taps =
+                    subscribers.taps.iter().filter(|tap| !tap.is_abandoned()).map(Arc::clone).collect();
+            }
             // Subscriptions that were dropped have left the list by themselves; here the count follows it.
-            self.listening.store(subscribers.queues.len(), Ordering::Release);
-            Arc::clone(&subscribers.queues)
+            self.listening.store(subscribers.count(), Ordering::Release);
+            (Arc::clone(&subscribers.queues), Arc::clone(&subscribers.taps))
         };
-        let lost = queues.iter().map(|queue| u64::from(queue.push(message.clone()))).sum();
+        let mut lost: u64 = queues.iter().map(|queue| u64::from(queue.push(message.clone()))).sum();
+        if !taps.is_empty() {
+            let message = DynamicMessage::new(self.path, message);
+            lost += taps.iter().map(|tap| u64::from(tap.push(message.clone()))).sum::<u64>();
+        }
         if lost > 0 {
             self.lost.fetch_add(lost, Ordering::Relaxed);
         }
@@ -115,6 +134,18 @@ impl<T> fmt::Debug for Topic<T> {
 
 /// What all topics have in common.
 pub trait AnyTopic {
+    /// Its path.
+    fn path(&self) -> &'static str;
+    /// The name of its payload's type.
+    fn payload_name(&self) -> &'static str;
+    /// Everybody who listens.
+    fn subscribers(&self) -> Vec<SubscriberStatistics>;
+    /// Hands every message to `tap` as well.
+    #[doc(hidden)]
+    fn tap(&self, tap: &Tap);
+    /// Itself, for whoever knows the payload.
+    #[doc(hidden)]
+    fn as_any(&self) -> &dyn Any;
     /// What it has counted.
     fn statistics(&self) -> TopicStatistics;
     /// Tells all subscribers that no more will come.
@@ -122,19 +153,60 @@ pub trait AnyTopic {
 }
 
 impl<T: Payload> AnyTopic for Topic<T> {
+    fn path(&self) -> &'static str {
+        self.path
+    }
+
+    fn payload_name(&self) -> &'static str {
+        T::NAME
+    }
+
+    fn subscribers(&self) -> Vec<SubscriberStatistics> {
+        let subscribers = lock(&self.subscribers);
+        let typed = subscribers.queues.iter().map(|queue| queue.statistics(true));
+        let taps = subscribers.taps.iter().filter(|tap| !tap.is_abandoned());
+        typed.chain(taps.map(|tap| tap.statistics(false))).collect()
+    }
+
+    fn tap(&self, tap: &Tap) {
+        let mut subscribers = lock(&self.subscribers);
+        if !subscribers.closed {
+            subscribers.taps = subscribers.taps.iter().chain([&tap.0]).map(Arc::clone).collect();
+            self.listening.store(subscribers.count(), Ordering::Release);
+        }
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
     fn statistics(&self) -> TopicStatistics {
         TopicStatistics {
             path: self.path,
             payload: T::NAME,
             published: self.published.load(Ordering::Relaxed),
             lost: self.lost.load(Ordering::Relaxed),
-            subscribers: lock(&self.subscribers).queues.len(),
+            subscribers: self.subscribers().len(),
         }
     }
 
     fn close(&self) {
         Topic::close(self);
     }
+}
+
+/// One who listens to a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SubscriberStatistics {
+    /// Whether it knows the payload's type.
+    pub is_typed: bool,
+    /// Messages that wait for it.
+    pub waiting: usize,
+    /// How many may wait.
+    pub capacity: usize,
+    /// Messages it has lost because it was slow.
+    pub lost: u64,
 }
 
 /// What a topic has counted since the start.

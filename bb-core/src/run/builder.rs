@@ -1,9 +1,15 @@
 //! A robot before it starts.
 
-use super::handle::{Configurable, Publisher};
+use super::bus::Wired;
+use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::machine::Machine;
-use super::{Robot, Running, Simulation, Source, StartError, Startup};
-use crate::pubsub::{Overflow, Subscription};
+use super::{Robot, Running, Simulation, Source, StartError, Startup, Supervision};
+use crate::component::Fault;
+use crate::control::{
+    Control, Declared, ParameterError, ParameterType, ParameterValue, ParameterValues, SystemTopics,
+};
+use crate::message::Origin;
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::Arc;
@@ -16,16 +22,50 @@ type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
 pub struct Builder<R: Robot> {
     options: R::Options,
     topics: R::Topics,
+    system: Arc<SystemTopics>,
+    parameters: Vec<ParameterValue>,
+    supervision: Supervision,
 }
 
 impl<R: Robot> Builder<R> {
     pub(super) fn new() -> Self {
-        Self { options: R::options(), topics: R::topics() }
+        Self {
+            options: R::options(),
+            topics: R::topics(),
+            system: Arc::new(SystemTopics::new(declared::<R>())),
+            parameters: R::PARAMETERS.iter().map(|parameter| parameter.default.into()).collect(),
+            supervision: Supervision::default(),
+        }
     }
 
-    /// The options of a component, at first as declared. They are validated at the start.
+    /// The options of a component, at first as declared. They are validated at the start. An option that is bound to a
+    /// parameter has that one's value, whatever is set here.
     pub fn options<C: Configurable<R>>(&mut self, component: C) -> &mut C::Options {
         component.options(&mut self.options)
+    }
+
+    /// Sets a parameter before the start.
+    ///
+    /// # Errors
+    /// What was expected.
+    pub fn set_parameter<T: ParameterType>(
+        &mut self,
+        parameter: ParameterHandle<R, T>,
+        value: T,
+    ) -> Result<(), ParameterError> {
+        let value = value.into_value();
+        if let Some(declared) = R::PARAMETERS.get(parameter.number()) {
+            declared.check(&value)?;
+        }
+        if let Some(slot) = self.parameters.get_mut(parameter.number()) {
+            *slot = value;
+        }
+        Ok(())
+    }
+
+    /// How patiently components that fail are started anew.
+    pub fn supervision(&mut self) -> &mut Supervision {
+        &mut self.supervision
     }
 
     /// Subscribes, with room for 1024 messages.
@@ -35,7 +75,19 @@ impl<R: Robot> Builder<R> {
 
     /// Subscribes, and says what happens when the subscriber is slow.
     pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
-        publisher.topic(&self.topics).subscribe(overflow)
+        publisher.topic(&self.topics, &self.system).subscribe(overflow)
+    }
+
+    /// Subscribes to messages of any payload, by path; with the name of a payload's type, to those only. (Commands to
+    /// actuators can be subscribed to once the robot runs.)
+    pub fn subscribe_any(
+        &self,
+        select: Select<'_>,
+        payload: Option<&str>,
+        overflow: Overflow,
+    ) -> DynamicSubscription {
+        let topics: Vec<&dyn AnyTopic> = R::all_topics(&self.topics).into_iter().chain(self.system.all()).collect();
+        DynamicSubscription::new(topics, select, payload, overflow)
     }
 
     /// Starts the robot in real time: each sensor on a thread of its own.
@@ -43,8 +95,7 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
     pub fn start(self) -> Result<Running<R>, StartError> {
-        let startup = Startup::new(Clock::real(), R::NAME);
-        let (machine, sources) = self.assemble(startup)?;
+        let (machine, sources) = self.assemble(Clock::real())?;
         Running::start(machine, sources)
     }
 
@@ -54,20 +105,32 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
     pub fn simulate(self) -> Result<Simulation<R>, StartError> {
-        let startup = Startup::new(Clock::virtual_at(MonotonicTime::ZERO), R::NAME);
-        let (machine, sources) = self.assemble(startup)?;
+        let (machine, sources) = self.assemble(Clock::virtual_at(MonotonicTime::ZERO))?;
         Ok(Simulation::new(machine, sources))
     }
 
     /// Dropping what has started stops it in order.
-    fn assemble(self, startup: Startup) -> Result<Assembled<R>, StartError> {
+    fn assemble(self, clock: Clock) -> Result<Assembled<R>, StartError> {
+        let origin = Origin { robot: R::NAME, node: "local" };
+        let commands = R::commands(&self.options);
+        let parameters = ParameterValues::new(self.parameters);
+        let control = Control::new(declared::<R>(), self.system, clock.clone(), origin, commands, parameters);
+        if let Err((path, message)) = control.check_commands() {
+            return Err(StartError::component(path, Fault::new(message)));
+        }
+        let startup = Startup::new::<R>(clock, origin, control, self.supervision);
         let wiring = Arc::new(R::wire(self.topics, &self.options, &startup));
+        startup.set_directory(Arc::new(Wired::<R>(Arc::downgrade(&wiring))));
         let sources = R::sources(&wiring, &self.options, &startup);
         match startup.refusal() {
             Some(error) => Err(error),
             None => Ok((Machine { wiring, startup }, sources)),
         }
     }
+}
+
+fn declared<R: Robot>() -> Declared {
+    Declared { states: R::STATES, categories: R::CATEGORIES, commands: R::COMMANDS, parameters: R::PARAMETERS }
 }
 
 impl<R: Robot> fmt::Debug for Builder<R> {

@@ -4,6 +4,7 @@ use crate::component::Fault;
 use std::any::Any;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Why a robot does not start: which component, and what keeps it. `Debug` prints the same as `Display`, since that is
 /// what a `main` that returns it shows.
@@ -42,7 +43,7 @@ impl fmt::Debug for StartError {
 
 impl std::error::Error for StartError {}
 
-/// A component that has stopped by a fault of its own, while the robot runs.
+/// A component that has failed by a fault of its own, while the robot runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ComponentFault {
     /// The path of the component.
@@ -53,11 +54,34 @@ pub struct ComponentFault {
 
 impl fmt::Display for ComponentFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} stopped: {}", self.path, self.message)
+        write!(f, "{} failed: {}", self.path, self.message)
     }
 }
 
 impl std::error::Error for ComponentFault {}
+
+/// Faults that are kept; of more only the number is.
+const KEPT: usize = 256;
+
+/// The faults of components, in the order they came.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Faults(Arc<Mutex<(Vec<ComponentFault>, u64)>>);
+
+impl Faults {
+    pub(super) fn add(&self, path: &'static str, message: String) {
+        tracing::error!(component = path, fault = message, "component failed");
+        let mut faults = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        faults.1 += 1;
+        if faults.0.len() < KEPT {
+            faults.0.push(ComponentFault { path, message });
+        }
+    }
+
+    /// The first ones, and how many there were.
+    pub(super) fn all(&self) -> (Vec<ComponentFault>, u64) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
 
 /// What a user's code did instead of what it was called for.
 pub(crate) struct Failed {

@@ -1,10 +1,17 @@
 //! Typed names of what a robot declares; `robot!` generates one per publisher, at its path.
 
-use super::Robot;
-use crate::component::{Estimator, Sensor};
+use super::{ActuatorNode, Robot};
+use crate::component::{Actuator, Bridge, Controller, Estimator, Sensor};
+use crate::control::{
+    Command, CommandEvent, ParameterChange, ParameterType, SafetyError, SafetyTransition, StateTransition,
+    SystemTopics,
+};
 use crate::message::{Frame, Payload, Stamp, Stamped};
+use crate::node::{HealthTransition, Node};
 use crate::pubsub::Topic;
+use crate::time::MonotonicTime;
 use std::fmt;
+use std::marker::PhantomData;
 
 /// What can be subscribed to: the handle of a sensor, of an estimator of one output, or of an output.
 #[diagnostic::on_unimplemented(
@@ -19,12 +26,19 @@ pub trait Publisher<R: Robot>: Copy {
     fn path(self) -> &'static str;
     /// Its topic.
     #[doc(hidden)]
-    fn topic(self, topics: &R::Topics) -> &Topic<Self::Payload>;
+    fn topic<'a>(self, topics: &'a R::Topics, system: &'a SystemTopics) -> &'a Topic<Self::Payload>;
 }
 
 type TopicOf<R, T> = fn(&<R as Robot>::Topics) -> &Topic<T>;
 type OptionsOf<R, O> = fn(&mut <R as Robot>::Options) -> &mut O;
-type PublishOf<R, T> = fn(&<R as Robot>::Wiring, &Stamped<T>);
+type NodeOf<R, A> = fn(&<R as Robot>::Wiring) -> &ActuatorNode<A>;
+type PublishOf<R, T> = fn(&<R as Robot>::Wiring, &Stamped<T>, MonotonicTime);
+/// Has a function called with an estimator once it is free, and publishes what that emits.
+type VisitOf<R, E> = fn(
+    &<R as Robot>::Wiring,
+    MonotonicTime,
+    &mut dyn FnMut(&mut Node<E>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp>,
+);
 
 macro_rules! handle {
     ($(#[$doc:meta])* $name:ident<$($component:ident: $bound:path),+> { $($field:ident: $type:ty),* }) => {
@@ -74,12 +88,152 @@ handle! {
 
 handle! {
     /// Names an estimator of one output, `T`, of the robot `R`.
-    EstimatorHandle<E: Estimator, T: Payload> { topic: TopicOf<R, T>, options: OptionsOf<R, E::Options> }
+    EstimatorHandle<E: Estimator, T: Payload> {
+        number: usize,
+        topic: TopicOf<R, T>,
+        options: OptionsOf<R, E::Options>,
+        visit: VisitOf<R, E>
+    }
 }
 
 handle! {
     /// Names an estimator of several outputs of the robot `R`; each [`OutputHandle`] stands below it.
-    EstimatorOfSeveralHandle<E: Estimator> { options: OptionsOf<R, E::Options> }
+    EstimatorOfSeveralHandle<E: Estimator> {
+        number: usize,
+        options: OptionsOf<R, E::Options>,
+        visit: VisitOf<R, E>
+    }
+}
+
+macro_rules! service_handle {
+    ($(#[$doc:meta])* $name:ident, $service:ident) => {
+        handle! {
+            $(#[$doc])*
+            $name<S: $service> { topic: TopicOf<R, S::Output>, options: OptionsOf<R, S::Options> }
+        }
+
+        impl<R: Robot, S: $service> Publisher<R> for $name<R, S> {
+            type Payload = S::Output;
+            fn path(self) -> &'static str {
+                self.path
+            }
+            fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<S::Output> {
+                (self.topic)(topics)
+            }
+        }
+
+        impl<R: Robot, S: $service> Configurable<R> for $name<R, S> {
+            type Options = S::Options;
+            fn options(self, options: &mut R::Options) -> &mut S::Options {
+                (self.options)(options)
+            }
+        }
+    };
+}
+
+service_handle! {
+    /// Names a controller of the robot `R`.
+    ControllerHandle, Controller
+}
+
+service_handle! {
+    /// Names a bridge of the robot `R`.
+    BridgeHandle, Bridge
+}
+
+handle! {
+    /// Names an actuator of the robot `R`.
+    ActuatorHandle<A: Actuator> { node: NodeOf<R, A>, options: OptionsOf<R, A::Options> }
+}
+
+handle! {
+    /// Names a command of the robot `R`. What becomes of it is published at its path.
+    CommandHandle<C: Command> { number: usize, options: OptionsOf<R, C::Options> }
+}
+
+handle! {
+    /// Names a parameter of the robot `R`, of type `T`. Its changes are published at its path.
+    ParameterHandle<T: ParameterType> { number: usize, value: PhantomData<fn() -> (R, T)> }
+}
+
+impl<R: Robot, A: Actuator> ActuatorHandle<R, A> {
+    pub(super) fn node(self, wiring: &R::Wiring) -> &ActuatorNode<A> {
+        (self.node)(wiring)
+    }
+}
+
+impl<R: Robot, A: Actuator> Configurable<R> for ActuatorHandle<R, A> {
+    type Options = A::Options;
+    fn options(self, options: &mut R::Options) -> &mut A::Options {
+        (self.options)(options)
+    }
+}
+
+impl<R: Robot, C: Command> CommandHandle<R, C> {
+    pub(super) fn number(self) -> usize {
+        self.number
+    }
+}
+
+impl<R: Robot, C: Command> Configurable<R> for CommandHandle<R, C> {
+    type Options = C::Options;
+    fn options(self, options: &mut R::Options) -> &mut C::Options {
+        (self.options)(options)
+    }
+}
+
+impl<R: Robot, T: ParameterType> ParameterHandle<R, T> {
+    pub(super) fn number(self) -> usize {
+        self.number
+    }
+}
+
+macro_rules! system_publisher {
+    ($($handle:ident<$($component:ident: $bound:path),+> publishes $payload:ty, $list:ident;)*) => { $(
+        impl<R: Robot, $($component: $bound),+> Publisher<R> for $handle<R, $($component),+> {
+            type Payload = $payload;
+            fn path(self) -> &'static str {
+                self.path
+            }
+            fn topic<'a>(self, _: &'a R::Topics, system: &'a SystemTopics) -> &'a Topic<$payload> {
+                &system.$list[self.number]
+            }
+        }
+    )* };
+}
+
+system_publisher! {
+    CommandHandle<C: Command> publishes CommandEvent, commands;
+    ParameterHandle<T: ParameterType> publishes ParameterChange, parameters;
+}
+
+macro_rules! system_topic {
+    ($($(#[$doc:meta])* $name:ident at $path:literal publishes $payload:ty, $field:ident;)*) => { $(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub struct $name;
+
+        impl<R: Robot> Publisher<R> for $name {
+            type Payload = $payload;
+            fn path(self) -> &'static str {
+                $path
+            }
+            fn topic<'a>(self, _: &'a R::Topics, system: &'a SystemTopics) -> &'a Topic<$payload> {
+                &system.$field
+            }
+        }
+    )* };
+}
+
+system_topic! {
+    /// Names the changes of health of all estimators.
+    Health at "health" publishes HealthTransition, health;
+    /// Names the changes of the operational state.
+    StateMachine at "state_machine" publishes StateTransition, state;
+    /// Names the changes of the safety state.
+    SafetyState at "safety" publishes SafetyTransition, safety;
+    /// Names what leads to the safety state `error`.
+    SafetyErrors at "safety/error" publishes SafetyError, safety_error;
 }
 
 handle! {
@@ -89,8 +243,8 @@ handle! {
 
 impl<R: Robot, S: Sensor> SensorHandle<R, S> {
     /// Publishes `payload` with the stamp, in the sensor's frame.
-    pub(super) fn publish(self, wiring: &R::Wiring, stamp: Stamp, payload: S::Output) {
-        (self.publish)(wiring, &Stamp { frame: self.frame, ..stamp }.message(payload));
+    pub(super) fn publish(self, wiring: &R::Wiring, stamp: Stamp, payload: S::Output, now: MonotonicTime) {
+        (self.publish)(wiring, &Stamp { frame: self.frame, ..stamp }.message(payload), now);
     }
 }
 
@@ -99,7 +253,7 @@ impl<R: Robot, S: Sensor> Publisher<R> for SensorHandle<R, S> {
     fn path(self) -> &'static str {
         self.path
     }
-    fn topic(self, topics: &R::Topics) -> &Topic<S::Output> {
+    fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<S::Output> {
         (self.topic)(topics)
     }
 }
@@ -109,7 +263,7 @@ impl<R: Robot, E: Estimator, T: Payload> Publisher<R> for EstimatorHandle<R, E, 
     fn path(self) -> &'static str {
         self.path
     }
-    fn topic(self, topics: &R::Topics) -> &Topic<T> {
+    fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<T> {
         (self.topic)(topics)
     }
 }
@@ -119,10 +273,51 @@ impl<R: Robot, T: Payload> Publisher<R> for OutputHandle<R, T> {
     fn path(self) -> &'static str {
         self.path
     }
-    fn topic(self, topics: &R::Topics) -> &Topic<T> {
+    fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<T> {
         (self.topic)(topics)
     }
 }
+
+/// What answers requests: the handle of an estimator.
+pub trait Visitable<R: Robot>: Copy {
+    /// The estimator.
+    type Estimator: Estimator;
+    /// Its number.
+    #[doc(hidden)]
+    fn number(self) -> usize;
+    /// Calls `visit` with it once it is free.
+    #[doc(hidden)]
+    fn visit(
+        self,
+        wiring: &R::Wiring,
+        now: MonotonicTime,
+        visit: &mut dyn FnMut(
+            &mut Node<Self::Estimator>,
+            &mut Option<<Self::Estimator as Estimator>::Output>,
+        ) -> Option<Stamp>,
+    );
+}
+
+macro_rules! visitable {
+    ($($handle:ident<$($component:ident: $bound:path),+>),*) => { $(
+        impl<R: Robot, $($component: $bound),+> Visitable<R> for $handle<R, $($component),+> {
+            type Estimator = E;
+            fn number(self) -> usize {
+                self.number
+            }
+            fn visit(
+                self,
+                wiring: &R::Wiring,
+                now: MonotonicTime,
+                visit: &mut dyn FnMut(&mut Node<E>, &mut Option<E::Output>) -> Option<Stamp>,
+            ) {
+                (self.visit)(wiring, now, visit);
+            }
+        }
+    )* };
+}
+
+visitable!(EstimatorHandle<E: Estimator, T: Payload>, EstimatorOfSeveralHandle<E: Estimator>);
 
 /// What has options: the handle of a sensor or of an estimator.
 pub trait Configurable<R: Robot>: Copy {

@@ -1,13 +1,15 @@
 //! What real and simulated runs share: the wiring, and what can be asked of it.
 
-use super::handle::Publisher;
-use super::{ComponentFault, Report, Robot, SensorHandle, Startup};
-use crate::component::Sensor;
+use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher, Visitable};
+use super::{ActuatorError, Report, Robot, SensorHandle, Startup};
+use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
+use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal};
 use crate::message::Stamp;
-use crate::pubsub::{Overflow, Subscription};
+use crate::node::{AnyIsland, Node};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
 use crate::time::MonotonicTime;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 pub(super) struct Machine<R: Robot> {
     pub(super) wiring: Arc<R::Wiring>,
@@ -16,38 +18,138 @@ pub(super) struct Machine<R: Robot> {
 
 impl<R: Robot> Machine<R> {
     pub(super) fn subscribe<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
-        publisher.topic(R::wired_topics(&self.wiring)).subscribe(overflow)
+        publisher.topic(R::wired_topics(&self.wiring), self.startup.control.topics()).subscribe(overflow)
+    }
+
+    pub(super) fn subscribe_any(
+        &self,
+        select: Select<'_>,
+        payload: Option<&str>,
+        overflow: Overflow,
+    ) -> DynamicSubscription {
+        DynamicSubscription::new(self.topics(), select, payload, overflow)
+    }
+
+    fn topics(&self) -> Vec<&dyn AnyTopic> {
+        let actuators = R::all_actuators(&self.wiring).into_iter().map(|actuator| actuator.any_topic());
+        let robot = R::all_topics(R::wired_topics(&self.wiring)).into_iter().chain(actuators);
+        robot.chain(self.startup.control.topics().all()).collect()
     }
 
     pub(super) fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
         let wall_time = self.startup.clock.wall_at(time);
         let origin = self.startup.origin;
         let stamp = Stamp { monotonic_time: time, wall_time, origin, ..Stamp::default() };
-        sensor.publish(&self.wiring, stamp, payload);
+        sensor.publish(&self.wiring, stamp, payload, self.startup.clock.now());
+    }
+
+    pub(super) fn call<V: Visitable<R>, Q>(
+        &self,
+        estimator: V,
+        request: Q,
+    ) -> Result<<V::Estimator as HandleCall<Q>>::Response, Fault>
+    where
+        V::Estimator: HandleCall<Q>,
+    {
+        let (mut request, mut response) = (Some(request), None);
+        let now = self.startup.clock.now();
+        estimator.visit(&self.wiring, now, &mut |node, emitted| {
+            let (answer, stamp) = node.call(request.take()?, now, emitted);
+            response = Some(answer);
+            stamp
+        });
+        response.unwrap_or_else(|| Err(Fault::new("the estimator was not reached")))
+    }
+
+    pub(super) fn cast<V: Visitable<R>, Q: Send + 'static>(&self, estimator: V, request: Q) -> Result<(), Fault>
+    where
+        V::Estimator: HandleCast<Q>,
+    {
+        let node = self.startup.node(estimator.number());
+        if !node.leave_cast(Node::<V::Estimator>::cast(request)) {
+            return Err(Fault::new(format!("too many requests wait for {}", node.declaration().path)));
+        }
+        if let Some(island) = self.island(node.declaration().island) {
+            island.wake(&self.wiring, self.startup.clock.now());
+        }
+        Ok(())
+    }
+
+    pub(super) fn command<C: Command>(
+        &self,
+        command: CommandHandle<R, C>,
+        arguments: C::Arguments,
+    ) -> Result<Execution<C::Output>, Refusal> {
+        self.startup.control.execute(command.number(), Box::new(arguments))
+    }
+
+    pub(super) fn actuate<A: Actuator>(
+        &self,
+        actuator: ActuatorHandle<R, A>,
+        command: A::Command,
+    ) -> Result<(), ActuatorError> {
+        actuator.node(&self.wiring).send(command)
+    }
+
+    pub(super) fn parameter<T: ParameterType>(&self, parameter: ParameterHandle<R, T>) -> T {
+        self.startup.control.parameters().get(parameter.number())
+    }
+
+    pub(super) fn set_parameter<T: ParameterType>(
+        &self,
+        parameter: ParameterHandle<R, T>,
+        value: T,
+    ) -> Result<(), ParameterError> {
+        self.startup.control.set_parameter(parameter.number(), value.into_value())
+    }
+
+    /// Wakes the estimators of an island.
+    pub(super) fn wake(&self, island: usize, now: MonotonicTime) {
+        if let Some(island) = self.island(island) {
+            island.wake(&self.wiring, now);
+        }
+    }
+
+    pub(super) fn island(&self, number: usize) -> Option<&dyn AnyIsland<R::Wiring>> {
+        R::ISLANDS.get(number).map(|find| find(&self.wiring))
     }
 
     pub(super) fn report(&self) -> Report {
-        let topics = R::all_topics(R::wired_topics(&self.wiring));
-        let estimators: Vec<_> = R::all_nodes(&self.wiring).iter().map(|node| node.statistics()).collect();
-        let stopped = estimators.iter().filter_map(|estimator| {
-            let message = estimator.stopped.clone()?;
-            Some(ComponentFault { path: estimator.path, message })
-        });
-        let mut faults = self.startup.faults.all();
-        faults.extend(stopped);
-        Report { topics: topics.iter().map(|topic| topic.statistics()).collect(), estimators, faults }
+        let topics = self.topics();
+        let estimators: Vec<_> = self.startup.nodes().iter().map(|node| node.statistics()).collect();
+        let (faults, all_faults) = self.startup.faults.all();
+        Report {
+            topics: topics.iter().map(|topic| topic.statistics()).collect(),
+            estimators,
+            commands: self.startup.control.statistics(),
+            state: self.startup.control.state(),
+            safety: self.startup.control.safety(),
+            faults,
+            all_faults,
+        }
     }
 
-    /// Tells the subscribers that no more will come and stops the estimators. One that is still busy at `deadline` is
-    /// left behind and reported as a fault.
+    /// Cancels commands and disarms, tells the subscribers that no more will come, and stops the estimators and actuators.
+    /// An estimator that is still busy at `deadline` is left behind and reported as a fault.
     pub(super) fn terminate(&self, deadline: Instant) {
-        for topic in R::all_topics(R::wired_topics(&self.wiring)) {
+        self.startup.control.stop();
+        for topic in self.topics() {
             topic.close();
         }
-        for node in R::all_nodes(&self.wiring) {
-            if !node.terminate(deadline) {
-                self.startup.faults.add(node.path(), "did not come back from its input in time".into());
+        for island in (0..R::ISLANDS.len()).filter_map(|number| self.island(number)) {
+            let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
+            if !island.terminate(&self.wiring, left) {
+                let message = "did not come back from its input in time";
+                self.startup.faults.add(island.name(), message.into());
             }
         }
+        for actuator in R::all_actuators(&self.wiring) {
+            actuator.terminate();
+        }
+    }
+
+    /// What a fault's list says of a component that did not come back.
+    pub(super) fn fault(&self, path: &'static str, message: &str) {
+        self.startup.faults.add(path, message.into());
     }
 }

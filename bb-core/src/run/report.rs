@@ -1,6 +1,7 @@
 //! What a run has done: what was published where, and what was dropped and why.
 
 use super::ComponentFault;
+use crate::control::{CommandStatistics, Safety};
 use crate::node::{DropReason, EstimatorStatistics};
 use crate::pubsub::TopicStatistics;
 use std::fmt;
@@ -13,8 +14,16 @@ pub struct Report {
     pub topics: Vec<TopicStatistics>,
     /// Every estimator.
     pub estimators: Vec<EstimatorStatistics>,
-    /// Components that have stopped by a fault of their own.
+    /// Every command.
+    pub commands: Vec<CommandStatistics>,
+    /// The operational state.
+    pub state: &'static str,
+    /// The safety state.
+    pub safety: Safety,
+    /// Components that have failed: the first 256 faults.
     pub faults: Vec<ComponentFault>,
+    /// How many faults there were.
+    pub all_faults: u64,
 }
 
 impl Report {
@@ -28,7 +37,7 @@ impl Report {
         self.estimators.iter().find(|estimator| estimator.path == path)
     }
 
-    /// This report, if no component has stopped by a fault.
+    /// This report, if no component has failed.
     ///
     /// # Errors
     /// The first fault.
@@ -60,6 +69,15 @@ impl fmt::Display for Report {
                     let (path, name, dropped) = (estimator.path, input.name, input.dropped(reason));
                     writeln!(f, "{path}: {dropped} dropped for `{name}`: {}", reason.name())?;
                 }
+            }
+        }
+        for estimator in self.estimators.iter().filter(|estimator| estimator.transitions > 0) {
+            let (path, health, transitions) = (estimator.path, estimator.health, estimator.transitions);
+            writeln!(f, "{path}: {health} after {transitions} changes of health, {} restarts", estimator.restarts)?;
+        }
+        for command in &self.commands {
+            if let Some(refusal) = &command.last_refusal {
+                writeln!(f, "{} times refused, last: {refusal}", command.refused)?;
             }
         }
         for fault in &self.faults {

@@ -1,10 +1,14 @@
 //! What `robot!` implements.
 
-use super::{Builder, SensorDeclaration, Source, Startup};
-use crate::node::{AnyNode, EstimatorDeclaration};
+use super::{ActuatorDeclaration, AnyActuator, Builder, SensorDeclaration, Source, Startup};
+use crate::control::{CategoryDeclaration, CommandDeclaration, ParameterDeclaration, Prepared};
+use crate::node::{AnyIsland, EstimatorDeclaration};
 use crate::pubsub::AnyTopic;
 use crate::topology::{GraphFormat, Topology, graph};
 use std::sync::Arc;
+
+/// Finds an island in a wiring.
+pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
 
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
 pub trait Robot: Sized + Send + Sync + 'static {
@@ -16,6 +20,21 @@ pub trait Robot: Sized + Send + Sync + 'static {
     const SENSORS: &'static [SensorDeclaration];
     /// Its estimators, in the order of their declaration.
     const ESTIMATORS: &'static [EstimatorDeclaration];
+    /// Its actuators, in the order of their declaration.
+    const ACTUATORS: &'static [ActuatorDeclaration];
+    /// Its controllers and bridges, in the order of their declaration.
+    const SERVICES: &'static [SensorDeclaration];
+    /// Its declared states, beside the built-in ones.
+    const STATES: &'static [&'static str];
+    /// The categories of its commands.
+    const CATEGORIES: &'static [CategoryDeclaration];
+    /// Its commands, in the order of their declaration.
+    const COMMANDS: &'static [CommandDeclaration];
+    /// Its parameters, in the order of their declaration.
+    const PARAMETERS: &'static [ParameterDeclaration];
+    /// Where its islands are in the wiring.
+    #[doc(hidden)]
+    const ISLANDS: &'static [IslandOf<Self::Wiring>];
 
     /// The options of all components.
     #[doc(hidden)]
@@ -43,7 +62,10 @@ pub trait Robot: Sized + Send + Sync + 'static {
     #[doc(hidden)]
     fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic>;
     #[doc(hidden)]
-    fn all_nodes(wiring: &Self::Wiring) -> Vec<&dyn AnyNode>;
+    fn all_actuators(wiring: &Self::Wiring) -> Vec<&dyn AnyActuator>;
+    /// The commands with their options.
+    #[doc(hidden)]
+    fn commands(options: &Self::Options) -> Vec<Prepared>;
 
     /// Its links and joints as a URDF file.
     fn to_urdf() -> String {

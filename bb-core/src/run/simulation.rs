@@ -1,22 +1,32 @@
 //! A run on virtual time, driven by its caller.
 
-use super::handle::Publisher;
+use super::handle::Visitable;
 use super::machine::Machine;
-use super::{Report, Robot, SensorHandle, Source};
+use super::{Live, Report, Robot, SensorHandle, Source};
 use crate::component::Sensor;
-use crate::pubsub::{Overflow, Subscription};
-use crate::time::{Clock, MonotonicTime};
+use crate::time::MonotonicTime;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fmt;
+use std::ops::Deref;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A robot on virtual time. Sensors are read in the order of their due times (equal ones in the order of their
-/// declaration), on the caller's thread, as fast as the machine can, so that every run gives the same outputs.
+/// declaration), on the caller's thread, as fast as the machine can, so that every run gives the same outputs. What else is
+/// due at the same time, timers and then commands, comes after them.
 pub struct Simulation<R: Robot> {
-    machine: Machine<R>,
+    live: Live<R>,
     sources: Vec<Box<dyn Source>>,
     due: BinaryHeap<Reverse<(MonotonicTime, usize)>>,
+}
+
+/// What is due next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Source,
+    Timer,
+    Command,
 }
 
 impl<R: Robot> Simulation<R> {
@@ -25,15 +35,12 @@ impl<R: Robot> Simulation<R> {
         if let Some(first) = sources.iter().filter_map(|source| source.starts_at()).min() {
             machine.startup.clock.advance_to(first);
         }
+        let now = machine.startup.clock.now();
+        (0..R::ISLANDS.len()).for_each(|island| machine.wake(island, now));
         sources.iter_mut().for_each(|source| source.begin());
         let due = sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
         let due = due.collect();
-        Self { machine, sources, due }
-    }
-
-    /// Its clock.
-    pub fn clock(&self) -> &Clock {
-        &self.machine.startup.clock
+        Self { live: Live(Arc::new(machine)), sources, due }
     }
 
     /// When the next sensor is due; none once all have finished.
@@ -41,23 +48,25 @@ impl<R: Robot> Simulation<R> {
         self.due.peek().map(|Reverse((time, _))| *time)
     }
 
-    /// Moves time on to the next sensor that is due and reads it; false once all have finished.
+    /// Moves time on to the next sensor that is due and reads it, with whatever else is due before; false once all
+    /// sensors have finished.
     pub fn step(&mut self) -> bool {
-        let Some(Reverse((time, index))) = self.due.pop() else {
-            return false;
-        };
-        self.clock().advance_to(time);
-        if let Some(source) = self.sources.get_mut(index) {
-            source.fire();
-            self.due.extend(source.due().map(|due| Reverse((due, index))));
+        loop {
+            match self.next() {
+                Some((time, Kind::Source)) => {
+                    self.fire(time, Kind::Source);
+                    return true;
+                }
+                Some((time, kind)) if self.next_due().is_some() => self.fire(time, kind),
+                _ => return false,
+            }
         }
-        true
     }
 
     /// Runs everything that is due up to `time`, and moves time there.
     pub fn run_until(&mut self, time: MonotonicTime) {
-        while self.next_due().is_some_and(|due| due <= time) {
-            self.step();
+        while let Some((due, kind)) = self.next().filter(|(due, _)| *due <= time) {
+            self.fire(due, kind);
         }
         self.clock().advance_to(time);
     }
@@ -70,6 +79,7 @@ impl<R: Robot> Simulation<R> {
     /// Runs until every sensor has finished: for recordings, and simulated sensors that end.
     pub fn run_to_end(&mut self) {
         while self.step() {}
+        self.run_until(self.clock().now());
     }
 
     /// Runs everything that is due up to `time`, moves time there, and publishes as if `sensor` had measured `payload`
@@ -77,38 +87,69 @@ impl<R: Robot> Simulation<R> {
     /// message is late.
     pub fn publish<S: Sensor>(&mut self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
         self.run_until(time);
-        self.machine.publish(sensor, time, payload);
+        self.live.0.publish(sensor, time, payload);
     }
 
-    /// Subscribes from now on, with room for 1024 messages.
-    pub fn subscribe<P: Publisher<R>>(&self, publisher: P) -> Subscription<P::Payload> {
-        self.subscribe_with(publisher, Overflow::default())
-    }
-
-    /// Subscribes from now on, and says what happens when the subscriber is slow.
-    pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
-        self.machine.subscribe(publisher, overflow)
-    }
-
-    /// What it has done so far.
-    pub fn report(&self) -> Report {
-        self.machine.report()
+    /// Has the callbacks of an estimator take so long from now on, as far as its `latency_budget` is concerned: on virtual
+    /// time nothing takes time by itself.
+    pub fn pretend_latency<V: Visitable<R>>(&self, estimator: V, latency: Duration) {
+        let nanos = i64::try_from(latency.as_nanos()).unwrap_or(i64::MAX);
+        self.live.0.startup.node(estimator.number()).pretend_latency(nanos);
     }
 
     /// Stops sensors, then estimators, tells the subscribers, and gives the last report.
     pub fn stop(mut self) -> Report {
         self.shut_down();
-        self.machine.report()
+        self.live.0.report()
+    }
+
+    /// What is due next, and when; what is over already is due now.
+    fn next(&self) -> Option<(MonotonicTime, Kind)> {
+        let now = self.clock().now();
+        let source = self.next_due().map(|time| (time, Kind::Source));
+        let timer = self.live.0.startup.agenda().next().map(|time| (time.max(now), Kind::Timer));
+        let control = &self.live.0.startup.control;
+        let command = if control.is_quiet() { None } else { control.next_due(now) };
+        let command = command.map(|time| (time.max(now), Kind::Command));
+        source.into_iter().chain(timer).chain(command).min()
+    }
+
+    fn fire(&mut self, time: MonotonicTime, kind: Kind) {
+        self.clock().advance_to(time);
+        let now = self.clock().now();
+        match kind {
+            Kind::Source => {
+                let Some(Reverse((_, index))) = self.due.pop() else { return };
+                let Some(source) = self.sources.get_mut(index) else { return };
+                source.fire();
+                if let Some(time) = source.due() {
+                    self.due.push(Reverse((time, index)));
+                }
+            }
+            Kind::Timer => {
+                if let Some(island) = self.live.0.startup.agenda().take(now) {
+                    self.live.0.wake(island, now);
+                }
+            }
+            Kind::Command => self.live.0.startup.control.drive(now),
+        }
     }
 
     fn shut_down(&mut self) {
-        self.machine.startup.stop.set();
+        self.live.0.startup.stop.set();
         self.due.clear();
         for mut source in self.sources.drain(..) {
             source.terminate();
         }
         // One thread runs all of this, so that nothing can be busy elsewhere.
-        self.machine.terminate(Instant::now());
+        self.live.0.terminate(Instant::now());
+    }
+}
+
+impl<R: Robot> Deref for Simulation<R> {
+    type Target = Live<R>;
+    fn deref(&self) -> &Live<R> {
+        &self.live
     }
 }
 

@@ -1,13 +1,18 @@
-//! A running sensor: when it is read, and what becomes of a reading.
+//! What is called at a rate, or whenever it wants to be: sensors, controllers, bridges. When each is called, what becomes
+//! of what it gives, and of itself when it fails.
 
+use super::periodic::Periodic;
+use super::supervision::{Supervisor, Verdict};
 use super::{Failed, Robot, Startup, caught, retire};
-use crate::component::{Fault, Next, Sensor, SensorContext};
+use crate::component::{Fault, Next, Then};
+use crate::control::Binding;
 use crate::message::{Frame, Stamp, Stamped};
 use crate::time::MonotonicTime;
 use crate::topology::Transform;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A sensor as declared.
+/// A sensor, a controller or a bridge as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct SensorDeclaration {
     /// Its path: `sensor/base_link/imu`.
@@ -18,9 +23,11 @@ pub struct SensorDeclaration {
     pub period_nanos: Option<i64>,
     /// Takes points from its frame to the root link's, if only fixed joints lie between.
     pub root_from_frame: Option<Transform>,
+    /// The number of its supervisor.
+    pub supervisor: Supervisor,
 }
 
-/// A running sensor, whatever its type.
+/// A running sensor or service, whatever its type.
 pub trait Source: Send {
     /// Its path.
     fn path(&self) -> &'static str;
@@ -28,7 +35,7 @@ pub trait Source: Send {
     fn starts_at(&self) -> Option<MonotonicTime>;
     /// Lets it begin: it is due at once, or when it wants to be.
     fn begin(&mut self);
-    /// When it is to be read next; none before it has begun and once it has finished.
+    /// When it is to be read next, or started anew; none before it has begun and once it has finished.
     fn due(&self) -> Option<MonotonicTime>;
     /// Reads it and publishes the reading; all estimators downstream run before this returns.
     fn fire(&mut self);
@@ -42,51 +49,80 @@ const FARTHEST_NANOS: i64 = 86_400_000_000_000;
 /// Readings at one instant of virtual time before the sensor is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-struct Running<R: Robot, S: Sensor, P> {
-    /// None once it has stopped.
-    sensor: Option<S>,
+struct Running<R: Robot, S: Periodic, P> {
+    /// None while it does not run.
+    component: Option<S>,
+    context: S::Context,
     declaration: &'static SensorDeclaration,
+    options: S::Options,
+    binding: Binding<S::Options>,
     startup: Startup,
     wiring: Arc<R::Wiring>,
     publish: P,
     due: Option<MonotonicTime>,
     at_one_instant: u32,
+    /// How often in a row it has failed, and when last.
+    attempt: u32,
+    failed_at: MonotonicTime,
+    restart: Arc<AtomicBool>,
+    options_changed: Arc<AtomicBool>,
 }
 
 impl Startup {
-    /// Opens the sensor and adds it to `sources`; its readings go to `publish`.
+    /// Makes a sensor or a service and adds it to `sources`; its readings go to `publish`.
     ///
     /// The wiring comes beside the function instead of in a closure: that it may go to another thread is known of every
     /// robot, and need not be proven anew for each of its sensors.
-    pub fn source<R: Robot, S: Sensor>(
+    pub fn source<R: Robot, S: Periodic>(
         &self,
         declaration: &'static SensorDeclaration,
         options: &S::Options,
+        binding: Binding<S::Options>,
         wiring: &Arc<R::Wiring>,
-        publish: impl Fn(&R::Wiring, &Stamped<S::Output>) + Send + 'static,
+        publish: impl Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send + 'static,
         sources: &mut Vec<Box<dyn Source>>,
     ) {
-        let context =
-            SensorContext { robot: self.robot(), declaration, clock: self.clock.clone(), stop: self.stop.clone() };
-        if let Some(sensor) = self.make(declaration.path, options, |options| S::init(options, &context)) {
-            sources.push(Box::new(Running::<R, S, _> {
-                sensor: Some(sensor),
-                declaration,
-                startup: self.clone(),
-                wiring: Arc::clone(wiring),
-                publish,
-                due: None,
-                at_one_instant: 0,
-            }));
-        }
+        let context = S::context(declaration, self);
+        let made = self.make(declaration.path, options, binding, |options| S::init(options, &context));
+        let Ok(component) = made else { return };
+        let options_changed = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&options_changed);
+        self.bind(declaration.path, options, binding, move || flag.store(true, Ordering::Release));
+        sources.push(Box::new(Running::<R, S, _> {
+            component: Some(component),
+            context,
+            declaration,
+            options: options.clone(),
+            binding,
+            startup: self.clone(),
+            wiring: Arc::clone(wiring),
+            publish,
+            due: None,
+            at_one_instant: 0,
+            attempt: 0,
+            failed_at: MonotonicTime::ZERO,
+            restart: self.look_after(declaration.supervisor),
+            options_changed,
+        }));
     }
 }
 
-impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Running<R, S, P> {
-    /// Reads the sensor once, publishes what it gave, and says when to read it next.
+impl<R, S, P> Running<R, S, P>
+where
+    R: Robot,
+    S: Periodic,
+    P: Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send,
+{
+    /// Reads it once, publishes what it gave, and says when to read it next.
     fn read(&mut self, due: MonotonicTime) -> Result<Option<MonotonicTime>, Fault> {
-        let Some(sensor) = &mut self.sensor else { return Ok(None) };
-        let mut reading = sensor.read(self.startup.clock.now())?;
+        if self.options_changed.load(Ordering::Relaxed) && self.options_changed.swap(false, Ordering::AcqRel) {
+            let options = self.startup.bound(&self.options, self.binding)?;
+            if let Some(component) = &mut self.component {
+                component.handle_options(options, &self.context)?;
+            }
+        }
+        let Some(component) = &mut self.component else { return Ok(None) };
+        let mut reading = component.read(self.startup.clock.now())?;
         let now = self.startup.clock.now();
         if let Some(payload) = reading.payload.take() {
             let monotonic_time = reading.time.unwrap_or(now);
@@ -96,7 +132,7 @@ impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Running
                 frame: self.declaration.frame,
                 origin: self.startup.origin,
             };
-            (self.publish)(&self.wiring, &stamp.message(payload));
+            (self.publish)(&self.wiring, &stamp.message(payload), now);
         }
         self.next_due(reading.next, due, now)
     }
@@ -112,7 +148,7 @@ impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Running
         let next = match (next, self.declaration.period_nanos) {
             (Next::Never, _) => return Ok(None),
             (Next::At(time), _) if !is_virtual && time.nanos_since(now) > FARTHEST_NANOS => {
-                return Err(Fault::new(format!(
+                return Err(Fault::permanent(format!(
                     "it asks to be read at {time}, and now is {now}; a recording with stamps of its own needs virtual \
                      time, `simulate`"
                 )));
@@ -121,7 +157,7 @@ impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Running
             (Next::AtRate, Some(period)) => next_on_grid(due, period, now),
             (Next::AtRate, None) if !is_virtual => now,
             (Next::AtRate, None) => {
-                return Err(Fault::new(
+                return Err(Fault::permanent(
                     "it has no `rate` and did not say when to read it next, so virtual time cannot go on; declare \
                      `rate`, or return `Reading::next_at`",
                 ));
@@ -129,16 +165,51 @@ impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Running
         };
         self.at_one_instant = if next > due { 0 } else { self.at_one_instant.saturating_add(1) };
         if is_virtual && self.at_one_instant > STUCK_AFTER {
-            return Err(Fault::new(format!("it asked {STUCK_AFTER} times to be read at {due}")));
+            return Err(Fault::permanent(format!("it asked {STUCK_AFTER} times to be read at {due}")));
         }
         Ok(Some(next))
     }
 
-    /// Closes the device and drops the sensor.
+    fn fail(&mut self, Failed { fault, panicked }: Failed) {
+        self.startup.fault(self.declaration.path, &fault);
+        self.retire(panicked);
+        if fault.then != Then::Restart {
+            return;
+        }
+        let now = self.startup.clock.now();
+        let supervisors = self.startup.supervisors();
+        if now.duration_since(self.failed_at) > supervisors.calm() {
+            self.attempt = 0;
+        }
+        let verdict = supervisors.failed(self.declaration.supervisor, now);
+        self.due = (verdict != Verdict::GiveUp).then(|| now + supervisors.backoff(self.attempt));
+        (self.attempt, self.failed_at) = (self.attempt.saturating_add(1), now);
+        self.startup.carry_out(verdict, self.declaration.path, now);
+        // The verdict may have flagged this one as well, which starts anew already.
+        self.restart.store(false, Ordering::Release);
+    }
+
+    fn make_anew(&mut self) {
+        let made = self.startup.bound(&self.options, self.binding);
+        let made = match made {
+            Ok(options) => caught(|| S::init(options, &self.context)),
+            Err(fault) => Err(Failed { fault, panicked: false }),
+        };
+        match made {
+            Ok(component) => {
+                tracing::info!(component = self.declaration.path, "started anew");
+                self.component = Some(component);
+                self.begin();
+            }
+            Err(failed) => self.fail(failed),
+        }
+    }
+
+    /// Closes the device and drops the component.
     fn retire(&mut self, panicked: bool) {
         self.due = None;
-        if let Some(fault) = self.sensor.take().and_then(|sensor| retire(sensor, panicked, S::terminate)) {
-            self.startup.faults.add(self.declaration.path, fault.to_string());
+        if let Some(fault) = self.component.take().and_then(|component| retire(component, panicked, S::terminate)) {
+            self.startup.fault(self.declaration.path, &fault);
         }
     }
 }
@@ -151,20 +222,25 @@ fn next_on_grid(due: MonotonicTime, period: i64, now: MonotonicTime) -> Monotoni
     if next < now { next.plus_nanos(period) } else { next }
 }
 
-impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Source for Running<R, S, P> {
+impl<R, S, P> Source for Running<R, S, P>
+where
+    R: Robot,
+    S: Periodic,
+    P: Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send,
+{
     fn path(&self) -> &'static str {
         self.declaration.path
     }
 
     fn starts_at(&self) -> Option<MonotonicTime> {
-        self.sensor.as_ref().and_then(S::starts_at)
+        self.component.as_ref().and_then(S::starts_at)
     }
 
     fn begin(&mut self) {
         let now = self.startup.clock.now();
         match self.next_due(Next::At(self.starts_at().unwrap_or(now)), MonotonicTime::from_nanos(i64::MIN), now) {
             Ok(due) => self.due = due,
-            Err(fault) => self.startup.faults.add(self.declaration.path, fault.to_string()),
+            Err(fault) => self.fail(Failed { fault, panicked: false }),
         }
     }
 
@@ -174,12 +250,15 @@ impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Source 
 
     fn fire(&mut self) {
         let Some(due) = self.due else { return };
+        if self.component.is_some() && self.restart.swap(false, Ordering::AcqRel) {
+            self.retire(false);
+        }
+        if self.component.is_none() {
+            return self.make_anew();
+        }
         match caught(|| self.read(due)) {
             Ok(next) => self.due = next,
-            Err(Failed { fault, panicked }) => {
-                self.startup.faults.add(self.declaration.path, fault.to_string());
-                self.retire(panicked);
-            }
+            Err(failed) => self.fail(failed),
         }
     }
 
@@ -188,11 +267,11 @@ impl<R: Robot, S: Sensor, P: Fn(&R::Wiring, &Stamped<S::Output>) + Send> Source 
     }
 }
 
-impl<R: Robot, S: Sensor, P> Drop for Running<R, S, P> {
+impl<R: Robot, S: Periodic, P> Drop for Running<R, S, P> {
     /// Of a robot that did not start.
     fn drop(&mut self) {
-        if let Some(sensor) = self.sensor.take() {
-            let _ = retire(sensor, false, S::terminate);
+        if let Some(component) = self.component.take() {
+            let _ = retire(component, false, S::terminate);
         }
     }
 }

@@ -1,53 +1,171 @@
-//! What is the same for all components of one start.
+//! What all components of one run share.
 
-use super::{ComponentFault, StartError, StopSignal, caught};
-use crate::component::{Fault, Options};
+use super::agenda::Agenda;
+use super::bus::{Bus, Directory};
+use super::error::Faults;
+use super::supervision::{Supervision, Supervisor, Supervisors, Verdict};
+use super::{Robot, StartError, StopSignal, caught};
+use crate::component::{Fault, Options, Then};
+use crate::control::{Binding, Control, ParameterValues};
 use crate::message::Origin;
-use crate::time::Clock;
-use std::sync::{Arc, Mutex, PoisonError};
+use crate::node::{HealthTransition, SharedNode};
+use crate::time::{Clock, MonotonicTime};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// What the components of a robot are started with.
+/// What the components of a robot are started with, and report to while they run.
 #[derive(Clone, Debug)]
 pub struct Startup {
     pub(super) clock: Clock,
     pub(super) origin: Origin,
     pub(super) stop: StopSignal,
     pub(super) faults: Faults,
+    pub(super) control: Control,
+    agenda: Agenda,
+    supervisors: Supervisors,
+    nodes: Arc<[SharedNode]>,
+    periodic: Periodic,
+    directory: Arc<OnceLock<Arc<dyn Directory>>>,
     /// The first component that could not start; those behind it are not started any more.
     refusal: Arc<Mutex<Option<StartError>>>,
 }
 
+/// Sensors and what else is called at a rate: who looks after each, and whether it is to be started anew.
+type Periodic = Arc<Mutex<Vec<(Supervisor, Arc<AtomicBool>)>>>;
+
 impl Startup {
-    pub(super) fn new(clock: Clock, robot: &'static str) -> Self {
-        let origin = Origin { robot, node: "local" };
-        Self { clock, origin, stop: StopSignal::default(), faults: Faults::default(), refusal: Arc::default() }
+    pub(super) fn new<R: Robot>(clock: Clock, origin: Origin, control: Control, supervision: Supervision) -> Self {
+        Self {
+            clock,
+            origin,
+            stop: StopSignal::default(),
+            faults: Faults::default(),
+            control,
+            agenda: Agenda::default(),
+            supervisors: Supervisors::new(R::TOPOLOGY, supervision),
+            nodes: R::ESTIMATORS.iter().map(SharedNode::new).collect(),
+            periodic: Periodic::default(),
+            directory: Arc::default(),
+            refusal: Arc::default(),
+        }
     }
 
     /// Makes a component with validated options, unless another one could not start; if it cannot start either, that is
-    /// kept.
+    /// kept. The error says why it does not run.
     pub(crate) fn make<O: Options, C>(
         &self,
         path: &'static str,
         options: &O,
+        binding: Binding<O>,
         make: impl FnOnce(O) -> Result<C, Fault>,
-    ) -> Option<C> {
+    ) -> Result<C, String> {
         let mut refusal = self.refusal.lock().unwrap_or_else(PoisonError::into_inner);
         if refusal.is_some() {
-            return None;
+            return Err("the robot does not start".into());
         }
-        let valid = options.validate().map_err(Fault::new);
-        match valid.and_then(|()| caught(|| make(options.clone())).map_err(|failed| failed.fault)) {
-            Ok(component) => Some(component),
-            Err(fault) => {
+        let made = self.bound(options, binding);
+        let made = made.and_then(|options| caught(|| make(options)).map_err(|failed| failed.fault));
+        made.map_err(|fault| {
+            let reason = fault.to_string();
+            if fault.then == Then::Skip {
+                tracing::info!(component = path, reason, "left out");
+            } else {
                 *refusal = Some(StartError::component(path, fault));
-                None
             }
+            reason
+        })
+    }
+
+    /// Options with the values that parameters have now, validated.
+    pub(crate) fn bound<O: Options>(&self, options: &O, binding: Binding<O>) -> Result<O, Fault> {
+        binding.bound(options, &self.control.parameters()).map_err(Fault::new)
+    }
+
+    /// Has `notify` called when a parameter has changed that these options are bound to. A value with which they would not
+    /// be valid is refused.
+    pub(crate) fn bind<O: Options>(
+        &self,
+        path: &'static str,
+        options: &O,
+        binding: Binding<O>,
+        notify: impl Fn() + Send + 'static,
+    ) {
+        if !binding.parameters.is_empty() {
+            let options = options.clone();
+            let check = move |values: &ParameterValues| binding.bound(&options, values).map(drop);
+            self.control.bind(path, binding.parameters, check, notify);
         }
+    }
+
+    /// The same for an estimator, which is told through its node.
+    pub(crate) fn bind_node<O: Options>(&self, node: &SharedNode, options: &O, binding: Binding<O>) {
+        let (node, agenda, clock) = (node.clone(), self.agenda.clone(), self.clock.clone());
+        self.bind(node.declaration().path, options, binding, move || {
+            node.change_options();
+            agenda.wake_at(clock.now(), node.declaration().island);
+        });
     }
 
     /// What kept the robot from starting, if anything did.
     pub(super) fn refusal(&self) -> Option<StartError> {
         self.refusal.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// Has `supervisor` look after a sensor or a service; true in the flag asks for a restart.
+    pub(super) fn look_after(&self, supervisor: Supervisor) -> Arc<AtomicBool> {
+        let flag = Arc::new(AtomicBool::new(false));
+        self.periodic().push((supervisor, Arc::clone(&flag)));
+        flag
+    }
+
+    /// Does what a supervisor has decided after a failure at `path`, beyond that component's own restart.
+    pub(crate) fn carry_out(&self, verdict: Verdict, path: &'static str, now: MonotonicTime) {
+        match verdict {
+            Verdict::Restart => {}
+            Verdict::RestartAll(above) => {
+                tracing::warn!(component = path, "failed too often: everything beside it starts anew");
+                for node in self.nodes.iter().filter(|node| node.declaration().path != path) {
+                    if self.supervisors.is_below(node.declaration().supervisor, above) {
+                        node.restart();
+                        self.agenda.wake_at(now, node.declaration().island);
+                    }
+                }
+                let periodic = self.periodic();
+                let below = periodic.iter().filter(|(supervisor, _)| self.supervisors.is_below(*supervisor, above));
+                below.for_each(|(_, flag)| flag.store(true, Ordering::Release));
+            }
+            Verdict::GiveUp => self.control.give_up(path),
+        }
+    }
+
+    /// Publishes a change of health and starts its command, if it has one.
+    pub(crate) fn health_changed(&self, transition: HealthTransition, command: Option<usize>) {
+        self.control.health_changed(transition, command);
+    }
+
+    /// Reports what went wrong with a component.
+    pub(crate) fn fault(&self, path: &'static str, fault: &Fault) {
+        self.faults.add(path, fault.to_string());
+    }
+
+    pub(crate) fn node(&self, number: usize) -> SharedNode {
+        match self.nodes.get(number) {
+            Some(node) => node.clone(),
+            // Numbers and declarations come from one expansion.
+            None => SharedNode::new(&crate::node::EstimatorDeclaration::NONE),
+        }
+    }
+
+    pub(crate) fn nodes(&self) -> &[SharedNode] {
+        &self.nodes
+    }
+
+    pub(crate) fn supervisors(&self) -> &Supervisors {
+        &self.supervisors
+    }
+
+    pub(crate) fn agenda(&self) -> &Agenda {
+        &self.agenda
     }
 
     pub(crate) fn clock(&self) -> &Clock {
@@ -61,19 +179,25 @@ impl Startup {
     pub(crate) fn origin(&self) -> Origin {
         self.origin
     }
-}
 
-/// The faults of sensors, and of what did not stop in time, in the order they came.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Faults(Arc<Mutex<Vec<ComponentFault>>>);
-
-impl Faults {
-    pub(super) fn add(&self, path: &'static str, message: String) {
-        tracing::error!(component = path, fault = message, "component stopped");
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(ComponentFault { path, message });
+    fn periodic(&self) -> std::sync::MutexGuard<'_, Vec<(Supervisor, Arc<AtomicBool>)>> {
+        self.periodic.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn all(&self) -> Vec<ComponentFault> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// Says where topics and actuators are, once they are made.
+    pub(super) fn set_directory(&self, directory: Arc<dyn Directory>) {
+        // It is set once.
+        let _ = self.directory.set(directory);
+    }
+
+    pub(super) fn bus(&self) -> Bus {
+        Bus::new(Arc::clone(&self.directory), self.control.clone(), self.clock.clone())
+    }
+
+    /// Counts a message that did not fit in the inbox of an estimator's island.
+    pub fn overflow(&self, estimator: usize, input: usize) {
+        if let Some(node) = self.nodes.get(estimator) {
+            node.overflow(input);
+        }
     }
 }

@@ -4,8 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+/// Set when the robot is told to stop.
+#[doc(hidden)]
 #[derive(Clone, Debug, Default)]
-pub(crate) struct StopSignal(Arc<Shared>);
+pub struct StopSignal(Arc<Shared>);
 
 #[derive(Debug, Default)]
 struct Shared {

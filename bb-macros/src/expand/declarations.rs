@@ -1,17 +1,18 @@
 //! What was declared, as constant data: sensors, and estimators with their inputs.
 
+use super::islands::Islands;
 use super::literal::{nanos, option, transform};
 use super::{path_text, topology};
-use crate::model::{Mount, Robot, Sensor};
+use crate::model::{EstimatorId, Mount, Robot, Sensor};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
 /// `static __SENSORS`, `__ESTIMATORS` and `__TOPOLOGY`.
-pub(super) fn declarations(verified: &Verified<'_>) -> TokenStream {
+pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenStream {
     let robot = verified.robot;
     let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor)).collect();
-    let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, id)).collect();
+    let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, islands, id)).collect();
     let sensors = array("__SENSOR", quote!(::bb_core::__private::SensorDeclaration), sensors);
     let estimators = array("__ESTIMATOR", quote!(::bb_core::__private::EstimatorDeclaration), estimators);
     let topology = topology::topology(robot);
@@ -41,11 +42,13 @@ fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
         quote!(#period)
     }));
     let root = root_from(robot, sensor.mount);
+    let supervisor = supervisor(robot, sensor.mount);
     quote!(::bb_core::__private::SensorDeclaration {
         path: #path,
         frame: ::bb_core::__private::Frame::new(#frame),
         period_nanos: #period,
         root_from_frame: #root,
+        supervisor: #supervisor,
     })
 }
 
@@ -55,13 +58,16 @@ pub(super) fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
     option(route.map(|route| transform(route.transform)))
 }
 
-fn estimator_declaration(verified: &Verified<'_>, id: usize) -> TokenStream {
+fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: usize) -> TokenStream {
     let robot = verified.robot;
     let (Some(estimator), Some(sources)) = (robot.estimators.get(id), verified.sources.get(id)) else {
         return TokenStream::new();
     };
     let mount = robot.mount_of_estimator(id);
     let (path, frame) = (path_text(&estimator.path), robot.frame_name(mount));
+    let island = islands.of.get(id).copied().unwrap_or(0);
+    let supervisor = supervisor(robot, mount);
+    let (health, worker) = (health(robot, id), worker(robot, id));
     let nested = estimator.is_nested().then(|| nested_input(&estimator.path));
     let synchronous = estimator.sync_tolerances.first().map(|tolerance| &tolerance.quantity);
     let several = estimator.inputs.len() > 1;
@@ -74,8 +80,13 @@ fn estimator_declaration(verified: &Verified<'_>, id: usize) -> TokenStream {
             let tolerance = nanos(tolerance.value);
             quote!(#tolerance)
         }));
+        // The driver has nothing to be compared with but the clock.
+        let stale = option(input.within.as_ref().filter(|_| driver).map(|limit| {
+            let limit = nanos(limit.value);
+            quote!(#limit)
+        }));
         let frame_from_input = transform(robot.route(robot.mount_of(*source), mount).transform);
-        input_declaration(index, &name, &path, driver, optional, &tolerance, &frame_from_input)
+        input_declaration(index, &name, &path, driver, optional, [&tolerance, &stale], &frame_from_input)
     });
     let inputs = nested.into_iter().chain(declared);
     let outputs = estimator.publishers.iter().filter_map(|publisher| robot.publishers.get(*publisher));
@@ -85,7 +96,29 @@ fn estimator_declaration(verified: &Verified<'_>, id: usize) -> TokenStream {
         frame: ::bb_core::__private::Frame::new(#frame),
         inputs: &[#(#inputs),*],
         outputs: &[#(#outputs),*],
+        island: #island,
+        supervisor: #supervisor,
+        health: #health,
+        worker: #worker,
     })
+}
+
+/// The number of the supervisor that looks after what is mounted there: the robot's, then the links', then the joints'.
+pub(super) fn supervisor(robot: &Robot, mount: Mount) -> usize {
+    match mount {
+        Mount::Robot => 0,
+        Mount::Link(link) => 1 + link,
+        Mount::Joint(joint) => 1 + robot.links.len() + joint,
+    }
+}
+
+fn health(_robot: &Robot, _id: EstimatorId) -> TokenStream {
+    quote!(::bb_core::__private::HealthDeclaration::NONE)
+}
+
+/// An `Option<WorkerDeclaration>`.
+pub(super) fn worker(_robot: &Robot, _id: EstimatorId) -> TokenStream {
+    option(None)
 }
 
 /// The one input of a nested estimator: its sensor, whose path is all but the last name of its own.
@@ -93,7 +126,7 @@ fn nested_input(estimator: &[String]) -> TokenStream {
     let sensor = estimator.split_last().map_or(&[][..], |(_, sensor)| sensor);
     let name = sensor.last().cloned().unwrap_or_default();
     let identity = quote!(::bb_core::__private::Transform::IDENTITY);
-    input_declaration(0, &name, &path_text(sensor), true, false, &option(None), &identity)
+    input_declaration(0, &name, &path_text(sensor), true, false, [&option(None), &option(None)], &identity)
 }
 
 fn input_declaration(
@@ -102,7 +135,7 @@ fn input_declaration(
     source: &str,
     driver: bool,
     optional: bool,
-    tolerance: &TokenStream,
+    [tolerance, stale]: [&TokenStream; 2],
     frame_from_input: &TokenStream,
 ) -> TokenStream {
     quote!(::bb_core::__private::InputDeclaration {
@@ -112,6 +145,7 @@ fn input_declaration(
         driver: #driver,
         optional: #optional,
         tolerance_nanos: #tolerance,
+        stale_after_nanos: #stale,
         frame_from_input: #frame_from_input,
     })
 }

@@ -8,7 +8,7 @@ use super::group;
 use super::literal::ident;
 use super::options::{of_estimator, of_sensor};
 use super::types::Types;
-use super::wiring::topic;
+use super::wiring::{topic, visit_function};
 use super::{docs, path_text};
 use crate::model::{EstimatorId, PublisherId, Robot, SensorId};
 use crate::names::module_name;
@@ -126,10 +126,10 @@ impl Handle {
                     Accessors::Wired => quote!(
                         |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
                         |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options,
-                        |wiring: &<#this as ::bb_core::Robot>::Wiring, message| wiring.#publish(message)
+                        |wiring: &<#this as ::bb_core::Robot>::Wiring, message, now| wiring.#publish(message, now)
                     ),
                     Accessors::Stub => {
-                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub(), |_, _| {})
+                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub(), |_, _, _| {})
                     }
                 };
                 let arguments = quote!(::bb_core::__private::Frame::new(#frame), #arguments);
@@ -146,12 +146,18 @@ impl Handle {
                 let options = of_estimator(robot, id);
                 let arguments = match accessors {
                     Accessors::Wired => {
-                        quote!(|topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic, |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options)
+                        let visit = visit_function(id);
+                        quote!(
+                            |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
+                            |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options,
+                            |wiring: &<#this as ::bb_core::Robot>::Wiring, now, visit| wiring.#visit(now, visit)
+                        )
                     }
                     Accessors::Stub => {
-                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub())
+                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub(), |_, _, _| {})
                     }
                 };
+                let arguments = quote!(#id, #arguments);
                 let kind = quote!(::bb_core::EstimatorHandle<#this, #component, #payload>);
                 (&estimator.attributes, path, kind, quote!(::bb_core::EstimatorHandle::new), arguments)
             }
@@ -163,10 +169,15 @@ impl Handle {
                 let options = of_estimator(robot, id);
                 let arguments = match accessors {
                     Accessors::Wired => {
-                        quote!(|options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options)
+                        let visit = visit_function(id);
+                        quote!(
+                            |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options,
+                            |wiring: &<#this as ::bb_core::Robot>::Wiring, now, visit| wiring.#visit(now, visit)
+                        )
                     }
-                    Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),
+                    Accessors::Stub => quote!(|_| ::bb_core::__private::stub(), |_, _, _| {}),
                 };
+                let arguments = quote!(#id, #arguments);
                 let kind = quote!(::bb_core::EstimatorOfSeveralHandle<#this, #component>);
                 (&estimator.attributes, path, kind, quote!(::bb_core::EstimatorOfSeveralHandle::new), arguments)
             }

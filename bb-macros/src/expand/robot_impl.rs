@@ -17,18 +17,28 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
     // would grow with their square.
     let starts = robot.estimators.iter().enumerate().map(|(id, estimator)| {
         let (function, options, kind) = (start_function(id), of_estimator(robot, id), types.estimator(id));
+        let taken = types.estimator_input(id);
         let inputs = if estimator.is_nested() { 1 } else { estimator.inputs.len() };
         let declared = (0..inputs).map(|input| {
             let index = index_name(id, Some(input));
-            quote!(.declare::<{ #index }>(#input))
+            quote!(::bb_core::__private::declare::<{ #index }, #taken>(&mut cache, &__ESTIMATORS[#id], #input);)
         });
         quote! {
             fn #function(
                 options: &__Options,
                 startup: &::bb_core::__private::Startup,
             ) -> ::bb_core::__private::Node<#kind> {
-                ::bb_core::__private::Node::<#kind>::new(&__ESTIMATORS[#id], &options.#options, startup)
-                    #(#declared)*
+                ::bb_core::__private::Node::<#kind>::new(
+                    #id,
+                    &options.#options,
+                    ::bb_core::__private::Binding::NONE,
+                    || {
+                        let mut cache: <#taken as ::bb_core::Inputs>::Cache = ::core::default::Default::default();
+                        #(#declared)*
+                        cache
+                    },
+                    startup,
+                )
             }
         }
     });
@@ -42,11 +52,12 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                 startup: &::bb_core::__private::Startup,
                 sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
             ) {
-                startup.source::<#name, #kind>(
+                startup.source::<#name, ::bb_core::__private::AsSensor<#kind>>(
                     &__SENSORS[#id],
                     &options.#options,
+                    ::bb_core::__private::Binding::NONE,
                     wiring,
-                    |wiring: &__Wiring, message| wiring.#publish(message),
+                    |wiring: &__Wiring, message, now| wiring.#publish(message, now),
                     sources,
                 );
             }
@@ -82,6 +93,13 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             const TOPOLOGY: &'static ::bb_core::__private::Topology = &__TOPOLOGY;
             const SENSORS: &'static [::bb_core::__private::SensorDeclaration] = &__SENSORS;
             const ESTIMATORS: &'static [::bb_core::__private::EstimatorDeclaration] = &__ESTIMATORS;
+            const ACTUATORS: &'static [::bb_core::__private::ActuatorDeclaration] = &[];
+            const SERVICES: &'static [::bb_core::__private::SensorDeclaration] = &[];
+            const STATES: &'static [&'static str] = &[];
+            const CATEGORIES: &'static [::bb_core::__private::CategoryDeclaration] = &[];
+            const COMMANDS: &'static [::bb_core::__private::CommandDeclaration] = &[];
+            const PARAMETERS: &'static [::bb_core::__private::ParameterDeclaration] = &[];
+            const ISLANDS: &'static [::bb_core::__private::IslandOf<__Wiring>] = &__ISLANDS;
 
             type Options = __Options;
             type Topics = __Topics;
@@ -96,7 +114,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             }
 
             fn wire(topics: __Topics, options: &__Options, startup: &::bb_core::__private::Startup) -> __Wiring {
-                __Wiring { topics, nodes: __new_nodes(options, startup) }
+                __Wiring { topics, islands: __new_islands(options, startup), startup: ::core::clone::Clone::clone(startup) }
             }
 
             fn sources(
@@ -117,8 +135,12 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                 __list_topics(topics)
             }
 
-            fn all_nodes(wiring: &__Wiring) -> ::std::vec::Vec<&dyn ::bb_core::__private::AnyNode> {
-                __list_nodes(&wiring.nodes)
+            fn all_actuators(wiring: &__Wiring) -> ::std::vec::Vec<&dyn ::bb_core::__private::AnyActuator> {
+                ::std::vec::Vec::new()
+            }
+
+            fn commands(options: &__Options) -> ::std::vec::Vec<::bb_core::__private::Prepared> {
+                ::std::vec::Vec::new()
             }
         }
     }

@@ -67,6 +67,20 @@ impl<'a> Types<'a> {
         Self { robot, name, above }
     }
 
+    pub(super) fn model(&self) -> &'a Robot {
+        self.robot
+    }
+
+    /// Who publishes.
+    pub(super) fn from(&self, publisher: PublisherId) -> Option<From> {
+        self.robot.publishers.get(publisher).map(|publisher| publisher.from)
+    }
+
+    /// The path of an estimator.
+    pub(super) fn path_of_estimator(&self, id: EstimatorId) -> String {
+        self.robot.estimators.get(id).map_or(String::new(), |estimator| super::path_text(&estimator.path))
+    }
+
     /// The robot's type.
     pub(super) fn robot(&self) -> TokenStream {
         let (above, name) = (&self.above, ident(&self.name.to_string()));

@@ -1,16 +1,24 @@
-//! `struct __Topics`, `struct __Wiring` and what lies downstream of each publisher, by direct calls.
+//! `struct __Topics`, `struct __Wiring`, the islands, and what lies downstream of each publisher, by direct calls.
 //!
 //! ```text
-//! fn p0(&self, message: &Stamped<Imu>) {                       // sensor::base::imu
+//! fn p0(&self, message: &Stamped<Imu>, now: MonotonicTime) {   // sensor::base::imu
 //!     self.topics.g0.p0.publish(message);
-//!     self.nodes.g0.n0.receive::<…>(0, feed(message), |emitted, stamp| self.e0(emitted, stamp));
+//!     self.islands.g0.i0.enter(self, now, |island| self.p0_i0(island, message, now), || …);
 //! }
-//! fn e0(&self, emitted: &mut Option<Orientation>, stamp: Stamp) {
-//!     if let Some(payload) = take(emitted) { self.p1(&stamp.message(payload)); }
+//! fn p0_i0(&self, island: &mut __Island0, message: &Stamped<Imu>, now: MonotonicTime) {
+//!     let mut emitted = None;
+//!     if let Some(stamp) = island.n0.receive::<…>(0, feed(message), now, &mut emitted) {
+//!         self.e0(island, &mut emitted, stamp, now);
+//!     }
+//!     if island.n0.is_unfinished() { self.t0(island, now); }
+//! }
+//! fn e0(&self, island: &mut __Island0, emitted: &mut Option<Orientation>, stamp: Stamp, now: MonotonicTime) {
+//!     if let Some(payload) = take(emitted) { self.p1(island, &stamp.message(payload), now); }
 //! }
 //! ```
 
 use super::group::{self, Field};
+use super::islands::{IslandId, Islands};
 use super::literal::respan;
 use super::types::Types;
 use super::{order, path_text};
@@ -19,11 +27,11 @@ use crate::verify::Verified;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{format_ident, quote};
 
-pub(super) fn wiring(verified: &Verified<'_>) -> TokenStream {
+pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream {
     let robot = verified.robot;
     let types = Types::new(robot, verified.name, 0);
     let consumers = consumers(verified);
-    let (mut indices, mut functions) = (TokenStream::new(), TokenStream::new());
+    let (mut indices, mut functions, mut shores) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
     let mut topics = Vec::new();
     for (id, publisher) in robot.publishers.iter().enumerate() {
         let (payload, path) = (types.payload(id), path_text(&publisher.path));
@@ -32,37 +40,51 @@ pub(super) fn wiring(verified: &Verified<'_>) -> TokenStream {
             kind: quote!(::bb_core::__private::Topic<#payload>),
             value: quote!(::bb_core::__private::Topic::new(#path)),
         });
-        functions.extend(published(&types, id, consumers.get(id).map_or(&[], Vec::as_slice)));
+        functions.extend(published(&types, islands, id, consumers.get(id).map_or(&[], Vec::as_slice)));
     }
-    let mut nodes = Vec::new();
     for (id, estimator) in robot.estimators.iter().enumerate() {
-        let (kind, start) = (types.estimator(id), start_function(id));
-        nodes.push(Field {
-            name: node(id),
-            kind: quote!(::bb_core::__private::Node<#kind>),
-            value: quote!(#start(options, startup)),
-        });
         let inputs: Vec<Option<usize>> =
             if estimator.is_nested() { vec![None] } else { (0..estimator.inputs.len()).map(Some).collect() };
         for input in inputs {
             let (name, index) = (index_name(id, input), types.input_index(id, input));
             indices.extend(quote!(const #name: usize = #index;));
         }
-        functions.extend(emitted(&types, id, &estimator.publishers, robot.publishers.as_slice()));
+        functions.extend(emitted(&types, islands, id, &estimator.publishers, robot.publishers.as_slice()));
+        functions.extend(turn(&types, islands, id));
+    }
+    let mut places = Vec::new();
+    for number in 0..islands.all.len() {
+        let (name, function) = (island_struct(number), format_ident!("__new_island_{number}"));
+        places.push(Field {
+            name: island(number),
+            kind: quote!(::bb_core::__private::Island<#name>),
+            value: quote!(::bb_core::__private::Island::new(#function(options, startup))),
+        });
+        shores.extend(shore(&types, islands, number, &consumers));
     }
     let topic_structs = group::structs("__Topics", "__new_topics", &topics, &quote!(), &quote!());
     let parameters = quote!(options: &__Options, startup: &::bb_core::__private::Startup);
-    let node_structs = group::structs("__Nodes", "__new_nodes", &nodes, &parameters, &quote!(options, startup));
+    let island_structs =
+        group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, startup));
     let list_topics =
         group::list("__Topics", "__list_topics", &topics, &quote!(dyn ::bb_core::__private::AnyTopic));
-    let list_nodes = group::list("__Nodes", "__list_nodes", &nodes, &quote!(dyn ::bb_core::__private::AnyNode));
+    let finders = (0..islands.all.len()).map(|number| {
+        let place = group::path(number, &island(number));
+        quote!(|wiring| &wiring.islands.#place)
+    });
+    let count = islands.all.len();
     quote! {
-        pub struct __Wiring { topics: __Topics, nodes: __Nodes }
+        pub struct __Wiring {
+            topics: __Topics,
+            islands: __Islands,
+            startup: ::bb_core::__private::Startup,
+        }
         #topic_structs
-        #node_structs
+        #island_structs
         #list_topics
-        #list_nodes
         #indices
+        #shores
+        static __ISLANDS: [::bb_core::__private::IslandOf<__Wiring>; #count] = [#(#finders),*];
 
         impl __Wiring { #functions }
     }
@@ -72,6 +94,8 @@ pub(super) fn wiring(verified: &Verified<'_>) -> TokenStream {
 pub(super) struct Consumer {
     estimator: EstimatorId,
     input: Option<usize>,
+    /// Whether its message makes the estimator run; else it is kept until another does.
+    runs: bool,
     /// Where rustc is to report that payloads do not match: the path of the input, or the type of a nested estimator.
     span: Span,
 }
@@ -85,49 +109,115 @@ fn consumers(verified: &Verified<'_>) -> Vec<Vec<Consumer>> {
             && let Some(list) = robot.sensors.get(sensor).and_then(|sensor| consumers.get_mut(sensor.publisher))
         {
             let span = crate::diagnostics::Place::of(&estimator.component.kind).start;
-            list.push(Consumer { estimator: id, input: None, span });
+            list.push(Consumer { estimator: id, input: None, runs: true, span });
         }
         for (number, (input, source)) in estimator.inputs.iter().zip(sources).enumerate() {
             if let Some(list) = consumers.get_mut(*source) {
                 let span = input.path.0.last().map_or_else(Span::call_site, Ident::span);
-                list.push(Consumer { estimator: id, input: Some(number), span });
+                let runs = estimator.inputs.len() < 2 || input.driver.is_some();
+                list.push(Consumer { estimator: id, input: Some(number), runs, span });
             }
         }
     }
-    // What an estimator makes of a message comes before those that take both; its driver, after its other inputs.
+    // What is kept for later comes first; then the estimators run, those that take what others make of the same message
+    // after these.
     let depths = order::depths(verified);
     for list in &mut consumers {
-        list.sort_by_key(|consumer| {
-            let estimator = robot.estimators.get(consumer.estimator);
-            let input = consumer.input.and_then(|input| estimator?.inputs.get(input));
-            (
-                depths.get(consumer.estimator).copied(),
-                consumer.estimator,
-                input.is_some_and(|input| input.driver.is_some()),
-            )
-        });
+        list.sort_by_key(|consumer| (consumer.runs, depths.get(consumer.estimator).copied(), consumer.estimator));
     }
     consumers
 }
 
-/// `fn p0`: publishes, then runs what lies downstream.
-fn published(types: &Types<'_>, id: PublisherId, consumers: &[Consumer]) -> TokenStream {
+/// `fn p0`: publishes, then runs what lies downstream, island by island.
+///
+/// One that an estimator publishes is called with the estimator's island open. There, what other islands keep for later
+/// goes first, then its own estimators run, then those of the others.
+fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &[Consumer]) -> TokenStream {
     let (name, payload, topic) = (topic(id), types.payload(id), group::path(id, &topic(id)));
-    let calls = consumers.iter().map(|Consumer { estimator, input, span }| {
-        let (node, emit) = (group::path(*estimator, &node(*estimator)), format_ident!("e{estimator}"));
-        let (index, number) = (index_name(*estimator, *input), input.unwrap_or(0));
-        let taken = types.estimator_input(*estimator);
-        let taken = quote!(<#taken as ::bb_core::__private::InputAt<{ #index }>>::Payload);
-        let known = quote!({ ::bb_core::__private::both_known::<#payload, #taken>() });
-        let feed = quote!(<#payload as ::bb_core::__private::Feeds<#taken, #known>>::feed(message));
-        let feed = respan(feed, *span);
-        quote!(self.nodes.#node.receive::<{ #index }>(#number, #feed, |emitted, stamp| self.#emit(emitted, stamp));)
+    let own = match types.from(id) {
+        Some(From::Estimator(estimator, _)) => islands.of.get(estimator).copied(),
+        _ => None,
+    };
+    let message = quote!(message: &::bb_core::__private::Stamped<#payload>);
+    let now = quote!(now: ::bb_core::__private::MonotonicTime);
+    let mut functions = TokenStream::new();
+    let calls: Vec<TokenStream> = visits(consumers, islands)
+        .iter()
+        .map(|Visit { island, runs, consumers }| {
+            let (deliver, kind) = (deliver_function(id, *island, *runs), island_struct(*island));
+            let receive = consumers.iter().map(|consumer| receive(types, &payload, consumer));
+            functions.extend(quote! {
+                #[inline]
+                fn #deliver(&self, island: &mut #kind, #message, #now) { #(#receive)* }
+            });
+            if own == Some(*island) {
+                return quote!(self.#deliver(island, message, now););
+            }
+            let (place, kind) = (group::path(*island, &self::island(*island)), message_enum(*island));
+            let variant = variant(id, *runs);
+            quote! {
+                self.islands.#place.enter(
+                    self,
+                    now,
+                    |island| self.#deliver(island, message, now),
+                    || #kind::#variant(::core::clone::Clone::clone(message)),
+                );
+            }
+        })
+        .collect();
+    let island = own.map(|own| {
+        let kind = island_struct(own);
+        quote!(island: &mut #kind,)
     });
     quote! {
         #[inline]
-        fn #name(&self, message: &::bb_core::__private::Stamped<#payload>) {
+        fn #name(&self, #island #message, #now) {
             self.topics.#topic.publish(message);
             #(#calls)*
+        }
+        #functions
+    }
+}
+
+/// The consumers of a publisher that stand in one island and are reached in one go: first what islands keep for later,
+/// then what runs.
+struct Visit<'a> {
+    island: IslandId,
+    runs: bool,
+    consumers: Vec<&'a Consumer>,
+}
+
+fn visits<'a>(consumers: &'a [Consumer], islands: &Islands) -> Vec<Visit<'a>> {
+    let mut visits: Vec<Visit<'_>> = Vec::new();
+    for consumer in consumers {
+        let island = islands.of.get(consumer.estimator).copied().unwrap_or(0);
+        match visits.iter_mut().find(|visit| visit.island == island && visit.runs == consumer.runs) {
+            Some(visit) => visit.consumers.push(consumer),
+            None => visits.push(Visit { island, runs: consumer.runs, consumers: vec![consumer] }),
+        }
+    }
+    visits
+}
+
+/// Hands the message to one estimator, publishes what it emits, and lets it go on if it wants to.
+fn receive(types: &Types<'_>, payload: &TokenStream, consumer: &Consumer) -> TokenStream {
+    let Consumer { estimator, input, span, .. } = consumer;
+    let (node, emit, turn) = (node(*estimator), emit_function(*estimator), turn_function(*estimator));
+    let (index, number) = (index_name(*estimator, *input), input.unwrap_or(0));
+    let taken = types.estimator_input(*estimator);
+    let taken = quote!(<#taken as ::bb_core::__private::InputAt<{ #index }>>::Payload);
+    let known = quote!({ ::bb_core::__private::both_known::<#payload, #taken>() });
+    let feed = quote!(<#payload as ::bb_core::__private::Feeds<#taken, #known>>::feed(message));
+    let feed = respan(feed, *span);
+    quote! {
+        let mut emitted = ::core::option::Option::None;
+        if let ::core::option::Option::Some(stamp) =
+            island.#node.receive::<{ #index }>(#number, #feed, now, &mut emitted)
+        {
+            self.#emit(island, &mut emitted, stamp, now);
+        }
+        if island.#node.is_unfinished() {
+            self.#turn(island, now);
         }
     }
 }
@@ -135,27 +225,146 @@ fn published(types: &Types<'_>, id: PublisherId, consumers: &[Consumer]) -> Toke
 /// `fn e0`: publishes what an estimator has emitted, output by output.
 fn emitted(
     types: &Types<'_>,
+    islands: &Islands,
     id: EstimatorId,
     publishers: &[PublisherId],
     all: &[crate::model::Publisher],
 ) -> TokenStream {
-    let (name, emitted) = (format_ident!("e{id}"), types.estimator_output(id));
+    let (name, emitted) = (emit_function(id), types.estimator_output(id));
+    let island = island_struct(islands.of.get(id).copied().unwrap_or(0));
     let outputs = publishers.iter().filter_map(|publisher| {
         let Some(From::Estimator(_, output)) = all.get(*publisher).map(|publisher| publisher.from) else {
             return None;
         };
-        let (index, publish) = (types.output_index(id, output), format_ident!("p{publisher}"));
+        let (index, publish) = (types.output_index(id, output), topic(*publisher));
         let take = types.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::take));
         Some(quote! {
             if let ::core::option::Option::Some(payload) = #take(emitted) {
-                self.#publish(&stamp.message(payload));
+                self.#publish(island, &stamp.message(payload), now);
             }
         })
     });
     quote! {
         #[inline]
-        fn #name(&self, emitted: &mut ::core::option::Option<#emitted>, stamp: ::bb_core::__private::Stamp) {
+        fn #name(
+            &self,
+            island: &mut #island,
+            emitted: &mut ::core::option::Option<#emitted>,
+            stamp: ::bb_core::__private::Stamp,
+            now: ::bb_core::__private::MonotonicTime,
+        ) {
             #(#outputs)*
+        }
+    }
+}
+
+/// `fn t0`: does all that is due in an estimator; `fn v0`: lets a caller reach it.
+fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
+    let number = islands.of.get(id).copied().unwrap_or(0);
+    let (island, place) = (island_struct(number), group::path(number, &self::island(number)));
+    let (node, emit, turn, visit) = (node(id), emit_function(id), turn_function(id), visit_function(id));
+    let (kind, output) = (types.estimator(id), types.estimator_output(id));
+    quote! {
+        #[cold]
+        fn #turn(&self, island: &mut #island, now: ::bb_core::__private::MonotonicTime) {
+            loop {
+                let mut emitted = ::core::option::Option::None;
+                match island.#node.turn(now, &mut emitted) {
+                    ::bb_core::__private::Turn::Idle => return,
+                    ::bb_core::__private::Turn::Quiet => {}
+                    ::bb_core::__private::Turn::Emitted(stamp) => self.#emit(island, &mut emitted, stamp, now),
+                }
+            }
+        }
+
+        #[cold]
+        fn #visit(
+            &self,
+            now: ::bb_core::__private::MonotonicTime,
+            visit: &mut dyn ::core::ops::FnMut(
+                &mut ::bb_core::__private::Node<#kind>,
+                &mut ::core::option::Option<#output>,
+            ) -> ::core::option::Option<::bb_core::__private::Stamp>,
+        ) {
+            self.islands.#place.with(self, ::core::option::Option::None, |island| {
+                let mut emitted = ::core::option::Option::None;
+                if let ::core::option::Option::Some(stamp) = visit(&mut island.#node, &mut emitted) {
+                    self.#emit(island, &mut emitted, stamp, now);
+                }
+                self.#turn(island, now);
+            });
+        }
+    }
+}
+
+/// The struct of an island, what may be left in its inbox, and how that is delivered.
+fn shore(types: &Types<'_>, islands: &Islands, number: IslandId, consumers: &[Vec<Consumer>]) -> TokenStream {
+    let Some(island) = islands.all.get(number) else { return TokenStream::new() };
+    let (name, message) = (island_struct(number), message_enum(number));
+    let function = format_ident!("__new_island_{number}");
+    let fields = island.estimators.iter().map(|id| {
+        let (node, kind) = (node(*id), types.estimator(*id));
+        quote!(#node: ::bb_core::__private::Node<#kind>,)
+    });
+    let values = island.estimators.iter().map(|id| {
+        let (node, start) = (node(*id), start_function(*id));
+        quote!(#node: #start(options, startup),)
+    });
+    let (mut variants, mut deliveries, mut drops) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+    for (publisher, consumers) in consumers.iter().enumerate() {
+        let is_inside = match types.from(publisher) {
+            Some(From::Estimator(id, _)) => islands.of.get(id) == Some(&number),
+            _ => false,
+        };
+        let visits = visits(consumers, islands);
+        for visit in visits.iter().filter(|visit| visit.island == number && !is_inside) {
+            let (variant, payload) = (variant(publisher, visit.runs), types.payload(publisher));
+            let deliver = deliver_function(publisher, number, visit.runs);
+            let counts = visit.consumers.iter().map(|Consumer { estimator, input, .. }| {
+                let input = input.unwrap_or(0);
+                quote!(wiring.startup.overflow(#estimator, #input);)
+            });
+            variants.extend(quote!(#variant(::bb_core::__private::Stamped<#payload>),));
+            deliveries.extend(quote!(#message::#variant(message) => wiring.#deliver(self, message, now),));
+            drops.extend(quote!(#message::#variant(_) => { #(#counts)* }));
+        }
+    }
+    let turns = island.estimators.iter().map(|id| turn_function(*id));
+    let terminated = island.estimators.iter().map(|id| node(*id));
+    let first = island.estimators.first();
+    let path = first.map_or(String::new(), |id| types.path_of_estimator(*id));
+    let worker = first.map_or_else(TokenStream::new, |id| super::declarations::worker(types.model(), *id));
+    quote! {
+        pub struct #name { #(#fields)* }
+
+        #[allow(non_camel_case_types, clippy::large_enum_variant)]
+        pub enum #message { #variants }
+
+        fn #function(options: &__Options, startup: &::bb_core::__private::Startup) -> #name {
+            #name { #(#values)* }
+        }
+
+        impl ::bb_core::__private::Shore for #name {
+            type Wiring = __Wiring;
+            type Message = #message;
+            const NAME: &'static str = #path;
+            const WORKER: ::core::option::Option<::bb_core::__private::WorkerDeclaration> = #worker;
+
+            fn deliver(&mut self, wiring: &__Wiring, message: &#message, now: ::bb_core::__private::MonotonicTime) {
+                match message { #deliveries }
+            }
+
+            fn wake(&mut self, wiring: &__Wiring, now: ::bb_core::__private::MonotonicTime) {
+                #(wiring.#turns(self, now);)*
+            }
+
+            fn dropped(wiring: &__Wiring, message: &#message) {
+                match message { #drops }
+            }
+
+            fn terminate(&mut self) {
+                #(self.#terminated.terminate();)*
+            }
         }
     }
 }
@@ -177,4 +386,39 @@ pub(super) fn node(id: EstimatorId) -> Ident {
 /// The constant that holds the number of an input in the algorithm's input type.
 pub(super) fn index_name(id: EstimatorId, input: Option<usize>) -> Ident {
     format_ident!("__E{id}_INPUT_{}", input.unwrap_or(0))
+}
+
+fn emit_function(id: EstimatorId) -> Ident {
+    format_ident!("e{id}")
+}
+
+fn turn_function(id: EstimatorId) -> Ident {
+    format_ident!("t{id}")
+}
+
+/// The function through which a caller reaches an estimator.
+pub(super) fn visit_function(id: EstimatorId) -> Ident {
+    format_ident!("v{id}")
+}
+
+/// What a publisher's message does in one island: what is kept for later, or what runs.
+fn deliver_function(publisher: PublisherId, island: IslandId, runs: bool) -> Ident {
+    let variant = variant(publisher, runs);
+    format_ident!("{variant}_i{island}")
+}
+
+fn variant(publisher: PublisherId, runs: bool) -> Ident {
+    if runs { topic(publisher) } else { format_ident!("p{publisher}_kept") }
+}
+
+fn island(number: IslandId) -> Ident {
+    format_ident!("i{number}")
+}
+
+fn island_struct(number: IslandId) -> Ident {
+    format_ident!("__Island{number}")
+}
+
+fn message_enum(number: IslandId) -> Ident {
+    format_ident!("__Message{number}")
 }

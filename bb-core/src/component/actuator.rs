@@ -1,0 +1,121 @@
+//! The contract of an actuator.
+
+use super::{Fault, Options};
+use crate::message::{Payload, Stamped};
+use crate::time::Clock;
+
+/// Moves a joint.
+///
+/// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. Simulation, motion
+/// and kinematics are later work of this framework; what is here starts and stops an actuator with the robot, makes it
+/// safe when the robot is disarmed, and lets everybody see what it was told, at its path.
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// /// Where a joint is to go.
+/// #[derive(Clone, Copy, Debug, Payload)]
+/// pub struct Position {
+///     /// rad or m.
+///     pub position: f64,
+/// }
+///
+/// /// A servo that believes that it is where it was told to go.
+/// #[derive(Debug, Default)]
+/// pub struct Servo {
+///     target: f64,
+///     has_torque: bool,
+/// }
+///
+/// impl Actuator for Servo {
+///     type Options = NoOptions;
+///     type Command = Position;
+///
+///     fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+///         Ok(Self::default())
+///     }
+///
+///     fn handle_command(&mut self, command: &Stamped<Position>) -> Result<(), Fault> {
+///         (self.target, self.has_torque) = (command.position, true);
+///         Ok(())
+///     }
+///
+///     fn disarm(&mut self) -> Result<(), Fault> {
+///         self.has_torque = false;
+///         Ok(())
+///     }
+/// }
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an actuator",
+    label = "cannot be declared with `actuator`",
+    note = "implement `bb_core::Actuator` for it"
+)]
+pub trait Actuator: Sized + Send + 'static {
+    /// What `Name(…)` in `robot!` fills.
+    type Options: Options;
+    /// What it is told.
+    type Command: Payload;
+
+    /// Opens the device, without moving anything.
+    ///
+    /// # Errors
+    /// What keeps it from starting; the robot then does not start.
+    fn init(options: Self::Options, context: &ActuatorContext) -> Result<Self, Fault>;
+
+    /// Does what it is told.
+    ///
+    /// # Errors
+    /// What keeps it from going on; the fault is reported, it is disarmed and started anew.
+    fn handle_command(&mut self, command: &Stamped<Self::Command>) -> Result<(), Fault>;
+
+    /// Makes it safe. Called whenever the robot is disarmed; within 5 s it must have come back.
+    ///
+    /// # Errors
+    /// Why it could not be made safe: the robot's safety state is then `error`.
+    fn disarm(&mut self) -> Result<(), Fault>;
+
+    /// Takes new options, validated, after a parameter that they are bound to has changed. Unless it is written, the
+    /// actuator is made anew with them.
+    ///
+    /// # Errors
+    /// As for `handle_command`.
+    fn handle_options(&mut self, options: Self::Options, context: &ActuatorContext) -> Result<(), Fault> {
+        *self = Self::init(options, context)?;
+        Ok(())
+    }
+
+    /// Closes the device, before it stops; not after a panic.
+    fn terminate(&mut self) {}
+}
+
+/// What an actuator is told when it starts.
+#[derive(Clone, Debug)]
+pub struct ActuatorContext {
+    pub(crate) robot: &'static str,
+    pub(crate) path: &'static str,
+    pub(crate) joint: &'static str,
+    pub(crate) clock: Clock,
+}
+
+impl ActuatorContext {
+    /// The robot's name.
+    pub fn robot(&self) -> &'static str {
+        self.robot
+    }
+
+    /// Its path: `actuator/base_link/pan/servo`.
+    pub fn path(&self) -> &'static str {
+        self.path
+    }
+
+    /// The joint that it moves.
+    pub fn joint(&self) -> &'static str {
+        self.joint
+    }
+
+    /// The clock of the run.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+}

@@ -1,0 +1,30 @@
+//! What an estimator may ask of the framework, and what comes of it.
+
+use std::time::Duration;
+
+/// What an estimator asks for beside its outputs: from a callback with [`Reply::and`](super::Reply::and), from `init`
+/// with [`Context::request`](super::Context::request).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Request {
+    /// [`handle_continue`](super::Estimator::handle_continue) with this number, before anything else happens to it.
+    Continue(u32),
+    /// [`Info::Timeout`], if nothing else happens to it for so long.
+    Timeout(Duration),
+    /// [`Info::Timer`] with the number, once, so long from now. One of the same number that is still to come is replaced.
+    Timer(u32, Duration),
+    /// [`Info::Tick`] at a fixed rate from now on; a period of zero ends it.
+    Tick(Duration),
+}
+
+/// Why [`handle_info`](super::Estimator::handle_info) is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Info {
+    /// Nothing has happened for as long as it asked.
+    Timeout,
+    /// The timer of that number.
+    Timer(u32),
+    /// The next period of its tick has begun. Periods that are missed while it is busy are skipped; the phase is kept.
+    Tick,
+}

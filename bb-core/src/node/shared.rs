@@ -1,0 +1,121 @@
+//! What can be asked of an estimator, and left for it, while it runs on whatever thread.
+
+use super::counters::Counters;
+use super::{EstimatorDeclaration, EstimatorStatistics, HealthState};
+use std::any::Any;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// One-way requests that wait for an estimator; one more is refused.
+const MAX_CASTS: usize = 1024;
+
+/// The part of a running estimator that is outside its island's lock.
+#[derive(Clone, Debug)]
+pub(crate) struct SharedNode(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    declaration: &'static EstimatorDeclaration,
+    counters: Counters,
+    health: AtomicU8,
+    /// Why it does not run, if it does not.
+    stopped: Mutex<Option<String>>,
+    casts: Mutex<VecDeque<Box<dyn Any + Send>>>,
+    /// A parameter that its options are bound to has changed.
+    options_changed: AtomicBool,
+    /// Its supervisor starts it anew, though it has not failed.
+    restart: AtomicBool,
+    /// How long its callbacks pretend to take on virtual time.
+    pretended_latency_nanos: AtomicI64,
+}
+
+impl SharedNode {
+    pub(crate) fn new(declaration: &'static EstimatorDeclaration) -> Self {
+        Self(Arc::new(Inner {
+            declaration,
+            counters: Counters::new(declaration),
+            health: AtomicU8::new(0),
+            stopped: Mutex::new(None),
+            casts: Mutex::default(),
+            options_changed: AtomicBool::new(false),
+            restart: AtomicBool::new(false),
+            pretended_latency_nanos: AtomicI64::new(0),
+        }))
+    }
+
+    #[inline]
+    pub(super) fn counters(&self) -> &Counters {
+        &self.0.counters
+    }
+
+    pub(crate) fn declaration(&self) -> &'static EstimatorDeclaration {
+        self.0.declaration
+    }
+
+    /// Counts a message that did not fit in an inbox.
+    pub(crate) fn overflow(&self, input: usize) {
+        if let Some(counters) = self.0.counters.inputs.get(input) {
+            counters.received.increment();
+        }
+        self.0.counters.drop(input, super::DropReason::Overflow);
+    }
+
+    pub(crate) fn statistics(&self) -> EstimatorStatistics {
+        self.0.counters.statistics(self.0.declaration, self.health(), lock(&self.0.stopped).clone())
+    }
+
+    pub(crate) fn health(&self) -> HealthState {
+        HealthState::from_index(self.0.health.load(Ordering::Relaxed))
+    }
+
+    pub(super) fn set_health(&self, state: HealthState) {
+        self.0.health.store(state as u8, Ordering::Relaxed);
+    }
+
+    pub(super) fn set_stopped(&self, reason: Option<String>) {
+        *lock(&self.0.stopped) = reason;
+    }
+
+    /// Leaves a one-way request; false if too many wait.
+    pub(crate) fn leave_cast(&self, cast: Box<dyn Any + Send>) -> bool {
+        let mut casts = lock(&self.0.casts);
+        let has_room = casts.len() < MAX_CASTS;
+        if has_room {
+            casts.push_back(cast);
+        }
+        has_room
+    }
+
+    pub(super) fn take_cast(&self) -> Option<Box<dyn Any + Send>> {
+        lock(&self.0.casts).pop_front()
+    }
+
+    pub(crate) fn change_options(&self) {
+        self.0.options_changed.store(true, Ordering::Release);
+    }
+
+    pub(super) fn take_changed_options(&self) -> bool {
+        self.0.options_changed.load(Ordering::Relaxed) && self.0.options_changed.swap(false, Ordering::AcqRel)
+    }
+
+    pub(crate) fn restart(&self) {
+        self.0.restart.store(true, Ordering::Release);
+    }
+
+    pub(super) fn take_restart(&self) -> bool {
+        self.0.restart.load(Ordering::Relaxed) && self.0.restart.swap(false, Ordering::AcqRel)
+    }
+
+    pub(crate) fn pretend_latency(&self, nanos: i64) {
+        self.0.pretended_latency_nanos.store(nanos, Ordering::Relaxed);
+    }
+
+    pub(super) fn pretended_latency_nanos(&self) -> i64 {
+        self.0.pretended_latency_nanos.load(Ordering::Relaxed)
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,125 @@
+//! When something is due in one estimator.
+
+use crate::component::{Info, Request};
+use crate::time::MonotonicTime;
+use std::time::Duration;
+
+/// What an estimator has asked for.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Timers {
+    pub(super) continue_with: Option<u32>,
+    timeout: Option<MonotonicTime>,
+    tick: Option<(Duration, MonotonicTime)>,
+    timers: Vec<(u32, MonotonicTime)>,
+}
+
+/// Timers that one estimator may have running; one more replaces the latest.
+const MAX_TIMERS: usize = 64;
+
+impl Timers {
+    /// Takes a request; the time at which it is due, if it is later.
+    #[cold]
+    pub(super) fn request(&mut self, request: Request, now: MonotonicTime) -> Option<MonotonicTime> {
+        match request {
+            Request::Continue(step) => {
+                self.continue_with = Some(step);
+                None
+            }
+            Request::Timeout(duration) => {
+                self.timeout = Some(now + duration);
+                self.timeout
+            }
+            Request::Tick(Duration::ZERO) => {
+                self.tick = None;
+                None
+            }
+            Request::Tick(period) => {
+                self.tick = Some((period, now + period));
+                Some(now + period)
+            }
+            Request::Timer(number, duration) => {
+                self.timers.retain(|(other, _)| *other != number);
+                if self.timers.len() == MAX_TIMERS {
+                    self.timers.pop();
+                }
+                self.timers.push((number, now + duration));
+                Some(now + duration)
+            }
+        }
+    }
+
+    /// Something has happened to the estimator: a timeout is over.
+    #[inline]
+    pub(super) fn happened(&mut self) {
+        self.timeout = None;
+    }
+
+    pub(super) fn next(&self) -> Option<MonotonicTime> {
+        let timers = self.timers.iter().map(|(_, time)| *time);
+        timers.chain(self.timeout).chain(self.tick.map(|(_, time)| time)).min()
+    }
+
+    /// Takes what is due first, with the time it was due.
+    pub(super) fn take(&mut self, now: MonotonicTime) -> Option<Info> {
+        let due = self.next().filter(|due| *due <= now)?;
+        if let Some(position) = self.timers.iter().position(|(_, time)| *time == due) {
+            return Some(Info::Timer(self.timers.remove(position).0));
+        }
+        if let Some((period, time)) = self.tick.filter(|(_, time)| *time == due) {
+            // What was missed is skipped, the phase kept.
+            let period_nanos = i64::try_from(period.as_nanos()).unwrap_or(i64::MAX).max(1);
+            let periods = now.nanos_since(time) / period_nanos + 1;
+            self.tick = Some((period, time.plus_nanos(period_nanos.saturating_mul(periods))));
+            return Some(Info::Tick);
+        }
+        self.timeout = None;
+        Some(Info::Timeout)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(millis: u64) -> MonotonicTime {
+        MonotonicTime::ZERO + Duration::from_millis(millis)
+    }
+
+    #[test]
+    fn what_is_due_comes_in_the_order_of_its_time() {
+        let mut timers = Timers::default();
+        timers.request(Request::Timer(7, Duration::from_millis(30)), at(0));
+        timers.request(Request::Tick(Duration::from_millis(20)), at(0));
+        timers.request(Request::Timeout(Duration::from_millis(25)), at(0));
+        assert_eq!(timers.take(at(10)), None);
+        let taken: Vec<_> = std::iter::from_fn(|| timers.take(at(30))).collect();
+        assert_eq!(taken, [Info::Tick, Info::Timeout, Info::Timer(7)]);
+        assert_eq!(timers.next(), Some(at(40)));
+    }
+
+    #[test]
+    fn missed_ticks_are_skipped_and_the_phase_is_kept() {
+        let mut timers = Timers::default();
+        timers.request(Request::Tick(Duration::from_millis(10)), at(0));
+        assert_eq!(timers.take(at(35)), Some(Info::Tick));
+        assert_eq!((timers.take(at(35)), timers.next()), (None, Some(at(40))));
+    }
+
+    #[test]
+    fn a_timeout_is_over_once_something_happens_and_a_tick_ends_on_request() {
+        let mut timers = Timers::default();
+        timers.request(Request::Timeout(Duration::from_millis(5)), at(0));
+        timers.request(Request::Tick(Duration::from_millis(5)), at(0));
+        timers.happened();
+        timers.request(Request::Tick(Duration::ZERO), at(1));
+        assert_eq!(timers.next(), None);
+    }
+
+    #[test]
+    fn a_timer_of_the_same_number_is_replaced() {
+        let mut timers = Timers::default();
+        timers.request(Request::Timer(1, Duration::from_millis(5)), at(0));
+        timers.request(Request::Timer(1, Duration::from_millis(50)), at(0));
+        assert_eq!((timers.take(at(10)), timers.next()), (None, Some(at(50))));
+    }
+}

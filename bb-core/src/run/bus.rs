@@ -1,0 +1,169 @@
+//! The robot by path, for those who do not know its type: controllers, bridges, dashboards.
+
+use super::Robot;
+use super::actuator::{Accepts, ActuatorError, AnyActuator};
+use crate::component::Fault;
+use crate::control::{Control, ParameterError, ParameterValue};
+use crate::message::Payload;
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription, Topic};
+use crate::time::Clock;
+use std::fmt;
+use std::sync::{Arc, OnceLock, Weak};
+
+/// Where topics and actuators are.
+pub(super) trait Directory: Send + Sync {
+    fn with_topics(&self, call: &mut dyn FnMut(Vec<&dyn AnyTopic>));
+    fn with_actuators(&self, call: &mut dyn FnMut(Vec<&dyn AnyActuator>));
+}
+
+impl fmt::Debug for dyn Directory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Directory")
+    }
+}
+
+/// The wiring of a robot `R`. Weak, since whoever has a bus may be a part of the wiring.
+pub(super) struct Wired<R: Robot>(pub(super) Weak<R::Wiring>);
+
+impl<R: Robot> Directory for Wired<R> {
+    fn with_topics(&self, call: &mut dyn FnMut(Vec<&dyn AnyTopic>)) {
+        if let Some(wiring) = self.0.upgrade() {
+            let mut topics = R::all_topics(R::wired_topics(&wiring));
+            topics.extend(R::all_actuators(&wiring).into_iter().map(|actuator| actuator.any_topic()));
+            call(topics);
+        }
+    }
+
+    fn with_actuators(&self, call: &mut dyn FnMut(Vec<&dyn AnyActuator>)) {
+        if let Some(wiring) = self.0.upgrade() {
+            call(R::all_actuators(&wiring));
+        }
+    }
+}
+
+/// Topics, actuators, parameters and states, by path. Clones are the same.
+#[derive(Clone)]
+pub struct Bus {
+    directory: Arc<OnceLock<Arc<dyn Directory>>>,
+    control: Control,
+    clock: Clock,
+}
+
+impl Bus {
+    pub(super) fn new(directory: Arc<OnceLock<Arc<dyn Directory>>>, control: Control, clock: Clock) -> Self {
+        Self { directory, control, clock }
+    }
+
+    /// Subscribes to what is published at `path`.
+    ///
+    /// # Errors
+    /// Nothing is published there, or another payload.
+    pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
+        self.with_topics(|topics| {
+            let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
+                return Err(Fault::new(format!("nothing publishes at `{path}`")));
+            };
+            let typed = topic.as_any().downcast_ref::<Topic<T>>().ok_or_else(|| {
+                Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))
+            })?;
+            Ok(typed.subscribe(overflow))
+        })
+    }
+
+    /// Subscribes to messages of any payload; with the name of a payload's type, to those only.
+    pub fn subscribe_any(
+        &self,
+        select: Select<'_>,
+        payload: Option<&str>,
+        overflow: Overflow,
+    ) -> DynamicSubscription {
+        self.with_topics(|topics| DynamicSubscription::new(topics.iter().copied(), select, payload, overflow))
+    }
+
+    /// All paths that are published at.
+    pub fn paths(&self) -> Vec<&'static str> {
+        self.with_topics(|topics| topics.iter().map(|topic| topic.path()).collect())
+    }
+
+    /// The actuator at `path`, which takes commands of type `T`.
+    ///
+    /// # Errors
+    /// No actuator is there, or one that takes other commands.
+    pub fn actuator<T: Payload>(&self, path: &str) -> Result<ActuatorLink<T>, Fault> {
+        let mut found = Err(Fault::new(format!("no actuator is at `{path}`")));
+        if let Some(directory) = self.directory.get() {
+            directory.with_actuators(&mut |actuators| {
+                let Some(actuator) = actuators.iter().find(|actuator| actuator.path() == path) else { return };
+                found = match actuator.accepts().downcast::<Arc<dyn Accepts<T>>>() {
+                    Ok(link) => Ok(ActuatorLink(*link)),
+                    Err(_) => {
+                        let takes = actuator.command_name();
+                        Err(Fault::new(format!("`{path}` takes commands of type `{takes}`, not `{}`", T::NAME)))
+                    }
+                };
+            });
+        }
+        found
+    }
+
+    /// The value of the parameter at `path`.
+    pub fn parameter(&self, path: &str) -> Option<ParameterValue> {
+        self.control.parameter_at(path)
+    }
+
+    /// Sets the parameter at `path`.
+    ///
+    /// # Errors
+    /// What was expected.
+    pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
+        self.control.set_parameter_at(path, value.into())
+    }
+
+    /// The operational state.
+    pub fn state(&self) -> &'static str {
+        self.control.state()
+    }
+
+    /// The clock of the run.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    fn with_topics<T>(&self, call: impl Fn(&[&dyn AnyTopic]) -> T) -> T {
+        let system = self.control.topics().all();
+        let mut result = None;
+        if let Some(directory) = self.directory.get() {
+            directory.with_topics(&mut |topics| {
+                let all: Vec<_> = topics.into_iter().chain(system.iter().copied()).collect();
+                result = Some(call(&all));
+            });
+        }
+        // Before the robot is wired, and after it is gone.
+        result.unwrap_or_else(|| call(&system))
+    }
+}
+
+impl fmt::Debug for Bus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bus").finish_non_exhaustive()
+    }
+}
+
+/// Sends commands of type `T` to one actuator.
+pub struct ActuatorLink<T: Payload>(Arc<dyn Accepts<T>>);
+
+impl<T: Payload> ActuatorLink<T> {
+    /// Sends a command; it has been carried out when this returns.
+    ///
+    /// # Errors
+    /// The robot is not armed, the command holds a NaN, or the actuator has failed.
+    pub fn send(&self, command: T) -> Result<(), ActuatorError> {
+        self.0.accept(command)
+    }
+}
+
+impl<T: Payload> fmt::Debug for ActuatorLink<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ActuatorLink").finish_non_exhaustive()
+    }
+}

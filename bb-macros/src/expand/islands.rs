@@ -1,0 +1,94 @@
+//! Which estimators always run together, behind one lock: see `bb_core::node::Island`.
+//!
+//! An estimator stands in the island of what feeds it, if all of its inputs come from there; one that several islands or
+//! sensors feed begins an island of its own, as does one with `runs_on: worker`.
+
+use super::order;
+use crate::model::{EstimatorId, From, PublisherId, Robot};
+use crate::verify::Verified;
+use std::collections::HashMap;
+
+pub(super) type IslandId = usize;
+
+/// Estimators behind one lock, in the order in which a message reaches them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Island {
+    pub(super) estimators: Vec<EstimatorId>,
+}
+
+/// The islands of a robot.
+#[derive(Clone, Debug)]
+pub(super) struct Islands {
+    pub(super) all: Vec<Island>,
+    /// The island of each estimator.
+    pub(super) of: Vec<IslandId>,
+}
+
+/// What feeds an input.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Feed {
+    /// Something that is no estimator, by its publisher.
+    Outside(PublisherId),
+    Island(IslandId),
+}
+
+impl Islands {
+    pub(super) fn of(verified: &Verified<'_>) -> Self {
+        let robot = verified.robot;
+        let depths = order::depths(verified);
+        let mut order: Vec<EstimatorId> = (0..robot.estimators.len()).collect();
+        order.sort_by_key(|id| (depths.get(*id).copied(), *id));
+        let mut islands = Self { all: Vec::new(), of: vec![0; order.len()] };
+        let mut begun: HashMap<Feed, IslandId> = HashMap::new();
+        for id in order {
+            let mut feeds = sources(verified, id).map(|source| {
+                let feed = islands.feed(robot, source);
+                begun.get(&feed).map_or(feed, |island| Feed::Island(*island))
+            });
+            let first = feeds.next();
+            let alone = first.filter(|first| feeds.all(|feed| feed == *first) && !is_worker(robot, id));
+            drop(feeds);
+            let island = match alone {
+                Some(Feed::Island(island)) => island,
+                Some(feed) => *begun.entry(feed).or_insert_with(|| islands.begin()),
+                None => islands.begin(),
+            };
+            if let Some(slot) = islands.of.get_mut(id) {
+                *slot = island;
+            }
+            if let Some(island) = islands.all.get_mut(island) {
+                island.estimators.push(id);
+            }
+        }
+        islands
+    }
+
+    fn begin(&mut self) -> IslandId {
+        self.all.push(Island::default());
+        self.all.len() - 1
+    }
+
+    fn feed(&self, robot: &Robot, publisher: PublisherId) -> Feed {
+        match robot.publishers.get(publisher).map(|publisher| publisher.from) {
+            Some(From::Estimator(id, _)) => Feed::Island(self.of.get(id).copied().unwrap_or(0)),
+            _ => Feed::Outside(publisher),
+        }
+    }
+}
+
+/// The publishers of all inputs of an estimator; that of a nested one is its sensor's.
+pub(super) fn sources<'a>(
+    verified: &'a Verified<'_>,
+    id: EstimatorId,
+) -> impl Iterator<Item = PublisherId> + use<'a> {
+    let robot = verified.robot;
+    let nested = robot.estimators.get(id).and_then(|estimator| match estimator.home {
+        crate::model::Home::Sensor(sensor) => robot.sensors.get(sensor).map(|sensor| sensor.publisher),
+        crate::model::Home::Link(_) => None,
+    });
+    nested.into_iter().chain(verified.sources.get(id).into_iter().flatten().copied())
+}
+
+fn is_worker(_robot: &Robot, _id: EstimatorId) -> bool {
+    false
+}
