@@ -13,7 +13,7 @@ fn words() {
     );
     wrong(
         &base("sensor imu: A() { on_lost: stop; }"),
-        &[("on_lost", "`on_lost` is not supported yet; a sensor holds `rate` or `estimator`")],
+        &[("on_lost", "`on_lost` does not belong in a sensor, which holds `rate` or `estimator`")],
     );
     wrong(
         &base("rate: 5 Hz;"),
@@ -86,7 +86,7 @@ fn declarations() {
         &base("sensor imu; sensor mag: ; sensor: A(); joint j; joint k: spin { link a; } estimator t = T();"),
         &[
             (";", "expected `:` and a type behind `imu`"),
-            (";", "expected a type: that of a sensor or of an estimator"),
+            (";", "expected the type of `mag`"),
             (":", "expected the name of this `sensor`"),
             (";", "expected `:` and the type of the joint behind `j`"),
             (
