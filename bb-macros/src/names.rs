@@ -86,13 +86,19 @@ pub(crate) fn text(ident: &Ident) -> String {
     ident.unraw().to_string()
 }
 
-/// What a misspelt name may have been meant to be: the nearest one, else some of those that are declared.
-pub(crate) fn hint<'a>(name: &str, declared: impl IntoIterator<Item = &'a str>) -> Option<String> {
+/// The way out for a name that is not declared: the nearest one that is, else to declare it in `block`.
+pub(crate) fn way_out<'a>(name: &str, declared: impl IntoIterator<Item = &'a str>, block: &str) -> String {
     let declared: Vec<&str> = declared.into_iter().collect();
-    if let Some(near) = nearest(name, declared.iter().copied()) {
-        return Some(format!("did you mean `{near}`?"));
+    match nearest(name, declared.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => declare(&declared, block),
     }
-    (!declared.is_empty()).then(|| format!("declared are {}", some_of(&declared)))
+}
+
+/// `` declare it in `block`, or name one of … ``
+pub(crate) fn declare(declared: &[&str], block: &str) -> String {
+    let or = if declared.is_empty() { String::new() } else { format!(", or name one of {}", some_of(declared)) };
+    format!("declare it in `{block}`{or}")
 }
 
 /// The first few of a list: `` `a`, `b`, … ``.

@@ -67,7 +67,7 @@ impl Category {
             if head.word != "concurrency" {
                 return Err(unexpected(&head.word, "a category", &["concurrency"]));
             }
-            category.concurrencies.push(Setting::parse(head, input, diagnostics)?);
+            category.concurrencies.push(Setting::parse_count(head, input, diagnostics)?);
             Ok(())
         });
         Ok(category)

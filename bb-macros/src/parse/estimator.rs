@@ -4,7 +4,7 @@
 
 use super::block::{Head, items, unexpected};
 use super::component::Declared;
-use super::{Component, HealthSettings, Input, Output, Reaction, RunsOn, Setting};
+use super::{Component, HealthSettings, Input, Output, RunsOn, Setting};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::Attribute;
@@ -56,14 +56,7 @@ impl Estimator {
     }
 
     fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
-        if let Some(settings) = self.health.settings(&head.word) {
-            settings.push(Setting::parse(head, input, diagnostics)?);
-            return Ok(());
-        }
-        if let Some(reactions) = self.health.reactions(&head.word) {
-            reactions.push(Reaction::parse(head, input, diagnostics)?);
-            return Ok(());
-        }
+        let Some(head) = self.health.item(head, input, diagnostics)? else { return Ok(()) };
         match &*head.word.to_string() {
             "input" => self.inputs.push(Input::parse(head, input, diagnostics)?),
             "output" => self.outputs.push(Output::parse(head, input, diagnostics)?),

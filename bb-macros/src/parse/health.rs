@@ -26,30 +26,29 @@ pub(crate) struct Reaction {
 }
 
 impl HealthSettings {
-    /// The settings that a word adds to.
-    pub(super) fn settings(&mut self, word: &Ident) -> Option<&mut Vec<Setting>> {
-        match &*word.to_string() {
-            "latency_budget" => Some(&mut self.latency_budgets),
-            "lost_after" => Some(&mut self.lost_afters),
-            "recover_after" => Some(&mut self.recover_afters),
-            _ => None,
+    /// Reads what stands behind one of the words of health; gives the head back if it is none.
+    pub(super) fn item(
+        &mut self,
+        head: Head,
+        input: ParseStream<'_>,
+        diagnostics: &mut Diagnostics,
+    ) -> syn::Result<Option<Head>> {
+        match &*head.word.to_string() {
+            "latency_budget" => self.latency_budgets.push(Setting::parse(head, input, diagnostics)?),
+            "lost_after" => self.lost_afters.push(Setting::parse(head, input, diagnostics)?),
+            "recover_after" => self.recover_afters.push(Setting::parse_count(head, input, diagnostics)?),
+            "on_degraded" => self.on_degraded.push(Reaction::parse(head, input, diagnostics)?),
+            "on_lost" => self.on_lost.push(Reaction::parse(head, input, diagnostics)?),
+            "on_recovered" => self.on_recovered.push(Reaction::parse(head, input, diagnostics)?),
+            _ => return Ok(Some(head)),
         }
-    }
-
-    /// The reactions that a word adds to.
-    pub(super) fn reactions(&mut self, word: &Ident) -> Option<&mut Vec<Reaction>> {
-        match &*word.to_string() {
-            "on_degraded" => Some(&mut self.on_degraded),
-            "on_lost" => Some(&mut self.on_lost),
-            "on_recovered" => Some(&mut self.on_recovered),
-            _ => None,
-        }
+        Ok(None)
     }
 }
 
 impl Reaction {
     /// Reads what stands behind the word.
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         colon(input, &head.word, "the name of a command")?;
         let place = input.span();
         let message = "expected the name of a command";

@@ -31,6 +31,11 @@ impl Quantity {
         is_number(input)
     }
 
+    /// Reads a number of which the rules will say that it is whole and has no unit.
+    pub(crate) fn parse_count(input: ParseStream<'_>) -> syn::Result<Self> {
+        if Self::peek(input) { Self::parse(input) } else { Err(input.error("expected a whole number")) }
+    }
+
     /// Reads a number, and the unit if one follows.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let start = input.cursor();

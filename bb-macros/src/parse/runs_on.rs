@@ -20,7 +20,7 @@ pub(crate) struct RunsOn {
 impl RunsOn {
     /// Reads what stands behind the word.
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        const EXPECTED: &str = "expected `worker`; where this setting is left out, its input's thread runs it";
+        const EXPECTED: &str = "expected `worker`; without this setting it runs where its input is published";
         colon(input, &head.word, "`worker`")?;
         let place = input.span();
         let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, EXPECTED))?;
@@ -49,7 +49,7 @@ impl RunsOn {
             }
         };
         colon(input, &word, "a number")?;
-        if slot.replace(Quantity::parse(input)?).is_some() {
+        if slot.replace(Quantity::parse_count(input)?).is_some() {
             diagnostics.error(&word, format!("`{word}` stands here twice; leave one out"));
         }
         Ok(())

@@ -25,13 +25,16 @@ fn declared_commands() {
     wrong(
         &estimator("on_recovered: resume; on_degraded: brake;"),
         &[
-            ("brake", "there is no command `brake`; declared are `stop`, `slow_down`"),
-            ("resume", "there is no command `resume`; declared are `stop`, `slow_down`"),
+            ("brake", "there is no command `brake`; declare it in `commands`, or name one of `stop`, `slow_down`"),
+            (
+                "resume",
+                "there is no command `resume`; declare it in `commands`, or name one of `stop`, `slow_down`",
+            ),
         ],
     );
     wrong(
         "robot R; link b { sensor i: A() { estimator t: T() { lost_after: 1 s; on_lost: stop; } } }",
-        &[("stop", "there is no command `stop`; declare it, as in `commands { stop: Type; }`")],
+        &[("stop", "there is no command `stop`; declare it in `commands`")],
     );
 }
 
@@ -45,7 +48,10 @@ fn declared_states() {
     wrong(
         &with("a: A { allowed_states: [moving, idle, idle]; }"),
         &[
-            ("moving", "there is no state `moving`; declared are `disarmed`, `idle`, `executing`, `degraded`"),
+            (
+                "moving",
+                "there is no state `moving`; declare it in `states`, or name one of `disarmed`, `idle`, `executing`, `degraded`",
+            ),
             ("idle", "`idle` stands here twice; leave one out"),
         ],
     );
@@ -75,8 +81,11 @@ fn declared_categories() {
         &[
             ("motion", "`motion` stands here twice; leave one out"),
             ("all", "`all` is no category; to end all commands write `cancel: all;`"),
-            ("b", "`b` is a command, not a category; put it into one and name that"),
-            ("speech", "there is no category `speech`; declared are `default`, `motion`"),
+            ("b", "`b` is a command, not a category; give it a `category` and name that"),
+            (
+                "speech",
+                "there is no category `speech`; declare it in `commands`, or name one of `default`, `motion`",
+            ),
         ],
     );
     wrong(

@@ -67,14 +67,14 @@ fn input_periods() {
         &fused("", "sync_tolerance: 20 ms;"),
         &[(
             "20 ms",
-            "`gnss` comes every 100 ms and may be 20 ms old, so most runs of `pose` would be dropped; give it a `within` of 100 ms or more, or make it `optional`",
+            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; give it a `within` of 100 ms or more, or make it `optional`",
         )],
     );
     wrong(
         &fused(", within: 20 ms", "sync_tolerance: 1 s;"),
         &[(
             "20 ms",
-            "`gnss` comes every 100 ms and may be 20 ms old, so most runs of `pose` would be dropped; allow 100 ms or more, or make it `optional`",
+            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; allow 100 ms or more, or make it `optional`",
         )],
     );
     // Through the driver of another estimator; and one tolerance is one mistake.
@@ -90,7 +90,7 @@ fn input_periods() {
         robot,
         &[(
             "0.1 s",
-            "`c` comes every 200 ms and may be 100 ms old, so most runs of `e` would be dropped; allow 200 ms or more, or make it `optional`",
+            "`c` comes every 200 ms but may be no older than 100 ms, so most runs of `e` would be dropped; allow 200 ms or more, or make it `optional`",
         )],
     );
 }

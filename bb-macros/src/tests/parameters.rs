@@ -53,11 +53,8 @@ fn ranges() {
     wrong(
         &with("a: f64 = 1 m, range: 0 s..=2;"),
         &[
-            ("0 s", "expected a length, as the default is, found a time; give both one kind of unit"),
-            (
-                "2",
-                "expected a length, as the default is, found a number without a unit; give both one kind of unit",
-            ),
+            ("0 s", "the default is a length and this is a time; write both in units of one kind"),
+            ("2", "the default is a length and this is a number without a unit; write both in units of one kind"),
         ],
     );
 }
@@ -92,7 +89,7 @@ fn references() {
         &bound("param::imu::gain"),
         &[(
             "param::imu::gain",
-            "there is no parameter `param::imu::gain`; declared are `param::imu::beta`, `param::imu::deep::on`, `param::rate`",
+            "there is no parameter `param::imu::gain`; declare it in `parameters`, or name one of `param::imu::beta`, `param::imu::deep::on`, `param::rate`",
         )],
     );
     wrong(
@@ -104,7 +101,7 @@ fn references() {
     );
     wrong(
         "robot Rover; link base { sensor a: A(x = param::x); }",
-        &[("param::x", "there is no parameter `param::x`, nor another; declare it in `parameters { … }`")],
+        &[("param::x", "there is no parameter `param::x`; declare it in `parameters`")],
     );
     wrong(&bound("param::"), &[(")", "expected the path of a parameter, as in `param::imu::beta`")]);
 }
@@ -118,6 +115,6 @@ fn references_of_every_component() {
             sensor imu: A(x = param::b) { estimator e: E(x = param::b); }
             joint j: continuous { axis: z; sensor e: E(); actuator m: M(x = param::b); link l; }
         }";
-    let message = "there is no parameter `param::b`; declared are `param::a`";
+    let message = "there is no parameter `param::b`; declare it in `parameters`, or name one of `param::a`";
     wrong(robot, &[("param::b", message); 7]);
 }

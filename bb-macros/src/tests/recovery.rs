@@ -270,7 +270,7 @@ fn unread_declarations_make_references_to_them_no_faults() {
 #[test]
 fn settings_of_estimators() {
     let nested = |settings: &str| base(&format!("sensor i: A() {{ estimator t: T() {{ {settings} }} }}"));
-    let worker = "expected `worker`; where this setting is left out, its input's thread runs it";
+    let worker = "expected `worker`; without this setting it runs where its input is published";
     let property = "expected `priority: …` or `core: …`";
     wrong(&nested("runs_on: thread;"), &[("thread", worker)]);
     wrong(&nested("runs_on: ;"), &[(";", worker)]);
@@ -281,7 +281,7 @@ fn settings_of_estimators() {
     );
     wrong(&nested("runs_on: worker, core: 1, core: 2;"), &[("core", "`core` stands here twice; leave one out")]);
     wrong(&nested("on_lost: \"stop\";"), &[("\"stop\"", "expected the name of a command")]);
-    wrong(&nested("recover_after: ten;"), &[("ten", "expected a number with its unit")]);
+    wrong(&nested("recover_after: ten;"), &[("ten", "expected a whole number")]);
 }
 
 #[test]

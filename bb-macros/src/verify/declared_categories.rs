@@ -5,7 +5,7 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
-use crate::names::{hint, text};
+use crate::names::{text, way_out};
 use crate::parse::Cancelled;
 use proc_macro2::Ident;
 use std::collections::HashSet;
@@ -38,13 +38,13 @@ fn declared(robot: &Robot, name: &Ident, diagnostics: &mut Diagnostics) -> bool 
         return true;
     }
     let message = if robot.command(name).is_some() {
-        format!("`{name}` is a command, not a category; put it into one and name that")
+        format!("`{name}` is a command, not a category; give it a `category` and name that")
     } else if name == "all" {
         "`all` is no category; to end all commands write `cancel: all;`".into()
     } else {
         let known: Vec<String> = robot.categories.iter().map(|category| text(&category.name)).collect();
-        let hint = hint(&text(name), known.iter().map(String::as_str)).unwrap_or_default();
-        format!("there is no category `{name}`; {hint}")
+        let way_out = way_out(&text(name), known.iter().map(String::as_str), "commands");
+        format!("there is no category `{name}`; {way_out}")
     };
     diagnostics.error(name, message);
     false

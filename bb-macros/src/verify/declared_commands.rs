@@ -5,7 +5,7 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
-use crate::names::{hint, text};
+use crate::names::{text, way_out};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // Unread items may have declared the missing ones.
@@ -18,8 +18,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         if robot.command(name).is_some() {
             continue;
         }
-        let hint = hint(&text(name), declared.iter().map(String::as_str))
-            .unwrap_or_else(|| format!("declare it, as in `commands {{ {name}: Type; }}`"));
-        diagnostics.error(name, format!("there is no command `{name}`; {hint}"));
+        let way_out = way_out(&text(name), declared.iter().map(String::as_str), "commands");
+        diagnostics.error(name, format!("there is no command `{name}`; {way_out}"));
     }
 }

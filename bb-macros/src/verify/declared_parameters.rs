@@ -5,7 +5,7 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
-use crate::names::{nearest_path, some_of};
+use crate::names::{declare, nearest_path, some_of};
 use crate::parse::OptionValue;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
@@ -29,11 +29,9 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             format!("`{text}` is a group of parameters; name one in it: {}", some_of(&inside))
         } else if let Some(near) = nearest_path(&text, &known) {
             format!("there is no parameter `{text}`; did you mean `{near}`?")
-        } else if known.is_empty() {
-            format!("there is no parameter `{text}`, nor another; declare it in `parameters {{ … }}`")
         } else {
             let known: Vec<&str> = known.iter().map(String::as_str).collect();
-            format!("there is no parameter `{text}`; declared are {}", some_of(&known))
+            format!("there is no parameter `{text}`; {}", declare(&known, "parameters"))
         };
         diagnostics.at(path.place(), message);
     }

@@ -5,7 +5,7 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::{BUILT_IN_STATES, Robot};
-use crate::names::{hint, text};
+use crate::names::{text, way_out};
 use std::collections::HashSet;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
@@ -22,8 +22,8 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             let name = text(state);
             // Unread items may have declared the missing ones.
             if robot.complete && known().all(|known| known != name) {
-                let hint = hint(&name, known()).unwrap_or_default();
-                diagnostics.error(state, format!("there is no state `{name}`; {hint}"));
+                let way_out = way_out(&name, known(), "states");
+                diagnostics.error(state, format!("there is no state `{name}`; {way_out}"));
             } else if !seen.insert(name) {
                 diagnostics.error(state, format!("`{state}` stands here twice; leave one out"));
             }

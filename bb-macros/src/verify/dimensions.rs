@@ -59,8 +59,7 @@ fn range(parameter: &Parameter, diagnostics: &mut Diagnostics) {
         if are_numbers && end.dimension != default.dimension {
             let expected = default.dimension.name();
             let found = if end.has_unit { end.dimension.name() } else { "a number without a unit".into() };
-            let message =
-                format!("expected {expected}, as the default is, found {found}; give both one kind of unit");
+            let message = format!("the default is {expected} and this is {found}; write both in units of one kind");
             diagnostics.at(end.place, message);
         }
     }

@@ -56,8 +56,8 @@ fn is_exceeded(tolerance: &Quantity, period_s: f64) -> bool {
 fn message(estimator: &Estimator, input: &Input, period_s: f64, tolerance: &Quantity, remedy: &str) -> String {
     let (period, tolerance) = (time_text(period_s), time_text(tolerance.value));
     format!(
-        "`{}` comes every {period} and may be {tolerance} old, so most runs of `{}` would be dropped; {remedy} \
-         {period} or more, or make it `optional`",
+        "`{}` comes every {period} but may be no older than {tolerance}, so most runs of `{}` would be dropped; \
+         {remedy} {period} or more, or make it `optional`",
         input.name, estimator.name
     )
 }
