@@ -148,7 +148,7 @@ const UNITS: &[(&str, [i8; 6], f64)] = &[
     ("bar", [-1, 1, -2, 0, 0, 0], 1e5),
 ];
 
-/// A time for messages: `250 ms`.
+/// A time for messages: `250 ms`. Rounded up, so that it is enough where it is said to be.
 pub(crate) fn time_text(seconds: f64) -> String {
     let (factor, unit) = match seconds {
         s if s >= 1.0 => (1.0, "s"),
@@ -156,8 +156,8 @@ pub(crate) fn time_text(seconds: f64) -> String {
         s if s >= 1e-6 => (1e6, "us"),
         _ => (1e9, "ns"),
     };
-    // Three digits behind the point, without zeros at the end.
-    let number = format!("{:.3}", seconds * factor);
+    // Three digits behind the point, without zeros at the end; an error in the last place of the double is no more.
+    let number = format!("{:.3}", (seconds * factor * 1e3 - 1e-6).ceil() / 1e3);
     let number = number.trim_end_matches('0').trim_end_matches('.');
     format!("{number} {unit}")
 }
@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn times_are_short() {
         let times = [0.02, 0.1, 1.0, 2.5, 1.0 / 3.0, 4e-6, 1e-9, 3600.0].map(time_text);
-        assert_eq!(times, ["20 ms", "100 ms", "1 s", "2.5 s", "333.333 ms", "4 us", "1 ns", "3600 s"]);
+        assert_eq!(times, ["20 ms", "100 ms", "1 s", "2.5 s", "333.334 ms", "4 us", "1 ns", "3600 s"]);
     }
 
     #[test]

@@ -59,13 +59,22 @@ pub(super) struct Head {
 
 impl Head {
     /// The first word as the name that it is where items start with no word of the language.
-    pub(super) fn name(&self) -> syn::Result<Ident> {
-        syn::parse_str::<Ident>(&self.word.to_string()).map(|_| self.word.clone()).map_err(|_| {
-            let message = format!("`{}` is a keyword of Rust; choose another name", self.word);
-            syn::Error::new(self.word.span(), message)
-        })
+    pub(super) fn name(&self, input: ParseStream<'_>) -> syn::Result<Ident> {
+        let text = self.word.to_string();
+        if NO_WORDS.contains(&&*text) && input.peek(Ident::peek_any) {
+            let message = format!("what stands in this block starts with its name; leave `{text}` out");
+            return Err(syn::Error::new(self.word.span(), message));
+        }
+        if syn::parse_str::<Ident>(&text).is_err() {
+            let message = format!("`{text}` is a keyword of Rust; choose another name");
+            return Err(syn::Error::new(self.word.span(), message));
+        }
+        Ok(self.word.clone())
     }
 }
+
+/// What those may write in front of a name who know that other blocks have a word there.
+const NO_WORDS: [&str; 5] = ["command", "state", "parameter", "param", "group"];
 
 /// Reads items until the end. `item` gets each head and reads the rest; an item that it cannot read is reported and
 /// skipped.

@@ -76,7 +76,7 @@ impl Category {
 
 impl Command {
     fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let name = head.name()?;
+        let name = head.name(input)?;
         let declared = Declared::named(head.attributes, name, input, diagnostics)?;
         let Declared { attributes, name, component, body } = declared;
         let mut settings = CommandSettings::default();

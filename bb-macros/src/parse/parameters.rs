@@ -57,7 +57,7 @@ impl ParameterItem {
     }
 
     fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let name = head.name()?;
+        let name = head.name(input)?;
         if input.peek(syn::token::Brace) {
             let items = Self::parse_all(&braced(input)?, diagnostics);
             return Ok(Self::Group { attributes: head.attributes, name, items });

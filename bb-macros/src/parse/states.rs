@@ -24,7 +24,7 @@ impl State {
             "expected the name of a state, as in `degraded;`",
             diagnostics,
             |head, input, diagnostics| {
-                let name = head.name()?;
+                let name = head.name(input)?;
                 semicolon(input, &format!("the state `{name}`"), diagnostics);
                 states.push(Self { attributes: head.attributes, name });
                 Ok(())

@@ -67,19 +67,25 @@ fn input_periods() {
         &fused("", "sync_tolerance: 20 ms;"),
         &[(
             "20 ms",
-            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; give it a `within` of 100 ms or more, or make it `optional`",
+            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; give it `within: 100 ms` or more, or make it `optional`",
         )],
     );
     wrong(
         &fused(", within: 20 ms", "sync_tolerance: 1 s;"),
         &[(
             "20 ms",
-            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; allow 100 ms or more, or make it `optional`",
+            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; give it `within: 100 ms` or more, or make it `optional`",
         )],
     );
     // Through the driver of another estimator; and one tolerance is one mistake.
     assert_eq!(places(&fused("", "input s: slow, within: 50 ms; sync_tolerance: 1 s;")), ["50 ms"]);
-    assert_eq!(places(&fused("", "input s: slow; sync_tolerance: 50 ms;")), ["50 ms"]);
+    wrong(
+        &fused("", "input s: slow; sync_tolerance: 50 ms;"),
+        &[(
+            "50 ms",
+            "`gnss` comes every 100 ms and `s` comes every 100 ms but may be no older than 50 ms, so most runs of `pose` would be dropped; give each a `within` of its own that is as long, or make it `optional`",
+        )],
+    );
     // Other faults of the tolerance are one fault each.
     assert_eq!(places(&fused(", within: 0 s", "")), ["0 s"]);
     assert_eq!(places(&fused(", within: 1 mm", "")), ["1 mm"]);
@@ -90,7 +96,7 @@ fn input_periods() {
         robot,
         &[(
             "0.1 s",
-            "`c` comes every 200 ms but may be no older than 100 ms, so most runs of `e` would be dropped; allow 200 ms or more, or make it `optional`",
+            "`c` comes every 200 ms but may be no older than 100 ms, so most runs of `e` would be dropped; give it `within: 200 ms` or more, or make it `optional`",
         )],
     );
 }

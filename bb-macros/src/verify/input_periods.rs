@@ -12,25 +12,15 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // What could not be read may be an `optional` or a `within`.
     let estimators = robot.estimators.iter().filter(|estimator| !estimator.is_nested() && robot.complete);
     for estimator in estimators {
-        let sync_tolerance = estimator.sync_tolerances.first().map(|tolerance| &tolerance.quantity);
-        // Of those that one tolerance is too short for, the slowest tells how long it must be.
-        let mut slowest: Option<(&Input, f64)> = None;
-        for (input, period_s) in inputs(robot, estimator) {
-            match &input.within {
-                Some(within) if is_exceeded(within, period_s) => {
-                    let message = message(estimator, input, period_s, within, "allow");
-                    diagnostics.at(within.place, message);
-                }
-                Some(_) => {}
-                None if slowest.is_none_or(|(_, other)| period_s > other) => slowest = Some((input, period_s)),
-                None => {}
+        let (own, shared): (Vec<_>, Vec<_>) =
+            inputs(robot, estimator).partition(|(input, _)| input.within.is_some());
+        for late in own {
+            if let Some(within) = &late.0.within {
+                report(estimator, within, &[late], diagnostics);
             }
         }
-        if let (Some(tolerance), Some((input, period_s))) = (sync_tolerance, slowest)
-            && is_exceeded(tolerance, period_s)
-        {
-            let message = message(estimator, input, period_s, tolerance, "give it a `within` of");
-            diagnostics.at(tolerance.place, message);
+        if let Some(tolerance) = estimator.sync_tolerances.first() {
+            report(estimator, &tolerance.quantity, &shared, diagnostics);
         }
     }
 }
@@ -53,11 +43,20 @@ fn is_exceeded(tolerance: &Quantity, period_s: f64) -> bool {
         && period_s > tolerance.value * (1.0 + 4.0 * f64::EPSILON)
 }
 
-fn message(estimator: &Estimator, input: &Input, period_s: f64, tolerance: &Quantity, remedy: &str) -> String {
-    let (period, tolerance) = (time_text(period_s), time_text(tolerance.value));
-    format!(
-        "`{}` comes every {period} but may be no older than {tolerance}, so most runs of `{}` would be dropped; \
-         {remedy} {period} or more, or make it `optional`",
-        input.name, estimator.name
-    )
+/// One message for a tolerance that is too short, however many inputs it is too short for.
+fn report(estimator: &Estimator, tolerance: &Quantity, inputs: &[(&Input, f64)], diagnostics: &mut Diagnostics) {
+    let late: Vec<_> = inputs.iter().filter(|(_, period_s)| is_exceeded(tolerance, *period_s)).collect();
+    let come =
+        late.iter().map(|(input, period_s)| format!("`{}` comes every {}", input.name, time_text(*period_s)));
+    let come = come.collect::<Vec<_>>().join(" and ");
+    let way_out = match &late[..] {
+        [] => return,
+        [(_, period_s)] => format!("give it `within: {}` or more, or make it `optional`", time_text(*period_s)),
+        _ => "give each a `within` of its own that is as long, or make it `optional`".to_owned(),
+    };
+    let (tolerance_text, name) = (time_text(tolerance.value), &estimator.name);
+    let message = format!(
+        "{come} but may be no older than {tolerance_text}, so most runs of `{name}` would be dropped; {way_out}"
+    );
+    diagnostics.at(tolerance.place, message);
 }
