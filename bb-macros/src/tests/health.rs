@@ -67,14 +67,14 @@ fn input_periods() {
         &fused("", "sync_tolerance: 20 ms;"),
         &[(
             "20 ms",
-            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; give it `within: 100 ms` or more, or make it `optional`",
+            "`gnss` comes every 100 ms but may be no older than 20 ms, so runs of `pose` would be dropped all the time; give it `within: 100 ms` or more, or make it `optional`",
         )],
     );
     wrong(
         &fused(", within: 20 ms", "sync_tolerance: 1 s;"),
         &[(
             "20 ms",
-            "`gnss` comes every 100 ms but may be no older than 20 ms, so most runs of `pose` would be dropped; give it `within: 100 ms` or more, or make it `optional`",
+            "`gnss` comes every 100 ms but may be no older than 20 ms, so runs of `pose` would be dropped all the time; give it `within: 100 ms` or more, or make it `optional`",
         )],
     );
     // Through the driver of another estimator; and one tolerance is one mistake.
@@ -83,7 +83,7 @@ fn input_periods() {
         &fused("", "input s: slow; sync_tolerance: 50 ms;"),
         &[(
             "50 ms",
-            "`gnss` comes every 100 ms and `s` comes every 100 ms but may be no older than 50 ms, so most runs of `pose` would be dropped; give each a `within` of its own that is as long, or make it `optional`",
+            "`gnss` comes every 100 ms and `s` comes every 100 ms but may be no older than 50 ms, so runs of `pose` would be dropped all the time; give each a `within` of its own that is as long, or make it `optional`",
         )],
     );
     // Other faults of the tolerance are one fault each.
@@ -96,9 +96,25 @@ fn input_periods() {
         robot,
         &[(
             "0.1 s",
-            "`c` comes every 200 ms but may be no older than 100 ms, so most runs of `e` would be dropped; give it `within: 200 ms` or more, or make it `optional`",
+            "`c` comes every 200 ms but may be no older than 100 ms, so runs of `e` would be dropped all the time; give it `within: 200 ms` or more, or make it `optional`",
         )],
     );
+}
+
+#[test]
+fn what_comes_in_step_with_the_driver_is_new() {
+    let pair = |driver: &str, other: &str| {
+        base(&format!(
+            "sensor a: A() {{ rate: {driver}; }} sensor b: B() {{ rate: {other}; }}
+             estimator e: E() {{ input a: a, driver; input b: b, within: 1 ms; }}"
+        ))
+    };
+    right(&pair("10 Hz", "10 Hz"));
+    right(&pair("10 Hz", "30 Hz"));
+    right(&pair("1 Hz", "3 Hz"));
+    for (driver, other) in [("20 Hz", "10 Hz"), ("10 Hz", "15 Hz")] {
+        assert_eq!(places(&pair(driver, other)), ["1 ms"]);
+    }
 }
 
 #[test]

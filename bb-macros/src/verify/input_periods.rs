@@ -1,10 +1,11 @@
-//! An input comes at least as often as its tolerance demands, unless it is `optional`: else most runs would be dropped.
+//! An input comes at least as often as its tolerance demands, unless it is `optional`: else runs
+//! would be dropped all the time. (Inputs in step with the driver are as new as they can be.)
 //!
 //! Right: `input gnss: sensor::base::gnss, within: 250 ms;` where `gnss` has `rate: 10 Hz;`
 //! Wrong: `input gnss: sensor::base::gnss, within: 20 ms;`
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{Estimator, Input, Robot};
+use crate::model::{Estimator, Input, PublisherId, Robot};
 use crate::parse::Quantity;
 use crate::units::{Dimension, time_text};
 
@@ -25,15 +26,27 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// The inputs that must not be too old, with the time between their messages. What comes from the same message as the
-/// driver is in step with it.
+/// The inputs that must not be too old and are not in step with the driver, with the time between their messages.
 fn inputs<'a>(robot: &'a Robot, estimator: &'a Estimator) -> impl Iterator<Item = (&'a Input, f64)> {
-    let driver = estimator.driver().and_then(|driver| robot.trigger(driver.source?));
-    estimator.inputs.iter().filter_map(move |input| {
+    let driver = estimator.driver().and_then(|driver| driver.source);
+    let must_be_new = estimator.inputs.iter().filter(|input| input.driver.is_none() && input.optional.is_none());
+    must_be_new.filter_map(move |input| {
         let source = input.source?;
-        let may_miss = input.driver.is_none() && input.optional.is_none() && robot.trigger(source) != driver;
-        Some((input, robot.period_s(source)?)).filter(|_| may_miss)
+        let period_s = robot.period_s(source)?;
+        let is_in_step = driver.is_some_and(|driver| is_in_step(robot, source, driver));
+        (!is_in_step).then_some((input, period_s))
     })
+}
+
+/// Whether there is a message with each of the driver's: both are made of the same one, or each time that the driver's
+/// sensor is due the other's is due too, which is then read before it.
+fn is_in_step(robot: &Robot, source: PublisherId, driver: PublisherId) -> bool {
+    if robot.trigger(source) == robot.trigger(driver) {
+        return true;
+    }
+    let (Some(period_s), Some(driver_s)) = (robot.period_s(source), robot.period_s(driver)) else { return false };
+    let messages = driver_s / period_s;
+    messages.round() >= 1.0 && (messages - messages.round()).abs() < 1e-9 * messages
 }
 
 /// A tolerance that is no positive time is a fault of its own. The rounding of `1.0 / rate` is none.
@@ -56,7 +69,7 @@ fn report(estimator: &Estimator, tolerance: &Quantity, inputs: &[(&Input, f64)],
     };
     let (tolerance_text, name) = (time_text(tolerance.value), &estimator.name);
     let message = format!(
-        "{come} but may be no older than {tolerance_text}, so most runs of `{name}` would be dropped; {way_out}"
+        "{come} but may be no older than {tolerance_text}, so runs of `{name}` would be dropped all the time; {way_out}"
     );
     diagnostics.at(tolerance.place, message);
 }
