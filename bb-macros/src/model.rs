@@ -1,23 +1,33 @@
 //! What a robot is once its names are resolved: plain data in lists, with numbers for references and spans kept.
 
+mod commands;
 mod frames;
+mod health;
+mod parameters;
 mod resolve;
 mod rigid;
+mod trigger;
 
+pub(crate) use commands::{BUILT_IN_STATES, Category, Command, CommandId};
+pub(crate) use health::{Health, Worker};
+pub(crate) use parameters::{Parameter, ParameterGroup, ParameterGroupId, ParameterId};
 pub(crate) use resolve::resolve;
 pub(crate) use rigid::Rigid;
+pub(crate) use trigger::Trigger;
 
 use crate::parse::{
-    self, Axis, Component, Dynamics, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity, Setting,
-    Shape, Transmission,
+    self, Axis, Component, Dynamics, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity, RunsOn,
+    ServiceKind, Setting, Shape, State, Transmission,
 };
 use proc_macro2::Ident;
+use std::collections::HashMap;
 use syn::{Attribute, Visibility};
 
 pub(crate) type LinkId = usize;
 pub(crate) type JointId = usize;
 pub(crate) type SensorId = usize;
 pub(crate) type EstimatorId = usize;
+pub(crate) type ServiceId = usize;
 pub(crate) type PublisherId = usize;
 
 /// A robot. References between its parts are numbers in these lists.
@@ -31,6 +41,18 @@ pub(crate) struct Robot {
     pub(crate) joints: Vec<Joint>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) estimators: Vec<Estimator>,
+    pub(crate) actuators: Vec<Actuator>,
+    /// Controllers and bridges.
+    pub(crate) services: Vec<Service>,
+    pub(crate) parameters: Vec<Parameter>,
+    pub(crate) parameter_groups: Vec<ParameterGroup>,
+    /// The number of the parameter at each path, with `::` between the names.
+    parameter_paths: HashMap<String, ParameterId>,
+    /// Beside the built-in ones.
+    pub(crate) states: Vec<State>,
+    /// The default one, then those that are declared.
+    pub(crate) categories: Vec<Category>,
+    pub(crate) commands: Vec<Command>,
     /// Whatever can be subscribed to, sensors first.
     pub(crate) publishers: Vec<Publisher>,
     /// Whether everything could be read; if not, what is missing may have been declared.
@@ -88,6 +110,28 @@ pub(crate) struct Sensor {
     pub(crate) publisher: PublisherId,
 }
 
+/// What moves a joint.
+#[derive(Clone, Debug)]
+pub(crate) struct Actuator {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    pub(crate) joint: JointId,
+    pub(crate) component: Component,
+    pub(crate) path: Vec<String>,
+}
+
+/// What runs beside the topology, in no frame: a controller or a bridge.
+#[derive(Clone, Debug)]
+pub(crate) struct Service {
+    pub(crate) kind: ServiceKind,
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    pub(crate) component: Component,
+    pub(crate) rates: Vec<Setting>,
+    pub(crate) publisher: PublisherId,
+    pub(crate) path: Vec<String>,
+}
+
 /// Where an estimator stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Home {
@@ -104,6 +148,11 @@ pub(crate) struct Estimator {
     pub(crate) inputs: Vec<Input>,
     pub(crate) outputs: Vec<Output>,
     pub(crate) sync_tolerances: Vec<Setting>,
+    pub(crate) health: Health,
+    /// As written.
+    pub(crate) runs_on: Vec<RunsOn>,
+    /// None where its input's thread runs it.
+    pub(crate) worker: Option<Worker>,
     /// Its own path.
     pub(crate) path: Vec<String>,
     /// One per output; its own path if none is declared.
@@ -137,6 +186,7 @@ pub(crate) enum From {
     Sensor(SensorId),
     /// An estimator; with the number of the declared output, if any is declared.
     Estimator(EstimatorId, Option<usize>),
+    Service(ServiceId),
 }
 
 impl Robot {
@@ -145,8 +195,24 @@ impl Robot {
         match self.publishers.get(publisher).map(|publisher| publisher.from) {
             Some(From::Sensor(sensor)) => self.mount_of_sensor(sensor),
             Some(From::Estimator(estimator, _)) => self.mount_of_estimator(estimator),
-            None => Mount::Robot,
+            Some(From::Service(_)) | None => Mount::Robot,
         }
+    }
+
+    /// The rates of sensors, controllers and bridges.
+    pub(crate) fn rates(&self) -> impl Iterator<Item = &Setting> {
+        let sensors = self.sensors.iter().flat_map(|sensor| &sensor.rates);
+        sensors.chain(self.services.iter().flat_map(|service| &service.rates))
+    }
+
+    /// All that is declared by a type of the user's.
+    pub(crate) fn components(&self) -> impl Iterator<Item = &Component> {
+        let sensors = self.sensors.iter().map(|sensor| &sensor.component);
+        let estimators = self.estimators.iter().map(|estimator| &estimator.component);
+        let actuators = self.actuators.iter().map(|actuator| &actuator.component);
+        let services = self.services.iter().map(|service| &service.component);
+        let commands = self.commands.iter().map(|command| &command.component);
+        sensors.chain(estimators).chain(actuators).chain(services).chain(commands)
     }
 
     pub(crate) fn mount_of_sensor(&self, sensor: SensorId) -> Mount {
@@ -175,6 +241,14 @@ impl Estimator {
     /// Whether it is nested in a sensor.
     pub(crate) fn is_nested(&self) -> bool {
         matches!(self.home, Home::Sensor(_))
+    }
+
+    /// The input whose arrival runs it: the one so marked, or the only one.
+    pub(crate) fn driver(&self) -> Option<&Input> {
+        match &self.inputs[..] {
+            [only] => Some(only),
+            several => several.iter().find(|input| input.driver.is_some()),
+        }
     }
 }
 

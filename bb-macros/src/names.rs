@@ -21,6 +21,20 @@ pub(crate) fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = 
     nearest(name, candidates).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 
+/// The path whose names are all near to those of `path`; else one with the same last name.
+pub(crate) fn nearest_path<'a>(path: &str, known: &'a [String]) -> Option<&'a str> {
+    let names: Vec<&str> = path.split("::").collect();
+    let known = || known.iter().map(String::as_str);
+    let is_near = |candidate: &&str| {
+        let candidate: Vec<&str> = candidate.split("::").collect();
+        let mut pairs = names.iter().zip(&candidate);
+        names.len() == candidate.len()
+            && pairs.all(|(name, other)| name == other || nearest(name, [*other]).is_some())
+    };
+    let near = nearest(path, known().filter(is_near));
+    near.or_else(|| known().find(|candidate| candidate.rsplit("::").next() == names.last().copied()))
+}
+
 /// The optimal string alignment distance in characters: insertions, deletions, replacements, and swaps of neighbours.
 fn distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
@@ -70,6 +84,29 @@ pub(crate) fn module_name(name: &Ident) -> Option<String> {
 /// The name of an identifier at run time: without the `r#` that lets a keyword be one.
 pub(crate) fn text(ident: &Ident) -> String {
     ident.unraw().to_string()
+}
+
+/// The way out for a name that is not declared: the nearest one that is, else to declare it in `block`.
+pub(crate) fn way_out<'a>(name: &str, declared: impl IntoIterator<Item = &'a str>, block: &str) -> String {
+    let declared: Vec<&str> = declared.into_iter().collect();
+    match nearest(name, declared.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => declare(&declared, block),
+    }
+}
+
+/// `` declare it in `block`, or name one of … ``
+pub(crate) fn declare(declared: &[&str], block: &str) -> String {
+    let or = if declared.is_empty() { String::new() } else { format!(", or name one of {}", some_of(declared)) };
+    format!("declare it in `{block}`{or}")
+}
+
+/// The first few of a list: `` `a`, `b`, … ``.
+pub(crate) fn some_of(names: &[&str]) -> String {
+    const SHOWN: usize = 8;
+    let shown: Vec<String> = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect();
+    let more = if names.len() > shown.len() { ", …" } else { "" };
+    format!("{}{more}", shown.join(", "))
 }
 
 /// Puts words into a sentence: `` `a`, `b` or `c` ``.

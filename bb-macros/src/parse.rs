@@ -1,33 +1,51 @@
 //! Tokens to a tree. Parsing never fails: what cannot be read is reported, skipped, and leaves the tree incomplete.
 
+mod actuator;
 mod block;
 mod body;
+mod commands;
 mod component;
 mod estimator;
+mod health;
 mod input;
 mod joint;
 mod link;
+mod literal;
 mod output;
+mod parameters;
+mod path;
 mod quantity;
 mod record;
 mod robot;
+mod runs_on;
 mod sensor;
+mod service;
 mod setting;
+mod states;
 mod topology;
 
+pub(crate) use actuator::Actuator;
 #[cfg(feature = "urdf")]
 pub(crate) use body::Material;
 pub(crate) use body::{Geometry, Inertial, Shape};
+pub(crate) use commands::{Cancelled, Category, Command, CommandSettings, Commands};
 pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
-pub(crate) use input::{Input, Path};
+pub(crate) use health::{HealthSettings, Reaction};
+pub(crate) use input::Input;
 pub(crate) use joint::{Axis, Dynamics, Joint, JointKind, Limit, Mimic, Origin, Transmission};
 pub(crate) use link::Link;
+pub(crate) use literal::{Literal, Value};
 pub(crate) use output::Output;
+pub(crate) use parameters::{Parameter, ParameterItem, ParameterKind, ParameterRange};
+pub(crate) use path::Path;
 pub(crate) use quantity::Quantity;
 pub(crate) use robot::Robot;
+pub(crate) use runs_on::RunsOn;
 pub(crate) use sensor::Sensor;
+pub(crate) use service::{Service, ServiceKind};
 pub(crate) use setting::Setting;
+pub(crate) use states::State;
 pub(crate) use topology::{JointAddition, Topology};
 
 use crate::diagnostics::Diagnostics;

@@ -1,12 +1,16 @@
 //! Floor one: diagnostics as data. Each is a pair of the text that it points at and its message.
 
+mod commands;
 mod expansion;
+mod health;
+mod model;
 mod mutations;
+mod parameters;
 mod recovery;
 mod rules;
 
 use crate::diagnostics::{Diagnostic, Diagnostics};
-use crate::{model, parse, verify};
+use crate::{parse, verify};
 use proc_macro2::TokenStream;
 
 /// Tokens with places in `text`.
@@ -18,7 +22,7 @@ fn tokens(text: &str) -> TokenStream {
 fn diagnostics(tokens: TokenStream) -> Vec<Diagnostic> {
     let mut diagnostics = Diagnostics::default();
     let tree = parse::robot(tokens, &mut diagnostics);
-    let robot = model::resolve(tree);
+    let robot = crate::model::resolve(tree);
     verify::verify(&robot, &mut diagnostics);
     diagnostics.all().to_vec()
 }

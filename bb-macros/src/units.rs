@@ -34,6 +34,12 @@ impl Dimension {
         named.map_or_else(|| format!("a quantity in {}", self.symbol()), |(_, name)| (*name).to_owned())
     }
 
+    /// The SI unit of such quantities; empty for a plain number.
+    pub(crate) fn unit(self) -> String {
+        let named = SI.iter().find(|(dimension, _)| *dimension == self);
+        named.map_or_else(|| self.symbol(), |(_, unit)| (*unit).to_owned())
+    }
+
     fn symbol(self) -> String {
         let factors = self.0.iter().zip(["m", "kg", "s", "A", "K", "rad"]).filter(|(exponent, _)| **exponent != 0);
         let factors = factors.map(|(exponent, base)| match exponent {
@@ -75,6 +81,23 @@ const NAMED: &[([i8; 6], &str)] = &[
     ([-1, 1, -2, 0, 0, 0], "a pressure"),
     ([2, 1, -3, -1, 0, 0], "a voltage"),
     ([0, 1, -2, -1, 0, 0], "a magnetic field"),
+];
+
+/// Units that products of base units do not show well.
+const SI: &[(Dimension, &str)] = &[
+    (Dimension::FREQUENCY, "Hz"),
+    (Dimension::VELOCITY, "m/s"),
+    (Dimension([1, 0, -2, 0, 0, 0]), "m/s^2"),
+    (Dimension::ANGULAR_VELOCITY, "rad/s"),
+    (Dimension([0, 0, -2, 0, 0, 1]), "rad/s^2"),
+    (Dimension::FORCE, "N"),
+    (Dimension::TORQUE, "N*m"),
+    (Dimension([2, 1, -3, 0, 0, 0]), "W"),
+    (Dimension::LINEAR_DAMPING, "N*s/m"),
+    (Dimension::ANGULAR_DAMPING, "N*m*s/rad"),
+    (Dimension([-1, 1, -2, 0, 0, 0]), "Pa"),
+    (Dimension([2, 1, -3, -1, 0, 0]), "V"),
+    (Dimension([0, 1, -2, -1, 0, 0]), "T"),
 ];
 
 use std::f64::consts::PI;
@@ -124,6 +147,20 @@ const UNITS: &[(&str, [i8; 6], f64)] = &[
     ("kPa", [-1, 1, -2, 0, 0, 0], 1e3),
     ("bar", [-1, 1, -2, 0, 0, 0], 1e5),
 ];
+
+/// A time for messages: `250 ms`. Rounded up, so that it is enough where it is said to be.
+pub(crate) fn time_text(seconds: f64) -> String {
+    let (factor, unit) = match seconds {
+        s if s >= 1.0 => (1.0, "s"),
+        s if s >= 1e-3 => (1e3, "ms"),
+        s if s >= 1e-6 => (1e6, "us"),
+        _ => (1e9, "ns"),
+    };
+    // Three digits behind the point, without zeros at the end; an error in the last place of the double is no more.
+    let number = format!("{:.3}", (seconds * factor * 1e3 - 1e-6).ceil() / 1e3);
+    let number = number.trim_end_matches('0').trim_end_matches('.');
+    format!("{number} {unit}")
+}
 
 /// A unit: a symbol, or a product of powers of symbols as in `kg*m/s^2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -215,6 +252,21 @@ mod tests {
         assert!((unit("km/h")?.factor - 1.0 / 3.6).abs() < 1e-15);
         assert_eq!(unit("m^2*kg")?.dimension.name(), "a moment of inertia");
         assert_eq!(unit("m^3")?.dimension.name(), "a quantity in m^3");
+        Ok(())
+    }
+
+    #[test]
+    fn times_are_short() {
+        let times = [0.02, 0.1, 1.0, 2.5, 1.0 / 3.0, 4e-6, 1e-9, 3600.0].map(time_text);
+        assert_eq!(times, ["20 ms", "100 ms", "1 s", "2.5 s", "333.334 ms", "4 us", "1 ns", "3600 s"]);
+    }
+
+    #[test]
+    fn si_units_are_those_of_the_language() -> Result<(), String> {
+        for (_, text) in SI {
+            assert_eq!(unit(text)?.dimension.unit(), *text);
+        }
+        assert_eq!(unit("mm^2")?.dimension.unit(), "m^2");
         Ok(())
     }
 

@@ -3,9 +3,15 @@
 //! One rule is one file, and a folder of the same name in `tests/ui`. All rules run, so that all faults are reported
 //! together; each fault is reported by one rule. Facts about types are left to rustc (see `expand::checks`).
 
+mod actuated_joints;
+mod declared_categories;
+mod declared_commands;
+mod declared_parameters;
 mod declared_publishers;
+mod declared_states;
 mod dimensions;
 mod distinct_paths;
+mod input_periods;
 mod joint_geometry;
 mod link_bodies;
 mod link_nested_input;
@@ -13,7 +19,9 @@ mod mimicked_joints;
 mod no_cycles;
 mod one_driver;
 mod one_root;
+mod parameter_values;
 mod positive_values;
+mod reachable_reactions;
 mod sensor_nested_input;
 mod single_input_tolerance;
 mod single_settings;
@@ -32,14 +40,22 @@ const RULES: &[Rule] = &[
     joint_geometry::check,
     mimicked_joints::check,
     link_bodies::check,
+    actuated_joints::check,
     dimensions::check,
+    parameter_values::check,
+    declared_parameters::check,
+    declared_states::check,
+    declared_categories::check,
     sensor_nested_input::check,
     link_nested_input::check,
     one_driver::check,
     single_input_tolerance::check,
     declared_publishers::check,
     no_cycles::check,
+    declared_commands::check,
+    reachable_reactions::check,
     positive_values::check,
+    input_periods::check,
     distinct_paths::check,
     single_settings::check,
 ];

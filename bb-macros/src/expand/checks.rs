@@ -5,7 +5,7 @@ use super::literal::{dimension, option, spanned_call};
 use super::types::{Types, type_name};
 use crate::diagnostics::Place;
 use crate::model::Robot;
-use crate::parse::{Component, ComponentOption, OptionValue};
+use crate::parse::{Component, ComponentOption, OptionValue, Value};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -15,10 +15,10 @@ pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
     let types = Types::new(robot, verified.name, 0);
     let mut checks = TokenStream::new();
     for (id, sensor) in robot.sensors.iter().enumerate() {
-        checks.extend(options(&sensor.component, &types.sensor_options(id)));
+        checks.extend(options(robot, &sensor.component, &types.sensor_options(id)));
     }
     for (id, estimator) in robot.estimators.iter().enumerate() {
-        checks.extend(options(&estimator.component, &types.estimator_options(id)));
+        checks.extend(options(robot, &estimator.component, &types.estimator_options(id)));
         checks.extend(inputs(robot, &types, id));
         checks.extend(outputs(robot, &types, id));
     }
@@ -27,7 +27,7 @@ pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
 }
 
 /// Required options are given; literals have the right dimension and keep their range.
-fn options(component: &Component, options: &TokenStream) -> TokenStream {
+fn options(robot: &Robot, component: &Component, options: &TokenStream) -> TokenStream {
     let name = type_name(component);
     let given = component.options.iter().map(|option| crate::names::text(&option.name));
     let fields = quote!(<#options as ::bb_core::Options>::FIELDS);
@@ -37,7 +37,7 @@ fn options(component: &Component, options: &TokenStream) -> TokenStream {
         quote!(#name, #fields, &[#(#given),*]),
     );
     for option in &component.options {
-        if let Some((place, given)) = given_number(option) {
+        if let Some((place, given)) = given_number(robot, option) {
             checks.extend(spanned_call(
                 place,
                 quote!(::bb_core::__private::check_option),
@@ -49,11 +49,22 @@ fn options(component: &Component, options: &TokenStream) -> TokenStream {
 }
 
 /// A literal number as a `bb_core::check::Given`, and its place.
-fn given_number(given: &ComponentOption) -> Option<(Place, TokenStream)> {
+fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenStream)> {
     let (place, unit, number) = match &given.value {
         OptionValue::Quantity(quantity) => {
             let unit = quantity.has_unit.then(|| dimension(quantity.dimension));
             (quantity.place, option(unit), quantity.value)
+        }
+        // Its default stands for it.
+        OptionValue::Parameter(path) => {
+            let default = &robot.parameters.get(robot.parameter(path)?)?.default;
+            let unit = default.has_unit.then(|| dimension(default.dimension));
+            let number = match default.value {
+                Value::Integer(integer) => integer as f64,
+                Value::Number(number) => number,
+                Value::Bool(_) | Value::Text(_) => return None,
+            };
+            (path.place(), option(unit), number)
         }
         OptionValue::Expression { expression, number } => {
             (Place::of(&**expression), option(None), number.as_ref().copied()?)

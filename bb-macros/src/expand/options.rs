@@ -6,7 +6,7 @@ use super::types::{Types, estimator_alias, given, sensor_alias};
 use crate::derive::into_if_text;
 use crate::diagnostics::Place;
 use crate::model::{EstimatorId, Robot, SensorId};
-use crate::parse::{Component, OptionValue};
+use crate::parse::{Component, OptionValue, Value};
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
@@ -26,7 +26,7 @@ pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     });
     for (field, options, given, component) in sensors.chain(estimators) {
         let function = function(&field);
-        functions.extend(filled(&function, &options, &given, component));
+        functions.extend(filled(robot, &function, &options, &given, component));
         fields.push(Field { name: field, kind: options, value: quote!(#function()) });
     }
     let structs = group::structs("__Options", "__declared_options", &fields, &quote!(), &quote!());
@@ -54,13 +54,24 @@ fn estimator_field(id: EstimatorId) -> Ident {
 /// `fn e0() -> … { let mut options = defaults(); options.beta = 0.1; options }`
 ///
 /// The only place that names the type as the user wrote it: that it is none of the kind is reported here.
-fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
+fn filled(
+    robot: &Robot,
+    function: &Ident,
+    options: &TokenStream,
+    given: &TokenStream,
+    component: &Component,
+) -> TokenStream {
     let settings = component.options.iter().map(|option| {
         let name = &option.name;
         let value = match &option.value {
             OptionValue::Quantity(quantity) => {
                 let number = quantity.value;
                 respan(quote!(::bb_core::__private::FromQuantity::from_quantity(#number)), quantity.place.start)
+            }
+            OptionValue::Parameter(path) => {
+                let parameter = robot.parameter(path).and_then(|id| robot.parameters.get(id));
+                let default = parameter.map(|parameter| default(&parameter.default.value));
+                respan(default.unwrap_or_default(), path.place().start)
             }
             OptionValue::Expression { expression, .. } => into_if_text(expression),
         };
@@ -78,6 +89,19 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
             #(#settings)*
             ::bb_core::__private::as_known(__options)
         }
+    }
+}
+
+/// The default of a parameter as the value of an option.
+fn default(value: &Value) -> TokenStream {
+    match value {
+        Value::Bool(value) => quote!(#value),
+        Value::Integer(value) => {
+            let magnitude = proc_macro2::Literal::u64_unsuffixed(value.unsigned_abs());
+            if *value < 0 { quote!(-#magnitude) } else { quote!(#magnitude) }
+        }
+        Value::Number(value) => quote!(::bb_core::__private::FromQuantity::from_quantity(#value)),
+        Value::Text(value) => quote!(::core::convert::Into::into(#value)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! In which order what is due at one instant happens, so that every estimator gets the newest of all its inputs.
 
-use crate::model::{EstimatorId, From, Home, PublisherId, Robot, SensorId};
+use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId, Trigger};
 use crate::verify::Verified;
 
 /// How many estimators stand above each one on the longest way to a sensor. Consumers of one publisher are called in
@@ -17,7 +17,7 @@ fn depth(verified: &Verified<'_>, id: EstimatorId, depths: &mut [Option<usize>])
     let above = verified.sources.get(id).into_iter().flatten().filter_map(|source| {
         match verified.robot.publishers.get(*source)?.from {
             From::Estimator(above, _) => Some(depth(verified, above, depths) + 1),
-            From::Sensor(_) => None,
+            From::Sensor(_) | From::Service(_) => None,
         }
     });
     let deepest = above.max().unwrap_or(0);
@@ -34,9 +34,8 @@ pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
     let mut before: Vec<Vec<SensorId>> = vec![Vec::new(); robot.sensors.len()];
     for (estimator, sources) in robot.estimators.iter().zip(&verified.sources) {
         let driver = estimator.inputs.iter().zip(sources).find(|(input, _)| input.driver.is_some());
-        let Some(driver) = driver.and_then(|(_, source)| trigger(verified, *source)) else { continue };
-        let others =
-            sources.iter().filter_map(|source| trigger(verified, *source)).filter(|other| *other != driver);
+        let Some(driver) = driver.and_then(|(_, source)| trigger(robot, *source)) else { continue };
+        let others = sources.iter().filter_map(|source| trigger(robot, *source)).filter(|other| *other != driver);
         if let Some(list) = before.get_mut(driver) {
             list.extend(others);
         }
@@ -53,18 +52,9 @@ pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
 }
 
 /// The sensor whose message makes this publisher publish.
-fn trigger(verified: &Verified<'_>, publisher: PublisherId) -> Option<SensorId> {
-    let robot: &Robot = verified.robot;
-    match robot.publishers.get(publisher)?.from {
-        From::Sensor(id) => Some(id),
-        From::Estimator(id, _) => match robot.estimators.get(id)?.home {
-            Home::Sensor(sensor) => Some(sensor),
-            Home::Link(_) => {
-                let estimator = robot.estimators.get(id)?;
-                let mut inputs = estimator.inputs.iter().zip(verified.sources.get(id)?);
-                let driver = inputs.find(|(input, _)| input.driver.is_some() || estimator.inputs.len() == 1);
-                trigger(verified, *driver?.1)
-            }
-        },
+fn trigger(robot: &Robot, publisher: PublisherId) -> Option<SensorId> {
+    match robot.trigger(publisher)? {
+        Trigger::Sensor(id) => Some(id),
+        Trigger::Service(_) => None,
     }
 }

@@ -129,7 +129,7 @@ impl<'a> Types<'a> {
                 let index = self.output_index(id, output);
                 self.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::Payload))
             }
-            None => quote!(()),
+            Some(From::Service(_)) | None => quote!(()),
         }
     }
 

@@ -1,7 +1,8 @@
 //! The tree to lists: every part gets its number and its path, every input its publisher.
 
 use super::{
-    Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor, SensorId,
+    Actuator, Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor,
+    SensorId, Service, Worker,
 };
 use crate::names::text;
 use crate::parse;
@@ -11,7 +12,20 @@ use syn::Visibility;
 
 /// Resolves what can be resolved; what cannot be is left out of the references for the rules to report.
 pub(crate) fn resolve(tree: parse::Robot) -> Robot {
-    let parse::Robot { attributes, visibility, name, sensors, links, topologies: _, joints: _, complete } = tree;
+    let parse::Robot {
+        attributes,
+        visibility,
+        name,
+        parameters,
+        states,
+        commands,
+        sensors,
+        services,
+        links,
+        topologies: _,
+        joints: _,
+        complete,
+    } = tree;
     let mut robot = Robot {
         attributes,
         visibility: visibility.unwrap_or(Visibility::Inherited),
@@ -20,11 +34,25 @@ pub(crate) fn resolve(tree: parse::Robot) -> Robot {
         joints: Vec::new(),
         sensors: Vec::new(),
         estimators: Vec::new(),
+        actuators: Vec::new(),
+        services: Vec::new(),
+        parameters: Vec::new(),
+        parameter_groups: Vec::new(),
+        parameter_paths: HashMap::new(),
+        states,
+        categories: Vec::new(),
+        commands: Vec::new(),
         publishers: Vec::new(),
         complete,
     };
+    // Before what refers to them.
+    robot.add_parameters(parameters);
+    robot.add_commands(commands);
     for sensor in sensors {
         robot.add_sensor(sensor, Mount::Robot, &[]);
+    }
+    for service in services {
+        robot.add_service(service);
     }
     for link in links {
         robot.add_link(link, None, &[]);
@@ -68,6 +96,7 @@ impl Robot {
             mimics,
             transmissions,
             sensors,
+            actuators,
             links,
         } = joint;
         let from_urdf = label.is_some();
@@ -90,6 +119,10 @@ impl Robot {
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Joint(id), &path);
         }
+        for parse::Actuator { attributes, name, component } in actuators {
+            let path = texts("actuator", &below(&path, &name));
+            self.actuators.push(Actuator { attributes, name, joint: id, component, path });
+        }
         let children = links.into_iter().map(|link| self.add_link(link, Some(id), &path)).collect();
         if let Some(joint) = self.joints.get_mut(id) {
             joint.children = children;
@@ -109,9 +142,17 @@ impl Robot {
         }
     }
 
+    fn add_service(&mut self, service: parse::Service) {
+        let parse::Service { kind, attributes, name, component, rates } = service;
+        let path = vec![kind.word().to_owned(), text(&name)];
+        let publisher = self.add_publisher(path.clone(), From::Service(self.services.len()));
+        self.services.push(Service { kind, attributes, name, component, rates, publisher, path });
+    }
+
     fn add_estimator(&mut self, estimator: parse::Estimator, home: Home, path: Vec<String>) {
         let id = self.estimators.len();
-        let parse::Estimator { attributes, name, component, inputs, outputs, sync_tolerances } = estimator;
+        let parse::Estimator { attributes, name, component, inputs, outputs, sync_tolerances, health, runs_on } =
+            estimator;
         let publishers = if outputs.is_empty() {
             vec![self.add_publisher(path.clone(), From::Estimator(id, None))]
         } else {
@@ -132,6 +173,9 @@ impl Robot {
             inputs,
             outputs,
             sync_tolerances,
+            health: self.resolve_health(health),
+            worker: Worker::of(&runs_on),
+            runs_on,
             path,
             publishers,
         });

@@ -10,16 +10,36 @@ use syn::{Attribute, Token};
 
 /// All words of the language that start an item: where reading can start anew.
 const WORDS: &[&str] = &[
+    "parameters",
+    "states",
+    "commands",
+    "category",
     "sensors",
+    "controllers",
+    "controller",
+    "bridges",
+    "bridge",
     "topology",
     "link",
     "joint",
     "sensor",
+    "actuator",
     "estimator",
     "input",
     "output",
     "rate",
     "sync_tolerance",
+    "latency_budget",
+    "lost_after",
+    "recover_after",
+    "on_degraded",
+    "on_lost",
+    "on_recovered",
+    "runs_on",
+    "allowed_states",
+    "timeout",
+    "cancel",
+    "concurrency",
     "origin",
     "axis",
     "limit",
@@ -31,34 +51,46 @@ const WORDS: &[&str] = &[
     "collision",
 ];
 
-/// Words that stand in the language but are not built yet.
-const PLANNED: &[&str] = &[
-    "parameters",
-    "states",
-    "commands",
-    "controllers",
-    "controller",
-    "actuator",
-    "bridge",
-    "latency_budget",
-    "lost_after",
-    "recover_after",
-    "on_degraded",
-    "on_lost",
-    "on_recovered",
-    "runs_on",
-];
-
 /// An item's attributes and its first word.
 pub(super) struct Head {
     pub(super) attributes: Vec<Attribute>,
     pub(super) word: Ident,
 }
 
+impl Head {
+    /// The first word as the name that it is where items start with no word of the language.
+    pub(super) fn name(&self, input: ParseStream<'_>) -> syn::Result<Ident> {
+        let text = self.word.to_string();
+        if NO_WORDS.contains(&&*text) && input.peek(Ident::peek_any) {
+            let message = format!("what stands in this block starts with its name; leave `{text}` out");
+            return Err(syn::Error::new(self.word.span(), message));
+        }
+        if syn::parse_str::<Ident>(&text).is_err() {
+            let message = format!("`{text}` is a keyword of Rust; choose another name");
+            return Err(syn::Error::new(self.word.span(), message));
+        }
+        Ok(self.word.clone())
+    }
+}
+
+/// What those may write in front of a name who know that other blocks have a word there.
+const NO_WORDS: [&str; 5] = ["command", "state", "parameter", "param", "group"];
+
 /// Reads items until the end. `item` gets each head and reads the rest; an item that it cannot read is reported and
 /// skipped.
 pub(super) fn items(
     input: ParseStream<'_>,
+    diagnostics: &mut Diagnostics,
+    item: impl FnMut(Head, ParseStream<'_>, &mut Diagnostics) -> syn::Result<()>,
+) {
+    let expected = "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`";
+    items_of(input, expected, diagnostics, item);
+}
+
+/// The same where items start with a name; `expected` is the error for what is none.
+pub(super) fn items_of(
+    input: ParseStream<'_>,
+    expected: &str,
     diagnostics: &mut Diagnostics,
     mut item: impl FnMut(Head, ParseStream<'_>, &mut Diagnostics) -> syn::Result<()>,
 ) {
@@ -68,7 +100,7 @@ pub(super) fn items(
             let _: syn::Result<Token![;]> = input.parse();
             continue;
         }
-        let result = head(input, diagnostics).and_then(|head| item(head, input, diagnostics));
+        let result = head(input, expected, diagnostics).and_then(|head| item(head, input, diagnostics));
         if let Err(error) = result {
             diagnostics.syntax(&error);
             skip(input);
@@ -116,18 +148,23 @@ pub(super) fn place_since(start: Cursor<'_>, input: ParseStream<'_>) -> Place {
 /// Skips to the next item, unless one starts here.
 pub(super) fn skip_to_item(input: ParseStream<'_>) {
     let ahead = input.fork();
-    let word = ahead.call(Attribute::parse_outer).and_then(|_| ahead.call(Ident::parse_any));
-    let word = word.map(|word| word.to_string());
-    if !word.is_ok_and(|word| WORDS.contains(&&*word) || PLANNED.contains(&&*word)) {
+    if ahead.call(Attribute::parse_outer).is_err() || !starts_item(&ahead) {
         skip(input);
     }
+}
+
+/// Whether an item starts here: with a word of the language, or a name with a `:` or with braces behind it.
+pub(super) fn starts_item(input: ParseStream<'_>) -> bool {
+    let is_word = input.fork().call(Ident::parse_any).map(|word| WORDS.contains(&&*word.to_string()));
+    let is_name = input.peek2(Token![:]) && !input.peek2(Token![::]) || input.peek2(syn::token::Brace);
+    is_word.is_ok_and(|is_word| is_word || is_name)
 }
 
 /// The error for a word that does not belong here.
 pub(super) fn unexpected(word: &Ident, place: &str, allowed: &[&str]) -> syn::Error {
     let name = word.to_string();
-    let message = if PLANNED.contains(&&*name) {
-        format!("`{name}` is not supported yet; {place} holds {}", one_of(allowed))
+    let message = if allowed.is_empty() {
+        format!("{place} holds nothing; leave this out")
     } else if WORDS.contains(&&*name) {
         format!("`{name}` does not belong in {place}, which holds {}", one_of(allowed))
     } else {
@@ -137,19 +174,14 @@ pub(super) fn unexpected(word: &Ident, place: &str, allowed: &[&str]) -> syn::Er
     syn::Error::new(word.span(), message)
 }
 
-fn head(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Head> {
+fn head(input: ParseStream<'_>, expected: &str, diagnostics: &mut Diagnostics) -> syn::Result<Head> {
     let attributes = input.call(Attribute::parse_outer)?;
     for attribute in attributes.iter().filter(|attribute| !attribute.path().is_ident("doc")) {
         let message = "only doc comments can stand before a part of a robot; leave this attribute out";
         diagnostics.error(attribute, message.into());
     }
     let place = input.span();
-    let word = input.call(Ident::parse_any).map_err(|_| {
-        syn::Error::new(
-            place,
-            "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`",
-        )
-    })?;
+    let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, expected))?;
     Ok(Head { attributes, word })
 }
 

@@ -1,7 +1,7 @@
 //! What is declared by name and type: `imu: Bmi270(bus = 1) { … }`.
 
-use super::Quantity;
 use super::block::{Head, braced, colon, semicolon};
+use super::{Path, Quantity};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::parse::{ParseBuffer, ParseStream};
@@ -26,6 +26,8 @@ pub(crate) struct ComponentOption {
 pub(crate) enum OptionValue {
     /// A literal number with a unit.
     Quantity(Quantity),
+    /// `param::imu::beta`: whatever the parameter is at the time.
+    Parameter(Path),
     /// Any expression; with its number, if it is a literal one.
     Expression { expression: Box<Expr>, number: Option<f64> },
 }
@@ -42,15 +44,25 @@ impl<'a> Declared<'a> {
     /// Reads what stands behind the word.
     pub(super) fn parse(head: Head, input: ParseStream<'a>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
+        Self::named(head.attributes, name, input, diagnostics)
+    }
+
+    /// Reads what stands behind the name.
+    pub(super) fn named(
+        attributes: Vec<Attribute>,
+        name: Ident,
+        input: ParseStream<'a>,
+        diagnostics: &mut Diagnostics,
+    ) -> syn::Result<Self> {
         colon(input, &name, "a type")?;
-        let component = Component::parse(input, diagnostics)?;
+        let component = Component::parse(&name, input, diagnostics)?;
         let body = if input.peek(syn::token::Brace) {
             Some(braced(input)?)
         } else {
             semicolon(input, &format!("`{name}`"), diagnostics);
             None
         };
-        Ok(Self { attributes: head.attributes, name, component, body })
+        Ok(Self { attributes, name, component, body })
     }
 }
 
@@ -61,8 +73,8 @@ pub(super) fn name(input: ParseStream<'_>, word: &Ident) -> syn::Result<Ident> {
 }
 
 impl Component {
-    fn parse(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let kind = path_of_type(input)?;
+    fn parse(name: &Ident, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        let kind = path_of_type(name, input)?;
         let mut options = Vec::new();
         if input.peek(syn::token::Paren) {
             let content;
@@ -78,14 +90,14 @@ impl Component {
 }
 
 /// Reads a path whose last parentheses are not taken for the arguments of a function's type.
-fn path_of_type(input: ParseStream<'_>) -> syn::Result<syn::Path> {
+fn path_of_type(name: &Ident, input: ParseStream<'_>) -> syn::Result<syn::Path> {
     let leading_colon = input.parse()?;
     let mut segments = syn::punctuated::Punctuated::new();
     loop {
         let place = input.span();
         let word: Ident = input
             .call(syn::ext::IdentExt::parse_any)
-            .map_err(|_| syn::Error::new(place, "expected a type: that of a sensor or of an estimator"))?;
+            .map_err(|_| syn::Error::new(place, format!("expected the type of `{name}`")))?;
         let mut segment = syn::PathSegment::from(word);
         if input.peek(Token![<]) {
             let arguments: AngleBracketedGenericArguments = input.parse()?;
@@ -115,6 +127,9 @@ impl ComponentOption {
 impl OptionValue {
     /// A number with a unit, or any expression: tried as a quantity first, since `0.42 m` is no expression.
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        if let Some(parameter) = Self::parameter(input)? {
+            return Ok(parameter);
+        }
         if !Quantity::peek(input) {
             return Ok(Self::Expression { expression: Box::new(input.parse()?), number: None });
         }
@@ -127,6 +142,21 @@ impl OptionValue {
             return Ok(Self::Expression { expression, number });
         }
         Quantity::parse(input).map(Self::Quantity)
+    }
+
+    /// A path that starts with `param::`, unless it is part of a larger expression.
+    fn parameter(input: ParseStream<'_>) -> syn::Result<Option<Self>> {
+        let starts = input.fork().parse::<Ident>().is_ok_and(|word| word == "param") && input.peek2(Token![::]);
+        if !starts {
+            return Ok(None);
+        }
+        const EXPECTED: &str = "the path of a parameter, as in `param::imu::beta`";
+        let ahead = input.fork();
+        Path::parse(&ahead, EXPECTED)?;
+        if !(ahead.is_empty() || ahead.peek(Token![,])) {
+            return Ok(None);
+        }
+        Path::parse(input, EXPECTED).map(|path| Some(Self::Parameter(path)))
     }
 }
 

@@ -1,9 +1,9 @@
 //! `input gnss: sensor::base_link::gnss, optional, within: 250 ms;`
 
-use super::Quantity;
 use super::block::{Head, colon, semicolon};
 use super::component::name;
-use crate::diagnostics::{Diagnostics, Place};
+use super::{Path, Quantity};
+use crate::diagnostics::Diagnostics;
 use crate::names::did_you_mean;
 use proc_macro2::Ident;
 use syn::Token;
@@ -22,45 +22,11 @@ pub(crate) struct Input {
     pub(crate) within: Option<Quantity>,
 }
 
-/// `sensor::base_link::imu`
-#[derive(Clone, Debug)]
-pub(crate) struct Path(pub(crate) Vec<Ident>);
-
-impl Path {
-    /// The names, joined as in messages: `sensor::base_link::imu`.
-    pub(crate) fn text(&self) -> String {
-        self.0.iter().map(crate::names::text).collect::<Vec<_>>().join("::")
-    }
-
-    pub(crate) fn place(&self) -> Place {
-        match (self.0.first(), self.0.last()) {
-            (Some(first), Some(last)) => Place { start: first.span(), end: last.span() },
-            _ => Place::from(proc_macro2::Span::call_site()),
-        }
-    }
-
-    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
-        let mut segments = vec![Self::segment(input)?];
-        while input.peek(Token![::]) {
-            input.parse::<Token![::]>()?;
-            segments.push(Self::segment(input)?);
-        }
-        Ok(Self(segments))
-    }
-
-    fn segment(input: ParseStream<'_>) -> syn::Result<Ident> {
-        let place = input.span();
-        input
-            .call(Ident::parse_any)
-            .map_err(|_| syn::Error::new(place, "expected the path of a publisher, as in `sensor::base_link::imu`"))
-    }
-}
-
 impl Input {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
         colon(input, &name, "the path of a publisher")?;
-        let path = Path::parse(input)?;
+        let path = Path::parse(input, "the path of a publisher, as in `sensor::base_link::imu`")?;
         let mut parsed = Self { word: head.word, name, path, driver: None, optional: None, within: None };
         while input.peek(Token![,]) {
             input.parse::<Token![,]>()?;

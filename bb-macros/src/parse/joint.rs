@@ -8,7 +8,7 @@ pub(crate) use mechanics::{Dynamics, Mimic, Transmission};
 
 use super::block::{Head, braced, colon, items, semicolon, unexpected};
 use super::component::name;
-use super::{Link, Sensor};
+use super::{Actuator, Link, Sensor};
 use crate::diagnostics::Diagnostics;
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::Ident;
@@ -29,6 +29,7 @@ pub(crate) struct Joint {
     pub(crate) mimics: Vec<Mimic>,
     pub(crate) transmissions: Vec<Transmission>,
     pub(crate) sensors: Vec<Sensor>,
+    pub(crate) actuators: Vec<Actuator>,
     pub(crate) links: Vec<Link>,
 }
 
@@ -69,7 +70,8 @@ impl JointKind {
 }
 
 /// What a joint holds.
-const WORDS: &[&str] = &["origin", "axis", "limit", "dynamics", "mimic", "transmission", "sensor", "link"];
+const WORDS: &[&str] =
+    &["origin", "axis", "limit", "dynamics", "mimic", "transmission", "sensor", "actuator", "link"];
 
 impl Joint {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
@@ -92,6 +94,7 @@ impl Joint {
             mimics: Vec::new(),
             transmissions: Vec::new(),
             sensors: Vec::new(),
+            actuators: Vec::new(),
             links: Vec::new(),
         };
         if input.peek(syn::token::Brace) {
@@ -118,6 +121,7 @@ impl Joint {
             "mimic" => self.mimics.push(Mimic::parse(head, input, diagnostics)?),
             "transmission" => self.transmissions.push(Transmission::parse(head, input, diagnostics)?),
             "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
+            "actuator" => self.actuators.push(Actuator::parse(head, input, diagnostics)?),
             "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
             _ => {
                 return Err(unexpected(&head.word, "a joint", WORDS));

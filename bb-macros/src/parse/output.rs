@@ -2,10 +2,11 @@
 
 use super::block::{Head, semicolon};
 use super::component::name;
+use super::record::names;
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::Token;
-use syn::parse::{Parse, ParseStream};
+use syn::parse::ParseStream;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Output {
@@ -20,14 +21,7 @@ impl Output {
         let mut path = None;
         if input.peek(Token![:]) {
             input.parse::<Token![:]>()?;
-            let content;
-            let bracket = syn::bracketed!(content in input);
-            let segments: Vec<Ident> = content.parse_terminated(Ident::parse, Token![,])?.into_iter().collect();
-            if segments.is_empty() {
-                let message = "a path has at least one name, as in `[nav, velocity]`";
-                return Err(syn::Error::new(bracket.span.join(), message));
-            }
-            path = Some(segments);
+            path = Some(names(input, "a path has at least one name, as in `[nav, velocity]`")?);
         }
         semicolon(input, &format!("`{name}`"), diagnostics);
         Ok(Self { name, path })

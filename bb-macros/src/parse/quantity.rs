@@ -1,6 +1,6 @@
 //! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also glued, `20ms`.
 
-use super::block::place_since;
+use super::block::{place_since, starts_item};
 use crate::diagnostics::Place;
 use crate::units::{Dimension, Unit};
 use proc_macro2::{Ident, Span};
@@ -31,6 +31,11 @@ impl Quantity {
         is_number(input)
     }
 
+    /// Reads a number of which the rules will say that it is whole and has no unit.
+    pub(crate) fn parse_count(input: ParseStream<'_>) -> syn::Result<Self> {
+        if Self::peek(input) { Self::parse(input) } else { Err(input.error("expected a whole number")) }
+    }
+
     /// Reads a number, and the unit if one follows.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let start = input.cursor();
@@ -59,7 +64,7 @@ impl Quantity {
         let number = number.ok_or_else(|| syn::Error::new(literal.span(), "this number is too large"))?;
         let unit = if !suffix.is_empty() {
             Some(Unit::with_suffix(&suffix_ident(&suffix, literal.span())?, input)?)
-        } else if input.peek(Ident::peek_any) {
+        } else if input.peek(Ident::peek_any) && !starts_item(input) {
             Some(Unit::parse(input)?)
         } else {
             None

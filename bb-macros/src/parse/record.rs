@@ -1,4 +1,4 @@
-//! Values in braces and brackets: `{ field: value, … }` and `[a, b, c]`.
+//! Values in braces and brackets: `{ field: value, … }`, `[1 m, 2 m]` and `[idle, executing]`.
 
 use super::Quantity;
 use super::block::{braced, colon};
@@ -6,7 +6,7 @@ use crate::names::{did_you_mean, one_of};
 use proc_macro2::Ident;
 use syn::Token;
 use syn::ext::IdentExt;
-use syn::parse::ParseStream;
+use syn::parse::{Parse, ParseStream};
 
 /// Reads `{ field: value, … }`; each of `fields` may stand in it once, in any order. `value` gets each field's name.
 pub(super) fn record(
@@ -48,4 +48,15 @@ pub(super) fn array<const N: usize>(input: ParseStream<'_>) -> syn::Result<[Quan
     quantities
         .try_into()
         .map_err(|_| syn::Error::new(bracket.span.join(), format!("expected {N} values, found {count}")))
+}
+
+/// Reads `[idle, executing]`: one name or more; `expected` is the error for none.
+pub(super) fn names(input: ParseStream<'_>, expected: &str) -> syn::Result<Vec<Ident>> {
+    let content;
+    let bracket = syn::bracketed!(content in input);
+    let names: Vec<Ident> = content.parse_terminated(Ident::parse, Token![,])?.into_iter().collect();
+    if names.is_empty() {
+        return Err(syn::Error::new(bracket.span.join(), expected));
+    }
+    Ok(names)
 }

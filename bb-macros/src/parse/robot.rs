@@ -1,7 +1,7 @@
-//! `robot Rover; sensors { … } link base { … }`
+//! `robot Rover; parameters { … } states { … } commands { … } sensors { … } link base { … }`
 
 use super::block::{Head, braced, items, semicolon, skip_to_item, unexpected};
-use super::{JointAddition, Link, Sensor, Topology};
+use super::{Commands, JointAddition, Link, ParameterItem, Sensor, Service, ServiceKind, State, Topology};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::{Ident, Span};
 use syn::ext::IdentExt;
@@ -15,7 +15,11 @@ pub(crate) struct Robot {
     pub(crate) visibility: Option<Visibility>,
     /// None if it could not be read.
     pub(crate) name: Option<Ident>,
+    pub(crate) parameters: Vec<ParameterItem>,
+    pub(crate) states: Vec<State>,
+    pub(crate) commands: Commands,
     pub(crate) sensors: Vec<Sensor>,
+    pub(crate) services: Vec<Service>,
     pub(crate) links: Vec<Link>,
     /// `topology: urdf("…");`
     pub(crate) topologies: Vec<Topology>,
@@ -24,6 +28,10 @@ pub(crate) struct Robot {
     /// Whether everything could be read; if not, what is missing may have been declared.
     pub(crate) complete: bool,
 }
+
+/// What a robot holds.
+const WORDS: &[&str] =
+    &["parameters", "states", "commands", "sensors", "controllers", "bridges", "link", "topology"];
 
 impl Robot {
     pub(super) fn parse(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) {
@@ -57,6 +65,14 @@ impl Robot {
 
     fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
         match &*head.word.to_string() {
+            "parameters" => {
+                let body = braced(input)?;
+                self.parameters.extend(ParameterItem::parse_all(&body, diagnostics));
+            }
+            "states" => self.states.extend(State::parse_all(input, diagnostics)?),
+            "commands" => self.commands.parse(input, diagnostics)?,
+            "controllers" => self.services.extend(Service::parse_all(ServiceKind::Controller, input, diagnostics)?),
+            "bridges" => self.services.extend(Service::parse_all(ServiceKind::Bridge, input, diagnostics)?),
             "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
             "sensors" => {
                 let body = braced(input)?;
@@ -70,7 +86,7 @@ impl Robot {
             }
             "topology" => self.topologies.push(Topology::parse(head, input, diagnostics)?),
             "joint" => self.joints.push(JointAddition::parse(&head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "a robot", &["link", "sensors", "topology"])),
+            _ => return Err(unexpected(&head.word, "a robot", WORDS)),
         }
         Ok(())
     }

@@ -16,8 +16,26 @@ pub(crate) struct Setting {
 impl Setting {
     /// Reads what stands behind the word.
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        Self::parse_with(Quantity::parse, head, input, diagnostics)
+    }
+
+    /// The same for a number that counts.
+    pub(super) fn parse_count(
+        head: Head,
+        input: ParseStream<'_>,
+        diagnostics: &mut Diagnostics,
+    ) -> syn::Result<Self> {
+        Self::parse_with(Quantity::parse_count, head, input, diagnostics)
+    }
+
+    fn parse_with(
+        quantity: impl FnOnce(ParseStream<'_>) -> syn::Result<Quantity>,
+        head: Head,
+        input: ParseStream<'_>,
+        diagnostics: &mut Diagnostics,
+    ) -> syn::Result<Self> {
         colon(input, &head.word, "a value")?;
-        let quantity = Quantity::parse(input)?;
+        let quantity = quantity(input)?;
         semicolon(input, &format!("`{}`", head.word), diagnostics);
         Ok(Self { word: head.word, quantity })
     }

@@ -1,8 +1,8 @@
 //! `topology: urdf("robot.urdf");`, and what is declared onto the joints that it brings: `joint elbow { sensor … }`.
 
-use super::Sensor;
 use super::block::{Head, braced, items, semicolon, unexpected};
 use super::component::name;
+use super::{Actuator, Sensor};
 use crate::diagnostics::{Diagnostics, Place};
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
@@ -25,6 +25,7 @@ pub(crate) struct Topology {
 pub(crate) struct JointAddition {
     pub(crate) name: Ident,
     pub(crate) sensors: Vec<Sensor>,
+    pub(crate) actuators: Vec<Actuator>,
 }
 
 impl Topology {
@@ -45,17 +46,18 @@ impl Topology {
 
 impl JointAddition {
     pub(super) fn parse(head: &Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let mut joint = Self { name: name(input, &head.word)?, sensors: Vec::new() };
+        let mut joint = Self { name: name(input, &head.word)?, sensors: Vec::new(), actuators: Vec::new() };
         if input.peek(Token![:]) {
             let message = "a joint stands in the link that it is mounted on; only joints of a URDF are named here";
             return Err(input.error(message));
         }
         let body = braced(input)?;
         items(&body, diagnostics, |head, input, diagnostics| {
-            if head.word != "sensor" {
-                return Err(unexpected(&head.word, "a joint of a URDF", &["sensor"]));
+            match &*head.word.to_string() {
+                "sensor" => joint.sensors.push(Sensor::parse(head, input, diagnostics)?),
+                "actuator" => joint.actuators.push(Actuator::parse(head, input, diagnostics)?),
+                _ => return Err(unexpected(&head.word, "a joint of a URDF", &["sensor", "actuator"])),
             }
-            joint.sensors.push(Sensor::parse(head, input, diagnostics)?);
             Ok(())
         });
         Ok(joint)

@@ -3,7 +3,7 @@
 use super::{diagnostics, sensing, tokens};
 use crate::pipeline;
 
-/// Everything that the language has.
+/// Sensors, estimators and what carries them.
 pub(super) const WHOLE: &str = r#"
     /// A rover.
     pub robot Rover;
@@ -37,11 +37,80 @@ pub(super) const WHOLE: &str = r#"
     }
 "#;
 
+/// What a robot does beside sensing and estimating.
+pub(super) const ACTING: &str = r#"
+    robot Rover;
+    parameters {
+        /// Of the filter.
+        imu {
+            /// How far it moves.
+            beta: f64 = 0.1, range: 0.0..=1.0;
+            mount { height: f64 = 90 cm, range: 0 m..=2 m; }
+        }
+        count: i64 = -3, range: -0x10..=10;
+        name: String = "rover";
+        verbose: bool = false;
+    }
+    states {
+        /// It feels its way.
+        degraded;
+        moving;
+    }
+    commands {
+        /// What moves.
+        category motion { concurrency: 2; }
+        category default { concurrency: 3; }
+        /// It may move now.
+        arm: Arm;
+        move_to: MoveTo(speed = 1 m/s) { allowed_states: [idle, executing]; timeout: 2 s; category: motion; }
+        slow_down: SlowDown { cancel: [motion, default]; category: default; }
+        stop: Stop { allowed_states: [idle, executing, degraded, moving]; cancel: all; }
+        resume: Resume { allowed_states: [degraded,]; }
+    }
+    controllers {
+        /// It balances.
+        controller stability: Stability(gain = param::imu::beta) { rate: 100 Hz; }
+    }
+    bridges { bridge ros: RosBridge(port = 1, name = param::name); bridge log: Log { rate: 10 Hz; } }
+    sensors { sensor stability: Level(); }
+    link base {
+        sensor imu: Imu() {
+            rate: 200 Hz;
+            estimator tilt: Madgwick(beta = param::imu::beta, count = param::count) {
+                latency_budget: 1 ms;
+                lost_after: 100 ms;
+                recover_after: 10;
+                on_degraded: slow_down;
+                on_lost: stop;
+                on_recovered: resume;
+                runs_on: worker, priority: 80, core: 1;
+            }
+        }
+        estimator pose: Pose() {
+            input imu: imu, driver;
+            input wish: controller::stability, within: 10 ms;
+            input log: log, optional;
+            sync_tolerance: 5 ms;
+            runs_on: worker;
+            on_degraded: slow_down;
+        }
+        joint pan: continuous {
+            axis: z;
+            /// It turns.
+            actuator servo: Dynamixel(id = 3);
+            sensor encoder: Encoder(id = 3);
+            link head;
+        }
+    }
+"#;
+
 #[test]
 fn a_right_robot_expands_to_rust() {
-    assert!(diagnostics(tokens(WHOLE)).is_empty(), "{:?}", super::faults(WHOLE));
-    let file = syn::parse2::<syn::File>(pipeline(tokens(WHOLE)));
-    assert!(file.is_ok(), "{:?}", file.err());
+    for robot in [WHOLE, ACTING] {
+        assert!(diagnostics(tokens(robot)).is_empty(), "{:?}", super::faults(robot));
+        let file = syn::parse2::<syn::File>(pipeline(tokens(robot)));
+        assert!(file.is_ok(), "{:?}", file.err());
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ fn words() {
     );
     wrong(
         &base("sensor imu: A() { on_lost: stop; }"),
-        &[("on_lost", "`on_lost` is not supported yet; a sensor holds `rate` or `estimator`")],
+        &[("on_lost", "`on_lost` does not belong in a sensor, which holds `rate` or `estimator`")],
     );
     wrong(
         &base("rate: 5 Hz;"),
@@ -86,7 +86,7 @@ fn declarations() {
         &base("sensor imu; sensor mag: ; sensor: A(); joint j; joint k: spin { link a; } estimator t = T();"),
         &[
             (";", "expected `:` and a type behind `imu`"),
-            (";", "expected a type: that of a sensor or of an estimator"),
+            (";", "expected the type of `mag`"),
             (":", "expected the name of this `sensor`"),
             (";", "expected `:` and the type of the joint behind `j`"),
             (
@@ -200,4 +200,109 @@ fn a_robot_with_mistakes_keeps_its_type_and_handles() {
         assert!(expansion.contains(kept), "`{kept}` is not in {expansion}");
     }
     assert_eq!(expansion.matches("compile_error").count(), faults(&robot).len());
+}
+
+#[test]
+fn a_mistake_in_a_block_leaves_the_rest_of_it_known() {
+    // One typo in each; what it hides makes no further fault, and what stands beside it is read.
+    for (robot, place) in [
+        ("paramters { a: f64 = 1; }", "paramters"),
+        ("parameters { a: f46 = 1; kept: i64 = 1; }", "f46"),
+        ("parameters { a f64 = 1; kept: i64 = 1; }", "f64"),
+        ("parameters { a: f64; kept: i64 = 1; }", ";"),
+        ("parameters { a: f64 = ; kept: i64 = 1; }", ";"),
+        ("parameters { a: f64 = 1 kept: i64 = 1; }", "kept"),
+        ("parameters { a: f64 = 1 g { kept: i64 = 1; } }", "g"),
+        ("parameters { a: f64 = 1, rnage: 0..=2; kept: i64 = 1; }", "rnage"),
+        ("parameters { a: f64 = 1, range: 0..2; kept: i64 = 1; }", "."),
+        ("parameters { a: f64 = K; kept: i64 = 1; }", "K"),
+        ("parameters { 5; kept: i64 = 1; }", "5"),
+        ("parameters { type: f64 = 1; kept: i64 = 1; }", "type"),
+        ("parameters { group g { kept: i64 = 1; } }", "group"),
+        ("commands { command kept: A; }", "command"),
+        ("states { state a; }", "state"),
+        ("states { a b; }", "b"),
+        ("states { 5; a; }", "5"),
+        ("states { fn; a; }", "fn"),
+        ("commands { arm Arm; kept: A; }", "Arm"),
+        ("commands { arm: Arm kept: A; }", "kept"),
+        ("commands { arm: ; kept: A; }", ";"),
+        ("commands { \"arm\"; kept: A; }", "\"arm\""),
+        ("commands { category { concurrency: 2; } kept: A; }", "{"),
+        ("commands { category motion { concurency: 2; } kept: A; }", "concurency"),
+        ("commands { kept: A { alowed_states: [idle]; timeout: 1 s; } }", "alowed_states"),
+        ("commands { kept: A { allowed_states: idle; } }", "idle"),
+        ("commands { kept: A { allowed_states: []; } }", "[]"),
+        ("commands { kept: A { allowed_states: [idle executing]; } }", "executing"),
+        ("commands { kept: A { timeout: 2 } }", "}"),
+        ("commands { kept: A { cancel: motion; } }", "motion"),
+        ("commands { kept: A { category: [motion]; } }", "["),
+        ("commands { kept: A { rate: 1 Hz; } }", "rate"),
+        ("controllers { contoller c: C(); controller kept: C(); }", "contoller"),
+        ("controllers { bridge c: C(); controller kept: C(); }", "bridge"),
+        ("bridges { bridge kept: C() { port: 1; } }", "port"),
+    ] {
+        let text = format!("robot Rover; {robot} link base;");
+        let faults = faults(&text);
+        if robot.contains("timeout: 2 }") {
+            // Two mistakes: no unit and no `;`.
+            assert_eq!(places(&text), ["}", "2"]);
+            continue;
+        }
+        assert_eq!(faults.iter().map(|(place, _)| &**place).collect::<Vec<_>>(), [place], "{robot}: {faults:?}");
+    }
+}
+
+#[test]
+fn unread_declarations_make_references_to_them_no_faults() {
+    for robot in [
+        "parameters { a f64 = 1; } link base { sensor i: A(x = param::a); }",
+        "commands { stp Stop; } link base { sensor i: A() { estimator t: T() { latency_budget: 1 s; on_degraded: stop; } } }",
+        "states { degraded moving; } commands { a: A { allowed_states: [moving]; } } link base;",
+        "commands { category motion { concurency: 1; } a: A { category: motion; cancel: [motoin]; } } link base;",
+        "commands { c: C; } link base { sensor i: A() { estimator t: T() { lost_aftr: 1 s; on_lost: c; } } }",
+        "link base { joint j: continuous { axis: z; snesor e: E(); actuator m: M(); link l; } }",
+        "link base { sensor i: A() { rate: 1 kHz; } sensor g: B() { rate: 1 Hz; } estimator e: E() { input i: i, driver;
+         input g: g, optinal; sync_tolerance: 1 ms; } }",
+    ] {
+        let text = format!("robot Rover; {robot}");
+        assert_eq!(faults(&text).len(), 1, "{text}: {:?}", faults(&text));
+    }
+}
+
+#[test]
+fn settings_of_estimators() {
+    let nested = |settings: &str| base(&format!("sensor i: A() {{ estimator t: T() {{ {settings} }} }}"));
+    let worker = "expected `worker`; without this setting it runs where its input is published";
+    let property = "expected `priority: …` or `core: …`";
+    wrong(&nested("runs_on: thread;"), &[("thread", worker)]);
+    wrong(&nested("runs_on: ;"), &[(";", worker)]);
+    wrong(&nested("runs_on: worker, prio: 3;"), &[("prio", property)]);
+    wrong(
+        &nested("runs_on: worker, proirity: 3;"),
+        &[("proirity", &format!("{property}; did you mean `priority`?"))],
+    );
+    wrong(&nested("runs_on: worker, core: 1, core: 2;"), &[("core", "`core` stands here twice; leave one out")]);
+    wrong(&nested("on_lost: \"stop\";"), &[("\"stop\"", "expected the name of a command")]);
+    wrong(&nested("recover_after: ten;"), &[("ten", "expected a whole number")]);
+}
+
+#[test]
+fn actuators() {
+    let joint = |content: &str| base(&format!("joint j: fixed {{ {content} link l; }}"));
+    wrong(&joint("actuator m: M() { rate: 5 Hz; }"), &[("rate", "an actuator holds nothing; leave this out")]);
+    wrong(
+        &joint("acuator m: M();"),
+        &[(
+            "acuator",
+            "unknown word `acuator`; a joint holds `origin`, `axis`, `limit`, `dynamics`, `mimic`, `transmission`, `sensor`, `actuator` or `link`; did you mean `actuator`?",
+        )],
+    );
+    wrong(
+        &base("actuator m: M();"),
+        &[(
+            "actuator",
+            "`actuator` does not belong in a link, which holds `sensor`, `estimator`, `joint`, `inertial`, `visual` or `collision`",
+        )],
+    );
 }

@@ -128,6 +128,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             mimics,
             transmissions: self.transmissions(robot, &label),
             sensors: Vec::new(),
+            actuators: Vec::new(),
             links: Vec::new(),
             label: Some(label),
         })

@@ -84,6 +84,7 @@ fn add_to_joint(tree: &mut Robot, addition: JointAddition, diagnostics: &mut Dia
         return;
     };
     joint.sensors.extend(addition.sensors);
+    joint.actuators.extend(addition.actuators);
 }
 
 fn unknown(what: &str, name: &Ident, names: &[String], diagnostics: &mut Diagnostics) {

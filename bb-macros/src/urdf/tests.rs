@@ -81,6 +81,21 @@ fn a_moment_that_misses_zero_by_a_rounding_is_zero() {
 }
 
 #[test]
+fn actuators_are_declared_onto_joints() {
+    let text = "robot Arm; topology: urdf(\"../tests/urdf/arm.urdf\");
+        joint elbow { sensor encoder: Encoder(); actuator motor: Motor(); }";
+    let mut diagnostics = crate::diagnostics::Diagnostics::default();
+    let tokens = text.parse().unwrap_or_default();
+    let (tree, _) = super::graft(crate::parse::robot(tokens, &mut diagnostics), &mut diagnostics);
+    let robot = crate::model::resolve(tree);
+    crate::verify::verify(&robot, &mut diagnostics);
+    assert!(!diagnostics.any(), "{:?}", diagnostics.all());
+    let ends: Vec<_> =
+        robot.actuators.iter().map(|actuator| actuator.path[actuator.path.len() - 2..].join("/")).collect();
+    assert_eq!(ends, ["elbow/motor"]);
+}
+
+#[test]
 fn names_become_identifiers() {
     let link = root("<robot name=\"r\"><link name=\"3 fingers-loop\"/></robot>").map(|link| link.name.to_string());
     assert_eq!(link.ok().as_deref(), Some("_3_fingers_loop"));

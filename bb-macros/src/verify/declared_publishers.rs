@@ -5,7 +5,7 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::{From, Robot};
-use crate::names::nearest;
+use crate::names::{nearest_path, some_of};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // Inputs of nested estimators are a fault of their own; unread items may have declared the missing ones.
@@ -30,25 +30,10 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             Some(near) => format!("nothing publishes at `{path}`; did you mean `{near}`?"),
             None if known.is_empty() => format!("nothing publishes at `{path}`, nor elsewhere; declare a sensor"),
             None => {
-                let shown: Vec<String> = known.iter().take(8).map(|path| format!("`{path}`")).collect();
-                let more = if known.len() > shown.len() { ", …" } else { "" };
-                format!("nothing publishes at `{path}`; declared are {}{more}", shown.join(", "))
+                let known: Vec<&str> = known.iter().map(String::as_str).collect();
+                format!("nothing publishes at `{path}`; declared are {}", some_of(&known))
             }
         };
         diagnostics.at(input.path.place(), message);
     }
-}
-
-/// The path whose names are all near to those of `path`; else one with the same last name.
-fn nearest_path<'a>(path: &str, known: &'a [String]) -> Option<&'a str> {
-    let names: Vec<&str> = path.split("::").collect();
-    let known = || known.iter().map(String::as_str);
-    let is_near = |candidate: &&str| {
-        let candidate: Vec<&str> = candidate.split("::").collect();
-        let mut pairs = names.iter().zip(&candidate);
-        names.len() == candidate.len()
-            && pairs.all(|(name, other)| name == other || nearest(name, [*other]).is_some())
-    };
-    let near = nearest(path, known().filter(is_near));
-    near.or_else(|| known().find(|candidate| candidate.rsplit("::").next() == names.last().copied()))
 }

@@ -6,12 +6,12 @@
 //! The options of components are checked against their types by `bb_core`.
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{Joint, Link, Robot};
-use crate::parse::{Geometry, JointKind, Origin, Quantity};
+use crate::model::{Joint, Link, Parameter, Robot};
+use crate::parse::{Geometry, HealthSettings, JointKind, Origin, ParameterKind, Quantity, RunsOn, Value};
 use crate::units::Dimension;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    for rate in robot.sensors.iter().flat_map(|sensor| &sensor.rates) {
+    for rate in robot.rates() {
         expect(Dimension::FREQUENCY, "200 Hz", &rate.quantity, diagnostics);
     }
     for link in &robot.links {
@@ -26,6 +26,41 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         }
         for within in estimator.inputs.iter().filter_map(|input| input.within.as_ref()) {
             expect(Dimension::TIME, "20 ms", within, diagnostics);
+        }
+        let HealthSettings { latency_budgets, lost_afters, recover_afters, .. } = &estimator.health.settings;
+        for (settings, dimension, example) in [
+            (latency_budgets, Dimension::TIME, "1 ms"),
+            (lost_afters, Dimension::TIME, "100 ms"),
+            (recover_afters, Dimension::NONE, "10"),
+        ] {
+            settings.iter().for_each(|setting| expect(dimension, example, &setting.quantity, diagnostics));
+        }
+        for RunsOn { priority, core, .. } in &estimator.runs_on {
+            priority.iter().for_each(|priority| expect(Dimension::NONE, "80", priority, diagnostics));
+            core.iter().for_each(|core| expect(Dimension::NONE, "1", core, diagnostics));
+        }
+    }
+    for concurrency in robot.categories.iter().flat_map(|category| &category.concurrencies) {
+        expect(Dimension::NONE, "2", &concurrency.quantity, diagnostics);
+    }
+    for timeout in robot.commands.iter().flat_map(|command| &command.settings.timeouts) {
+        expect(Dimension::TIME, "2 s", &timeout.quantity, diagnostics);
+    }
+    for parameter in robot.parameters.iter().filter(|parameter| parameter.kind == ParameterKind::Number) {
+        range(parameter, diagnostics);
+    }
+}
+
+/// The ends of a range are of the default's dimension.
+fn range(parameter: &Parameter, diagnostics: &mut Diagnostics) {
+    let default = &parameter.default;
+    for end in parameter.range.iter().flat_map(|range| [&range.start, &range.end]) {
+        let are_numbers = [default, end].iter().all(|literal| matches!(literal.value, Value::Number(_)));
+        if are_numbers && end.dimension != default.dimension {
+            let expected = default.dimension.name();
+            let found = if end.has_unit { end.dimension.name() } else { "a number without a unit".into() };
+            let message = format!("the default is {expected} and this is {found}; write both in units of one kind");
+            diagnostics.at(end.place, message);
         }
     }
 }

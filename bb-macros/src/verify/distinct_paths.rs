@@ -1,4 +1,4 @@
-//! No two publishers have one path, and no two inputs of an estimator one name.
+//! No two publishers have one path, nor one that something else of the robot has, and no two inputs of an estimator one name.
 //!
 //! Right: `output pose; output velocity: [nav, velocity];`
 //! Wrong: `output pose; output velocity: [estimator, base, fused, pose];`
@@ -40,6 +40,12 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             diagnostics.at(place, message);
         }
     }
+    let others = others(robot);
+    for publisher in &robot.publishers {
+        if let (Some(place), Some(other)) = (explicit(robot, publisher), others.get(&publisher.path[..])) {
+            diagnostics.at(place, format!("{other} stands at this path; choose another path"));
+        }
+    }
     for estimator in robot.estimators.iter().filter(|estimator| !estimator.is_nested()) {
         let mut names: HashMap<String, &Ident> = HashMap::new();
         for input in &estimator.inputs {
@@ -50,6 +56,15 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             }
         }
     }
+}
+
+/// What has a path and is no publisher of the language's: its path, and how messages name it.
+fn others(robot: &Robot) -> HashMap<&[String], String> {
+    let actuators = robot.actuators.iter().map(|it| (&it.path[..], format!("the actuator `{}`", it.name)));
+    let parameters = robot.parameters.iter().map(|it| (&it.path[..], format!("the parameter `{}`", it.name)));
+    let groups = robot.parameter_groups.iter().map(|it| (&it.path[..], format!("the group `{}`", it.name)));
+    let commands = robot.commands.iter().map(|it| (&it.path[..], format!("the command `{}`", it.name)));
+    actuators.chain(parameters).chain(groups).chain(commands).collect()
 }
 
 /// The declared output behind a publisher.
@@ -69,6 +84,6 @@ fn explicit(robot: &Robot, publisher: &Publisher) -> Option<Place> {
 fn estimator(publisher: &Publisher) -> Option<EstimatorId> {
     match publisher.from {
         From::Estimator(estimator, _) => Some(estimator),
-        From::Sensor(_) => None,
+        From::Sensor(_) | From::Service(_) => None,
     }
 }

@@ -4,6 +4,7 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
+use crate::parse::{CommandSettings, HealthSettings};
 use proc_macro2::Ident;
 use std::collections::HashSet;
 
@@ -11,8 +12,21 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for sensor in &robot.sensors {
         once(sensor.rates.iter().map(|rate| &rate.word), diagnostics);
     }
-    let sensors = robot.sensors.iter().map(|sensor| &sensor.component);
-    for component in sensors.chain(robot.estimators.iter().map(|estimator| &estimator.component)) {
+    for service in &robot.services {
+        once(service.rates.iter().map(|rate| &rate.word), diagnostics);
+    }
+    for category in &robot.categories {
+        once(category.concurrencies.iter().map(|concurrency| &concurrency.word), diagnostics);
+    }
+    for CommandSettings { allowed_states, timeouts, categories, cancels } in
+        robot.commands.iter().map(|command| &command.settings)
+    {
+        once(allowed_states.iter().map(|allowed| &allowed.word), diagnostics);
+        once(timeouts.iter().map(|timeout| &timeout.word), diagnostics);
+        once(categories.iter().map(|category| &category.word), diagnostics);
+        once(cancels.iter().map(|cancel| &cancel.word), diagnostics);
+    }
+    for component in robot.components() {
         let mut given = HashSet::new();
         for name in component.options.iter().map(|option| &option.name) {
             if !given.insert(name.to_string()) {
@@ -33,6 +47,17 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
     for estimator in robot.estimators.iter().filter(|estimator| !estimator.is_nested()) {
         once(estimator.sync_tolerances.iter().map(|tolerance| &tolerance.word), diagnostics);
+    }
+    for estimator in &robot.estimators {
+        let HealthSettings { latency_budgets, lost_afters, recover_afters, .. } = &estimator.health.settings;
+        for settings in [latency_budgets, lost_afters, recover_afters] {
+            once(settings.iter().map(|setting| &setting.word), diagnostics);
+        }
+        let HealthSettings { on_degraded, on_lost, on_recovered, .. } = &estimator.health.settings;
+        for reactions in [on_degraded, on_lost, on_recovered] {
+            once(reactions.iter().map(|reaction| &reaction.word), diagnostics);
+        }
+        once(estimator.runs_on.iter().map(|runs_on| &runs_on.word), diagnostics);
     }
 }
 

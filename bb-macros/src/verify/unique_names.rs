@@ -4,8 +4,9 @@
 //! Wrong: `link base { sensor imu: A(); sensor imu: B(); }`
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{Home, Mount, Robot};
+use crate::model::{Home, Mount, ParameterGroupId, Robot};
 use crate::names::{module_name, snake_case};
+use crate::parse::ServiceKind;
 use proc_macro2::Ident;
 use std::collections::{HashMap, HashSet};
 
@@ -35,9 +36,22 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let place = link.joint.map_or(Place::Robot, Place::Joint);
         siblings.entry(place).or_insert_with(Names::of_siblings).know(&link.name);
     }
+    for group in &robot.parameter_groups {
+        siblings
+            .entry(Place::Parameters(group.group))
+            .or_insert_with(Names::of_siblings)
+            .add(&group.name, diagnostics);
+    }
     let sensors = robot.sensors.iter().map(|sensor| (Place::of_mount(sensor.mount), &sensor.name));
     let estimators = robot.estimators.iter().map(|estimator| (Place::of_home(estimator.home), &estimator.name));
-    for (place, name) in sensors.chain(estimators) {
+    let actuators = robot.actuators.iter().map(|actuator| (Place::Joint(actuator.joint), &actuator.name));
+    let services = robot.services.iter().map(|service| (Place::Services(service.kind), &service.name));
+    let parameters = robot.parameters.iter().map(|parameter| (Place::Parameters(parameter.group), &parameter.name));
+    let states = robot.states.iter().map(|state| (Place::States, &state.name));
+    let categories = robot.categories.iter().map(|category| (Place::Categories, &category.name));
+    let commands = robot.commands.iter().map(|command| (Place::Commands, &command.name));
+    let of_robot = services.chain(parameters).chain(states).chain(categories).chain(commands);
+    for (place, name) in sensors.chain(actuators).chain(estimators).chain(of_robot) {
         siblings.entry(place).or_insert_with(Names::of_siblings).add(name, diagnostics);
     }
 }
@@ -49,6 +63,12 @@ enum Place {
     Link(usize),
     Joint(usize),
     Sensor(usize),
+    Services(ServiceKind),
+    /// In a group, or in `parameters` itself.
+    Parameters(Option<ParameterGroupId>),
+    States,
+    Categories,
+    Commands,
 }
 
 impl Place {

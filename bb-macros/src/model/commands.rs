@@ -1,0 +1,107 @@
+//! Commands, their categories, and the states in which they may run.
+
+use super::Robot;
+use crate::names::text;
+use crate::parse::{self, Cancelled, CommandSettings, Component, Setting};
+use proc_macro2::{Ident, Span};
+use syn::Attribute;
+
+pub(crate) type CommandId = usize;
+pub(crate) type CategoryId = usize;
+
+/// The operational states that every robot has.
+pub(crate) const BUILT_IN_STATES: [&str; 3] = ["disarmed", "idle", "executing"];
+
+/// The category of commands that name none.
+pub(crate) const DEFAULT_CATEGORY: &str = "default";
+
+#[derive(Clone, Debug)]
+pub(crate) struct Category {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    /// As written.
+    pub(crate) concurrencies: Vec<Setting>,
+    /// How many of its commands run at once.
+    pub(crate) concurrency: u32,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Command {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    pub(crate) path: Vec<String>,
+    pub(crate) component: Component,
+    /// As written.
+    pub(crate) settings: CommandSettings,
+    /// Built-in or declared ones; none if it does not say.
+    pub(crate) allowed_states: Option<Vec<Ident>>,
+    pub(crate) timeout_s: Option<f64>,
+    pub(crate) category: CategoryId,
+    pub(crate) cancel: Cancel,
+}
+
+/// Which commands one ends when it starts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Cancel {
+    Nothing,
+    All,
+    Categories(Vec<CategoryId>),
+}
+
+impl Robot {
+    pub(crate) fn command(&self, name: &Ident) -> Option<CommandId> {
+        self.commands.iter().position(|command| command.name == *name)
+    }
+
+    pub(crate) fn category(&self, name: &Ident) -> Option<CategoryId> {
+        self.categories.iter().position(|category| category.name == *name)
+    }
+
+    /// The default category gets the number 0, declared or not.
+    pub(super) fn add_commands(&mut self, parse::Commands { mut categories, commands }: parse::Commands) {
+        let declared = categories.iter().position(|category| category.name == DEFAULT_CATEGORY);
+        let default = declared.map_or_else(built_in_category, |position| categories.remove(position));
+        self.categories = std::iter::once(default).chain(categories).map(Category::from).collect();
+        for command in commands {
+            let command = self.resolve_command(command);
+            self.commands.push(command);
+        }
+    }
+
+    fn resolve_command(&self, command: parse::Command) -> Command {
+        let parse::Command { attributes, name, component, settings } = command;
+        let category = settings.categories.first().and_then(|category| self.category(&category.name));
+        let cancel = match settings.cancels.first().map(|cancel| &cancel.cancelled) {
+            None => Cancel::Nothing,
+            Some(Cancelled::All) => Cancel::All,
+            Some(Cancelled::Categories(names)) => {
+                Cancel::Categories(names.iter().filter_map(|name| self.category(name)).collect())
+            }
+        };
+        Command {
+            attributes,
+            path: vec!["command".to_owned(), text(&name)],
+            name,
+            component,
+            allowed_states: settings.allowed_states.first().map(|allowed| allowed.states.clone()),
+            timeout_s: settings.timeouts.first().map(|timeout| timeout.quantity.value),
+            category: category.unwrap_or(0),
+            cancel,
+            settings,
+        }
+    }
+}
+
+fn built_in_category() -> parse::Category {
+    let name = Ident::new(DEFAULT_CATEGORY, Span::call_site());
+    parse::Category { attributes: Vec::new(), name, concurrencies: Vec::new() }
+}
+
+impl std::convert::From<parse::Category> for Category {
+    fn from(category: parse::Category) -> Self {
+        let parse::Category { attributes, name, concurrencies } = category;
+        // A value that is no such number is refused; a cast saturates all the same.
+        let concurrency = concurrencies.first().map_or(1, |concurrency| concurrency.quantity.value as u32);
+        Self { attributes, name, concurrencies, concurrency }
+    }
+}

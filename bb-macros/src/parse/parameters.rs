@@ -1,0 +1,129 @@
+//! `parameters { imu { beta: f64 = 0.1, range: 0.0..=1.0; } }`
+
+use super::Literal;
+use super::block::{Head, braced, colon, items_of, semicolon};
+use crate::diagnostics::Diagnostics;
+use crate::names::did_you_mean;
+use proc_macro2::Ident;
+use syn::ext::IdentExt;
+use syn::parse::ParseStream;
+use syn::{Attribute, Token};
+
+/// What stands in `parameters` or in a group of them.
+#[derive(Clone, Debug)]
+pub(crate) enum ParameterItem {
+    Group { attributes: Vec<Attribute>, name: Ident, items: Vec<ParameterItem> },
+    Parameter(Parameter),
+}
+
+/// `beta: f64 = 0.1, range: 0.0..=1.0;`
+#[derive(Clone, Debug)]
+pub(crate) struct Parameter {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) name: Ident,
+    pub(crate) kind: ParameterKind,
+    pub(crate) default: Literal,
+    pub(crate) range: Option<ParameterRange>,
+}
+
+/// The scalars of ROS 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ParameterKind {
+    Bool,
+    Integer,
+    Number,
+    Text,
+}
+
+/// `range: 0.0..=1.0`
+#[derive(Clone, Debug)]
+pub(crate) struct ParameterRange {
+    pub(crate) word: Ident,
+    pub(crate) start: Literal,
+    pub(crate) end: Literal,
+}
+
+impl ParameterItem {
+    /// Reads the content of the braces.
+    pub(super) fn parse_all(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> Vec<Self> {
+        const EXPECTED: &str =
+            "expected a parameter, as in `gain: f64 = 0.1;`, or a group of them, as in `imu { }`";
+        let mut parsed = Vec::new();
+        items_of(input, EXPECTED, diagnostics, |head, input, diagnostics| {
+            parsed.push(Self::parse(head, input, diagnostics)?);
+            Ok(())
+        });
+        parsed
+    }
+
+    fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        let name = head.name(input)?;
+        if input.peek(syn::token::Brace) {
+            let items = Self::parse_all(&braced(input)?, diagnostics);
+            return Ok(Self::Group { attributes: head.attributes, name, items });
+        }
+        Parameter::parse(head.attributes, name, input, diagnostics).map(Self::Parameter)
+    }
+}
+
+impl Parameter {
+    fn parse(
+        attributes: Vec<Attribute>,
+        name: Ident,
+        input: ParseStream<'_>,
+        diagnostics: &mut Diagnostics,
+    ) -> syn::Result<Self> {
+        colon(input, &name, "the type of the parameter")?;
+        let kind = ParameterKind::parse(input)?;
+        let place = input.span();
+        let equals: syn::Result<Token![=]> = input.parse();
+        equals.map_err(|_| syn::Error::new(place, format!("expected `=` and the default of `{name}`")))?;
+        let default = Literal::parse(input)?;
+        let mut range = None;
+        if input.peek(Token![,]) {
+            input.parse::<Token![,]>()?;
+            range = Some(ParameterRange::parse(input)?);
+        }
+        semicolon(input, &format!("`{name}`"), diagnostics);
+        Ok(Self { attributes, name, kind, default, range })
+    }
+}
+
+impl ParameterKind {
+    const ALL: [(&'static str, Self); 4] =
+        [("bool", Self::Bool), ("i64", Self::Integer), ("f64", Self::Number), ("String", Self::Text)];
+
+    /// As it is written.
+    pub(crate) fn name(self) -> &'static str {
+        Self::ALL.into_iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
+
+    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        const EXPECTED: &str = "a parameter is a `bool`, an `i64`, an `f64` or a `String`";
+        let place = input.span();
+        let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, EXPECTED))?;
+        let name = word.to_string();
+        let known = Self::ALL.into_iter().find(|(known, _)| *known == name);
+        known.map(|(_, kind)| kind).ok_or_else(|| {
+            let hint = did_you_mean(&name, Self::ALL.map(|(known, _)| known));
+            syn::Error::new(word.span(), format!("{EXPECTED}{hint}"))
+        })
+    }
+}
+
+impl ParameterRange {
+    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        const EXPECTED: &str = "expected `range: …`, as in `range: 0.0..=1.0`";
+        let place = input.span();
+        let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, EXPECTED))?;
+        if word != "range" {
+            return Err(syn::Error::new(word.span(), EXPECTED));
+        }
+        colon(input, &word, "its ends, as in `0.0..=1.0`,")?;
+        let start = Literal::parse(input)?;
+        let place = input.span();
+        let dots: syn::Result<Token![..=]> = input.parse();
+        dots.map_err(|_| syn::Error::new(place, "expected `..=` and the upper end, which belongs to the range"))?;
+        Ok(Self { word, start, end: Literal::parse(input)? })
+    }
+}

@@ -1,0 +1,19 @@
+//! A category, and the one that is there anyway.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover;
+    commands {
+        /// What moves.
+        category motion { concurrency: 2; }
+        category default { concurrency: 3; }
+        category speech;
+    }
+    link base { sensor field: Magnetometer(); }
+}
+
+fn main() {
+    let _ = Rover::builder().subscribe(rover::sensor::base::field);
+}

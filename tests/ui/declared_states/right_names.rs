@@ -1,0 +1,18 @@
+//! States beside the built-in ones.
+
+use bb_core::prelude::*;
+use bb_ui_tests::*;
+
+robot! {
+    robot Rover;
+    states {
+        /// It feels its way.
+        degraded;
+        moving;
+    }
+    link base { sensor field: Magnetometer(); }
+}
+
+fn main() {
+    let _ = Rover::builder().subscribe(rover::sensor::base::field);
+}
