@@ -6,6 +6,7 @@
 mod find;
 mod names;
 mod options;
+mod roles;
 mod text;
 
 pub use find::{find_input, find_nested, find_output};
@@ -13,3 +14,4 @@ pub use names::{
     check_dynamic, check_input, check_inputs, check_nested, check_optional, check_output, check_outputs,
 };
 pub use options::{Given, check_option, check_required};
+pub use roles::{check_divergence, check_reachable, check_role};

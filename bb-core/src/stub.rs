@@ -10,12 +10,13 @@ mod unknown;
 pub(crate) use unknown::UNKNOWN_INDEX;
 pub use unknown::Unknown;
 
-use crate::component::{Estimator, Inputs, Options, Outputs, Sensor};
+use crate::component::{Actuator, Bridge, Controller, Estimator, Inputs, Options, Outputs, Sensor};
+use crate::control::Command;
 use crate::message::Payload;
 use std::any::Any;
 use std::marker::PhantomData;
 
-/// Tells as a constant whether `T` is a sensor or an estimator: its own constants where it is, else those of
+/// Tells as a constant whether `T` is a sensor, an estimator, …: its own constants where it is, else those of
 /// [`NotProbed`], since own ones go first.
 #[derive(Debug)]
 pub struct Probe<T>(PhantomData<fn() -> T>);
@@ -37,12 +38,52 @@ where
     pub const IS_ESTIMATOR: bool = true;
 }
 
+impl<T> Probe<T>
+where
+    T: Actuator<Options: Options, Command: Payload>,
+{
+    /// `T` is an actuator.
+    pub const IS_ACTUATOR: bool = true;
+}
+
+impl<T> Probe<T>
+where
+    T: Controller<Options: Options, Output: Payload>,
+{
+    /// `T` is a controller.
+    pub const IS_CONTROLLER: bool = true;
+}
+
+impl<T> Probe<T>
+where
+    T: Bridge<Options: Options, Output: Payload>,
+{
+    /// `T` is a bridge.
+    pub const IS_BRIDGE: bool = true;
+}
+
+impl<T> Probe<T>
+where
+    T: Command<Options: Options>,
+{
+    /// `T` is a command.
+    pub const IS_COMMAND: bool = true;
+}
+
 /// What holds of a [`Probe`] that has no constants of its own.
 pub trait NotProbed {
     /// It is not known to be a sensor.
     const IS_SENSOR: bool = false;
     /// It is not known to be an estimator.
     const IS_ESTIMATOR: bool = false;
+    /// It is not known to be an actuator.
+    const IS_ACTUATOR: bool = false;
+    /// It is not known to be a controller.
+    const IS_CONTROLLER: bool = false;
+    /// It is not known to be a bridge.
+    const IS_BRIDGE: bool = false;
+    /// It is not known to be a command.
+    const IS_COMMAND: bool = false;
 }
 
 impl<T> NotProbed for Probe<T> {}

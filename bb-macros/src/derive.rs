@@ -6,6 +6,7 @@ mod options;
 mod outputs;
 mod payload;
 
+pub(crate) use fields::doc;
 pub(crate) use inputs::inputs;
 pub(crate) use options::{into_if_text, options};
 pub(crate) use outputs::outputs;

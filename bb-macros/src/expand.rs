@@ -16,6 +16,7 @@
 //! ```
 
 mod checks;
+mod control;
 mod declarations;
 mod group;
 mod handles;
@@ -23,6 +24,7 @@ mod islands;
 mod literal;
 mod options;
 mod order;
+mod part;
 mod robot_impl;
 mod stub;
 mod topology;

@@ -13,7 +13,6 @@ use proc_macro::TokenStream;
 mod derive;
 mod diagnostics;
 mod expand;
-#[allow(dead_code, reason = "the expansion reads only part of it so far")]
 mod model;
 mod names;
 mod parse;

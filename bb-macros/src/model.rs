@@ -8,7 +8,7 @@ mod resolve;
 mod rigid;
 mod trigger;
 
-pub(crate) use commands::{BUILT_IN_STATES, Category, Command, CommandId};
+pub(crate) use commands::{BUILT_IN_STATES, Cancel, Category, Command, CommandId};
 pub(crate) use health::{Health, Worker};
 pub(crate) use parameters::{Parameter, ParameterGroup, ParameterGroupId, ParameterId};
 pub(crate) use resolve::resolve;
@@ -28,6 +28,7 @@ pub(crate) type JointId = usize;
 pub(crate) type SensorId = usize;
 pub(crate) type EstimatorId = usize;
 pub(crate) type ServiceId = usize;
+pub(crate) type ActuatorId = usize;
 pub(crate) type PublisherId = usize;
 
 /// A robot. References between its parts are numbers in these lists.

@@ -1,11 +1,12 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
+mod callbacks;
 mod components;
-
 mod external;
 mod fan_in;
 mod faults;
 mod frames;
+mod health;
 mod hygiene;
 mod outputs;
 mod real_time;

@@ -1,18 +1,20 @@
 //! One running estimator: what comes in, what goes out, and what becomes of it when it fails.
 
+mod recovery;
+mod requests;
+
+use self::recovery::Restart;
+use self::requests::Cast;
 use super::admission::Admission;
 use super::health::{Event, Health};
 use super::shared::SharedNode;
 use super::timers::Timers;
 use super::{DropReason, EstimatorDeclaration, HealthReason, HealthState, HealthTransition, InputDeclaration};
-use crate::component::{
-    Context, Estimator, Fault, HandleCall, HandleCast, InputAt, Inputs, Reply, Request, SyncMiss, Then,
-};
+use crate::component::{Context, Estimator, Fault, InputAt, Inputs, Reply, Request, SyncMiss};
 use crate::control::Binding;
 use crate::message::{Stamp, Stamped};
-use crate::run::{Failed, Startup, Verdict, caught, retire};
+use crate::run::{Startup, caught, retire};
 use crate::time::{Clock, MonotonicTime};
-use std::any::Any;
 use std::fmt;
 
 /// One estimator with its fan-in, its health and its timers. Its island's lock sees to it that one thread at a time is in
@@ -47,16 +49,6 @@ struct Recipe<E: Estimator> {
     cache: fn() -> <E::Input as Inputs>::Cache,
 }
 
-/// What is known of its failures.
-#[derive(Clone, Copy, Debug, Default)]
-struct Restart {
-    /// When it is made anew, if it is.
-    at: Option<MonotonicTime>,
-    /// How often in a row it has failed.
-    attempt: u32,
-    failed_at: MonotonicTime,
-}
-
 /// What became of a message.
 enum Handled<O> {
     Refused(DropReason),
@@ -75,9 +67,6 @@ pub enum Turn {
     /// Something was, and emitted.
     Emitted(Stamp),
 }
-
-/// A one-way request, as it waits.
-type Cast<E> = Box<dyn FnOnce(&mut E) -> Result<Reply<<E as Estimator>::Output>, Fault> + Send>;
 
 impl<E: Estimator> Node<E> {
     /// Makes the estimator; what keeps it from starting is in `startup`. `cache` makes the slots of its inputs, and
@@ -244,43 +233,6 @@ impl<E: Estimator> Node<E> {
         Turn::Idle
     }
 
-    /// Answers a request; the stamp of what it put into `emitted`, if anything.
-    pub(crate) fn call<Q>(
-        &mut self,
-        request: Q,
-        now: MonotonicTime,
-        emitted: &mut Option<E::Output>,
-    ) -> (Result<E::Response, Fault>, Option<Stamp>)
-    where
-        E: HandleCall<Q>,
-    {
-        let mut response = Err(Fault::new(format!("{} does not run", self.declaration.path)));
-        if self.estimator.is_none() {
-            return (response, None);
-        }
-        let turn = self.run(now, emitted, |estimator| {
-            let (answer, reply) = estimator.handle_call(request)?;
-            response = Ok(answer);
-            Ok(reply)
-        });
-        match turn {
-            Turn::Emitted(stamp) => (response, Some(stamp)),
-            Turn::Idle | Turn::Quiet if self.estimator.is_none() => {
-                (Err(Fault::new(format!("{} failed at this call", self.declaration.path))), None)
-            }
-            Turn::Idle | Turn::Quiet => (response, None),
-        }
-    }
-
-    /// A one-way request of type `Q`, as it is left for [`Self::turn`].
-    pub(crate) fn cast<Q: Send + 'static>(request: Q) -> Box<dyn Any + Send>
-    where
-        E: HandleCast<Q>,
-    {
-        let cast: Cast<E> = Box::new(|estimator| estimator.handle_cast(request));
-        Box::new(cast)
-    }
-
     /// Lets the estimator clean up and drops it; messages that still come are counted as dropped.
     pub fn terminate(&mut self) {
         self.restart.at = None;
@@ -401,89 +353,6 @@ impl<E: Estimator> Node<E> {
         let estimator = self.declaration.path;
         tracing::debug!(estimator, input = input.name, age_nanos, tolerance_nanos, "dispatch dropped for sync");
         self.judge(Event::Bad(HealthReason::SyncMiss), input.source, now);
-    }
-
-    #[cold]
-    fn fail(&mut self, Failed { fault, panicked }: Failed, now: MonotonicTime) {
-        self.startup.fault(self.declaration.path, &fault);
-        self.shared.set_stopped(Some(fault.to_string()));
-        if let Some(estimator) = self.estimator.take() {
-            // What goes wrong from here on follows from the fault that is known.
-            let _ = retire(estimator, panicked, E::terminate);
-        }
-        self.judge(Event::Bad(HealthReason::Restarted), self.declaration.path, now);
-        if fault.then == Then::Restart {
-            self.plan_restart(now);
-        }
-    }
-
-    /// Asks its supervisor.
-    fn plan_restart(&mut self, now: MonotonicTime) {
-        let supervisors = self.startup.supervisors();
-        if now.duration_since(self.restart.failed_at) > supervisors.calm() {
-            self.restart.attempt = 0;
-        }
-        let backoff = supervisors.backoff(self.restart.attempt);
-        let verdict = supervisors.failed(self.declaration.supervisor, now);
-        self.restart = Restart {
-            at: (verdict != Verdict::GiveUp).then(|| now + backoff),
-            attempt: self.restart.attempt.saturating_add(1),
-            failed_at: now,
-        };
-        self.startup.carry_out(verdict, self.declaration.path, now);
-        self.schedule();
-    }
-
-    /// Its supervisor starts it anew, though it has not failed.
-    fn leave_for_restart(&mut self, now: MonotonicTime) {
-        if let Some(estimator) = self.estimator.take() {
-            let _ = retire(estimator, false, E::terminate);
-            self.restart.at = Some(now);
-        }
-    }
-
-    #[cold]
-    fn make_anew(&mut self, now: MonotonicTime) {
-        let Recipe { options, binding, cache } = &self.recipe;
-        let context = Context::new(self.startup.robot(), self.declaration, now);
-        let options = self.startup.bound(options, *binding);
-        let made = options.and_then(|options| caught(|| E::init(options, &context)).map_err(|failed| failed.fault));
-        self.restart.at = None;
-        match made {
-            Ok(estimator) => {
-                self.estimator = Some(estimator);
-                self.cache = cache();
-                self.timers = Timers::default();
-                self.last_input = now;
-                self.shared.counters().restarts.increment();
-                self.shared.set_stopped(None);
-                tracing::info!(estimator = self.declaration.path, "started anew");
-                for request in context.into_requests() {
-                    self.timers.request(request, now);
-                }
-                self.schedule();
-            }
-            Err(fault) => self.fail(Failed { fault, panicked: false }, now),
-        }
-    }
-
-    fn change_options(&mut self, now: MonotonicTime) {
-        let Some(estimator) = &mut self.estimator else { return };
-        let context = Context::new(self.startup.robot(), self.declaration, now);
-        let options = self.startup.bound(&self.recipe.options, self.recipe.binding);
-        let changed = match options {
-            Ok(options) => caught(|| estimator.handle_options(options, &context)),
-            Err(fault) => Err(Failed { fault, panicked: false }),
-        };
-        match changed {
-            Ok(()) => {
-                for request in context.into_requests() {
-                    self.timers.request(request, now);
-                }
-                self.schedule();
-            }
-            Err(failed) => self.fail(failed, now),
-        }
     }
 
     /// The first turn: time may have been set to a recording's after it was made.

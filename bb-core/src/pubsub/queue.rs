@@ -52,13 +52,21 @@ struct State<M> {
     lagged: u64,
     closed: bool,
     waker: Option<Waker>,
+    /// Threads that wait: telling nobody would cost a system call.
+    waiting: usize,
 }
 
 impl<M> Queue<M> {
     /// All its room is made here, so that publishing allocates nothing.
     pub(super) fn new(overflow: Overflow) -> Self {
         let capacity = overflow.capacity();
-        let state = State { messages: VecDeque::with_capacity(capacity), lagged: 0, closed: false, waker: None };
+        let state = State {
+            messages: VecDeque::with_capacity(capacity),
+            lagged: 0,
+            closed: false,
+            waker: None,
+            waiting: 0,
+        };
         Self { state: Mutex::new(state), arrived: Condvar::new(), capacity, abandoned: AtomicBool::new(false) }
     }
 
@@ -129,13 +137,19 @@ impl<M> Queue<M> {
             if state.closed {
                 return None;
             }
+            state.waiting += 1;
             state = match deadline {
                 None => self.arrived.wait(state).unwrap_or_else(PoisonError::into_inner),
                 Some(deadline) => {
-                    let left = deadline.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())?;
+                    let left = deadline.saturating_duration_since(Instant::now());
+                    if left.is_zero() {
+                        state.waiting -= 1;
+                        return None;
+                    }
                     self.arrived.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0
                 }
             };
+            state.waiting -= 1;
         }
     }
 
@@ -155,9 +169,11 @@ impl<M> Queue<M> {
     }
 
     fn wake(&self, mut state: MutexGuard<'_, State<M>>) {
-        let waker = state.waker.take();
+        let (waker, is_awaited) = (state.waker.take(), state.waiting > 0);
         drop(state);
-        self.arrived.notify_one();
+        if is_awaited {
+            self.arrived.notify_one();
+        }
         if let Some(waker) = waker {
             waker.wake();
         }

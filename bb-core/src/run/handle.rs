@@ -34,11 +34,7 @@ type OptionsOf<R, O> = fn(&mut <R as Robot>::Options) -> &mut O;
 type NodeOf<R, A> = fn(&<R as Robot>::Wiring) -> &ActuatorNode<A>;
 type PublishOf<R, T> = fn(&<R as Robot>::Wiring, &Stamped<T>, MonotonicTime);
 /// Has a function called with an estimator once it is free, and publishes what that emits.
-type VisitOf<R, E> = fn(
-    &<R as Robot>::Wiring,
-    MonotonicTime,
-    &mut dyn FnMut(&mut Node<E>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp>,
-);
+type VisitOf<R, E> = fn(&<R as Robot>::Wiring, MonotonicTime, Visit<'_, E>);
 
 macro_rules! handle {
     ($(#[$doc:meta])* $name:ident<$($component:ident: $bound:path),+> { $($field:ident: $type:ty),* }) => {
@@ -278,6 +274,9 @@ impl<R: Robot, T: Payload> Publisher<R> for OutputHandle<R, T> {
     }
 }
 
+/// What is called with an estimator once that is free, and the slot for what it emits.
+type Visit<'a, E> = &'a mut dyn FnMut(&mut Node<E>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp>;
+
 /// What answers requests: the handle of an estimator.
 pub trait Visitable<R: Robot>: Copy {
     /// The estimator.
@@ -287,15 +286,7 @@ pub trait Visitable<R: Robot>: Copy {
     fn number(self) -> usize;
     /// Calls `visit` with it once it is free.
     #[doc(hidden)]
-    fn visit(
-        self,
-        wiring: &R::Wiring,
-        now: MonotonicTime,
-        visit: &mut dyn FnMut(
-            &mut Node<Self::Estimator>,
-            &mut Option<<Self::Estimator as Estimator>::Output>,
-        ) -> Option<Stamp>,
-    );
+    fn visit(self, wiring: &R::Wiring, now: MonotonicTime, visit: Visit<'_, Self::Estimator>);
 }
 
 macro_rules! visitable {
@@ -309,7 +300,7 @@ macro_rules! visitable {
                 self,
                 wiring: &R::Wiring,
                 now: MonotonicTime,
-                visit: &mut dyn FnMut(&mut Node<E>, &mut Option<E::Output>) -> Option<Stamp>,
+                visit: Visit<'_, E>,
             ) {
                 (self.visit)(wiring, now, visit);
             }

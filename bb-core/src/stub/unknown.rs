@@ -2,13 +2,14 @@
 
 use super::stub;
 use crate::component::{
-    Context, Estimator, Fault, InputAt, InputField, Inputs, NoOptions, OutputAt, Outputs, Reading, Reply, Sensor,
-    SensorContext, Slot, SyncMiss,
+    Actuator, ActuatorContext, Bridge, Context, Controller, Estimator, Fault, InputAt, InputField, Inputs,
+    NoOptions, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, ServiceContext, Slot, SyncMiss,
 };
+use crate::control::{Command, CommandContext, NoArguments, Outcome};
 use crate::message::{Finite, Payload, Stamped};
 use crate::time::MonotonicTime;
 
-/// A payload, a sensor and an estimator, wherever one is needed that is not known.
+/// A payload, a sensor, an estimator and all the rest, wherever one is needed that is not known.
 #[derive(Clone, Copy, Debug)]
 pub struct Unknown;
 
@@ -54,12 +55,70 @@ impl Estimator for Unknown {
     type Input = UnknownInput;
     type Output = UnknownOutput;
     const HANDLES_MOVING_JOINTS: bool = true;
+    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
         stub()
     }
 
     fn handle_input(&mut self, (): ()) -> Result<Reply<UnknownOutput>, Fault> {
+        stub()
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl Actuator for Unknown {
+    type Options = NoOptions;
+    type Command = Self;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        stub()
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Self>) -> Result<(), Fault> {
+        stub()
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        stub()
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl Controller for Unknown {
+    type Options = NoOptions;
+    type Output = Self;
+
+    fn init(_: NoOptions, _: &ServiceContext) -> Result<Self, Fault> {
+        stub()
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Self>, Fault> {
+        stub()
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl Bridge for Unknown {
+    type Options = NoOptions;
+    type Output = Self;
+
+    fn init(_: NoOptions, _: &ServiceContext) -> Result<Self, Fault> {
+        stub()
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Self>, Fault> {
+        stub()
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl Command for Unknown {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
         stub()
     }
 }

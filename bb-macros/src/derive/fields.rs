@@ -22,7 +22,7 @@ pub(super) fn named<'a>(
 }
 
 /// The text of the doc comments, lines joined by spaces.
-pub(super) fn doc(attributes: &[Attribute]) -> String {
+pub(crate) fn doc(attributes: &[Attribute]) -> String {
     let lines = attributes.iter().filter_map(|attribute| match &attribute.meta {
         Meta::NameValue(meta) if meta.path.is_ident("doc") => match &meta.value {
             Expr::Lit(literal) => match &literal.lit {

@@ -2,9 +2,10 @@
 //! there while rustc evaluates it.
 
 use super::literal::{dimension, option, spanned_call};
+use super::part::Part;
 use super::types::{Types, type_name};
 use crate::diagnostics::Place;
-use crate::model::Robot;
+use crate::model::{EstimatorId, Robot};
 use crate::parse::{Component, ComponentOption, OptionValue, Value};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
@@ -14,15 +15,18 @@ pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
     let robot = verified.robot;
     let types = Types::new(robot, verified.name, 0);
     let mut checks = TokenStream::new();
-    for (id, sensor) in robot.sensors.iter().enumerate() {
-        checks.extend(options(robot, &sensor.component, &types.sensor_options(id)));
+    for part in Part::all(robot) {
+        if let Some(component) = part.component(robot) {
+            checks.extend(options(robot, component, &types.options(part)));
+        }
     }
-    for (id, estimator) in robot.estimators.iter().enumerate() {
-        checks.extend(options(robot, &estimator.component, &types.estimator_options(id)));
+    for id in 0..robot.estimators.len() {
         checks.extend(inputs(robot, &types, id));
         checks.extend(outputs(robot, &types, id));
+        checks.extend(divergence(robot, &types, id));
     }
     checks.extend(moving_joints(verified, &types));
+    checks.extend(roles(robot, &types));
     checks
 }
 
@@ -60,9 +64,9 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenS
             let default = &robot.parameters.get(robot.parameter(path)?)?.default;
             let unit = default.has_unit.then(|| dimension(default.dimension));
             let number = match default.value {
-                Value::Integer(integer) => integer as f64,
                 Value::Number(number) => number,
-                Value::Bool(_) | Value::Text(_) => return None,
+                // Whether an integer fits is rustc's to say, and the range the start's.
+                Value::Integer(_) | Value::Bool(_) | Value::Text(_) => return None,
             };
             (path.place(), option(unit), number)
         }
@@ -139,6 +143,50 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
                 ),
             ));
         }
+    }
+    checks
+}
+
+/// Where only the algorithm's own report can degrade an estimator, it makes one.
+fn divergence(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
+    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
+    let (name, kind) = (type_name(&estimator.component), types.estimator(id));
+    let words = estimator.needs_divergence().map(|word| {
+        let text = word.to_string();
+        spanned_call(
+            Place::of(word),
+            quote!(::bb_core::__private::check_divergence),
+            quote!(#name, <#kind as ::bb_core::Estimator>::REPORTS_DIVERGENCE, #text),
+        )
+    });
+    words.collect()
+}
+
+/// At most one command arms and one disarms, each in a state in which it can.
+fn roles(robot: &Robot, types: &Types<'_>) -> TokenStream {
+    let mut checks = TokenStream::new();
+    let mut before: Vec<TokenStream> = Vec::new();
+    for (id, command) in robot.commands.iter().enumerate() {
+        let (name, kind) = (crate::names::text(&command.name), types.part(Part::Command(id)));
+        let role = quote!(<#kind as ::bb_core::Command>::ROLE);
+        checks.extend(spanned_call(
+            Place::of(&command.name),
+            quote!(::bb_core::__private::check_role),
+            quote!(#name, #role, &[#(#before),*]),
+        ));
+        if let Some(states) = &command.allowed_states {
+            let names = states.iter().map(crate::names::text);
+            let place = match (states.first(), states.last()) {
+                (Some(first), Some(last)) => Place { start: first.span(), end: last.span() },
+                _ => Place::of(&command.name),
+            };
+            checks.extend(spanned_call(
+                place,
+                quote!(::bb_core::__private::check_reachable),
+                quote!(#name, #role, &[#(#names),*]),
+            ));
+        }
+        before.push(quote!((#name, #role)));
     }
     checks
 }

@@ -2,8 +2,9 @@
 
 use super::islands::Islands;
 use super::literal::{nanos, option, transform};
-use super::{path_text, topology};
-use crate::model::{EstimatorId, Mount, Robot, Sensor};
+use super::{control, path_text, topology};
+use crate::model::{Actuator, EstimatorId, Mount, Robot, Sensor, Service};
+use crate::parse::Setting;
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
@@ -13,19 +14,27 @@ pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenS
     let robot = verified.robot;
     let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor)).collect();
     let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, islands, id)).collect();
-    let sensors = array("__SENSOR", quote!(::bb_core::__private::SensorDeclaration), sensors);
-    let estimators = array("__ESTIMATOR", quote!(::bb_core::__private::EstimatorDeclaration), estimators);
+    let actuators = robot.actuators.iter().map(|actuator| actuator_declaration(robot, actuator)).collect();
+    let services = robot.services.iter().map(service_declaration).collect();
+    let arrays = [
+        array("__SENSOR", quote!(::bb_core::__private::SensorDeclaration), sensors),
+        array("__ESTIMATOR", quote!(::bb_core::__private::EstimatorDeclaration), estimators),
+        array("__ACTUATOR", quote!(::bb_core::__private::ActuatorDeclaration), actuators),
+        array("__SERVICE", quote!(::bb_core::__private::SensorDeclaration), services),
+        control::categories(robot),
+        control::commands(robot),
+        control::parameters(robot),
+    ];
     let topology = topology::topology(robot);
     quote! {
-        #sensors
-        #estimators
+        #(#arrays)*
         static __TOPOLOGY: ::bb_core::__private::Topology = #topology;
     }
 }
 
 /// `static __SENSORS: [SensorDeclaration; 2] = [__SENSOR0, __SENSOR1];`, each value in a constant of its own: the time
 /// that rustc takes for one grows with its square.
-fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> TokenStream {
+pub(super) fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> TokenStream {
     let (array, count) = (format_ident!("{name}S"), values.len());
     let names: Vec<_> = (0..count).map(|number| format_ident!("{name}{number}")).collect();
     quote! {
@@ -37,10 +46,7 @@ fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> TokenStream
 fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let path = robot.publishers.get(sensor.publisher).map_or(String::new(), |publisher| path_text(&publisher.path));
     let frame = robot.frame_name(sensor.mount);
-    let period = option(sensor.rates.first().map(|rate| {
-        let period = nanos(1.0 / rate.quantity.value).max(1);
-        quote!(#period)
-    }));
+    let period = period(&sensor.rates);
     let root = root_from(robot, sensor.mount);
     let supervisor = supervisor(robot, sensor.mount);
     quote!(::bb_core::__private::SensorDeclaration {
@@ -112,13 +118,64 @@ pub(super) fn supervisor(robot: &Robot, mount: Mount) -> usize {
     }
 }
 
-fn health(_robot: &Robot, _id: EstimatorId) -> TokenStream {
-    quote!(::bb_core::__private::HealthDeclaration::NONE)
+fn period(rates: &[Setting]) -> TokenStream {
+    option(rates.first().map(|rate| {
+        let period = nanos(1.0 / rate.quantity.value).max(1);
+        quote!(#period)
+    }))
+}
+
+fn actuator_declaration(robot: &Robot, actuator: &Actuator) -> TokenStream {
+    let path = path_text(&actuator.path);
+    let joint = robot.joints.get(actuator.joint).map_or(String::new(), |joint| joint.label.clone());
+    let supervisor = supervisor(robot, Mount::Joint(actuator.joint));
+    quote!(::bb_core::__private::ActuatorDeclaration { path: #path, joint: #joint, supervisor: #supervisor })
+}
+
+fn service_declaration(service: &Service) -> TokenStream {
+    let (path, period) = (path_text(&service.path), period(&service.rates));
+    quote!(::bb_core::__private::SensorDeclaration {
+        path: #path,
+        frame: ::bb_core::__private::Frame::NONE,
+        period_nanos: #period,
+        root_from_frame: ::core::option::Option::None,
+        supervisor: 0,
+    })
+}
+
+fn health(robot: &Robot, id: EstimatorId) -> TokenStream {
+    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
+    let health = &estimator.health;
+    let [budget, lost] = [health.latency_budget_s, health.lost_after_s].map(|time| {
+        option(time.map(|time| {
+            let time = nanos(time);
+            quote!(#time)
+        }))
+    });
+    let recover_after = health.recover_after;
+    let [degraded, lost_command, recovered] = [health.on_degraded, health.on_lost, health.on_recovered]
+        .map(|command| option(command.map(|command| quote!(#command))));
+    quote!(::bb_core::__private::HealthDeclaration {
+        latency_budget_nanos: #budget,
+        lost_after_nanos: #lost,
+        recover_after: #recover_after,
+        on_degraded: #degraded,
+        on_lost: #lost_command,
+        on_recovered: #recovered,
+    })
 }
 
 /// An `Option<WorkerDeclaration>`.
-pub(super) fn worker(_robot: &Robot, _id: EstimatorId) -> TokenStream {
-    option(None)
+pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
+    let worker = robot.estimators.get(id).and_then(|estimator| estimator.worker.as_ref());
+    option(worker.map(|worker| {
+        let priority = option(worker.priority.map(|priority| quote!(#priority)));
+        let core = option(worker.core.map(|core| {
+            let core = core as usize;
+            quote!(#core)
+        }));
+        quote!(::bb_core::__private::WorkerDeclaration { priority: #priority, core: #core })
+    }))
 }
 
 /// The one input of a nested estimator: its sensor, whose path is all but the last name of its own.

@@ -6,14 +6,17 @@
 
 use super::group;
 use super::literal::ident;
-use super::options::{of_estimator, of_sensor};
+use super::options::{parameter_type, place};
+use super::part::Part;
 use super::types::Types;
 use super::wiring::{topic, visit_function};
 use super::{docs, path_text};
-use crate::model::{EstimatorId, PublisherId, Robot, SensorId};
+use crate::model::{ActuatorId, CommandId, EstimatorId, ParameterId, PublisherId, Robot, SensorId, ServiceId};
 use crate::names::module_name;
+use crate::parse::ServiceKind;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
+use syn::Attribute;
 
 /// How handles reach what they name.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -29,6 +32,7 @@ pub(super) enum Accessors {
 struct Module {
     constants: Vec<(Ident, Handle)>,
     modules: Vec<(String, Module)>,
+    docs: Vec<Attribute>,
 }
 
 #[derive(Clone, Copy)]
@@ -39,6 +43,14 @@ enum Handle {
     /// An estimator that publishes below its path only.
     Several(EstimatorId),
     Output(EstimatorId, PublisherId),
+    Service(ServiceId),
+    Actuator(ActuatorId),
+    Command(CommandId),
+    Parameter(ParameterId),
+    /// The name of a state, by its number.
+    State(usize),
+    /// The name of a category of commands.
+    Category(usize),
 }
 
 pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> TokenStream {
@@ -61,6 +73,29 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
                 root.add(path, &output.name, Handle::Output(id, *publisher));
             }
         }
+    }
+    for (id, service) in robot.services.iter().enumerate() {
+        root.add(&service.path, &service.name, Handle::Service(id));
+    }
+    for (id, actuator) in robot.actuators.iter().enumerate() {
+        root.add(&actuator.path, &actuator.name, Handle::Actuator(id));
+    }
+    for (id, command) in robot.commands.iter().enumerate() {
+        root.add(&command.path, &command.name, Handle::Command(id));
+    }
+    for (id, parameter) in robot.parameters.iter().enumerate() {
+        root.add(&parameter.path, &parameter.name, Handle::Parameter(id));
+    }
+    for group in &robot.parameter_groups {
+        root.describe(&group.path, &group.attributes);
+    }
+    for (id, state) in robot.states.iter().enumerate() {
+        root.add(&["state".to_owned(), crate::names::text(&state.name)], &state.name, Handle::State(id));
+    }
+    // The first is the built-in one, declared or not.
+    for (id, category) in robot.categories.iter().enumerate().skip(1) {
+        let path = ["category".to_owned(), crate::names::text(&category.name)];
+        root.add(&path, &category.name, Handle::Category(id));
     }
     let Some(module) = module_name(name).map(|module| ident(&module)) else {
         return TokenStream::new();
@@ -95,12 +130,24 @@ impl Module {
         }
     }
 
+    /// Has the module at a path carry doc comments; one without handles does not exist.
+    fn describe(&mut self, path: &[String], attributes: &[Attribute]) {
+        let mut module = self;
+        for segment in path {
+            let Some((_, below)) = module.modules.iter_mut().find(|(name, _)| name == segment) else { return };
+            module = below;
+        }
+        module.docs = docs(attributes).cloned().collect();
+    }
+
     fn tokens(&self, robot: &Robot, name: &Ident, accessors: Accessors, depth: usize) -> TokenStream {
         let types = Types::new(robot, name, depth);
         let constants = self.constants.iter().map(|(name, handle)| handle.tokens(robot, &types, name, accessors));
         let modules = self.modules.iter().map(|(segment, module)| {
             let (segment, content) = (ident(segment), module.tokens(robot, name, accessors, depth + 1));
+            let docs = &module.docs;
             quote! {
+                #(#docs)*
                 #[allow(missing_docs)]
                 pub mod #segment { #content }
             }
@@ -113,6 +160,18 @@ impl Handle {
     /// `pub const imu: SensorHandle<Rover, Bmi270> = SensorHandle::new(…);`
     fn tokens(self, robot: &Robot, types: &Types<'_>, name: &Ident, accessors: Accessors) -> TokenStream {
         let this = types.robot();
+        let named = match self {
+            Self::State(id) => robot.states.get(id).map(|state| (&state.attributes, &state.name)),
+            Self::Category(id) => robot.categories.get(id).map(|category| (&category.attributes, &category.name)),
+            _ => None,
+        };
+        if let Some((attributes, named)) = named {
+            let (docs, text) = (docs(attributes), crate::names::text(named));
+            return quote! {
+                #(#docs)*
+                pub const #name: &str = #text;
+            };
+        }
         let (attributes, path, kind, function, arguments) = match self {
             Self::Sensor(id) => {
                 let Some(sensor) = robot.sensors.get(id) else {
@@ -120,7 +179,7 @@ impl Handle {
                 };
                 let (component, frame) = (types.sensor(id), robot.frame_name(sensor.mount));
                 let path = robot.publishers.get(sensor.publisher).map(|publisher| path_text(&publisher.path));
-                let (publish, options) = (topic(sensor.publisher), of_sensor(id));
+                let (publish, options) = (topic(sensor.publisher), place(robot, Part::Sensor(id)));
                 let topic = group::path(sensor.publisher, &publish);
                 let arguments = match accessors {
                     Accessors::Wired => quote!(
@@ -143,7 +202,7 @@ impl Handle {
                 let (component, payload) = (types.estimator(id), types.payload(publisher));
                 let path = Some(path_text(&estimator.path));
                 let topic = group::path(publisher, &topic(publisher));
-                let options = of_estimator(robot, id);
+                let options = place(robot, Part::Estimator(id));
                 let arguments = match accessors {
                     Accessors::Wired => {
                         let visit = visit_function(id);
@@ -166,7 +225,7 @@ impl Handle {
                     return TokenStream::new();
                 };
                 let (component, path) = (types.estimator(id), Some(path_text(&estimator.path)));
-                let options = of_estimator(robot, id);
+                let options = place(robot, Part::Estimator(id));
                 let arguments = match accessors {
                     Accessors::Wired => {
                         let visit = visit_function(id);
@@ -193,6 +252,76 @@ impl Handle {
                 };
                 let kind = quote!(::bb_core::OutputHandle<#this, #payload>);
                 (&estimator.attributes, path, kind, quote!(::bb_core::OutputHandle::new), arguments)
+            }
+            Self::Service(id) => {
+                let Some(service) = robot.services.get(id) else {
+                    return TokenStream::new();
+                };
+                let handle = match service.kind {
+                    ServiceKind::Controller => quote!(ControllerHandle),
+                    ServiceKind::Bridge => quote!(BridgeHandle),
+                };
+                let (component, options) = (types.part(Part::Service(id)), place(robot, Part::Service(id)));
+                let topic = group::path(service.publisher, &topic(service.publisher));
+                let arguments = match accessors {
+                    Accessors::Wired => quote!(
+                        |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
+                        |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options
+                    ),
+                    Accessors::Stub => {
+                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub())
+                    }
+                };
+                let kind = quote!(::bb_core::__private::#handle<#this, #component>);
+                let function = quote!(::bb_core::__private::#handle::new);
+                (&service.attributes, Some(path_text(&service.path)), kind, function, arguments)
+            }
+            Self::Actuator(id) => {
+                let Some(actuator) = robot.actuators.get(id) else {
+                    return TokenStream::new();
+                };
+                let part = Part::Actuator(id);
+                let (component, options, name) = (types.part(part), place(robot, part), part.name());
+                let node = group::path(id, &name);
+                let arguments = match accessors {
+                    Accessors::Wired => quote!(
+                        |wiring: &<#this as ::bb_core::Robot>::Wiring| &wiring.actuators.#node,
+                        |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options
+                    ),
+                    Accessors::Stub => {
+                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub())
+                    }
+                };
+                let kind = quote!(::bb_core::ActuatorHandle<#this, #component>);
+                let function = quote!(::bb_core::ActuatorHandle::new);
+                (&actuator.attributes, Some(path_text(&actuator.path)), kind, function, arguments)
+            }
+            Self::Command(id) => {
+                let Some(command) = robot.commands.get(id) else {
+                    return TokenStream::new();
+                };
+                let (component, options) = (types.part(Part::Command(id)), place(robot, Part::Command(id)));
+                let arguments = match accessors {
+                    Accessors::Wired => {
+                        quote!(|options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options)
+                    }
+                    Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),
+                };
+                let kind = quote!(::bb_core::CommandHandle<#this, #component>);
+                let arguments = quote!(#id, #arguments);
+                let function = quote!(::bb_core::CommandHandle::new);
+                (&command.attributes, Some(path_text(&command.path)), kind, function, arguments)
+            }
+            Self::State(_) | Self::Category(_) => return TokenStream::new(),
+            Self::Parameter(id) => {
+                let Some(parameter) = robot.parameters.get(id) else {
+                    return TokenStream::new();
+                };
+                let value = parameter_type(parameter.kind);
+                let kind = quote!(::bb_core::ParameterHandle<#this, #value>);
+                let arguments = quote!(#id, ::core::marker::PhantomData);
+                let function = quote!(::bb_core::ParameterHandle::new);
+                (&parameter.attributes, Some(path_text(&parameter.path)), kind, function, arguments)
             }
         };
         let (docs, path) = (docs(attributes), path.unwrap_or_default());

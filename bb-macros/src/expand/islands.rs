@@ -89,6 +89,6 @@ pub(super) fn sources<'a>(
     nested.into_iter().chain(verified.sources.get(id).into_iter().flatten().copied())
 }
 
-fn is_worker(_robot: &Robot, _id: EstimatorId) -> bool {
-    false
+fn is_worker(robot: &Robot, id: EstimatorId) -> bool {
+    robot.estimators.get(id).is_some_and(|estimator| estimator.worker.is_some())
 }

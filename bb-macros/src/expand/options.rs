@@ -1,12 +1,13 @@
-//! `struct __Options`: the options of every component, at first as declared.
+//! `struct __Options`: the options of every component, at first as declared, and which parameters they are bound to.
 
 use super::group::{self, Field};
 use super::literal::respan;
-use super::types::{Types, estimator_alias, given, sensor_alias};
+use super::part::Part;
+use super::types::Types;
 use crate::derive::into_if_text;
 use crate::diagnostics::Place;
-use crate::model::{EstimatorId, Robot, SensorId};
-use crate::parse::{Component, OptionValue, Value};
+use crate::model::Robot;
+use crate::parse::{Component, OptionValue, ParameterKind};
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
@@ -14,73 +15,49 @@ use quote::{format_ident, quote};
 pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     let types = Types::new(robot, name, 0);
     let (mut fields, mut functions) = (Vec::new(), TokenStream::new());
-    let sensors = robot.sensors.iter().enumerate().map(|(id, sensor)| {
-        let given = given(&sensor_alias(name, id));
-        let given = types.at_sensor(id, quote!(<#given as ::bb_core::Sensor>::Options));
-        (sensor_field(id), types.sensor_options(id), given, &sensor.component)
-    });
-    let estimators = robot.estimators.iter().enumerate().map(|(id, estimator)| {
-        let given = given(&estimator_alias(name, id));
-        let given = types.at_estimator(id, quote!(<#given as ::bb_core::Estimator>::Options));
-        (estimator_field(id), types.estimator_options(id), given, &estimator.component)
-    });
-    for (field, options, given, component) in sensors.chain(estimators) {
-        let function = function(&field);
-        functions.extend(filled(robot, &function, &options, &given, component));
+    for part in Part::all(robot) {
+        let Some(component) = part.component(robot) else { continue };
+        let (options, given) = (types.options(part), types.given_options(part));
+        // Values are expressions of the user's, so the names around them must be none of his.
+        let (field, function) = (part.name(), format_ident!("__{}", part.name()));
+        functions.extend(filled(&function, &options, &given, component));
         fields.push(Field { name: field, kind: options, value: quote!(#function()) });
     }
     let structs = group::structs("__Options", "__declared_options", &fields, &quote!(), &quote!());
     quote!(#structs #functions)
 }
 
-/// Where the options of a sensor stand in `__Options`: sensors come first.
-pub(super) fn of_sensor(id: SensorId) -> TokenStream {
-    group::path(id, &sensor_field(id))
-}
-
-/// Where the options of an estimator stand in `__Options`.
-pub(super) fn of_estimator(robot: &Robot, id: EstimatorId) -> TokenStream {
-    group::path(robot.sensors.len() + id, &estimator_field(id))
-}
-
-fn sensor_field(id: SensorId) -> Ident {
-    format_ident!("s{id}")
-}
-
-fn estimator_field(id: EstimatorId) -> Ident {
-    format_ident!("e{id}")
+/// Where the options of a part stand in `__Options`.
+pub(super) fn place(robot: &Robot, part: Part) -> TokenStream {
+    group::path(part.position(robot), &part.name())
 }
 
 /// `fn e0() -> … { let mut options = defaults(); options.beta = 0.1; options }`
 ///
 /// The only place that names the type as the user wrote it: that it is none of the kind is reported here.
-fn filled(
-    robot: &Robot,
-    function: &Ident,
-    options: &TokenStream,
-    given: &TokenStream,
-    component: &Component,
-) -> TokenStream {
-    let settings = component.options.iter().map(|option| {
-        let name = &option.name;
-        let value = match &option.value {
-            OptionValue::Quantity(quantity) => {
-                let number = quantity.value;
-                respan(quote!(::bb_core::__private::FromQuantity::from_quantity(#number)), quantity.place.start)
-            }
-            OptionValue::Parameter(path) => {
-                let parameter = robot.parameter(path).and_then(|id| robot.parameters.get(id));
-                let default = parameter.map(|parameter| default(&parameter.default.value));
-                respan(default.unwrap_or_default(), path.place().start)
-            }
-            OptionValue::Expression { expression, .. } => into_if_text(expression),
-        };
-        // What does not fit is reported at the value; the option's name is pointed at beside it.
-        let receiver = respan(quote!(__options.), name.span());
-        quote!(#receiver #name = #value;)
-    });
+fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
+    let settings: Vec<TokenStream> = component
+        .options
+        .iter()
+        .filter_map(|option| {
+            let name = &option.name;
+            let value = match &option.value {
+                OptionValue::Quantity(quantity) => {
+                    let number = quantity.value;
+                    let place = quantity.place.start;
+                    respan(quote!(::bb_core::__private::FromQuantity::from_quantity(#number)), place)
+                }
+                OptionValue::Expression { expression, .. } => into_if_text(expression),
+                // It has the parameter's value from the start on, see `binding`.
+                OptionValue::Parameter(_) => return None,
+            };
+            // What does not fit is reported at the value; the option's name is pointed at beside it.
+            let receiver = respan(quote!(__options.), name.span());
+            Some(quote!(#receiver #name = #value;))
+        })
+        .collect();
     let place = Place::of(&component.kind).start;
-    let mutability = (!component.options.is_empty()).then(|| quote!(mut));
+    let mutability = (!settings.is_empty()).then(|| quote!(mut));
     // Spanned at the user's type, which rustc points at when a value does not fit.
     let start = respan(quote!(let #mutability __options: #given = ::bb_core::Options::defaults();), place);
     quote! {
@@ -92,20 +69,44 @@ fn filled(
     }
 }
 
-/// The default of a parameter as the value of an option.
-fn default(value: &Value) -> TokenStream {
-    match value {
-        Value::Bool(value) => quote!(#value),
-        Value::Integer(value) => {
-            let magnitude = proc_macro2::Literal::u64_unsuffixed(value.unsigned_abs());
-            if *value < 0 { quote!(-#magnitude) } else { quote!(#magnitude) }
+/// A `bb_core::control::Binding`: which parameters the options of a part are bound to.
+pub(super) fn binding(types: &Types<'_>, part: Part) -> TokenStream {
+    let robot = types.model();
+    let bound = part.component(robot).into_iter().flat_map(|component| &component.options);
+    let bound: Vec<_> = bound
+        .filter_map(|option| match &option.value {
+            OptionValue::Parameter(path) => {
+                let id = robot.parameter(path)?;
+                Some((&option.name, path, id, robot.parameters.get(id)?.kind))
+            }
+            OptionValue::Quantity(_) | OptionValue::Expression { .. } => None,
+        })
+        .collect();
+    if bound.is_empty() {
+        return quote!(::bb_core::__private::Binding::NONE);
+    }
+    let numbers = bound.iter().map(|(_, _, id, _)| id);
+    let settings = bound.iter().map(|(name, path, id, kind)| {
+        let kind = parameter_type(*kind);
+        let value = quote!(::bb_core::__private::FromParameter::from_parameter(values.get::<#kind>(#id)));
+        let value = respan(value, path.place().start);
+        quote!(options.#name = #value;)
+    });
+    let options = types.options(part);
+    quote! {
+        ::bb_core::__private::Binding {
+            apply: |options: &mut #options, values: &::bb_core::__private::ParameterValues| { #(#settings)* },
+            parameters: &[#(#numbers),*],
         }
-        Value::Number(value) => quote!(::bb_core::__private::FromQuantity::from_quantity(#value)),
-        Value::Text(value) => quote!(::core::convert::Into::into(#value)),
     }
 }
 
-/// Values are expressions of the user's, so the names around them must be none of his.
-fn function(field: &Ident) -> Ident {
-    format_ident!("__{field}")
+/// The type of a parameter's values.
+pub(super) fn parameter_type(kind: ParameterKind) -> TokenStream {
+    match kind {
+        ParameterKind::Bool => quote!(bool),
+        ParameterKind::Integer => quote!(i64),
+        ParameterKind::Number => quote!(f64),
+        ParameterKind::Text => quote!(::std::string::String),
+    }
 }

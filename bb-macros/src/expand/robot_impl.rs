@@ -1,10 +1,12 @@
 //! `impl Robot`: how all is made, started and listed.
 
-use super::options::{of_estimator, of_sensor};
-use super::order;
+use super::options::{binding, place};
+use super::part::Part;
 use super::types::Types;
 use super::wiring::{index_name, start_function, topic};
-use crate::model::SensorId;
+use super::{control, order};
+use crate::model::PublisherId;
+use crate::parse::ServiceKind;
 use crate::verify::Verified;
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
@@ -16,8 +18,9 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
     // A function for each component: one for all would have a way out behind every one of them, and the time to check it
     // would grow with their square.
     let starts = robot.estimators.iter().enumerate().map(|(id, estimator)| {
-        let (function, options, kind) = (start_function(id), of_estimator(robot, id), types.estimator(id));
-        let taken = types.estimator_input(id);
+        let part = Part::Estimator(id);
+        let (function, options, kind) = (start_function(id), place(robot, part), types.estimator(id));
+        let (taken, binding) = (types.estimator_input(id), binding(&types, part));
         let inputs = if estimator.is_nested() { 1 } else { estimator.inputs.len() };
         let declared = (0..inputs).map(|input| {
             let index = index_name(id, Some(input));
@@ -31,7 +34,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                 ::bb_core::__private::Node::<#kind>::new(
                     #id,
                     &options.#options,
-                    ::bb_core::__private::Binding::NONE,
+                    #binding,
                     || {
                         let mut cache: <#taken as ::bb_core::Inputs>::Cache = ::core::default::Default::default();
                         #(#declared)*
@@ -42,33 +45,24 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             }
         }
     });
-    let sources = robot.sensors.iter().enumerate().map(|(id, sensor)| {
-        let (function, options) = (source_function(id), of_sensor(id));
-        let (publish, kind) = (topic(sensor.publisher), types.sensor(id));
-        quote! {
-            fn #function(
-                wiring: &::bb_core::__private::Arc<__Wiring>,
-                options: &__Options,
-                startup: &::bb_core::__private::Startup,
-                sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
-            ) {
-                startup.source::<#name, ::bb_core::__private::AsSensor<#kind>>(
-                    &__SENSORS[#id],
-                    &options.#options,
-                    ::bb_core::__private::Binding::NONE,
-                    wiring,
-                    |wiring: &__Wiring, message, now| wiring.#publish(message, now),
-                    sources,
-                );
-            }
-        }
+    let sensors = robot.sensors.iter().enumerate().map(|(id, sensor)| {
+        source(&types, Part::Sensor(id), sensor.publisher, quote!(AsSensor), quote!(&__SENSORS[#id]))
     });
+    let services = robot.services.iter().enumerate().map(|(id, service)| {
+        let wrapper = match service.kind {
+            ServiceKind::Controller => quote!(AsController),
+            ServiceKind::Bridge => quote!(AsBridge),
+        };
+        source(&types, Part::Service(id), service.publisher, wrapper, quote!(&__SERVICES[#id]))
+    });
+    let sources = sensors.chain(services);
     let functions: TokenStream = starts.chain(sources).collect();
     // In groups, for the same reason.
-    let order: Vec<SensorId> = order::sensors(verified);
-    let groups = order.chunks(16).enumerate().map(|(number, sensors)| {
+    let sensors = order::sensors(verified).into_iter().map(Part::Sensor);
+    let order: Vec<Part> = sensors.chain((0..robot.services.len()).map(Part::Service)).collect();
+    let groups = order.chunks(16).enumerate().map(|(number, parts)| {
         let (group, functions) =
-            (format_ident!("__open_group_{number}"), sensors.iter().map(|id| source_function(*id)));
+            (format_ident!("__open_group_{number}"), parts.iter().map(|part| source_function(*part)));
         quote! {
             fn #group(
                 wiring: &::bb_core::__private::Arc<__Wiring>,
@@ -85,6 +79,12 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
         let group = format_ident!("__open_group_{number}");
         quote!(#group(wiring, options, startup, &mut sources);)
     });
+    let states = control::states(robot);
+    let commands = (0..robot.commands.len()).map(|id| {
+        let part = Part::Command(id);
+        let (kind, options, binding) = (types.part(part), place(robot, part), binding(&types, part));
+        quote!(::bb_core::__private::Prepared::new::<#kind>(&options.#options, #binding))
+    });
     quote! {
         #functions
 
@@ -93,12 +93,12 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             const TOPOLOGY: &'static ::bb_core::__private::Topology = &__TOPOLOGY;
             const SENSORS: &'static [::bb_core::__private::SensorDeclaration] = &__SENSORS;
             const ESTIMATORS: &'static [::bb_core::__private::EstimatorDeclaration] = &__ESTIMATORS;
-            const ACTUATORS: &'static [::bb_core::__private::ActuatorDeclaration] = &[];
-            const SERVICES: &'static [::bb_core::__private::SensorDeclaration] = &[];
-            const STATES: &'static [&'static str] = &[];
-            const CATEGORIES: &'static [::bb_core::__private::CategoryDeclaration] = &[];
-            const COMMANDS: &'static [::bb_core::__private::CommandDeclaration] = &[];
-            const PARAMETERS: &'static [::bb_core::__private::ParameterDeclaration] = &[];
+            const ACTUATORS: &'static [::bb_core::__private::ActuatorDeclaration] = &__ACTUATORS;
+            const SERVICES: &'static [::bb_core::__private::SensorDeclaration] = &__SERVICES;
+            const STATES: &'static [&'static str] = #states;
+            const CATEGORIES: &'static [::bb_core::__private::CategoryDeclaration] = &__CATEGORYS;
+            const COMMANDS: &'static [::bb_core::__private::CommandDeclaration] = &__COMMANDS;
+            const PARAMETERS: &'static [::bb_core::__private::ParameterDeclaration] = &__PARAMETERS;
             const ISLANDS: &'static [::bb_core::__private::IslandOf<__Wiring>] = &__ISLANDS;
 
             type Options = __Options;
@@ -114,7 +114,12 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             }
 
             fn wire(topics: __Topics, options: &__Options, startup: &::bb_core::__private::Startup) -> __Wiring {
-                __Wiring { topics, islands: __new_islands(options, startup), startup: ::core::clone::Clone::clone(startup) }
+                __Wiring {
+                    topics,
+                    islands: __new_islands(options, startup),
+                    actuators: __new_actuators(options, startup),
+                    startup: ::core::clone::Clone::clone(startup),
+                }
             }
 
             fn sources(
@@ -136,17 +141,45 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             }
 
             fn all_actuators(wiring: &__Wiring) -> ::std::vec::Vec<&dyn ::bb_core::__private::AnyActuator> {
-                ::std::vec::Vec::new()
+                __list_actuators(&wiring.actuators)
             }
 
             fn commands(options: &__Options) -> ::std::vec::Vec<::bb_core::__private::Prepared> {
-                ::std::vec::Vec::new()
+                ::std::vec![#(#commands),*]
             }
         }
     }
 }
 
-/// Opens one sensor.
-fn source_function(id: SensorId) -> Ident {
-    format_ident!("__open_{id}")
+/// `fn __open_s0`: makes one sensor or service, whose readings go to its publisher.
+fn source(
+    types: &Types<'_>,
+    part: Part,
+    publisher: PublisherId,
+    wrapper: TokenStream,
+    declaration: TokenStream,
+) -> TokenStream {
+    let (function, options) = (source_function(part), place(types.model(), part));
+    let (publish, kind, binding, robot) = (topic(publisher), types.part(part), binding(types, part), types.robot());
+    quote! {
+        fn #function(
+            wiring: &::bb_core::__private::Arc<__Wiring>,
+            options: &__Options,
+            startup: &::bb_core::__private::Startup,
+            sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
+        ) {
+            startup.source::<#robot, ::bb_core::__private::#wrapper<#kind>>(
+                #declaration,
+                &options.#options,
+                #binding,
+                wiring,
+                |wiring: &__Wiring, message, now| wiring.#publish(message, now),
+                sources,
+            );
+        }
+    }
+}
+
+fn source_function(part: Part) -> Ident {
+    format_ident!("__open_{}", part.name())
 }

@@ -4,22 +4,19 @@
 //! rustc has to say of it is said there, and once.
 
 use super::literal::{ident, respan};
+use super::part::Part;
 use crate::diagnostics::Place;
 use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId};
 use crate::parse::Component;
 use proc_macro2::{Ident, TokenStream};
-use quote::{ToTokens, format_ident, quote};
+use quote::quote;
 
 /// `type __RoverS0 = Bmi270;`, if it is a sensor, else `Unknown`; and as the user wrote it, `__RoverS0Given`.
 pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
-    let sensors = robot.sensors.iter().enumerate();
-    let sensors = sensors.map(|(id, sensor)| (sensor_alias(name, id), &sensor.component.kind, quote!(IS_SENSOR)));
-    let estimators = robot.estimators.iter().enumerate();
-    let estimators = estimators
-        .map(|(id, estimator)| (estimator_alias(name, id), &estimator.component.kind, quote!(IS_ESTIMATOR)));
-    let aliases = sensors.chain(estimators).map(|(alias, kind, is_known)| {
-        let given = given(&alias);
-        quote! {
+    let aliases = Part::all(robot).filter_map(|part| {
+        let kind = &part.component(robot)?.kind;
+        let (alias, given, (_, is_known)) = (part.alias(name), part.given(name), part.contract(robot));
+        Some(quote! {
             #[doc(hidden)]
             #[allow(non_camel_case_types, dead_code)]
             type #given = #kind;
@@ -29,22 +26,9 @@ pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
                 use ::bb_core::__private::NotProbed as _;
                 <::bb_core::__private::Probe<#given>>::#is_known
             }>>::Type;
-        }
+        })
     });
     aliases.collect()
-}
-
-/// The alias of the type as the user wrote it.
-pub(super) fn given(alias: &Ident) -> Ident {
-    format_ident!("{alias}Given")
-}
-
-pub(super) fn sensor_alias(name: &Ident, id: SensorId) -> Ident {
-    format_ident!("__{name}S{id}", span = proc_macro2::Span::call_site())
-}
-
-pub(super) fn estimator_alias(name: &Ident, id: EstimatorId) -> Ident {
-    format_ident!("__{name}E{id}", span = proc_macro2::Span::call_site())
 }
 
 /// The last name of a component's type, for messages: `Madgwick`.
@@ -87,24 +71,34 @@ impl<'a> Types<'a> {
         quote!(#above #name)
     }
 
+    /// The type of a part, at the span of the user's type.
+    pub(super) fn part(&self, part: Part) -> TokenStream {
+        let (above, alias) = (&self.above, part.alias(self.name));
+        self.at(part, quote!(#above #alias))
+    }
+
     pub(super) fn sensor(&self, id: SensorId) -> TokenStream {
-        let component = self.robot.sensors.get(id).map(|sensor| &sensor.component);
-        self.at(component, sensor_alias(self.name, id).into_token_stream())
+        self.part(Part::Sensor(id))
     }
 
     pub(super) fn estimator(&self, id: EstimatorId) -> TokenStream {
-        let component = self.robot.estimators.get(id).map(|estimator| &estimator.component);
-        self.at(component, estimator_alias(self.name, id).into_token_stream())
+        self.part(Part::Estimator(id))
     }
 
-    pub(super) fn sensor_options(&self, id: SensorId) -> TokenStream {
-        let sensor = self.sensor(id);
-        self.at_sensor(id, quote!(<#sensor as ::bb_core::Sensor>::Options))
+    /// The type of a part's options.
+    pub(super) fn options(&self, part: Part) -> TokenStream {
+        self.options_of(part, self.part(part))
     }
 
-    pub(super) fn estimator_options(&self, id: EstimatorId) -> TokenStream {
-        let estimator = self.estimator(id);
-        self.at_estimator(id, quote!(<#estimator as ::bb_core::Estimator>::Options))
+    /// The same for the type as the user wrote it.
+    pub(super) fn given_options(&self, part: Part) -> TokenStream {
+        let (above, given) = (&self.above, part.given(self.name));
+        self.options_of(part, quote!(#above #given))
+    }
+
+    fn options_of(&self, part: Part, kind: TokenStream) -> TokenStream {
+        let (contract, _) = part.contract(self.robot);
+        self.at(part, quote!(<#kind as #contract>::Options))
     }
 
     pub(super) fn estimator_input(&self, id: EstimatorId) -> TokenStream {
@@ -120,16 +114,14 @@ impl<'a> Types<'a> {
     /// The payload of a publisher. That of an estimator's output is named through its number, see `output_index`.
     pub(super) fn payload(&self, publisher: PublisherId) -> TokenStream {
         match self.robot.publishers.get(publisher).map(|publisher| publisher.from) {
-            Some(From::Sensor(id)) => {
-                let sensor = self.sensor(id);
-                self.at_sensor(id, quote!(<#sensor as ::bb_core::Sensor>::Output))
-            }
+            Some(From::Sensor(id)) => self.output(Part::Sensor(id)),
+            Some(From::Service(id)) => self.output(Part::Service(id)),
             Some(From::Estimator(id, output)) => {
                 let emitted = self.estimator_output(id);
                 let index = self.output_index(id, output);
                 self.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::Payload))
             }
-            Some(From::Service(_)) | None => quote!(()),
+            None => quote!(()),
         }
     }
 
@@ -157,24 +149,18 @@ impl<'a> Types<'a> {
         self.at_estimator(id, find)
     }
 
+    fn output(&self, part: Part) -> TokenStream {
+        let (kind, (contract, _)) = (self.part(part), part.contract(self.robot));
+        self.at(part, quote!(<#kind as #contract>::Output))
+    }
+
     pub(super) fn at_estimator(&self, id: EstimatorId, tokens: TokenStream) -> TokenStream {
-        match self.robot.estimators.get(id) {
-            Some(estimator) => respan(tokens, Place::of(&estimator.component.kind).start),
-            None => tokens,
-        }
+        self.at(Part::Estimator(id), tokens)
     }
 
-    pub(super) fn at_sensor(&self, id: SensorId, tokens: TokenStream) -> TokenStream {
-        match self.robot.sensors.get(id) {
-            Some(sensor) => respan(tokens, Place::of(&sensor.component.kind).start),
-            None => tokens,
-        }
-    }
-
-    fn at(&self, component: Option<&Component>, alias: TokenStream) -> TokenStream {
-        let above = &self.above;
-        let tokens = quote!(#above #alias);
-        match component {
+    /// The tokens at the span of the user's type.
+    fn at(&self, part: Part, tokens: TokenStream) -> TokenStream {
+        match part.component(self.robot) {
             Some(component) => respan(tokens, Place::of(&component.kind).start),
             None => tokens,
         }

@@ -20,6 +20,8 @@
 use super::group::{self, Field};
 use super::islands::{IslandId, Islands};
 use super::literal::respan;
+use super::options::{self, binding};
+use super::part::Part;
 use super::types::Types;
 use super::{order, path_text};
 use crate::model::{EstimatorId, From, Home, PublisherId};
@@ -73,14 +75,17 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
         quote!(|wiring| &wiring.islands.#place)
     });
     let count = islands.all.len();
+    let actuators = actuators(&types);
     quote! {
         pub struct __Wiring {
             topics: __Topics,
             islands: __Islands,
+            actuators: __Actuators,
             startup: ::bb_core::__private::Startup,
         }
         #topic_structs
         #island_structs
+        #actuators
         #list_topics
         #indices
         #shores
@@ -88,6 +93,29 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
 
         impl __Wiring { #functions }
     }
+}
+
+/// `struct __Actuators`.
+fn actuators(types: &Types<'_>) -> TokenStream {
+    let robot = types.model();
+    let fields: Vec<Field> = (0..robot.actuators.len())
+        .map(|id| {
+            let part = Part::Actuator(id);
+            let (kind, options, binding) = (types.part(part), options::place(robot, part), binding(types, part));
+            let node = quote!(::bb_core::__private::ActuatorNode);
+            Field {
+                name: part.name(),
+                kind: quote!(#node<#kind>),
+                value: quote!(#node::<#kind>::new(&__ACTUATORS[#id], &options.#options, #binding, startup)),
+            }
+        })
+        .collect();
+    let parameters = quote!(options: &__Options, startup: &::bb_core::__private::Startup);
+    let arguments = quote!(options, startup);
+    let structs = group::structs("__Actuators", "__new_actuators", &fields, &parameters, &arguments);
+    let object = quote!(dyn ::bb_core::__private::AnyActuator);
+    let list = group::list("__Actuators", "__list_actuators", &fields, &object);
+    quote!(#structs #list)
 }
 
 /// A declared input of an estimator, or the implicit one of a nested estimator.
@@ -138,6 +166,7 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
         Some(From::Estimator(estimator, _)) => islands.of.get(estimator).copied(),
         _ => None,
     };
+    let publish = if own.is_some() { quote!(publish_alone) } else { quote!(publish) };
     let message = quote!(message: &::bb_core::__private::Stamped<#payload>);
     let now = quote!(now: ::bb_core::__private::MonotonicTime);
     let mut functions = TokenStream::new();
@@ -172,7 +201,7 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
     quote! {
         #[inline]
         fn #name(&self, #island #message, #now) {
-            self.topics.#topic.publish(message);
+            self.topics.#topic.#publish(message);
             #(#calls)*
         }
         #functions

@@ -1,24 +1,109 @@
-//! Commands, actuators, controllers and bridges: only their names so far.
+//! Commands, actuators, controllers and bridges.
 
-macro_rules! named {
-    ($($(#[$doc:meta])* $name:ident)*) => {
-        $($(#[$doc])* #[derive(Debug)] pub struct $name;)*
-    };
+use bb_core::prelude::*;
+
+/// Options of [`MoveTo`].
+#[derive(Clone, Debug, Options)]
+pub struct MoveToOptions {
+    /// Unit: m/s.
+    #[option(default = 1.0, range = 0.0..=5.0, unit = "m/s")]
+    pub speed: f64,
 }
 
-named! {
-    /// A command.
-    Stop
-    /// A command.
-    SlowDown
-    /// A command.
-    Resume
-    /// A command.
-    MoveTo
-    /// An actuator.
-    Servo
+macro_rules! commands {
+    ($($(#[$doc:meta])* $name:ident($options:ty))*) => { $(
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub struct $name;
+
+        impl Command for $name {
+            type Options = $options;
+            type Arguments = NoArguments;
+            type Output = ();
+
+            async fn run(_: $options, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+                Ok(Outcome::done(()))
+            }
+        }
+    )* };
+}
+
+commands! {
+    /// Stops the robot.
+    Stop(NoOptions)
+    /// Slows it down.
+    SlowDown(NoOptions)
+    /// Goes on.
+    Resume(NoOptions)
+    /// Moves somewhere.
+    MoveTo(MoveToOptions)
+}
+
+/// Where a joint is to go.
+#[derive(Clone, Copy, Debug, Payload)]
+pub struct Position(pub f64);
+
+/// Options of [`Servo`].
+#[derive(Clone, Debug, Options)]
+pub struct ServoOptions {
+    /// On the bus.
+    #[option(default = 1)]
+    pub id: u8,
+}
+
+/// An actuator.
+#[derive(Debug)]
+pub struct Servo;
+
+impl Actuator for Servo {
+    type Options = ServoOptions;
+    type Command = Position;
+
+    fn init(_: ServoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Position>) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+/// Options of [`RosBridge`].
+#[derive(Clone, Debug, Options)]
+pub struct RosBridgeOptions {
+    /// TCP.
+    #[option(default = 9090)]
+    pub port: u16,
+}
+
+macro_rules! services {
+    ($($(#[$doc:meta])* $name:ident: $service:ident($options:ty))*) => { $(
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub struct $name;
+
+        impl $service for $name {
+            type Options = $options;
+            type Output = Position;
+
+            fn init(_: $options, _: &ServiceContext) -> Result<Self, Fault> {
+                Ok(Self)
+            }
+
+            fn update(&mut self, _: MonotonicTime) -> Result<Reading<Position>, Fault> {
+                Ok(Reading::nothing())
+            }
+        }
+    )* };
+}
+
+services! {
     /// A controller.
-    Stability
+    Stability: Controller(NoOptions)
     /// A bridge.
-    RosBridge
+    RosBridge: Bridge(RosBridgeOptions)
 }

@@ -1,0 +1,58 @@
+//! What commands do to the robot's safety, and what an estimator says of its own divergence.
+
+use super::text::{Text, equal};
+use crate::control::Role;
+
+/// That no command before has the same role, where a robot may have one such command.
+#[track_caller]
+pub const fn check_role(command: &str, role: Role, before: &[(&str, Role)]) {
+    let mut index = 0;
+    while index < before.len() {
+        let (other, other_role) = before[index];
+        let does = match (role, other_role) {
+            (Role::Arming, Role::Arming) => " arms",
+            (Role::Disarming, Role::Disarming) => " disarms",
+            _ => "",
+        };
+        if !does.is_empty() {
+            let text = Text::new("").name(command).push(does).push(" the robot, as ").name(other);
+            panic!("{}", text.push(" does; a robot has one such command, leave one out").as_str())
+        }
+        index += 1;
+    }
+}
+
+/// That a command that arms may start while the robot is disarmed, and one that disarms while it is not.
+#[track_caller]
+pub const fn check_reachable(command: &str, role: Role, allowed: &[&str]) {
+    let (mut disarmed, mut other, mut index) = (false, false, 0);
+    while index < allowed.len() {
+        if equal(allowed[index], "disarmed") {
+            disarmed = true;
+        } else {
+            other = true;
+        }
+        index += 1;
+    }
+    match role {
+        Role::Arming if !disarmed => {
+            let text = Text::new("").name(command).push(" arms the robot and can never start here; ");
+            panic!("{}", text.push("add `disarmed` to its states").as_str())
+        }
+        Role::Disarming if !other => {
+            let text = Text::new("").name(command).push(" disarms the robot and is of no use here; ");
+            panic!("{}", text.push("add `idle` and `executing` to its states").as_str())
+        }
+        _ => {}
+    }
+}
+
+/// That the algorithm reports divergence, where nothing else gives `word` a meaning.
+#[track_caller]
+pub const fn check_divergence(estimator: &str, reports: bool, word: &str) {
+    if !reports {
+        let text = Text::new("").name(word).push(" can never take effect: nothing degrades this estimator; set a ");
+        let text = text.push("`latency_budget`, or `REPORTS_DIVERGENCE` in the `Estimator` of ").name(estimator);
+        panic!("{}", text.push(", or leave it out").as_str())
+    }
+}

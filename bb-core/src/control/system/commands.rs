@@ -1,0 +1,250 @@
+//! Commands: which may start, how they go on, how they end.
+
+use super::{Control, State, Waiting};
+use crate::control::commands::{AnyCommand, CommandStatistics, Refusal, RefusalReason};
+use crate::control::event::CommandPhase;
+use crate::control::execution::{CommandError, Execution, Slot};
+use crate::control::safety::Safety;
+use crate::control::state::IDLE;
+use crate::control::tasks::{Sleeper, Task, Value, lock};
+use crate::control::{CategoryDeclaration, CommandContext, CommandDeclaration, Outcome, Role};
+use crate::node::HealthTransition;
+use crate::time::MonotonicTime;
+use std::any::Any;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+impl Control {
+    pub(crate) fn state(&self) -> &'static str {
+        lock(&self.0.state).machine.state()
+    }
+
+    pub(crate) fn statistics(&self) -> Vec<CommandStatistics> {
+        lock(&self.0.state).statistics.clone()
+    }
+
+    pub(in crate::control) fn sleeper(&self) -> Sleeper {
+        self.0.sleeper.clone()
+    }
+
+    /// Starts a command for a caller who knows the type of its result.
+    pub(crate) fn execute<T: 'static>(
+        &self,
+        number: usize,
+        arguments: Box<dyn Any + Send>,
+    ) -> Result<Execution<T>, Refusal> {
+        self.start(number, Some(arguments), None).map(Execution::new)
+    }
+
+    /// That all commands could start with their options as they are; else the path of one, and why not.
+    pub(crate) fn check_commands(&self) -> Result<(), (&'static str, String)> {
+        let parameters = self.parameters();
+        self.0.commands.iter().zip(self.0.declared.commands).try_for_each(|(command, declared)| {
+            command.0.check(&parameters).map_err(|message| (declared.path, message))
+        })
+    }
+
+    /// Starts a command, or says why not. It runs at the next [`Self::drive`].
+    pub(super) fn start(
+        &self,
+        number: usize,
+        arguments: Option<Box<dyn Any + Send>>,
+        health: Option<HealthTransition>,
+    ) -> Result<Arc<Slot>, Refusal> {
+        let (declared, prepared) = match (self.0.declared.commands.get(number), self.0.commands.get(number)) {
+            (Some(declared), Some(prepared)) => (declared, &prepared.0),
+            // Numbers and declarations come from one expansion.
+            _ => {
+                let category = CategoryDeclaration { name: "", concurrency: 0 };
+                return Err(Refusal { command: "", reason: RefusalReason::Stopping, state: "", category });
+            }
+        };
+        let _starting = lock(&self.0.starting);
+        let mut state = lock(&self.0.state);
+        if let Err(refusal) = self.may_start(&state, declared, &**prepared) {
+            if let Some(statistics) = state.statistics.get_mut(number) {
+                statistics.refused += 1;
+                statistics.last_refusal = Some(refusal.clone());
+            }
+            drop(state);
+            tracing::warn!(command = declared.name, %refusal, "command refused");
+            self.command_event(number, 0, CommandPhase::Refused(refusal.clone()), health);
+            return Err(refusal);
+        }
+        let cancelled = state.tasks.iter().filter(|task| {
+            self.0.declared.commands.get(task.command).is_some_and(|other| declared.cancel.includes(other.category))
+        });
+        cancelled.for_each(|task| task.cancel());
+        let before = state.machine;
+        let id = state.next_id;
+        state.next_id += 1;
+        state.machine.running += 1;
+        if let Some(statistics) = state.statistics.get_mut(number) {
+            statistics.started += 1;
+        }
+        let after = state.machine;
+        let context =
+            CommandContext { name: declared.name, health, clock: self.0.clock.clone(), control: self.clone() };
+        let deadline = declared.timeout_nanos.map(|timeout| self.0.clock.now().plus_nanos(timeout));
+        let parameters = self.parameters();
+        drop(state);
+        // The user's code may run here already, so no lock is held.
+        let started = crate::run::caught(|| prepared.start(arguments, &parameters, context));
+        let future = started.unwrap_or_else(|failed| Box::pin(std::future::ready(Err(failed.fault))));
+        let task = Arc::new(Task::new(id, number, health, deadline, future, self.0.bell.clone()));
+        let slot = Arc::clone(&task.slot);
+        lock(&self.0.state).tasks.push(task);
+        self.command_event(number, id, CommandPhase::Started, health);
+        self.publish_changes(before, after, Some(declared.name));
+        self.0.bell.ring();
+        Ok(slot)
+    }
+
+    fn may_start(
+        &self,
+        state: &State,
+        declared: &CommandDeclaration,
+        prepared: &dyn AnyCommand,
+    ) -> Result<(), Refusal> {
+        let category = self.0.declared.categories.get(declared.category).copied();
+        let category = category.unwrap_or(CategoryDeclaration { name: "default", concurrency: 1 });
+        let refuse =
+            |reason| Err(Refusal { command: declared.name, reason, state: state.machine.state(), category });
+        if state.is_stopping {
+            return refuse(RefusalReason::Stopping);
+        }
+        if matches!(state.machine.safety, Safety::Error | Safety::Disarming) {
+            return refuse(RefusalReason::Safety);
+        }
+        if !declared.allowed(prepared.role(), state.machine.state()) {
+            return refuse(RefusalReason::State);
+        }
+        let in_category = |task: &&Arc<Task>| {
+            self.0.declared.commands.get(task.command).is_some_and(|other| other.category == declared.category)
+        };
+        let running = state.tasks.iter().filter(in_category).count();
+        if running >= category.concurrency && !declared.cancel.includes(declared.category) {
+            return refuse(RefusalReason::Busy);
+        }
+        Ok(())
+    }
+
+    /// When a command is to be gone on with; `now` if one can be at once.
+    pub(crate) fn next_due(&self, now: MonotonicTime) -> Option<MonotonicTime> {
+        let state = lock(&self.0.state);
+        if !state.waiting.is_empty() || state.tasks.iter().any(|task| task.is_due(now)) {
+            return Some(now);
+        }
+        state.tasks.iter().filter_map(|task| task.deadline).chain(self.0.sleeper.next()).min()
+    }
+
+    /// Whether there is anything that [`Self::drive`] looks after: the one question in a simulation's every step.
+    pub(crate) fn is_quiet(&self) -> bool {
+        !self.0.has_waiting.load(Ordering::Acquire) && lock(&self.0.state).tasks.is_empty()
+    }
+
+    /// Does all that can be done at `now`.
+    pub(crate) fn drive(&self, now: MonotonicTime) {
+        loop {
+            self.0.sleeper.advance(now);
+            let (waiting, due) = {
+                let mut state = lock(&self.0.state);
+                let waiting = std::mem::take(&mut state.waiting);
+                self.0.has_waiting.store(false, Ordering::Release);
+                let due = state.tasks.iter().filter(|task| task.is_due(now)).cloned().collect::<Vec<_>>();
+                (waiting, due)
+            };
+            if waiting.is_empty() && due.is_empty() {
+                return;
+            }
+            for waiting in waiting {
+                match waiting {
+                    // A refusal is counted and published.
+                    Waiting::Start(transition, command) => drop(self.start(command, None, Some(transition))),
+                    Waiting::GiveUp(path) => self.carry_out_giving_up(path),
+                }
+            }
+            for task in due {
+                if let Some(result) = task.poll(now) {
+                    self.finish(&task, result);
+                }
+            }
+        }
+    }
+
+    /// Waits until there may be something to drive, `longest` at most.
+    pub(crate) fn wait(&self, longest: Duration) {
+        self.0.bell.wait(longest);
+    }
+
+    pub(crate) fn ring(&self) {
+        self.0.bell.ring();
+    }
+
+    /// Cancels what runs; nothing is started any more. The robot is disarmed.
+    pub(crate) fn stop(&self) {
+        {
+            let mut state = lock(&self.0.state);
+            state.is_stopping = true;
+            state.tasks.iter().for_each(|task| task.cancel());
+        }
+        self.drive(self.0.clock.now());
+        if self.safety() == Safety::Armed {
+            self.disarm(false);
+        }
+    }
+
+    fn finish(&self, task: &Task, result: Result<Outcome<Value>, CommandError>) {
+        let Some(declared) = self.0.declared.commands.get(task.command) else { return };
+        let role = self.0.commands.get(task.command).map_or(Role::Plain, |command| command.0.role());
+        let result = result.and_then(|outcome| self.checked(outcome));
+        if result.is_ok() && role == Role::Disarming {
+            self.disarm_except(Some(task.id), Some(declared.name), false);
+        }
+        let phase = match &result {
+            Ok(_) => CommandPhase::Succeeded,
+            Err(CommandError::Failed(message)) => CommandPhase::Failed(message.clone()),
+            Err(CommandError::TimedOut) => CommandPhase::TimedOut,
+            Err(CommandError::Cancelled) => CommandPhase::Cancelled,
+        };
+        let (before, after) = {
+            let mut state = lock(&self.0.state);
+            let before = state.machine;
+            state.tasks.retain(|other| other.id != task.id);
+            state.machine.running = state.machine.running.saturating_sub(1);
+            if let Ok(outcome) = &result {
+                if role == Role::Arming && state.machine.safety == Safety::Disarmed {
+                    state.machine.safety = Safety::Armed;
+                    state.machine.resting = IDLE;
+                }
+                if let Some(next) = outcome.next_state {
+                    state.machine.resting = next;
+                }
+            }
+            if let Some(statistics) = state.statistics.get_mut(task.command) {
+                match &phase {
+                    CommandPhase::Succeeded => statistics.succeeded += 1,
+                    CommandPhase::Failed(_) => statistics.failed += 1,
+                    CommandPhase::TimedOut => statistics.timed_out += 1,
+                    CommandPhase::Cancelled => statistics.cancelled += 1,
+                    CommandPhase::Started | CommandPhase::Refused(_) => {}
+                }
+            }
+            (before, state.machine)
+        };
+        self.command_event(task.command, task.id, phase, task.health);
+        self.publish_changes(before, after, Some(declared.name));
+        task.slot.set(result.map(|outcome| outcome.value));
+    }
+
+    /// The state that a command names must be one.
+    fn checked(&self, outcome: Outcome<Value>) -> Result<Outcome<Value>, CommandError> {
+        match outcome.next_state {
+            Some(next) if next != IDLE && !self.0.declared.states.contains(&next) => {
+                Err(CommandError::Failed(format!("it names the next state `{next}`, which is not declared")))
+            }
+            _ => Ok(outcome),
+        }
+    }
+}

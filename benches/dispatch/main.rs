@@ -1,0 +1,71 @@
+//! What the runtime costs: a hop from estimator to estimator, a publish, an allocation, and what an estimator that hangs on
+//! a worker does to a chain beside it.
+//!
+//! `cargo bench -p bb-benches --bench dispatch -- --json` prints one JSON object a line; without `--json`, a table. Each
+//! figure is the smallest of many batches, and stands beside the same work without the runtime, run in turn with it.
+
+mod chain;
+mod hang;
+mod publish;
+
+use std::time::Instant;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // Cargo itself adds `--bench`.
+    let json = std::env::args().any(|argument| argument == "--json");
+    let mut lines = chain::measure()?;
+    lines.extend(publish::measure());
+    lines.extend(hang::measure()?);
+    for line in lines {
+        line.print(json);
+    }
+    Ok(())
+}
+
+/// One measure.
+enum Line {
+    /// Nanoseconds beside nanoseconds.
+    Beside { name: &'static str, ours_ns: f64, beside_ns: f64 },
+    /// A figure of its own.
+    Figure { name: &'static str, ours: f64 },
+}
+
+impl Line {
+    fn print(&self, json: bool) {
+        match *self {
+            Self::Beside { name, ours_ns, beside_ns } if json => {
+                let ratio = ours_ns / beside_ns;
+                let line = serde_json::json!({
+                    "name": name, "ours_ns": ours_ns, "beside_ns": beside_ns, "ratio": ratio,
+                });
+                println!("{line}");
+            }
+            Self::Figure { name, ours } if json => {
+                println!("{}", serde_json::json!({ "name": name, "ours": ours }))
+            }
+            Self::Beside { name, ours_ns, beside_ns } => {
+                println!(
+                    "{name:>28} {ours_ns:>10.1} ns, beside {beside_ns:>8.1} ns, {:>8.1} ns more",
+                    ours_ns - beside_ns
+                );
+            }
+            Self::Figure { name, ours } => println!("{name:>28} {ours:>10}"),
+        }
+    }
+}
+
+/// Nanoseconds of one call of each: the smallest of batches that are run in turn.
+fn in_turn(calls: u32, mut ours: impl FnMut(), mut beside: impl FnMut()) -> (f64, f64) {
+    const BATCHES: usize = 60;
+    let batch = |call: &mut dyn FnMut(u32)| {
+        let start = Instant::now();
+        call(calls);
+        start.elapsed().as_nanos() as f64 / f64::from(calls)
+    };
+    let (mut best_ours, mut best_beside) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..BATCHES {
+        best_ours = best_ours.min(batch(&mut |calls| (0..calls).for_each(|_| ours())));
+        best_beside = best_beside.min(batch(&mut |calls| (0..calls).for_each(|_| beside())));
+    }
+    (best_ours, best_beside)
+}

@@ -1,0 +1,244 @@
+//! Every callback of an estimator, what it may emit and ask for.
+
+use crate::components::{Number, at};
+use bb_core::control::ParameterValue;
+use bb_core::prelude::*;
+
+/// What it can be told and asked.
+pub(crate) struct Add(f64);
+pub(crate) struct HowMuch;
+pub(crate) struct Break;
+
+/// Options of [`Sum`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct SumOptions {
+    #[option(default = 1.0, range = 0.0..=10.0)]
+    pub(crate) gain: f64,
+    /// What it asks for in `init`.
+    #[option(default = "nothing")]
+    pub(crate) asks: &'static str,
+    #[option(default = false)]
+    pub(crate) skipped: bool,
+}
+
+/// Sums up what it gets.
+#[derive(Debug)]
+pub(crate) struct Sum {
+    options: SumOptions,
+    sum: f64,
+}
+
+impl Estimator for Sum {
+    type Options = SumOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: SumOptions, context: &Context) -> Result<Self, Fault> {
+        match options.asks {
+            _ if options.skipped => return Err(Fault::skip("not on this robot")),
+            "a tick" => context.request(Request::Tick(Duration::from_millis(20))),
+            "a timer" => context.request(Request::Timer(7, Duration::from_millis(30))),
+            "a timeout" => context.request(Request::Timeout(Duration::from_millis(50))),
+            "to go on" => context.request(Request::Continue(3)),
+            _ => {}
+        }
+        Ok(Self { options, sum: 0.0 })
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        self.sum += self.options.gain * number.0;
+        Ok(match number.0 {
+            // Asks for more of each kind.
+            100.0 => Reply::none().and(Request::Timeout(Duration::from_millis(50))),
+            200.0 => Reply::emit(Number(self.sum)).and(Request::Continue(1)),
+            300.0 => Reply::none().and(Request::Tick(Duration::ZERO)),
+            _ => Reply::none(),
+        })
+    }
+
+    fn handle_info(&mut self, info: Info) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(match info {
+            Info::Tick => 1000.0,
+            Info::Timer(number) => 2000.0 + f64::from(number),
+            Info::Timeout => 3000.0,
+            _ => 0.0,
+        })))
+    }
+
+    fn handle_continue(&mut self, step: u32) -> Result<Reply<Number>, Fault> {
+        let reply = Reply::emit(Number(4000.0 + f64::from(step)));
+        Ok(if step < 3 { reply.and(Request::Continue(step + 1)) } else { reply })
+    }
+
+    fn handle_options(&mut self, options: SumOptions, _: &Context) -> Result<(), Fault> {
+        self.options = options;
+        Ok(())
+    }
+}
+
+impl HandleCall<HowMuch> for Sum {
+    type Response = f64;
+    fn handle_call(&mut self, HowMuch: HowMuch) -> Result<(f64, Reply<Number>), Fault> {
+        Ok((self.sum, Reply::emit(Number(self.sum))))
+    }
+}
+
+impl HandleCall<Break> for Sum {
+    type Response = ();
+    fn handle_call(&mut self, Break: Break) -> Result<((), Reply<Number>), Fault> {
+        Err(Fault::new("broken on request"))
+    }
+}
+
+impl HandleCast<Add> for Sum {
+    fn handle_cast(&mut self, Add(number): Add) -> Result<Reply<Number>, Fault> {
+        self.sum += number;
+        Ok(Reply::none())
+    }
+}
+
+robot! {
+    robot Summing;
+
+    parameters {
+        sum {
+            gain: f64 = 2.0, range: 0.0..=20.0;
+        }
+    }
+
+    link base {
+        sensor number: External<Number>() {
+            estimator sum: Sum(gain = param::sum::gain);
+        }
+        sensor other: External<Number>() {
+            // Takes what it is given at the start.
+            estimator second: Sum();
+        }
+    }
+}
+
+fn run(asks: &'static str, millis: i64) -> Result<Vec<(i64, f64)>, StartError> {
+    let mut builder = Summing::builder();
+    builder.options(summing::sensor::base::number::sum).asks = asks;
+    let sums = builder.subscribe(summing::sensor::base::number::sum);
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(millis));
+    Ok(emitted(&sums))
+}
+
+fn emitted(sums: &Subscription<Number>) -> Vec<(i64, f64)> {
+    sums.drain().map(|number| (number.monotonic_time.as_nanos() / 1_000_000, number.0)).collect()
+}
+
+#[test]
+fn what_is_asked_for_in_init_comes_at_its_time() -> Result<(), StartError> {
+    assert_eq!(run("a tick", 65)?, [(20, 1000.0), (40, 1000.0), (60, 1000.0)]);
+    assert_eq!(run("a timer", 100)?, [(30, 2007.0)]);
+    assert_eq!(run("a timeout", 200)?, [(50, 3000.0)]);
+    assert_eq!(run("to go on", 200)?, [(0, 4003.0)]);
+    Ok(())
+}
+
+#[test]
+fn a_timeout_is_put_off_by_whatever_happens() -> Result<(), StartError> {
+    let builder = Summing::builder();
+    let sums = builder.subscribe(summing::sensor::base::number::sum);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(summing::sensor::base::number, at(10), Number(100.0));
+    simulation.publish(summing::sensor::base::number, at(40), Number(100.0));
+    simulation.run_until(at(89));
+    assert_eq!(emitted(&sums), []);
+    simulation.publish(summing::sensor::base::number, at(89), Number(1.0));
+    simulation.run_until(at(300));
+    assert_eq!(emitted(&sums), [], "the last message asked for none");
+    simulation.publish(summing::sensor::base::number, at(300), Number(100.0));
+    simulation.run_until(at(500));
+    assert_eq!(emitted(&sums), [(350, 3000.0)]);
+    Ok(())
+}
+
+#[test]
+fn work_goes_on_before_the_next_message() -> Result<(), StartError> {
+    let builder = Summing::builder();
+    let sums = builder.subscribe(summing::sensor::base::number::sum);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(summing::sensor::base::number, at(10), Number(200.0));
+    assert_eq!(emitted(&sums), [(10, 400.0), (10, 4001.0), (10, 4002.0), (10, 4003.0)]);
+    Ok(())
+}
+
+#[test]
+fn a_tick_ends_on_request() -> Result<(), StartError> {
+    let mut builder = Summing::builder();
+    builder.options(summing::sensor::base::number::sum).asks = "a tick";
+    let sums = builder.subscribe(summing::sensor::base::number::sum);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(summing::sensor::base::number, at(30), Number(300.0));
+    simulation.run_until(at(100));
+    assert_eq!(emitted(&sums), [(20, 1000.0)]);
+    Ok(())
+}
+
+#[test]
+fn calls_are_answered_and_casts_are_taken() -> Result<(), Box<dyn std::error::Error>> {
+    let sum = summing::sensor::base::number::sum;
+    let builder = Summing::builder();
+    let sums = builder.subscribe(sum);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
+    simulation.cast(sum, Add(40.0)).map_err(|fault| fault.to_string())?;
+    assert_eq!(simulation.call(sum, HowMuch).map_err(|fault| fault.to_string())?, 42.0);
+    assert_eq!(emitted(&sums), [(5, 42.0)], "a call may emit as well");
+    // One that fails fails the estimator, and the caller hears of it.
+    let error = simulation.call(sum, Break).expect_err("it breaks").to_string();
+    assert_eq!(error, "sensor/base/number/sum failed at this call");
+    let error = simulation.call(sum, HowMuch).expect_err("it waits for its restart").to_string();
+    assert_eq!(error, "sensor/base/number/sum does not run");
+    simulation.run_until(at(100));
+    assert_eq!(simulation.call(sum, HowMuch).map_err(|fault| fault.to_string())?, 0.0, "it is as new");
+    Ok(())
+}
+
+#[test]
+fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Box<dyn std::error::Error>> {
+    let mut builder = Summing::builder();
+    builder.set_parameter(summing::param::sum::gain, 3.0)?;
+    let changes = builder.subscribe(summing::param::sum::gain);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
+    simulation.set_parameter(summing::param::sum::gain, 5.0)?;
+    simulation.publish(summing::sensor::base::number, at(10), Number(1.0));
+    let sum = simulation.call(summing::sensor::base::number::sum, HowMuch).map_err(|fault| fault.to_string())?;
+    assert_eq!(sum, 8.0, "it keeps its state");
+    let change = changes.try_recv().expect("a change is published");
+    assert_eq!((&change.from, &change.to), (&ParameterValue::Float(3.0), &ParameterValue::Float(5.0)));
+
+    // In the parameter's range, but not in the option's; and in neither.
+    let refused = |value| {
+        let refused = simulation.set_parameter(summing::param::sum::gain, value);
+        refused.expect_err("it is out of range").to_string()
+    };
+    assert_eq!(
+        refused(15.0),
+        "param/sum/gain is not set: sensor/base/number/sum would refuse it: option `gain` is 15, but must be in \
+         0.0..=10.0"
+    );
+    assert_eq!(refused(21.0), "param/sum/gain is not set: expected a number in 0.0..=20.0, found `21.0`");
+    assert_eq!(simulation.parameter(summing::param::sum::gain), 5.0);
+    let unknown = simulation.bus().set_parameter("param/sum/gian", 1.0).expect_err("there is none").to_string();
+    assert_eq!(unknown, "param/sum/gian is not set: no such parameter is declared");
+    Ok(())
+}
+
+#[test]
+fn an_estimator_may_be_left_out() -> Result<(), StartError> {
+    let mut builder = Summing::builder();
+    builder.options(summing::sensor::base::other::second).skipped = true;
+    let mut simulation = builder.simulate()?;
+    simulation.publish(summing::sensor::base::other, at(5), Number(1.0));
+    let report = simulation.stop();
+    let second = report.estimator("sensor/base/other/second").expect("it is declared");
+    assert_eq!(second.stopped.as_deref(), Some("not on this robot"));
+    assert!(report.ok().is_ok(), "that is no fault");
+    Ok(())
+}
