@@ -1,6 +1,7 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
 mod callbacks;
+mod control;
 mod components;
 mod external;
 mod fan_in;

@@ -1,0 +1,384 @@
+//! States, commands, safety, actuators, controllers and bridges.
+
+use crate::components::{Counter, Number, at};
+use bb_core::control::{CommandError, CommandPhase, RefusalReason};
+use bb_core::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+/// What a [`Move`] is told.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Target {
+    pub(crate) millis: u64,
+    pub(crate) does: Option<&'static str>,
+}
+
+/// Takes its time.
+#[derive(Debug)]
+pub(crate) struct Move;
+
+impl Command for Move {
+    type Options = NoOptions;
+    type Arguments = Target;
+    type Output = MonotonicTime;
+
+    async fn run(
+        _: NoOptions,
+        target: Target,
+        context: CommandContext,
+    ) -> Result<Outcome<MonotonicTime>, Fault> {
+        context.sleep(Duration::from_millis(target.millis)).await;
+        let outcome = Outcome::done(context.now());
+        match target.does {
+            Some("fail") => Err(Fault::new("no way there")),
+            Some("panic") => panic!("fell over"),
+            Some(state) => Ok(outcome.next_state(state)),
+            None => Ok(outcome),
+        }
+    }
+}
+
+/// A servo; negative targets break it.
+#[derive(Debug)]
+pub(crate) struct Servo;
+
+static HAS_TORQUE: AtomicBool = AtomicBool::new(false);
+static REFUSES: AtomicBool = AtomicBool::new(false);
+static MADE: AtomicU32 = AtomicU32::new(0);
+
+impl Actuator for Servo {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        assert_eq!((context.path(), context.joint()), ("actuator/base/pan/servo", "pan"));
+        MADE.fetch_add(1, Ordering::SeqCst);
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
+        if command.0 < 0.0 {
+            return Err(Fault::new("stalled"));
+        }
+        HAS_TORQUE.store(true, Ordering::SeqCst);
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        if REFUSES.load(Ordering::SeqCst) {
+            return Err(Fault::new("the brake does not close"));
+        }
+        HAS_TORQUE.store(false, Ordering::SeqCst);
+        Ok(())
+    }
+}
+
+/// Sends twice what a sensor says to the servo.
+pub(crate) struct Follow {
+    numbers: Subscription<Number>,
+    servo: bb_core::run::ActuatorLink<Number>,
+}
+
+impl Controller for Follow {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &ServiceContext) -> Result<Self, Fault> {
+        let bus = context.bus();
+        Ok(Self {
+            numbers: bus.subscribe("sensor/base/pan/encoder", Overflow::default())?,
+            servo: bus.actuator("actuator/base/pan/servo")?,
+        })
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        let Some(number) = self.numbers.drain().last() else { return Ok(Reading::nothing()) };
+        // It is not armed all the time.
+        let sent = self.servo.send(Number(2.0 * number.0)).is_ok();
+        Ok(Reading::now(Number(f64::from(u8::from(sent)))))
+    }
+}
+
+/// Options of [`Dashboard`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct DashboardOptions {
+    #[option(default = "sensor/base/pan/encoder")]
+    pub(crate) path: String,
+}
+
+/// Counts what there is.
+pub(crate) struct Dashboard(bb_core::DynamicSubscription);
+
+impl Bridge for Dashboard {
+    type Options = DashboardOptions;
+    type Output = Number;
+
+    fn init(options: DashboardOptions, context: &ServiceContext) -> Result<Self, Fault> {
+        // Of the right type, or an error that names what is wrong.
+        context.bus().subscribe::<Number>(&options.path, Overflow::default())?;
+        Ok(Self(context.bus().subscribe_any(Select::Below("sensor"), None, Overflow::default())))
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::now(Number(self.0.drain().count() as f64)))
+    }
+}
+
+robot! {
+    robot Commanded;
+
+    parameters { speed: f64 = 1.0; }
+    states { parked; }
+
+    commands {
+        category motion { concurrency: 2; }
+        arm: Arm;
+        disarm: Disarm;
+        go: Move { category: motion; timeout: 1 s; }
+        turn: Move { category: motion; allowed_states: [idle, executing]; }
+        look: Move { allowed_states: [idle, executing, parked]; }
+        stop: Move { allowed_states: [idle, executing]; cancel: [motion]; }
+        halt: Move { allowed_states: [idle, executing]; cancel: all; }
+    }
+
+    controllers { controller follow: Follow() { rate: 10 Hz; } }
+    bridges { bridge dashboard: Dashboard() { rate: 10 Hz; } }
+
+    link base {
+        joint pan: continuous {
+            axis: z;
+            actuator servo: Servo();
+            sensor encoder: Counter(count = 1000) { rate: 100 Hz; }
+            link head { }
+        }
+    }
+}
+
+/// The servo of these tests is one device.
+static ONE_AT_A_TIME: std::sync::Mutex<()> = std::sync::Mutex::new(());
+
+fn alone() -> std::sync::MutexGuard<'static, ()> {
+    let guard = ONE_AT_A_TIME.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    REFUSES.store(false, Ordering::SeqCst);
+    guard
+}
+
+fn millis(millis: u64) -> Target {
+    Target { millis, does: None }
+}
+
+#[test]
+fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let builder = Commanded::builder();
+    let (states, safety) = (builder.subscribe(system::StateMachine), builder.subscribe(system::SafetyState));
+    let mut simulation = builder.simulate()?;
+    assert_eq!((simulation.state(), simulation.safety()), ("disarmed", Safety::Disarmed));
+    let refused = simulation.command(commanded::command::go, millis(10)).expect_err("it is disarmed");
+    assert_eq!(refused.reason, RefusalReason::State);
+    let arming = simulation.command(commanded::command::arm, NoArguments)?;
+    simulation.run_until(at(10));
+    assert_eq!(arming.try_result(), Some(Ok(())));
+    let going = simulation.command(commanded::command::go, millis(50))?;
+    let turning = simulation.command(commanded::command::turn, millis(80))?;
+    simulation.run_until(at(1000));
+    assert_eq!(going.try_result(), Some(Ok(at(60))));
+    assert_eq!(turning.try_result(), Some(Ok(at(90))));
+    let states: Vec<_> = states.drain().map(|change| (change.from, change.to, change.command)).collect();
+    assert_eq!(
+        states,
+        [("disarmed", "idle", Some("arm")), ("idle", "executing", Some("go")), ("executing", "idle", Some("turn"))]
+    );
+    let safety: Vec<_> = safety.drain().map(|change| change.to).collect();
+    assert_eq!(safety, [Safety::Armed]);
+    Ok(())
+}
+
+#[test]
+fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let mut simulation = Commanded::builder().simulate()?;
+    simulation.arm();
+    let parking = Target { millis: 1, does: Some(commanded::state::parked) };
+    simulation.command(commanded::command::go, parking)?;
+    simulation.run_until(at(10));
+    assert_eq!(simulation.state(), "parked");
+    assert!(simulation.command(commanded::command::go, millis(1)).is_err(), "by default only when idle");
+    let lost = simulation.command(commanded::command::look, Target { millis: 1, does: Some("lost") })?;
+    simulation.run_until(at(20));
+    let error = lost.try_result().expect("it has ended").expect_err("there is no such state").to_string();
+    assert_eq!(error, "the command failed: it names the next state `lost`, which is not declared");
+    assert_eq!(simulation.state(), "parked");
+    Ok(())
+}
+
+#[test]
+fn a_command_fails_times_out_or_is_cancelled_and_each_is_told() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let builder = Commanded::builder();
+    let events = builder.subscribe(commanded::command::go);
+    let mut simulation = builder.simulate()?;
+    simulation.arm();
+    let mut outcome = |target, cancelled_at: Option<i64>| -> Result<_, Box<dyn std::error::Error>> {
+        let start = simulation.clock().now();
+        let execution = simulation.command(commanded::command::go, target)?;
+        if let Some(millis) = cancelled_at {
+            simulation.run_until(start + Duration::from_millis(millis as u64));
+            execution.cancel();
+        }
+        simulation.run_for(Duration::from_secs(2));
+        Ok(execution.try_result())
+    };
+    let failed = |message: &str| Some(Err(CommandError::Failed(message.to_owned())));
+    assert_eq!(outcome(Target { millis: 1, does: Some("fail") }, None)?, failed("no way there"));
+    assert_eq!(outcome(Target { millis: 1, does: Some("panic") }, None)?, failed("panicked: fell over"));
+    assert_eq!(outcome(millis(5000), None)?, Some(Err(CommandError::TimedOut)));
+    assert_eq!(outcome(millis(500), Some(100))?, Some(Err(CommandError::Cancelled)));
+    let ends: Vec<_> = events.drain().filter(|event| event.phase != CommandPhase::Started).collect();
+    // The timeout comes at its second, the cancellation at once.
+    assert_eq!(ends[2].monotonic_time, at(2000 + 2000 + 1000));
+    assert_eq!(ends[3].monotonic_time, at(6000 + 100));
+    let report = simulation.stop();
+    let go = report.commands.iter().find(|command| command.name == "go").expect("it is declared");
+    assert_eq!((go.started, go.failed, go.timed_out, go.cancelled, go.succeeded), (4, 2, 1, 1, 0));
+    Ok(())
+}
+
+#[test]
+fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let mut simulation = Commanded::builder().simulate()?;
+    simulation.arm();
+    let first = simulation.command(commanded::command::turn, millis(500))?;
+    let second = simulation.command(commanded::command::turn, millis(500))?;
+    let refusal = simulation.command(commanded::command::turn, millis(500)).expect_err("two are the limit");
+    assert_eq!(refusal.to_string(), "`turn` is refused: 2 of the category `motion` run already, and no more may");
+    let looking = simulation.command(commanded::command::look, millis(500))?;
+    simulation.run_until(at(100));
+    assert!(
+        simulation.command(commanded::command::stop, millis(10)).is_err(),
+        "looking is of its own category, the default one, which it does not cancel"
+    );
+    let halting = simulation.command(commanded::command::halt, millis(10))?;
+    simulation.run_until(at(200));
+    for cancelled in [first, second, looking] {
+        assert_eq!(cancelled.try_result(), Some(Err(CommandError::Cancelled)));
+    }
+    assert_eq!(halting.try_result(), Some(Ok(at(110))));
+    let turning = simulation.command(commanded::command::turn, millis(500))?;
+    let stopping = simulation.command(commanded::command::stop, millis(10))?;
+    simulation.run_until(at(300));
+    assert_eq!(turning.try_result(), Some(Err(CommandError::Cancelled)));
+    assert_eq!(stopping.try_result(), Some(Ok(at(210))));
+    Ok(())
+}
+
+#[test]
+fn an_actuator_moves_only_while_armed_and_is_made_safe() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let builder = Commanded::builder();
+    let mut simulation = builder.simulate()?;
+    let servo = commanded::actuator::base::pan::servo;
+    let error = simulation.actuate(servo, Number(1.0)).expect_err("it is disarmed").to_string();
+    assert_eq!(error, "the robot is not armed (disarmed)");
+    let seen = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
+    simulation.arm();
+    simulation.actuate(servo, Number(1.0))?;
+    assert!(simulation.actuate(servo, Number(f64::NAN)).is_err());
+    assert!(HAS_TORQUE.load(Ordering::SeqCst));
+    let message = seen.try_recv().expect("what it was told is published");
+    assert_eq!(message.downcast::<Number>().map(|number| number.0), Some(1.0));
+    assert!(seen.try_recv().is_none());
+    let going = simulation.command(commanded::command::go, millis(500))?;
+    simulation.run_until(at(10));
+    assert!(simulation.disarm());
+    simulation.run_until(at(20));
+    assert_eq!(going.try_result(), Some(Err(CommandError::Cancelled)));
+    assert!(!HAS_TORQUE.load(Ordering::SeqCst));
+    assert_eq!((simulation.state(), simulation.safety()), ("disarmed", Safety::Disarmed));
+    Ok(())
+}
+
+#[test]
+fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let builder = Commanded::builder();
+    let errors = builder.subscribe(system::SafetyErrors);
+    let mut simulation = builder.simulate()?;
+    simulation.arm();
+    REFUSES.store(true, Ordering::SeqCst);
+    let disarming = simulation.command(commanded::command::disarm, NoArguments)?;
+    simulation.run_until(at(10));
+    assert!(disarming.try_result().is_some());
+    assert_eq!((simulation.state(), simulation.safety()), ("disarmed", Safety::Error));
+    let error = errors.try_recv().expect("it is published");
+    assert_eq!(
+        (error.path, error.message.as_str()),
+        ("actuator/base/pan/servo", "disarming failed: the brake does not close")
+    );
+    assert!(!simulation.arm() && !simulation.disarm(), "neither leads out");
+    let refusal = simulation.command(commanded::command::arm, NoArguments).expect_err("it is not safe");
+    assert_eq!(refusal.reason, RefusalReason::Safety);
+    simulation.force_disarm();
+    assert_eq!(simulation.safety(), Safety::Disarmed);
+    REFUSES.store(false, Ordering::SeqCst);
+    assert!(simulation.arm());
+    Ok(())
+}
+
+#[test]
+fn an_actuator_that_fails_is_made_anew() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let mut simulation = Commanded::builder().simulate()?;
+    let servo = commanded::actuator::base::pan::servo;
+    let made = MADE.load(Ordering::SeqCst);
+    simulation.arm();
+    let error = simulation.actuate(servo, Number(-1.0)).expect_err("it stalls").to_string();
+    assert_eq!(error, "the actuator failed: stalled");
+    assert!(simulation.actuate(servo, Number(1.0)).is_err(), "it waits for its restart");
+    simulation.run_until(at(10));
+    simulation.actuate(servo, Number(1.0))?;
+    assert_eq!(MADE.load(Ordering::SeqCst), made + 1);
+    Ok(())
+}
+
+#[test]
+fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let builder = Commanded::builder();
+    let (follow, counts) = (
+        builder.subscribe(commanded::controller::follow),
+        builder.subscribe(commanded::bridge::dashboard),
+    );
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(150));
+    simulation.arm();
+    simulation.run_until(at(350));
+    assert_eq!(follow.drain().map(|number| number.0).collect::<Vec<_>>(), [0.0, 0.0, 1.0, 1.0]);
+    assert_eq!(counts.drain().map(|number| number.0).collect::<Vec<_>>(), [1.0, 10.0, 10.0, 10.0]);
+    let mut builder = Commanded::builder();
+    for (path, message) in [
+        ("sensor/base/pan/encodre", "nothing publishes at `sensor/base/pan/encodre`"),
+        ("state_machine", "`state_machine` publishes `StateTransition`, not `Number`"),
+    ] {
+        builder.options(commanded::bridge::dashboard).path = path.into();
+        let error = builder.simulate().expect_err("there is none").to_string();
+        assert_eq!(error, format!("bridge/dashboard cannot start: {message}"));
+        builder = Commanded::builder();
+    }
+    Ok(())
+}
+
+#[test]
+fn commands_run_in_real_time_too_and_end_with_the_robot() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let running = Commanded::builder().start()?;
+    running.command(commanded::command::arm, NoArguments)?.wait()?;
+    let start = running.clock().now();
+    let end = running.command(commanded::command::go, millis(20))?.wait()?;
+    assert!(end.nanos_since(start) >= 20_000_000);
+    let endless = running.command(commanded::command::turn, millis(1_000_000))?;
+    let report = running.stop();
+    assert_eq!(endless.wait(), Err(CommandError::Cancelled));
+    assert_eq!(report.safety, Safety::Disarmed);
+    Ok(())
+}
