@@ -26,7 +26,7 @@ pub(crate) fn draw(file: &Path, evaluations: &[Evaluation], axes: Axes) -> Resul
         Axes::Six => "inclination error",
         Axes::Nine => "total error",
     };
-    let panels: Vec<_> = evaluations.iter().filter_map(|evaluation| panel(evaluation)).collect();
+    let panels: Vec<_> = evaluations.iter().filter_map(|evaluation| panel(evaluation, evaluations)).collect();
     if panels.is_empty() {
         return Err(format!("{}: not plotted, for no recording has errors", file.display()));
     }
@@ -38,7 +38,7 @@ pub(crate) fn draw(file: &Path, evaluations: &[Evaluation], axes: Axes) -> Resul
     Picture { title, panels, panel_size: (1400, 260) }.write(file)
 }
 
-fn panel(evaluation: &Evaluation) -> Option<Panel> {
+fn panel(evaluation: &Evaluation, all: &[Evaluation]) -> Option<Panel> {
     let runs = evaluation.runs.as_ref().ok()?;
     let has_errors = runs.iter().any(|run| run.errors.iter().any(|(_, error)| error.is_some()));
     let line = |(index, run): (usize, &crate::Run)| {
@@ -46,5 +46,5 @@ fn panel(evaluation: &Evaluation) -> Option<Panel> {
         Line::peaks(run.filter, colour, 1, &run.errors)
     };
     let lines = runs.iter().enumerate().map(line).collect();
-    has_errors.then(|| Panel { name: name(&evaluation.file), lines })
+    has_errors.then(|| Panel { name: name(&evaluation.file, all), lines })
 }

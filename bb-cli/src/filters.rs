@@ -54,7 +54,7 @@ pub struct Filter {
     pub parameters: &'static [&'static str],
     #[cfg(test)]
     declared: fn() -> Vec<&'static str>,
-    make: fn(&[(&str, &str)]) -> Result<Box<dyn Running>, String>,
+    make: fn(&[(&str, &str)]) -> Made,
 }
 
 /// Gyroscope and accelerometer, or the magnetometer as well.
@@ -102,7 +102,7 @@ impl Chosen {
     }
 
     /// A filter that has seen no sample yet.
-    pub(crate) fn start(&self) -> Result<Box<dyn Running>, String> {
+    pub(crate) fn start(&self) -> Made {
         let values: Vec<_> = self.values.iter().map(|(name, value)| (&**name, &**value)).collect();
         (self.filter.make)(&values)
     }
@@ -138,12 +138,13 @@ impl<F: AttitudeFilter> Running for F {
     }
 }
 
+/// A filter, or which value it refuses.
+type Made = Result<Box<dyn Running>, String>;
+
+/// Sets a parameter of a name to what a text says.
 type Set<P> = fn(&mut P, &str, &str) -> Result<(), String>;
 
-fn make<F: AttitudeFilter + 'static>(
-    values: &[(&str, &str)],
-    set: Set<F::Params>,
-) -> Result<Box<dyn Running>, String> {
+fn make<F: AttitudeFilter + 'static>(values: &[(&str, &str)], set: Set<F::Params>) -> Made {
     let mut params = F::Params::default();
     for (name, value) in values {
         set(&mut params, name, value).map_err(|fault| format!("`{name}` is `{value}`, {fault}"))?;

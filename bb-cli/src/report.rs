@@ -51,7 +51,15 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
         let [total, heading, inclination] = angles(run.score.rms(), axes);
         let cost = format!("{:.0}", run.ns_per_update);
         let count = run.score.count().to_string();
-        lines.push([name(&evaluation.file), run.filter.into(), total, heading, inclination, count, cost]);
+        lines.push([
+            name(&evaluation.file, evaluations),
+            run.filter.into(),
+            total,
+            heading,
+            inclination,
+            count,
+            cost,
+        ]);
     }
     if lines.is_empty() {
         return String::new();
@@ -106,9 +114,11 @@ fn runs(evaluations: &[Evaluation]) -> impl Iterator<Item = (&Evaluation, &Run)>
     evaluations.iter().flat_map(|evaluation| evaluation.runs.iter().flatten().map(move |run| (evaluation, run)))
 }
 
-/// A recording in a table or a picture.
-pub(crate) fn name(file: &Path) -> String {
-    file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
+/// A recording in a table or a picture: without folder and ending, where that is only one.
+pub(crate) fn name(file: &Path, evaluations: &[Evaluation]) -> String {
+    let alike = evaluations.iter().filter(|other| other.file.file_stem() == file.file_stem()).count();
+    let short = file.file_stem().filter(|_| alike == 1);
+    short.unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// With six axes the heading starts anywhere, so only the inclination is a result.
