@@ -102,23 +102,28 @@ impl Chosen {
     }
 
     /// A filter that has seen no sample yet.
-    pub(crate) fn start(&self) -> Made {
+    ///
+    /// # Errors
+    /// A value that is refused; there is none after [`all`](Self::all).
+    pub fn start(&self) -> Result<Box<dyn Running>, String> {
         let values: Vec<_> = self.values.iter().map(|(name, value)| (&**name, &**value)).collect();
         (self.filter.make)(&values)
     }
 }
 
 /// A filter that runs, whichever it is.
-pub(crate) trait Running {
+pub trait Running {
     /// Takes samples, and gives the orientation after each: none where there is none yet, or the sample was refused.
     fn run(&mut self, samples: &[ImuSample], estimates: &mut Vec<Option<UnitQuaternion<f64>>>) -> Refused;
 }
 
 /// The samples that a filter refused.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Refused {
-    pub(crate) count: u64,
-    pub(crate) first: Option<SampleError>,
+pub struct Refused {
+    /// How many.
+    pub count: u64,
+    /// Why the first was.
+    pub first: Option<SampleError>,
 }
 
 impl<F: AttitudeFilter> Running for F {

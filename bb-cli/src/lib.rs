@@ -2,7 +2,8 @@
 //!
 //! `bb eval attitude FILES…` plays each bag through the filters and prints their errors against the truth; the guide is
 //! `docs/evaluate.md`. What it is made of is a library, for others that score: [`Score`] and [`Averages`] are the one
-//! definition of the figures, [`evaluate`](fn@evaluate) gives them for one recording, [`Picture`] draws them.
+//! definition of the figures, [`evaluate`](fn@evaluate) gives them for one recording, [`Picture`] draws
+//! lines over time.
 
 mod arguments;
 mod averages;
@@ -18,10 +19,10 @@ mod score;
 
 pub use averages::Averages;
 pub use evaluate::{Evaluation, Evaluator, Run, evaluate};
-pub use filters::{Axes, Chosen, FILTERS, Filter, Setting};
+pub use filters::{Axes, Chosen, FILTERS, Filter, Refused, Running, Setting};
 pub use plot::{Line, Panel, Picture};
 pub use progress::Progress;
-pub use recording::{MovingTopic, Topics};
+pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
 
 use arguments::Attitude;

@@ -33,8 +33,9 @@ pub enum MovingTopic {
 
 /// A recording, opened up to its first sample.
 #[derive(Debug)]
-pub(crate) struct Recording {
-    pub(crate) truth: Truth,
+pub struct Recording {
+    /// What is known of the true orientation; nothing, if nothing is.
+    pub truth: Truth,
     /// What to say of the truth, where it gives no score.
     pub(crate) note: Option<String>,
     samples: MargSamples,
@@ -47,12 +48,10 @@ pub(crate) struct Recording {
 
 impl Recording {
     /// Opens a recording. With `before_motion_s` it starts so many seconds before the first motion.
-    pub(crate) fn open(
-        file: &Path,
-        topics: &Topics,
-        axes: Axes,
-        before_motion_s: Option<f64>,
-    ) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// It is no recording, or has not the topics, or not one of each; in words.
+    pub fn open(file: &Path, topics: &Topics, axes: Axes, before_motion_s: Option<f64>) -> Result<Self, String> {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
         let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
         let magnetometer = axes == Axes::Nine;
@@ -93,9 +92,12 @@ impl Recording {
         Ok(Self { truth, note, samples, magnetometer, start_ns, expected: imu.messages.unwrap_or(0) })
     }
 
-    /// The next samples, as many as there are up to `most`. A recorder that was stopped is an end like any other, but
-    /// for what is said of it.
-    pub(crate) fn read(&mut self, samples: &mut Vec<ImuSample>, most: usize) -> Result<End, String> {
+    /// Adds the next samples, as many as there are, until there are `most`. A recorder that was stopped is an end like
+    /// any other, but for what is said of it.
+    ///
+    /// # Errors
+    /// The recording is damaged; in words.
+    pub fn read(&mut self, samples: &mut Vec<ImuSample>, most: usize) -> Result<End, String> {
         while samples.len() < most {
             let (time, marg) = match self.samples.next() {
                 None => return Ok(End::Whole),
@@ -119,7 +121,7 @@ impl Recording {
 
 /// How far reading has come.
 #[derive(Debug)]
-pub(crate) enum End {
+pub enum End {
     /// There may be more.
     NotYet,
     /// All is read.
