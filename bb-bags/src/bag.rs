@@ -80,6 +80,28 @@ impl Bag {
         Err(BagError::new(&self.path, kind))
     }
 
+    /// The topic of this name, if one is given, which must then be of the type; else the only one of the type.
+    ///
+    /// # Errors
+    ///
+    /// If there is none of the name, or it is of another type, or the type does not choose one.
+    pub fn choose(&self, schema: &str, name: Option<&str>) -> Result<&Topic, BagError> {
+        let Some(name) = name else { return self.topic_of(schema) };
+        let wanted = ros::full_name(schema);
+        let mut named = self.topics.iter().filter(|topic| *topic.name == *name).peekable();
+        let kind = match named.peek() {
+            None => BagErrorKind::NoTopic { topic: name.to_owned(), topics: self.topics_in_words() },
+            Some(first) => {
+                let schema = first.schema.to_string();
+                match named.find(|topic| *topic.schema == *wanted) {
+                    Some(topic) => return Ok(topic),
+                    None => BagErrorKind::OtherType { topic: name.to_owned(), schema, wanted },
+                }
+            }
+        };
+        Err(BagError::new(&self.path, kind))
+    }
+
     /// The messages of the named topics, read as they are asked for and in the order of the file.
     ///
     /// Recorders write messages as they arrive, so the order of the file is that of the log times but for small

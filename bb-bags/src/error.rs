@@ -133,6 +133,16 @@ pub enum BagErrorKind {
         /// The names of the topics with that type.
         candidates: Vec<String>,
     },
+    /// The topic that was named has another type.
+    #[error("the messages of {topic} are {schema}, and {wanted} is needed here; name a topic of that type")]
+    OtherType {
+        /// The topic.
+        topic: String,
+        /// Its type.
+        schema: String,
+        /// The type that is needed.
+        wanted: String,
+    },
     /// The messages of the topic are not CDR.
     #[error(
         "the messages of {topic} are encoded as `{encoding}`, and only `cdr` is read; record with ROS 2 or \

@@ -1,7 +1,6 @@
 //! A sensor that plays the IMU and the magnetometer of a ROS 2 bag.
 
-use crate::{Bag, Messages, RosMessage, ros};
-use bb_core::nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use crate::{Bag, MargSamples};
 use bb_core::prelude::*;
 use std::path::PathBuf;
 
@@ -11,7 +10,6 @@ pub const IMU: &str = "sensor_msgs/msg/Imu";
 pub const MAGNETIC_FIELD: &str = "sensor_msgs/msg/MagneticField";
 
 /// Options of [`BagImu`].
-
 #[derive(Clone, Debug, Options)]
 pub struct BagImuOptions {
     /// The bag, an MCAP file. Must be given, here or before the start.
@@ -30,9 +28,8 @@ pub struct BagImuOptions {
 
 /// Plays a recorded IMU, and its magnetometer, at the stamps of their headers.
 ///
-/// A reading of the magnetometer goes with the IMU's sample before which, or with which, it was recorded: bags hold
-/// messages of one instant in any order, so a sample waits for the next one. A sample out of order is published with
-/// its own stamp, and refused by the estimators that take it.
+/// Which reading of the magnetometer goes with which sample, [`MargSamples`] says. A sample out of order is published
+/// with its own stamp, and refused by the estimators that take it.
 ///
 /// ```no_run
 /// use bb_bags::BagImu;
@@ -61,11 +58,7 @@ pub struct BagImuOptions {
 /// }
 /// ```
 #[derive(Debug)]
-pub struct BagImu {
-    messages: Messages,
-    /// The sample that waits until it is known which reading of the magnetometer belongs to it.
-    pending: Option<(MonotonicTime, Marg)>,
-}
+pub struct BagImu(MargSamples);
 
 impl Sensor for BagImu {
     type Options = BagImuOptions;
@@ -73,85 +66,22 @@ impl Sensor for BagImu {
 
     fn init(options: BagImuOptions, _: &SensorContext) -> Result<Self, Fault> {
         let bag = Bag::open(&options.file)?;
-        let topic = |name: String, schema: &str| match name.as_str() {
-            "" => Ok(bag.topic_of(schema)?.name.to_string()),
-            _ => match bag.topics().iter().find(|topic| *topic.name == *name) {
-                Some(topic) if *topic.schema != *schema => {
-                    Err(Fault::new(format!("{name} is {}, and {schema} is needed here", topic.schema)))
-                }
-                // One that is not there is reported where it is read.
-                _ => Ok(name),
-            },
+        let named = |name: &str| Some(name.to_owned()).filter(|name| !name.is_empty());
+        let imu = bag.choose(IMU, named(&options.imu_topic).as_deref())?;
+        let magnetometer = match options.magnetometer {
+            true => Some(&*bag.choose(MAGNETIC_FIELD, named(&options.magnetometer_topic).as_deref())?.name),
+            false => None,
         };
-        let mut topics = vec![topic(options.imu_topic, IMU)?];
-        if options.magnetometer {
-            topics.push(topic(options.magnetometer_topic, MAGNETIC_FIELD)?);
-        }
-        let mut bag = Self { messages: bag.messages(&topics)?, pending: None };
-        // The first sample, to know when the recording starts.
-        let _first = bag.read(MonotonicTime::ZERO)?;
-        Ok(bag)
+        Ok(Self(MargSamples::read(&bag, &imu.name, magnetometer)?))
     }
 
     fn starts_at(&self) -> Option<MonotonicTime> {
-        self.pending.as_ref().map(|(time, _)| *time)
+        self.0.next_time()
     }
 
-    /// Gives the sample that waits once the next one is there, with the readings of the magnetometer that came up to
-    /// then: bags write messages of one instant in any order.
     fn read(&mut self, _: MonotonicTime) -> Result<Reading<Marg>, Fault> {
-        for message in self.messages.by_ref() {
-            match message?.payload {
-                RosMessage::Imu(imu) => {
-                    let time = time_of(imu.header.stamp);
-                    let next = (time, Marg { imu: imu_of(&imu), magnetic_field: None });
-                    return Ok(match self.pending.replace(next) {
-                        Some((measured, sample)) => Reading::at(measured, sample).next_at(time),
-                        None => Reading::nothing().next_at(time),
-                    });
-                }
-                RosMessage::MagneticField(field) => {
-                    if let Some((_, sample)) = &mut self.pending {
-                        sample.magnetic_field = Some(MagneticField {
-                            magnetic_field: vector_of(&field.magnetic_field),
-                            covariance: covariance_of(&field.magnetic_field_covariance),
-                        });
-                    }
-                }
-                _ => {}
-            }
-        }
-        Ok(match self.pending.take() {
-            Some((measured, sample)) => Reading::at(measured, sample).next_at(measured),
-            None => Reading::finished(),
-        })
+        let Some(sample) = self.0.next() else { return Ok(Reading::finished()) };
+        let (measured, sample) = sample?;
+        Ok(Reading::at(measured, sample).next_at(self.0.next_time().unwrap_or(measured)))
     }
-}
-
-fn time_of(stamp: ros::Stamp) -> MonotonicTime {
-    MonotonicTime::from_nanos(stamp.nanoseconds())
-}
-
-fn vector_of(vector: &ros::Vector3) -> Vector3<f64> {
-    Vector3::new(vector.x, vector.y, vector.z)
-}
-
-/// ROS marks what is unknown: covariances by zeros, an orientation by -1 as its covariance's first element.
-fn imu_of(imu: &ros::Imu) -> Imu {
-    let has_orientation = imu.orientation_covariance[0] >= 0.0;
-    let ros::Quaternion { x, y, z, w } = imu.orientation;
-    let quaternion = Quaternion::new(w, x, y, z);
-    let is_rotation = has_orientation && (quaternion.norm() - 1.0).abs() < 0.1;
-    Imu {
-        orientation: is_rotation.then(|| UnitQuaternion::new_normalize(quaternion)),
-        orientation_covariance: covariance_of(&imu.orientation_covariance).filter(|_| is_rotation),
-        angular_velocity_covariance: covariance_of(&imu.angular_velocity_covariance),
-        linear_acceleration_covariance: covariance_of(&imu.linear_acceleration_covariance),
-        ..Imu::new(vector_of(&imu.angular_velocity), vector_of(&imu.linear_acceleration))
-    }
-}
-
-fn covariance_of(values: &[f64; 9]) -> Option<Matrix3<f64>> {
-    let known = values[0] >= 0.0 && values.iter().all(|value| value.is_finite()) && *values != [0.0; 9];
-    known.then(|| Matrix3::from_row_slice(values))
 }

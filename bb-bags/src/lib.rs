@@ -20,8 +20,8 @@
 //! }
 //! ```
 //!
-//! [`BagImu`] plays a recorded IMU as the sensor of a robot, and [`Truth`] is what a recording knows of the true
-//! orientation.
+//! [`BagImu`] plays a recorded IMU as the sensor of a robot, [`MargSamples`] gives its samples without one, and
+//! [`Truth`] is what a recording knows of the true orientation.
 //!
 //! # What is read
 //!
@@ -44,6 +44,7 @@ mod imu;
 mod messages;
 mod records;
 pub mod ros;
+mod samples;
 mod summary;
 mod truth;
 
@@ -52,4 +53,5 @@ pub use error::{BagError, BagErrorKind};
 pub use imu::{BagImu, BagImuOptions, IMU, MAGNETIC_FIELD};
 pub use messages::{Message, Messages};
 pub use ros::RosMessage;
-pub use truth::Truth;
+pub use samples::MargSamples;
+pub use truth::{MOVING, ODOMETRY, POSE, Truth};

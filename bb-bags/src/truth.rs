@@ -1,13 +1,20 @@
 //! The truth of a recording: optical orientation, and when the body moves.
 
-use crate::{Bag, BagError, RosMessage};
+use crate::{Bag, BagError, Messages, RosMessage, ros};
 use bb_core::nalgebra::{Quaternion, UnitQuaternion};
+
+/// The type of a topic of poses.
+pub const POSE: &str = "geometry_msgs/msg/PoseStamped";
+/// The other type of a topic of poses, with velocities.
+pub const ODOMETRY: &str = "nav_msgs/msg/Odometry";
+/// The type of a topic that says whether the body moves.
+pub const MOVING: &str = "std_msgs/msg/Bool";
 
 /// Beyond it nothing is said about the time between two poses.
 const LONGEST_GAP_NS: i64 = 100_000_000;
 
-/// What a recording knows of the true orientation: poses (`geometry_msgs/PoseStamped`), and when the body moves
-/// (`std_msgs/Bool`, on change).
+/// What a recording knows of the true orientation: poses (`geometry_msgs/PoseStamped`, or `nav_msgs/Odometry` where it
+/// is named), and when the body moves (`std_msgs/Bool`, on change).
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
     /// By time; none where the markers were lost.
@@ -22,33 +29,47 @@ impl Truth {
     /// # Errors
     /// The bag is broken; says where.
     pub fn read(bag: &Bag) -> Result<Self, BagError> {
-        let mut truth = Self { poses: Vec::new(), moving: Vec::new() };
-        let wanted = ["geometry_msgs/msg/PoseStamped", "std_msgs/msg/Bool"];
-        let topics: Vec<_> = wanted.iter().filter_map(|schema| bag.topic_of(schema).ok()).collect();
-        if topics.is_empty() {
-            return Ok(truth);
-        }
+        let topics: Vec<_> = [POSE, MOVING].iter().filter_map(|schema| bag.topic_of(schema).ok()).collect();
         let topics: Vec<_> = topics.iter().map(|topic| &topic.name).collect();
-        for message in bag.messages(&topics)? {
+        let mut truth = Self::default();
+        truth.extend(bag.messages(&topics)?)?;
+        Ok(truth)
+    }
+
+    /// Takes in poses and when the body moves; other messages are none of its business.
+    ///
+    /// # Errors
+    /// The bag is broken; says where. What came before stays.
+    pub fn extend(&mut self, mut messages: Messages) -> Result<(), BagError> {
+        let end = messages.try_for_each(|message| {
             let message = message?;
-            match message.payload {
-                RosMessage::PoseStamped(pose) => {
-                    let q = pose.pose.orientation;
-                    let quaternion = Quaternion::new(q.w, q.x, q.y, q.z);
-                    let is_rotation = (quaternion.norm() - 1.0).abs() < 0.1;
-                    let rotation = is_rotation.then(|| UnitQuaternion::new_normalize(quaternion));
-                    truth.poses.push((pose.header.stamp.nanoseconds(), rotation));
-                }
+            match &message.payload {
+                RosMessage::PoseStamped(pose) => self.push(&pose.header, &pose.pose),
+                RosMessage::Odometry(odometry) => self.push(&odometry.header, &odometry.pose.pose),
                 // A Bool has no header: its time is the recorder's.
                 RosMessage::Bool(moving) => {
-                    truth.moving.push((i64::try_from(message.log_time_ns).unwrap_or(i64::MAX), moving.data));
+                    self.moving.push((i64::try_from(message.log_time_ns).unwrap_or(i64::MAX), moving.data));
                 }
                 _ => {}
             }
-        }
-        truth.poses.sort_by_key(|(time, _)| *time);
-        truth.moving.sort_by_key(|(time, _)| *time);
-        Ok(truth)
+            Ok(())
+        });
+        self.poses.sort_by_key(|(time, _)| *time);
+        self.moving.sort_by_key(|(time, _)| *time);
+        end
+    }
+
+    fn push(&mut self, header: &ros::Header, pose: &ros::Pose) {
+        let ros::Quaternion { x, y, z, w } = pose.orientation;
+        let quaternion = Quaternion::new(w, x, y, z);
+        let is_rotation = (quaternion.norm() - 1.0).abs() < 0.1;
+        let rotation = is_rotation.then(|| UnitQuaternion::new_normalize(quaternion));
+        self.poses.push((header.stamp.nanoseconds(), rotation));
+    }
+
+    /// When the body first moves, nanoseconds; none where the recording does not say, or it never does.
+    pub fn first_motion(&self) -> Option<i64> {
+        self.moving.iter().find(|(_, moving)| *moving).map(|(time, _)| *time)
     }
 
     /// Whether any orientation is known.

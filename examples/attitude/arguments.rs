@@ -26,8 +26,8 @@ pub(crate) struct Arguments {
     /// Madgwick's step, rad/s. [default: 0.12]
     #[arg(long, allow_negative_numbers = true)]
     beta: Option<f64>,
-    /// Plots truth and estimate over time into this file.
-    #[arg(long, value_name = "FILE.png")]
+    /// Plots truth and estimate over time into this file, an SVG or a PNG.
+    #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
     /// Prints one JSON object instead of the tables.
     #[arg(long)]

@@ -7,11 +7,11 @@ mod arguments;
 mod filter;
 mod outcome;
 mod plot;
-mod progress;
 mod recorded;
 mod simulated;
 
 use arguments::Arguments;
+use bb_cli::Picture;
 use clap::Parser;
 use std::error::Error;
 use std::io::Write;
@@ -39,7 +39,7 @@ fn say(text: &str) -> std::io::Result<()> {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let params = arguments.params()?;
     if let Some(file) = &arguments.plot {
-        plot::check(file)?;
+        Picture::check(file, "--plot")?;
     }
     let outcome = match &arguments.data {
         Some(file) => recorded::run(file, arguments, params)?,
@@ -51,7 +51,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         say(&outcome.to_string())?;
     }
     if let Some(file) = &arguments.plot {
-        plot::plot(file, &outcome)?;
+        plot::picture(&outcome)?.write(file)?;
         eprintln!("plotted {}", file.display());
     }
     Ok(())

@@ -1,9 +1,10 @@
 //! What a run gave: estimates beside the truth, and their errors.
 
 use crate::filter::Kind;
+use bb_cli::{Degrees, Score};
 use bb_core::Report;
 use bb_core::nalgebra::UnitQuaternion;
-use bb_estimators::attitude::{ErrorStatistics, OrientationError};
+use bb_estimators::attitude::OrientationError;
 use serde::Serialize;
 use std::fmt;
 
@@ -22,13 +23,14 @@ pub(crate) struct Outcome {
 pub(crate) struct Series {
     pub(crate) name: &'static str,
     pub(crate) points: Vec<Point>,
-    errors: ErrorStatistics,
+    score: Score,
 }
 
 pub(crate) struct Point {
     pub(crate) time_s: f64,
     pub(crate) estimate: UnitQuaternion<f64>,
     pub(crate) truth: Option<UnitQuaternion<f64>>,
+    pub(crate) error: Option<OrientationError>,
 }
 
 /// The object that `--json` prints, of the first series. Errors are null where there is no truth.
@@ -46,7 +48,7 @@ pub(crate) struct Summary {
 
 impl Series {
     pub(crate) fn new(name: &'static str) -> Self {
-        Self { name, points: Vec::new(), errors: ErrorStatistics::default() }
+        Self { name, points: Vec::new(), score: Score::default() }
     }
 
     /// Adds an estimate; its error counts where the body moves and the truth is known.
@@ -57,10 +59,8 @@ impl Series {
         truth: Option<UnitQuaternion<f64>>,
         moving: bool,
     ) {
-        if moving {
-            self.errors.add(truth.and_then(|truth| OrientationError::between(&estimate, &truth)));
-        }
-        self.points.push(Point { time_s, estimate, truth });
+        let error = self.score.add(&estimate, truth.as_ref(), moving);
+        self.points.push(Point { time_s, estimate, truth, error });
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -71,14 +71,14 @@ impl Series {
 impl Outcome {
     pub(crate) fn summary(&self) -> Summary {
         let first = self.series.first();
-        let rms = first.and_then(|series| series.errors.rms());
+        let rms = first.and_then(|series| series.score.rms());
         Summary {
             filter: self.filter.name(),
             samples: first.map_or(0, Series::len),
-            scored: first.map_or(0, |series| series.errors.count() as usize),
-            total_deg: rms.map(|rms| rms.total.to_degrees()),
-            heading_deg: rms.map(|rms| rms.heading.to_degrees()),
-            inclination_deg: rms.map(|rms| rms.inclination.to_degrees()),
+            scored: first.map_or(0, |series| series.score.count() as usize),
+            total_deg: rms.map(|rms| rms.total),
+            heading_deg: rms.map(|rms| rms.heading),
+            inclination_deg: rms.map(|rms| rms.inclination),
             seconds: self.seconds,
         }
     }
@@ -97,9 +97,8 @@ impl fmt::Display for Outcome {
         writeln!(f, "\nError against the truth, RMS in degrees:\n")?;
         writeln!(f, "{:16} {:>8} {:>8} {:>12} {:>9}", "orientation", "total", "heading", "inclination", "scored")?;
         for series in &self.series {
-            let Some(rms) = series.errors.rms() else { continue };
-            let [total, heading, inclination] = [rms.total, rms.heading, rms.inclination].map(f64::to_degrees);
-            let count = series.errors.count();
+            let Some(Degrees { total, heading, inclination }) = series.score.rms() else { continue };
+            let count = series.score.count();
             writeln!(f, "{:16} {total:8.2} {heading:8.2} {inclination:12.2} {count:9}", series.name)?;
         }
         if !self.has_heading {

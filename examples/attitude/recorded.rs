@@ -3,8 +3,8 @@
 use crate::arguments::Arguments;
 use crate::filter::{Chosen, ChosenParams};
 use crate::outcome::{Outcome, Series};
-use crate::progress::Progress;
 use bb_bags::{Bag, BagImu, IMU, MAGNETIC_FIELD, Truth};
+use bb_cli::Progress;
 use bb_core::prelude::*;
 use std::error::Error;
 use std::path::Path;

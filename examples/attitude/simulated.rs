@@ -2,7 +2,7 @@
 
 use crate::filter::{Chosen, ChosenParams};
 use crate::outcome::{Outcome, Series};
-use crate::progress::Progress;
+use bb_cli::Progress;
 use bb_core::prelude::*;
 use bb_estimators::simulation::Motion;
 use bb_estimators::{OrientationAverage, SimulatedImu};

@@ -2,8 +2,8 @@
 
 use crate::recordings::broad;
 use bb_bags::{BagImu, Truth};
+use bb_cli::{Averages, Degrees, Score};
 use bb_core::prelude::*;
-use bb_estimators::attitude::{ErrorStatistics, OrientationError};
 use bb_estimators::{Complementary, Madgwick, Mekf};
 use std::error::Error;
 use std::path::Path;
@@ -24,10 +24,10 @@ robot! {
     }
 }
 
-/// Total, heading and inclination in degrees of each.
-type Errors = [[f64; 3]; 6];
+/// Of each filter.
+type Errors = [Degrees; 6];
 
-fn errors(file: &Path) -> Result<Errors, Box<dyn Error>> {
+pub(crate) fn errors(file: &Path) -> Result<Errors, Box<dyn Error>> {
     let truth = Truth::read(&bb_bags::Bag::open(file)?)?;
     let mut builder = Recorded::builder();
     builder.options(recorded::sensor::body::imu).file = file.to_owned();
@@ -39,52 +39,41 @@ fn errors(file: &Path) -> Result<Errors, Box<dyn Error>> {
         builder.subscribe(recorded::sensor::body::imu::mekf),
         builder.subscribe(recorded::sensor::body::imu::mekf_six),
     ]
-    .map(|orientation| (orientation, ErrorStatistics::new()));
+    .map(|orientation| (orientation, Score::default()));
     let mut simulation = builder.simulate()?;
     while simulation.step() {
-        for (orientation, statistics) in &mut filters {
+        for (orientation, score) in &mut filters {
             for message in orientation.drain() {
-                let (truth, moving) = truth.at(message.monotonic_time.as_nanos());
-                if moving {
-                    let error = truth.and_then(|truth| OrientationError::between(&message.world_from_body, &truth));
-                    statistics.add(error);
-                }
+                score.add_at(&truth, message.monotonic_time.as_nanos(), &message.world_from_body);
             }
         }
     }
     simulation.stop().ok()?;
-    let rms = |statistics: ErrorStatistics| {
-        let rms = statistics.rms().ok_or("no sample moves and has truth")?;
-        Ok([rms.total, rms.heading, rms.inclination].map(f64::to_degrees))
-    };
-    let [a, b, c, d, e, f] = filters.map(|(_, statistics)| rms(statistics));
-    let all: Result<Errors, &str> = (|| Ok([a?, b?, c?, d?, e?, f?]))();
-    Ok(all?)
+    let [a, b, c, d, e, f] = filters.map(|(_, score)| score.rms().ok_or("no sample moves and has truth"));
+    Ok([a?, b?, c?, d?, e?, f?])
 }
 
 #[test]
 fn mean_errors_on_broad() -> Result<(), Box<dyn Error>> {
     let Some(files) = broad() else { return Ok(()) };
-    let mut sums: Errors = Default::default();
-    for file in &files {
-        let errors = errors(file)?;
-        assert!(errors.as_flattened().iter().all(|error| error.is_finite()), "{}: {errors:?}", file.display());
-        for (sum, error) in sums.as_flattened_mut().iter_mut().zip(errors.as_flattened()) {
-            *sum += error / files.len() as f64;
-        }
-    }
+    let errors = files.iter().map(|file| errors(file)).collect::<Result<Vec<_>, _>>()?;
+    let means: [[f64; 3]; 6] = std::array::from_fn(|filter| {
+        let averages = Averages::of(errors.iter().map(|errors| errors[filter]));
+        let mean = averages.map(|averages| averages.mean);
+        mean.map_or([f64::NAN; 3], |mean| [mean.total, mean.heading, mean.inclination])
+    });
     if files.len() != 10 {
         println!("{} trials instead of 10: no bounds are known for these", files.len());
         return Ok(());
     }
     // Measured, degrees; six axes have no heading.
     let known = [
-        ("Madgwick, nine axes", sums[0], [5.252, 4.194, 3.005]),
-        ("Madgwick, six axes", sums[1], [f64::INFINITY, f64::INFINITY, 1.996]),
-        ("complementary, nine axes", sums[2], [3.701, 3.095, 1.801]),
-        ("complementary, six axes", sums[3], [f64::INFINITY, f64::INFINITY, 1.801]),
-        ("Kalman filter, nine axes", sums[4], [1.171, 0.968, 0.620]),
-        ("Kalman filter, six axes", sums[5], [f64::INFINITY, f64::INFINITY, 0.621]),
+        ("Madgwick, nine axes", means[0], [5.252, 4.194, 3.005]),
+        ("Madgwick, six axes", means[1], [f64::INFINITY, f64::INFINITY, 1.996]),
+        ("complementary, nine axes", means[2], [3.701, 3.095, 1.801]),
+        ("complementary, six axes", means[3], [f64::INFINITY, f64::INFINITY, 1.801]),
+        ("Kalman filter, nine axes", means[4], [1.171, 0.968, 0.620]),
+        ("Kalman filter, six axes", means[5], [f64::INFINITY, f64::INFINITY, 0.621]),
     ];
     for (name, measured, known) in known {
         println!("{name}: total {:.3}, heading {:.3}, inclination {:.3}", measured[0], measured[1], measured[2]);
@@ -93,6 +82,6 @@ fn mean_errors_on_broad() -> Result<(), Box<dyn Error>> {
         }
     }
     // The published figure of Madgwick with nine axes at this beta is 5.27.
-    assert!((sums[0][0] / 5.27 - 1.0).abs() < 0.05);
+    assert!((means[0][0] / 5.27 - 1.0).abs() < 0.05);
     Ok(())
 }

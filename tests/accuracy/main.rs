@@ -4,4 +4,5 @@
 //! The bounds fail if a filter gets worse by 2 %.
 
 mod attitude;
+mod command;
 mod recordings;

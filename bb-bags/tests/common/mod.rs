@@ -47,7 +47,10 @@ impl Maker {
 
     /// Writes the messages 0, 10, 20, … ms after 12 s.
     pub fn bytes(&mut self, channel_id: u16, payload: &[u8]) {
-        let log_time = 12_000_000_000 + 10_000_000 * self.messages;
+        self.bytes_at(channel_id, 12_000_000_000 + 10_000_000 * self.messages, payload);
+    }
+
+    pub fn bytes_at(&mut self, channel_id: u16, log_time: u64, payload: &[u8]) {
         let sequence = self.messages as u32;
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         self.writer.write_to_known_channel(&header, payload).expect("message");

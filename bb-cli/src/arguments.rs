@@ -1,0 +1,176 @@
+//! The command line.
+
+use crate::evaluate::Evaluator;
+use crate::filters::{Axes, Chosen, FILTERS, Filter, Setting};
+use crate::plot::Picture;
+use crate::recording::{MovingTopic, Topics};
+use crate::{files, filters};
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+/// State estimation for robots that are declared.
+#[derive(Debug, Parser)]
+#[command(name = "bb", version)]
+struct Bb {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Scores algorithms on recordings.
+    Eval {
+        #[command(subcommand)]
+        what: Eval,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+enum Eval {
+    /// Plays recordings through attitude filters and prints their errors against the truth.
+    #[command(after_help = EXAMPLES)]
+    Attitude(AttitudeArguments),
+}
+
+const EXAMPLES: &str =
+    "Exit code: 0; 1 if a recording could not be evaluated, or not to its end; 2 for a wrong use.
+
+Examples:
+  bb eval attitude walk.mcap
+  bb eval attitude recordings/ --filter mekf,madgwick --axes six --plot errors.svg
+  bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json";
+
+#[derive(Debug, Args)]
+struct AttitudeArguments {
+    /// ROS 2 bags in MCAP, or folders of them.
+    #[arg(value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// The filters, or `all`.
+    #[arg(long = "filter", value_name = "NAME", num_args = 1.., value_delimiter = ',', default_value = "all",
+          long_help = filters_in_words())]
+    filters: Vec<String>,
+    /// Gyroscope and accelerometer alone, or the magnetometer as well. With six axes only the inclination counts.
+    #[arg(long, value_enum, default_value_t = Axes::Nine)]
+    axes: Axes,
+    /// Sets a parameter, in SI, of all chosen filters that have it; FILTER.NAME=VALUE sets it of one.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    settings: Vec<Setting>,
+    /// Starts the filters so many seconds before the first motion, instead of at the first sample.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    start_before_motion: Option<f64>,
+    /// The topic of the IMU, where several fit (sensor_msgs/Imu).
+    #[arg(long, value_name = "TOPIC")]
+    imu_topic: Option<String>,
+    /// The topic of the magnetometer, where several fit (sensor_msgs/MagneticField).
+    #[arg(long, value_name = "TOPIC")]
+    mag_topic: Option<String>,
+    /// The topic of the true orientation, where several fit (geometry_msgs/PoseStamped); nav_msgs/Odometry by name.
+    #[arg(long, value_name = "TOPIC")]
+    truth_topic: Option<String>,
+    /// The topic that says when the body moves, where several fit (std_msgs/Bool); `none` scores all of it.
+    #[arg(long, value_name = "TOPIC")]
+    moving_topic: Option<String>,
+    /// Prints an array of objects instead of the table.
+    #[arg(long)]
+    json: bool,
+    /// Plots the errors over time into this file, an SVG or a PNG.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+}
+
+/// What to do.
+#[derive(Debug)]
+pub(crate) struct Attitude {
+    pub(crate) paths: Vec<PathBuf>,
+    pub(crate) evaluator: Evaluator,
+    pub(crate) json: bool,
+    pub(crate) plot: Option<PathBuf>,
+}
+
+/// Reads the command line. An error is what to print, and has the exit code: help, which was asked for, has 0.
+pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Attitude, clap::Error> {
+    let Bb { command: Command::Eval { what: Eval::Attitude(arguments) } } = Bb::try_parse_from(arguments)?;
+    arguments.check().map_err(|(kind, fault)| {
+        let mut bb = Bb::command();
+        bb.build();
+        let attitude = bb.find_subcommand_mut("eval").and_then(|eval| eval.find_subcommand_mut("attitude"));
+        match attitude {
+            Some(attitude) => attitude.error(kind, fault),
+            None => bb.error(kind, fault),
+        }
+    })
+}
+
+impl AttitudeArguments {
+    fn check(mut self) -> Result<Attitude, (ErrorKind, String)> {
+        let invalid = |fault: String| (ErrorKind::ValueValidation, fault);
+        let filters = self.filters().map_err(invalid)?;
+        if self.files.is_empty() {
+            let fault = "no recording is named; name bags (.mcap) or folders of them";
+            return Err((ErrorKind::MissingRequiredArgument, fault.into()));
+        }
+        if let Some(seconds) = self.start_before_motion
+            && !(0.0..=1e6).contains(&seconds)
+        {
+            return Err(invalid(format!("--start-before-motion is {seconds}, but must be in 0..=1000000 s")));
+        }
+        if let Some(plot) = &self.plot {
+            Picture::check(plot, "--plot").map_err(invalid)?;
+        }
+        let evaluator = Evaluator {
+            filters: Chosen::all(&filters, self.axes, &self.settings).map_err(invalid)?,
+            axes: self.axes,
+            topics: Topics {
+                imu: self.imu_topic,
+                magnetometer: self.mag_topic,
+                truth: self.truth_topic,
+                moving: match self.moving_topic {
+                    None => MovingTopic::ByType,
+                    Some(none) if none == "none" => MovingTopic::None,
+                    Some(name) => MovingTopic::Named(name),
+                },
+            },
+            before_motion_s: self.start_before_motion,
+            keep_errors: self.plot.is_some(),
+        };
+        Ok(Attitude { paths: self.files, evaluator, json: self.json, plot: self.plot })
+    }
+
+    /// The filters that are named, in the order of the table. What follows `--filter` and is a path is a recording.
+    fn filters(&mut self) -> Result<Vec<&'static Filter>, String> {
+        let is_recording = |name: &str| {
+            let path = Path::new(name);
+            path.extension().is_some_and(|end| end == files::EXTENSION) || path.exists()
+        };
+        let known: Vec<_> = FILTERS.iter().map(|filter| filter.name).chain(["all"]).collect();
+        let mut named = Vec::new();
+        for name in std::mem::take(&mut self.filters) {
+            if known.contains(&&*name) {
+                named.push(name);
+            } else if is_recording(&name) {
+                self.files.push(name.into());
+            } else {
+                return Err(format!("no filter `{name}`; {}", filters::near(&name, &known)));
+            }
+        }
+        let all = named.iter().any(|name| name == "all");
+        let is_chosen = |filter: &&Filter| match all {
+            // Those that have no ninth axis are not asked to.
+            true => filter.takes(self.axes),
+            false => named.iter().any(|name| name == filter.name),
+        };
+        Ok(FILTERS.iter().filter(is_chosen).collect())
+    }
+}
+
+fn filters_in_words() -> String {
+    let mut text =
+        String::from("The filters, or `all`: several with commas. Those there are, with their parameters:\n");
+    for filter in FILTERS {
+        let parameters: Vec<_> = filter.parameters.iter().copied().filter(|name| *name != "magnetometer").collect();
+        text += &format!("\n{}: {}", filter.name, parameters.join(", "));
+    }
+    text
+}

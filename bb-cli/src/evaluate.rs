@@ -1,0 +1,205 @@
+//! Plays recordings through filters.
+
+use crate::filters::{Axes, Chosen, Refused, Running};
+use crate::progress::Progress;
+use crate::recording::{End, Recording, Topics};
+use crate::score::Score;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Samples that are read, then played: enough that the clock costs nothing, few enough to stay in the cache.
+const BLOCK: usize = 1024;
+
+/// The length of the progress bar for one recording.
+const BAR: u64 = 1000;
+
+/// How recordings are evaluated.
+#[derive(Clone, Debug)]
+pub struct Evaluator {
+    /// The filters; all take the axes, see [`Chosen::all`].
+    pub filters: Vec<Chosen>,
+    /// Whether the magnetometer is used.
+    pub axes: Axes,
+    /// The topics to take.
+    pub topics: Topics,
+    /// Starts the filters so many seconds before the first motion, instead of at the first sample.
+    pub before_motion_s: Option<f64>,
+    /// Whether to keep the errors over time.
+    pub keep_errors: bool,
+}
+
+/// What one recording gave.
+#[derive(Debug)]
+pub struct Evaluation {
+    /// The recording.
+    pub file: PathBuf,
+    /// One run a filter, in the order of the filters; or why there is none.
+    pub runs: Result<Vec<Run>, String>,
+    /// What broke the recording off, if it did; the runs are of what came before.
+    pub broken: Option<String>,
+    /// What to know about the runs.
+    pub notes: Vec<String>,
+}
+
+/// One filter on one recording.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The filter's name.
+    pub filter: &'static str,
+    /// Its errors.
+    pub score: Score,
+    /// How long it took for a sample, on average, with reading its orientation; ns.
+    pub ns_per_update: f64,
+    /// Error over time: seconds since the first sample, degrees; none where the truth is unknown. Total with nine axes,
+    /// else inclination.
+    pub errors: Vec<(f64, Option<f64>)>,
+}
+
+/// Evaluates recordings on all cores, with a progress bar on the terminal; gives them in their order.
+pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &Evaluator) -> Vec<Evaluation> {
+    let progress = Progress::new("evaluating", BAR * files.len() as u64);
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::new());
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        for _ in 0..cores.min(files.len()) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some((file, found)) = files.get(index) else { break };
+                    let evaluation = match found {
+                        Ok(()) => evaluate(file, evaluator, &progress),
+                        Err(fault) => Evaluation::failed(file, fault.clone()),
+                    };
+                    // A thread that panicked leaves the list whole.
+                    done.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((index, evaluation));
+                }
+            });
+        }
+    });
+    progress.finish();
+    let mut done = done.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+    done.sort_by_key(|(index, _)| *index);
+    done.into_iter().map(|(_, evaluation)| evaluation).collect()
+}
+
+/// Plays one recording through the filters. Moves the progress by 1,000.
+pub fn evaluate(file: &Path, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
+    let mut shown = 0;
+    let mut show = |part: u64| {
+        progress.add(part.min(BAR).saturating_sub(shown));
+        shown = shown.max(part.min(BAR));
+    };
+    let evaluation = play(file, evaluator, &mut show).unwrap_or_else(|fault| Evaluation::failed(file, fault));
+    show(BAR);
+    evaluation
+}
+
+impl Evaluation {
+    fn failed(file: &Path, fault: String) -> Self {
+        Self { file: file.to_owned(), runs: Err(fault), broken: None, notes: Vec::new() }
+    }
+}
+
+fn play(file: &Path, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result<Evaluation, String> {
+    let mut recording = Recording::open(file, &evaluator.topics, evaluator.axes, evaluator.before_motion_s)?;
+    let mut players = evaluator.filters.iter().map(Player::new).collect::<Result<Vec<_>, _>>()?;
+    let mut samples = Vec::with_capacity(BLOCK);
+    let mut start_ns = None;
+    let mut played = 0_u64;
+    let broken = loop {
+        samples.clear();
+        let end = recording.read(&mut samples, BLOCK)?;
+        if let Some(first) = samples.first() {
+            let start_ns = *start_ns.get_or_insert(first.time_ns);
+            for player in &mut players {
+                player.play(&samples, &recording, start_ns, evaluator);
+            }
+        }
+        played += samples.len() as u64;
+        show(played * BAR / recording.expected.max(played).max(1));
+        match end {
+            End::NotYet => {}
+            End::Whole => break None,
+            End::Broken(fault) => break Some(fault),
+        }
+    };
+    if played == 0 {
+        return Err("no sample of the IMU is left to play".into());
+    }
+    let mut notes: Vec<_> = recording.note.iter().cloned().collect();
+    notes.extend(players.iter().filter_map(|player| player.refusals(played)));
+    if recording.note.is_none() && players.iter().all(|player| player.score.count() == 0) {
+        notes.push(
+            "no errors: no sample of the IMU has truth within 0.05 s while the body moves; are both stamped by \
+             one clock?"
+                .into(),
+        );
+    }
+    let runs = Ok(players.into_iter().map(|player| player.finish(played)).collect());
+    Ok(Evaluation { file: file.to_owned(), runs, broken, notes })
+}
+
+/// A filter under way.
+struct Player {
+    name: &'static str,
+    filter: Box<dyn Running>,
+    score: Score,
+    refused: Refused,
+    time: Duration,
+    estimates: Vec<Option<bb_core::nalgebra::UnitQuaternion<f64>>>,
+    errors: Vec<(f64, Option<f64>)>,
+}
+
+impl Player {
+    fn new(chosen: &Chosen) -> Result<Self, String> {
+        Ok(Self {
+            name: chosen.name(),
+            filter: chosen.start()?,
+            score: Score::default(),
+            refused: Refused::default(),
+            time: Duration::ZERO,
+            estimates: Vec::with_capacity(BLOCK),
+            errors: Vec::new(),
+        })
+    }
+
+    fn play(
+        &mut self,
+        samples: &[bb_estimators::attitude::ImuSample],
+        recording: &Recording,
+        start_ns: i64,
+        evaluator: &Evaluator,
+    ) {
+        self.estimates.clear();
+        let started = Instant::now();
+        let refused = self.filter.run(samples, &mut self.estimates);
+        self.time += started.elapsed();
+        self.refused.count += refused.count;
+        self.refused.first = self.refused.first.or(refused.first);
+        for (sample, estimate) in samples.iter().zip(&self.estimates) {
+            let Some(estimate) = estimate else { continue };
+            let error = self.score.add_at(&recording.truth, sample.time_ns, estimate);
+            if evaluator.keep_errors {
+                let angle = error.map(|error| match evaluator.axes {
+                    Axes::Six => error.inclination.to_degrees(),
+                    Axes::Nine => error.total.to_degrees(),
+                });
+                self.errors.push((sample.time_ns.saturating_sub(start_ns) as f64 * 1e-9, angle));
+            }
+        }
+    }
+
+    fn refusals(&self, played: u64) -> Option<String> {
+        let Refused { count, first } = self.refused;
+        first.map(|first| format!("{} refused {count} of {played} samples: {first}", self.name))
+    }
+
+    fn finish(self, played: u64) -> Run {
+        let ns_per_update = self.time.as_secs_f64() * 1e9 / played as f64;
+        Run { filter: self.name, score: self.score, ns_per_update, errors: self.errors }
+    }
+}

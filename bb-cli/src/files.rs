@@ -1,0 +1,45 @@
+//! From the paths on the command line to the recordings in them.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What the files on the command line are called at their end.
+pub(crate) const EXTENSION: &str = "mcap";
+
+/// The recordings in the order of the arguments, those of a folder by name; a path that leads to none carries the
+/// reason.
+pub(crate) fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)> {
+    let mut recordings = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            recordings.push((path.clone(), Ok(())));
+            continue;
+        }
+        let mut found = Vec::new();
+        match collect(path, &mut found) {
+            Err(error) => recordings.push((path.clone(), Err(format!("the folder cannot be read: {error}")))),
+            Ok(()) if found.is_empty() => {
+                let fault = "the folder holds no file that ends in .mcap; name the recordings or their folder";
+                recordings.push((path.clone(), Err(fault.into())));
+            }
+            Ok(()) => recordings.extend(found.into_iter().map(|file| (file, Ok(())))),
+        }
+    }
+    recordings
+}
+
+/// Folders in it as well, for a ROS 2 recording is one. Links to folders are not followed, as they may lead back.
+fn collect(folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
+    let mut entries: Vec<_> = fs::read_dir(folder)?.collect::<Result<_, _>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let path = entry.path();
+        if entry.file_type()?.is_dir() {
+            collect(&path, found)?;
+        } else if path.extension().is_some_and(|end| end == EXTENSION) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}

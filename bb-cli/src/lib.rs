@@ -1,0 +1,79 @@
+//! The command `bb`: attitude filters, scored on recordings.
+//!
+//! `bb eval attitude FILES…` plays each bag through the filters and prints their errors against the truth; the guide is
+//! `docs/evaluate.md`. What it is made of is a library, for others that score: [`Score`] and [`Averages`] are the one
+//! definition of the figures, [`evaluate`](fn@evaluate) gives them for one recording, [`Picture`] draws
+//! lines over time.
+
+mod arguments;
+mod averages;
+mod error_plot;
+mod evaluate;
+mod files;
+mod filters;
+mod plot;
+mod progress;
+mod recording;
+mod report;
+mod score;
+
+pub use averages::Averages;
+pub use evaluate::{Evaluation, Evaluator, Run, evaluate};
+pub use filters::{Axes, Chosen, FILTERS, Filter, Refused, Running, Setting};
+pub use plot::{Line, Panel, Picture};
+pub use progress::Progress;
+pub use recording::{End, MovingTopic, Recording, Topics};
+pub use score::{Degrees, Score};
+
+use arguments::Attitude;
+use std::ffi::OsString;
+use std::io::{ErrorKind, Write};
+use std::process::ExitCode;
+
+/// Runs the command with these arguments, its own name first. The exit code is 2 for a wrong use and 1 for a
+/// recording that could not be evaluated, or not to its end.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let attitude = match arguments::parse(arguments) {
+        Ok(attitude) => attitude,
+        Err(error) => {
+            // A terminal that is gone is told nothing.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    match eval_attitude(&attitude) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Whether every recording could be evaluated to its end.
+fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
+    let Attitude { paths, evaluator, json, plot } = attitude;
+    let files = files::recordings(paths);
+    let evaluations = evaluate::evaluate_all(&files, evaluator);
+    let text = if *json {
+        report::json(&evaluations, evaluator.axes)?
+    } else {
+        report::table(&evaluations, evaluator.axes)
+    };
+    say(&text)?;
+    let is_whole = report::complain(&evaluations);
+    if let Some(plot) = plot {
+        error_plot::draw(plot, &evaluations, evaluator.axes)?;
+        eprintln!("plotted {}", plot.display());
+    }
+    Ok(is_whole)
+}
+
+/// Prints; a reader that has read enough (`| head`) is no error.
+fn say(text: &str) -> Result<(), String> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(format!("cannot print: {error}")),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,190 @@
+//! A recording, opened: its samples, its truth, and what is to be said of it.
+
+use bb_bags::{Bag, BagError, BagErrorKind, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY, POSE, Truth};
+use bb_estimators::attitude::ImuSample;
+use std::path::Path;
+
+use crate::filters::Axes;
+
+/// The topics to take, where a recording has several that fit.
+#[derive(Clone, Debug, Default)]
+pub struct Topics {
+    /// The IMU; else the only topic of its type.
+    pub imu: Option<String>,
+    /// The magnetometer; else the only topic of its type.
+    pub magnetometer: Option<String>,
+    /// The true orientation; else the only topic of poses, if there is one.
+    pub truth: Option<String>,
+    /// What says when the body moves.
+    pub moving: MovingTopic,
+}
+
+/// What says when the body moves.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum MovingTopic {
+    /// The only topic of its type, if there is one.
+    #[default]
+    ByType,
+    /// This one.
+    Named(String),
+    /// Nothing: the body counts as moving all the time.
+    None,
+}
+
+/// A recording, opened up to its first sample.
+#[derive(Debug)]
+pub struct Recording {
+    /// What is known of the true orientation; nothing, if nothing is.
+    pub truth: Truth,
+    /// What to say of the truth, where it gives no score.
+    pub(crate) note: Option<String>,
+    samples: MargSamples,
+    magnetometer: bool,
+    /// When the first sample to take was measured at the earliest.
+    start_ns: i64,
+    /// How many samples there are about; 0 if unknown.
+    pub(crate) expected: u64,
+}
+
+impl Recording {
+    /// Opens a recording. With `before_motion_s` it starts so many seconds before the first motion.
+    ///
+    /// # Errors
+    /// It is no recording, or has not the topics, or not one of each; in words.
+    pub fn open(file: &Path, topics: &Topics, axes: Axes, before_motion_s: Option<f64>) -> Result<Self, String> {
+        let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
+        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let magnetometer = axes == Axes::Nine;
+        let magnetic = match bag.choose(MAGNETIC_FIELD, topics.magnetometer.as_deref()) {
+            _ if !magnetometer => None,
+            Ok(topic) => Some(&*topic.name),
+            Err(error) => return Err(format!("{}; without one, choose --axes six", said(&error, "--mag-topic"))),
+        };
+        let poses = poses(&bag, topics.truth.as_deref())?;
+        let moving = moving(&bag, &topics.moving)?;
+        let truth = truth(&bag, &[poses.as_deref().ok(), moving.as_deref()])?;
+        let note = match &poses {
+            Err(fault) => Some(format!("no truth, so no errors: {fault}")),
+            Ok(topic) if !truth.is_known() => {
+                Some(format!("no truth, so no errors: {topic} holds no orientation that is a rotation"))
+            }
+            Ok(_) => None,
+        };
+        let start_ns = match before_motion_s {
+            None => i64::MIN,
+            Some(seconds) => {
+                let motion = truth.first_motion().ok_or_else(|| match &moving {
+                    Some(topic) => {
+                        format!("{topic} never says that it moves; leave out --start-before-motion")
+                    }
+                    None => format!(
+                        "no topic says when it moves ({MOVING}); name one with --moving-topic, or leave out \
+                         --start-before-motion"
+                    ),
+                })?;
+                motion.saturating_sub((seconds * 1e9) as i64)
+            }
+        };
+        let samples = MargSamples::read(&bag, &imu.name, magnetic).map_err(|error| error.kind().to_string())?;
+        if samples.next_time().is_none() {
+            return Err(format!("{} holds no message, so there is nothing to play", imu.name));
+        }
+        Ok(Self { truth, note, samples, magnetometer, start_ns, expected: imu.messages.unwrap_or(0) })
+    }
+
+    /// Adds the next samples, as many as there are, until there are `most`. A recorder that was stopped is an end like
+    /// any other, but for what is said of it.
+    ///
+    /// # Errors
+    /// The recording is damaged; in words.
+    pub fn read(&mut self, samples: &mut Vec<ImuSample>, most: usize) -> Result<End, String> {
+        while samples.len() < most {
+            let (time, marg) = match self.samples.next() {
+                None => return Ok(End::Whole),
+                Some(Ok(sample)) => sample,
+                Some(Err(error)) if is_break(&error) => return Ok(End::Broken(error.kind().to_string())),
+                Some(Err(error)) => return Err(error.kind().to_string()),
+            };
+            if time.as_nanos() < self.start_ns {
+                continue;
+            }
+            samples.push(ImuSample {
+                time_ns: time.as_nanos(),
+                angular_velocity: marg.imu.angular_velocity,
+                specific_force: marg.imu.linear_acceleration,
+                magnetic_field: marg.magnetic_field.filter(|_| self.magnetometer).map(|field| field.magnetic_field),
+            });
+        }
+        Ok(End::NotYet)
+    }
+}
+
+/// How far reading has come.
+#[derive(Debug)]
+pub enum End {
+    /// There may be more.
+    NotYet,
+    /// All is read.
+    Whole,
+    /// All before the break is read; what broke it.
+    Broken(String),
+}
+
+/// The topic of poses, or why there is none. One that was named must be there.
+fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String> {
+    let error = match bag.choose(POSE, name) {
+        Ok(topic) => return Ok(Ok(topic.name.to_string())),
+        Err(error) => error,
+    };
+    match error.kind() {
+        BagErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
+            Ok(Ok(name.unwrap_or_default().to_owned()))
+        }
+        BagErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth-topic"))),
+        _ => Err(said(&error, "--truth-topic")),
+    }
+}
+
+/// The topic that says when the body moves, if there is one. One that was named must be there.
+fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
+    let name = match topic {
+        MovingTopic::None => return Ok(None),
+        MovingTopic::ByType => None,
+        MovingTopic::Named(name) => Some(&**name),
+    };
+    match bag.choose(MOVING, name) {
+        Ok(topic) => Ok(Some(topic.name.to_string())),
+        Err(error) => match error.kind() {
+            BagErrorKind::NoTopicOfType { .. } => Ok(None),
+            BagErrorKind::SeveralTopicsOfType { .. } => {
+                Err(format!("{}, or score all of it with --moving-topic none", said(&error, "--moving-topic")))
+            }
+            _ => Err(said(&error, "--moving-topic")),
+        },
+    }
+}
+
+/// Reads the truth, up to where the recording breaks off.
+fn truth(bag: &Bag, topics: &[Option<&str>]) -> Result<Truth, String> {
+    let topics: Vec<_> = topics.iter().copied().flatten().collect();
+    let mut truth = Truth::default();
+    let end = bag.messages(&topics).and_then(|messages| truth.extend(messages));
+    match end {
+        // The samples meet the same break, and report it.
+        Err(error) if !is_break(&error) => Err(error.kind().to_string()),
+        _ => Ok(truth),
+    }
+}
+
+fn is_break(error: &BagError) -> bool {
+    matches!(error.kind(), BagErrorKind::Truncated { .. })
+}
+
+/// What is wrong, with the option that chooses another topic.
+fn said(error: &BagError, option: &str) -> String {
+    let kind = error.kind();
+    match kind {
+        BagErrorKind::NoTopicOfType { .. } => kind.to_string(),
+        _ => format!("{kind} ({option})"),
+    }
+}

@@ -1,0 +1,156 @@
+//! What is printed.
+
+use crate::averages::Averages;
+use crate::evaluate::{Evaluation, Run};
+use crate::filters::Axes;
+use crate::score::Degrees;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::Path;
+
+/// One object of `--json`. What is unknown is null: every error without truth, and with six axes, of which only the
+/// inclination counts, total and heading.
+#[derive(Serialize)]
+struct Row {
+    file: String,
+    filter: &'static str,
+    axes: &'static str,
+    total_deg: Option<f64>,
+    heading_deg: Option<f64>,
+    inclination_deg: Option<f64>,
+    /// How many samples were scored.
+    samples: u64,
+    ns_per_update: f64,
+}
+
+/// One object a recording and filter.
+pub(crate) fn json(evaluations: &[Evaluation], axes: Axes) -> Result<String, String> {
+    let row = |evaluation: &Evaluation, run: &Run| {
+        let rms = run.score.rms();
+        let whole = rms.filter(|_| axes == Axes::Nine);
+        Row {
+            file: evaluation.file.display().to_string(),
+            filter: run.filter,
+            axes: axes.name(),
+            total_deg: whole.map(|rms| rms.total),
+            heading_deg: whole.map(|rms| rms.heading),
+            inclination_deg: rms.map(|rms| rms.inclination),
+            samples: run.score.count(),
+            ns_per_update: run.ns_per_update,
+        }
+    };
+    let rows: Vec<_> = runs(evaluations).map(|(evaluation, run)| row(evaluation, run)).collect();
+    let text = serde_json::to_string_pretty(&rows).map_err(|error| error.to_string())?;
+    Ok(text + "\n")
+}
+
+/// A line a recording and filter, then the averages of each filter.
+pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
+    let mut lines: Vec<[String; 7]> = Vec::new();
+    for (evaluation, run) in runs(evaluations) {
+        let [total, heading, inclination] = angles(run.score.rms(), axes);
+        let cost = format!("{:.0}", run.ns_per_update);
+        let count = run.score.count().to_string();
+        lines.push([
+            name(&evaluation.file, evaluations),
+            run.filter.into(),
+            total,
+            heading,
+            inclination,
+            count,
+            cost,
+        ]);
+    }
+    if lines.is_empty() {
+        return String::new();
+    }
+    let rows = lines.len();
+    let mut filters: Vec<&str> = Vec::new();
+    for (_, run) in runs(evaluations) {
+        if !filters.contains(&run.filter) {
+            filters.push(run.filter);
+        }
+    }
+    for filter in filters {
+        let of_filter = runs(evaluations).filter(|(_, run)| run.filter == filter);
+        let Some(averages) = Averages::of(of_filter.filter_map(|(_, run)| run.score.rms())) else { continue };
+        for (what, score) in [("mean of", averages.mean), ("worst of", averages.worst)] {
+            let [total, heading, inclination] = angles(Some(score), axes);
+            let what = format!("{what} {}", averages.count);
+            lines.push([what, filter.into(), total, heading, inclination, String::new(), String::new()]);
+        }
+    }
+    let head = ["recording", "filter", "total", "heading", "inclination", "samples", "ns/update"];
+    lines.insert(0, head.map(String::from));
+    let mut text = format!("Error against the truth, {} axes, RMS in degrees:\n\n", axes.name());
+    text += &aligned(&lines, rows + 1);
+    text
+}
+
+/// Says on the error stream what to know about the runs, then what was wrong; whether nothing was.
+pub(crate) fn complain(evaluations: &[Evaluation]) -> bool {
+    for evaluation in evaluations {
+        for note in &evaluation.notes {
+            eprintln!("note: {}: {note}", evaluation.file.display());
+        }
+    }
+    let mut bad = 0;
+    for evaluation in evaluations {
+        let file = evaluation.file.display();
+        match (&evaluation.runs, &evaluation.broken) {
+            (Err(fault), _) => eprintln!("error: {file}: {fault}"),
+            (Ok(_), Some(fault)) => eprintln!("error: {file}: {fault}; scored up to there"),
+            (Ok(_), None) => continue,
+        }
+        bad += 1;
+    }
+    if bad > 0 && evaluations.len() > 1 {
+        eprintln!("error: {bad} of {} recordings could not be evaluated to the end", evaluations.len());
+    }
+    bad == 0
+}
+
+fn runs(evaluations: &[Evaluation]) -> impl Iterator<Item = (&Evaluation, &Run)> {
+    evaluations.iter().flat_map(|evaluation| evaluation.runs.iter().flatten().map(move |run| (evaluation, run)))
+}
+
+/// A recording in a table or a picture: without folder and ending, where that is only one.
+pub(crate) fn name(file: &Path, evaluations: &[Evaluation]) -> String {
+    let alike = evaluations.iter().filter(|other| other.file.file_stem() == file.file_stem()).count();
+    let short = file.file_stem().filter(|_| alike == 1);
+    short.unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// With six axes the heading starts anywhere, so only the inclination is a result.
+fn angles(rms: Option<Degrees>, axes: Axes) -> [String; 3] {
+    let angle = |angle: f64| format!("{angle:.2}");
+    let none = || "-".to_owned();
+    match (rms, axes) {
+        (None, _) => [none(), none(), none()],
+        (Some(rms), Axes::Six) => [none(), none(), angle(rms.inclination)],
+        (Some(rms), Axes::Nine) => [angle(rms.total), angle(rms.heading), angle(rms.inclination)],
+    }
+}
+
+/// Columns: the first two are words, the others numbers. An empty line before line `gap`.
+fn aligned(lines: &[[String; 7]], gap: usize) -> String {
+    let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+    let widths: [usize; 7] = std::array::from_fn(width);
+    let mut text = String::new();
+    for (index, line) in lines.iter().enumerate() {
+        if index == gap {
+            text.push('\n');
+        }
+        let mut row = String::new();
+        for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
+            // Writing to a string cannot fail.
+            let _ = match column {
+                0 | 1 => write!(row, "{cell:width$}  "),
+                _ => write!(row, "{cell:>width$}  "),
+            };
+        }
+        text += row.trim_end();
+        text.push('\n');
+    }
+    text
+}

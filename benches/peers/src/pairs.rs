@@ -1,0 +1,73 @@
+//! What is compared with what.
+
+use crate::peers;
+use bb_cli::{Axes, Running};
+
+/// One of our filters and a peer, each with its parameters.
+pub struct Pair {
+    pub name: &'static str,
+    /// By the name that `bb eval attitude --filter` takes; a pair without it is left out.
+    pub ours: &'static str,
+    /// As `--set` takes them.
+    pub settings: &'static [&'static str],
+    pub axes: Axes,
+    pub peer: fn() -> Box<dyn Running>,
+}
+
+impl Pair {
+    pub fn nine(&self) -> bool {
+        self.axes == Axes::Nine
+    }
+}
+
+/// Madgwick's parameter is the same on both sides. Ours run with their defaults else; the peers with what is best for
+/// them on BROAD, VQF with its defaults.
+pub const PAIRS: &[Pair] = &[
+    Pair {
+        name: "madgwick/ahrs_madgwick/nine",
+        ours: "madgwick",
+        settings: &["beta=0.12"],
+        axes: Axes::Nine,
+        peer: || peers::madgwick(0.12),
+    },
+    Pair {
+        name: "madgwick/ahrs_madgwick/six",
+        ours: "madgwick",
+        settings: &["beta=0.03"],
+        axes: Axes::Six,
+        peer: || peers::madgwick(0.03),
+    },
+    Pair {
+        name: "mahony/ahrs_mahony/nine",
+        ours: "mahony",
+        settings: &[],
+        axes: Axes::Nine,
+        peer: || peers::mahony(0.74, 0.0012),
+    },
+    Pair {
+        name: "complementary/ahrs_mahony/nine",
+        ours: "complementary",
+        settings: &[],
+        axes: Axes::Nine,
+        peer: || peers::mahony(0.74, 0.0012),
+    },
+    Pair {
+        name: "complementary/ahrs_mahony/six",
+        ours: "complementary",
+        settings: &[],
+        axes: Axes::Six,
+        peer: || peers::mahony(0.18, 0.0015),
+    },
+    Pair { name: "fusion/fusion_ahrs/nine", ours: "fusion", settings: &[], axes: Axes::Nine, peer: peers::fusion },
+    Pair {
+        name: "complementary/fusion_ahrs/nine",
+        ours: "complementary",
+        settings: &[],
+        axes: Axes::Nine,
+        peer: peers::fusion,
+    },
+    Pair { name: "vqf/vqf_rs/nine", ours: "vqf", settings: &[], axes: Axes::Nine, peer: peers::vqf },
+    Pair { name: "vqf/vqf_rs/six", ours: "vqf", settings: &[], axes: Axes::Six, peer: peers::vqf },
+    Pair { name: "mekf/vqf_rs/nine", ours: "mekf", settings: &[], axes: Axes::Nine, peer: peers::vqf },
+    Pair { name: "mekf/vqf_rs/six", ours: "mekf", settings: &[], axes: Axes::Six, peer: peers::vqf },
+];
