@@ -1,8 +1,8 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
 mod callbacks;
-mod control;
 mod components;
+mod control;
 mod external;
 mod fan_in;
 mod faults;
