@@ -24,10 +24,12 @@
 
 pub mod average;
 pub mod complementary;
+mod directions;
 mod error;
 mod filter;
 pub mod initial;
 pub mod madgwick;
+pub mod mahony;
 pub mod mekf;
 mod params;
 mod rotation;
@@ -45,6 +47,7 @@ pub use error::{ErrorStatistics, OrientationError};
 pub use estimator::{Attitude, Frames, ImuAndMagnetometer, InertialInput, InertialInputs};
 pub use filter::AttitudeFilter;
 pub use madgwick::{MadgwickFilter, MadgwickParams};
+pub use mahony::{MahonyFilter, MahonyParams};
 pub use mekf::{MekfFilter, MekfParams};
 pub use params::ParamsError;
 pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};

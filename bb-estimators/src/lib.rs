@@ -27,6 +27,10 @@ pub use simulation::SimulatedImu;
 #[cfg(feature = "runtime")]
 pub type Madgwick<I = bb_core::payload::Imu> = Attitude<attitude::MadgwickFilter, I>;
 
+/// Mahony's filter as an estimator: of six axes, `Mahony<Marg>` and `Mahony<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Mahony<I = bb_core::payload::Imu> = Attitude<attitude::MahonyFilter, I>;
+
 /// The self-calibrating Kalman filter as an estimator, the most accurate of all here: of six axes, `Mekf<Marg>` and
 /// `Mekf<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]
