@@ -35,6 +35,7 @@ mod params;
 mod rotation;
 mod sample;
 mod state;
+pub mod vqf;
 
 #[cfg(feature = "runtime")]
 mod estimator;
@@ -52,3 +53,4 @@ pub use mekf::{MekfFilter, MekfParams};
 pub use params::ParamsError;
 pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};
 pub use state::MAX_GAP_S;
+pub use vqf::{VqfFilter, VqfParams};

@@ -31,6 +31,10 @@ pub type Madgwick<I = bb_core::payload::Imu> = Attitude<attitude::MadgwickFilter
 #[cfg(feature = "runtime")]
 pub type Mahony<I = bb_core::payload::Imu> = Attitude<attitude::MahonyFilter, I>;
 
+/// VQF as an estimator: of six axes, `Vqf<Marg>` and `Vqf<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Vqf<I = bb_core::payload::Imu> = Attitude<attitude::VqfFilter, I>;
+
 /// The self-calibrating Kalman filter as an estimator, the most accurate of all here: of six axes, `Mekf<Marg>` and
 /// `Mekf<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]

@@ -4,7 +4,7 @@ use crate::recordings::broad;
 use bb_bags::{BagImu, Truth};
 use bb_core::prelude::*;
 use bb_estimators::attitude::{ErrorStatistics, OrientationError};
-use bb_estimators::{Complementary, Madgwick, Mahony, Mekf};
+use bb_estimators::{Complementary, Madgwick, Mahony, Mekf, Vqf};
 use std::error::Error;
 use std::path::Path;
 
@@ -22,6 +22,8 @@ robot! {
             estimator mekf_six: Mekf<Marg>(magnetometer = false);
             estimator mahony: Mahony<Marg>(proportional_gain = 0.74, integral_gain = 0.0012);
             estimator mahony_six: Mahony<Marg>(proportional_gain = 0.18, integral_gain = 0.0015, magnetometer = false);
+            estimator vqf: Vqf<Marg>();
+            estimator vqf_six: Vqf<Marg>(magnetometer = false);
         }
     }
 }
@@ -33,7 +35,7 @@ type Errors = [f64; 3];
 const ANY: f64 = f64::INFINITY;
 
 /// Each filter's name and its mean errors as measured.
-const KNOWN: [(&str, Errors); 8] = [
+const KNOWN: [(&str, Errors); 10] = [
     ("Madgwick, nine axes", [5.252, 4.194, 3.005]),
     ("Madgwick, six axes", [ANY, ANY, 1.996]),
     ("complementary, nine axes", [3.701, 3.095, 1.801]),
@@ -42,14 +44,20 @@ const KNOWN: [(&str, Errors); 8] = [
     ("Kalman filter, six axes", [ANY, ANY, 0.621]),
     ("Mahony, nine axes", [8.316, 6.881, 4.511]),
     ("Mahony, six axes", [ANY, ANY, 3.393]),
+    ("VQF, nine axes", [2.177, 2.010, 0.765]),
+    ("VQF, six axes", [ANY, ANY, 0.765]),
 ];
 
 /// Means that others have measured with their own code, the parameter sets being the same: the filter's place in
 /// [`KNOWN`], which of its errors, degrees, and by which fraction ours may differ.
-const PUBLISHED: [(usize, usize, f64, f64); 3] = [
+const PUBLISHED: [(usize, usize, f64, f64); 7] = [
     (0, 0, 5.27, 0.02),
     (6, 0, 8.32, 0.02),
     (7, 2, 3.34, 0.02),
+    (8, 0, 2.18, 0.005),
+    (8, 1, 2.01, 0.005),
+    (8, 2, 0.77, 0.01),
+    (9, 2, 0.77, 0.01),
 ];
 
 /// The errors on one recording, in the order of [`KNOWN`].
@@ -66,6 +74,8 @@ fn errors(file: &Path) -> Result<[Errors; KNOWN.len()], Box<dyn Error>> {
         builder.subscribe(recorded::sensor::body::imu::mekf_six),
         builder.subscribe(recorded::sensor::body::imu::mahony),
         builder.subscribe(recorded::sensor::body::imu::mahony_six),
+        builder.subscribe(recorded::sensor::body::imu::vqf),
+        builder.subscribe(recorded::sensor::body::imu::vqf_six),
     ]
     .map(|orientation| (orientation, ErrorStatistics::new()));
     let mut simulation = builder.simulate()?;

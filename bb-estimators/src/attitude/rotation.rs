@@ -8,21 +8,26 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 /// Below this squared angle, rad², sine and cosine of the half angle are series.
 const SERIES_SQUARED_ANGLE: f64 = 0.01;
 
-/// `world_from_body ⊗ exp(½ rotation)`: turns the body by a rotation vector given in the body frame, rad.
-pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let squared_angle = rotation.norm_squared();
-    let (cos, scale) = if squared_angle < SERIES_SQUARED_ANGLE {
+/// Cosine of half an angle, and the factor that makes the sine of half of it of the angle, for its square, rad².
+#[inline]
+pub(super) fn half_angle(squared_angle: f64) -> (f64, f64) {
+    if squared_angle < SERIES_SQUARED_ANGLE {
         // With h = (θ/2)² below 0.0025 the first terms left out are below 1e-15.
         let h = 0.25 * squared_angle;
-        (
+        return (
             1.0 - h * (1.0 / 2.0 - h * (1.0 / 24.0 - h * (1.0 / 720.0))),
             0.5 - h * (1.0 / 12.0 - h * (1.0 / 240.0 - h * (1.0 / 10080.0))),
-        )
-    } else {
-        let angle = squared_angle.sqrt();
-        let (sin, cos) = (0.5 * angle).sin_cos();
-        (cos, sin / angle)
-    };
+        );
+    }
+    let angle = squared_angle.sqrt();
+    let (sin, cos) = (0.5 * angle).sin_cos();
+    (cos, sin / angle)
+}
+
+/// `world_from_body ⊗ exp(½ rotation)`: turns the body by a rotation vector given in the body frame, rad.
+#[inline]
+pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let (cos, scale) = half_angle(rotation.norm_squared());
     let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
     let q = world_from_body;
     unit(
@@ -35,7 +40,13 @@ pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64
 
 /// Turns `world_from_body` about the world's vertical by `angle`, rad, counter-clockwise seen from above.
 pub(super) fn turn_heading(world_from_body: &UnitQuaternion<f64>, angle: f64) -> UnitQuaternion<f64> {
-    let (s, c) = (0.5 * angle).sin_cos();
+    let (sin, cos) = (0.5 * angle).sin_cos();
+    turn_heading_by(world_from_body, [cos, sin])
+}
+
+/// Turns `world_from_body` about the world's vertical by an angle of whose half these are cosine and sine.
+#[inline]
+pub(super) fn turn_heading_by(world_from_body: &UnitQuaternion<f64>, [c, s]: [f64; 2]) -> UnitQuaternion<f64> {
     let q = world_from_body;
     unit(c * q.w - s * q.k, c * q.i - s * q.j, c * q.j + s * q.i, c * q.k + s * q.w)
 }

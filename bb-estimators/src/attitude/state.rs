@@ -109,6 +109,11 @@ impl AttitudeState {
         self.world_from_body
     }
 
+    /// Whether a field has set the heading, or it was given.
+    pub(super) fn heading_is_known(&self) -> bool {
+        self.heading_known
+    }
+
     /// Forgets every sample.
     pub(super) fn reset(&mut self) {
         *self = Self::new(self.magnetometer);
