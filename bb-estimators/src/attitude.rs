@@ -27,6 +27,7 @@ pub mod complementary;
 mod directions;
 mod error;
 mod filter;
+pub mod fusion;
 pub mod initial;
 pub mod madgwick;
 pub mod mahony;
@@ -47,6 +48,7 @@ pub use error::{ErrorStatistics, OrientationError};
 #[cfg(feature = "runtime")]
 pub use estimator::{Attitude, Frames, ImuAndMagnetometer, InertialInput, InertialInputs};
 pub use filter::AttitudeFilter;
+pub use fusion::{FusionFilter, FusionParams};
 pub use madgwick::{MadgwickFilter, MadgwickParams};
 pub use mahony::{MahonyFilter, MahonyParams};
 pub use mekf::{MekfFilter, MekfParams};

@@ -35,6 +35,11 @@ pub type Mahony<I = bb_core::payload::Imu> = Attitude<attitude::MahonyFilter, I>
 #[cfg(feature = "runtime")]
 pub type Vqf<I = bb_core::payload::Imu> = Attitude<attitude::VqfFilter, I>;
 
+/// The revised AHRS algorithm of x-io's Fusion library as an estimator: of six axes, `Fusion<Marg>` and
+/// `Fusion<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Fusion<I = bb_core::payload::Imu> = Attitude<attitude::FusionFilter, I>;
+
 /// The self-calibrating Kalman filter as an estimator, the most accurate of all here: of six axes, `Mekf<Marg>` and
 /// `Mekf<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]

@@ -40,3 +40,13 @@ pub(super) fn horizontal_axis(world_up: &Vector3<f64>) -> Vector3<f64> {
     let axis = if world_up.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
     axis.cross(world_up).normalize()
 }
+
+/// East and up, as they are expected in the body frame: the first and third row of R.
+#[inline]
+pub(super) fn expected(world_from_body: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
+    let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
+    let (x2, y2, z2) = (x + x, y + y, z + z);
+    let (xx, yy, zz, xy, xz, yz) = (x * x2, y * y2, z * z2, x * y2, x * z2, y * z2);
+    let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+    [Vector3::new(1.0 - yy - zz, xy - wz, xz + wy), Vector3::new(xz - wy, yz + wx, 1.0 - xx - yy)]
+}
