@@ -29,6 +29,7 @@ mod error;
 mod filter;
 pub mod fusion;
 pub mod initial;
+mod low_pass;
 pub mod madgwick;
 pub mod mahony;
 pub mod mekf;
@@ -36,6 +37,7 @@ mod params;
 mod rotation;
 mod sample;
 mod state;
+pub mod tilt;
 pub mod vqf;
 
 #[cfg(feature = "runtime")]
@@ -55,4 +57,5 @@ pub use mekf::{MekfFilter, MekfParams};
 pub use params::ParamsError;
 pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};
 pub use state::MAX_GAP_S;
+pub use tilt::{TiltFilter, TiltParams};
 pub use vqf::{VqfFilter, VqfParams};

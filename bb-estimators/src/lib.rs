@@ -5,8 +5,8 @@
 //!
 //! | declared as | takes | emits |
 //! |---|---|---|
-//! | `Mekf(…)`, `Madgwick(beta = 0.1)`, `Complementary(…)` in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
-//! | `Mekf<Marg>(…)`, `Madgwick<Marg>(…)`, `Complementary<Marg>(…)` in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
+//! | `Mekf(…)`, `Vqf(…)`, `Madgwick(beta = 0.1)`, … in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
+//! | `Mekf<Marg>(…)`, `Vqf<Marg>(…)`, `Madgwick<Marg>(…)`, … in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
 //! | `Madgwick<ImuAndMagnetometer>(…)` on a link | `input imu`, driver, and `input magnetic_field`, of two sensors | `Orientation` of the link |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
@@ -39,6 +39,11 @@ pub type Vqf<I = bb_core::payload::Imu> = Attitude<attitude::VqfFilter, I>;
 /// `Fusion<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]
 pub type Fusion<I = bb_core::payload::Imu> = Attitude<attitude::FusionFilter, I>;
+
+/// Inclination from gravity, without a gyroscope, as an estimator: `Tilt<Marg>` and `Tilt<ImuAndMagnetometer>` have a
+/// heading from the field, too.
+#[cfg(feature = "runtime")]
+pub type Tilt<I = bb_core::payload::Imu> = Attitude<attitude::TiltFilter, I>;
 
 /// The self-calibrating Kalman filter as an estimator, the most accurate of all here: of six axes, `Mekf<Marg>` and
 /// `Mekf<ImuAndMagnetometer>` of nine.

@@ -4,7 +4,7 @@ use crate::recordings::broad;
 use bb_bags::{BagImu, Truth};
 use bb_core::prelude::*;
 use bb_estimators::attitude::{ErrorStatistics, OrientationError};
-use bb_estimators::{Complementary, Fusion, Madgwick, Mahony, Mekf, Vqf};
+use bb_estimators::{Complementary, Fusion, Madgwick, Mahony, Mekf, Tilt, Vqf};
 use std::error::Error;
 use std::path::Path;
 
@@ -26,6 +26,8 @@ robot! {
             estimator vqf_six: Vqf<Marg>(magnetometer = false);
             estimator fusion: Fusion<Marg>(gain = 0.1, recovery_time = 20 s);
             estimator fusion_six: Fusion<Marg>(gain = 0.1, recovery_time = 20 s, magnetometer = false);
+            estimator tilt: Tilt<Marg>();
+            estimator tilt_six: Tilt<Marg>(magnetometer = false);
         }
     }
 }
@@ -37,7 +39,7 @@ type Errors = [f64; 3];
 const ANY: f64 = f64::INFINITY;
 
 /// Each filter's name and its mean errors as measured.
-const KNOWN: [(&str, Errors); 12] = [
+const KNOWN: [(&str, Errors); 14] = [
     ("Madgwick, nine axes", [5.252, 4.194, 3.005]),
     ("Madgwick, six axes", [ANY, ANY, 1.996]),
     ("complementary, nine axes", [3.701, 3.095, 1.801]),
@@ -50,6 +52,8 @@ const KNOWN: [(&str, Errors); 12] = [
     ("VQF, six axes", [ANY, ANY, 0.765]),
     ("Fusion, nine axes", [4.402, 3.585, 2.302]),
     ("Fusion, six axes", [ANY, ANY, 2.302]),
+    ("tilt, nine axes", [50.578, 40.631, 32.316]),
+    ("tilt, six axes", [ANY, ANY, 32.316]),
 ];
 
 /// Means that others have measured with their own code, the parameter sets being the same: the filter's place in
@@ -82,6 +86,8 @@ fn errors(file: &Path) -> Result<[Errors; KNOWN.len()], Box<dyn Error>> {
         builder.subscribe(recorded::sensor::body::imu::vqf_six),
         builder.subscribe(recorded::sensor::body::imu::fusion),
         builder.subscribe(recorded::sensor::body::imu::fusion_six),
+        builder.subscribe(recorded::sensor::body::imu::tilt),
+        builder.subscribe(recorded::sensor::body::imu::tilt_six),
     ]
     .map(|orientation| (orientation, ErrorStatistics::new()));
     let mut simulation = builder.simulate()?;

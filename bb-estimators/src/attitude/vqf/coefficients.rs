@@ -2,6 +2,7 @@
 
 use super::VqfParams;
 use super::low_pass::Coefficients;
+use crate::attitude::low_pass::gain;
 
 /// Coefficients serve sample times that differ from theirs by up to this fraction.
 const TOLERANCE: f64 = 1.0 / 64.0;
@@ -72,8 +73,8 @@ impl FieldCoefficients {
         Self {
             dt_s,
             field: Coefficients::new(params.field_time_constant, dt_s),
-            heading_gain: gain(params.heading_time_constant, dt_s),
-            reference_gain: gain(params.reference_time_constant, dt_s),
+            heading_gain: gain(dt_s, params.heading_time_constant),
+            reference_gain: gain(dt_s, params.reference_time_constant),
         }
     }
 
@@ -84,9 +85,4 @@ impl FieldCoefficients {
             *self = Self::new(params, dt_s);
         }
     }
-}
-
-/// The gain of a first-order low-pass, `1 - exp(-dt/τ)`, which is 1 for τ = 0.
-fn gain(time_constant_s: f64, dt_s: f64) -> f64 {
-    -(-dt_s / time_constant_s).exp_m1()
 }
