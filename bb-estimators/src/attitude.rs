@@ -48,7 +48,10 @@ mod laws;
 pub use complementary::{ComplementaryFilter, ComplementaryParams};
 pub use error::{ErrorStatistics, OrientationError};
 #[cfg(feature = "runtime")]
-pub use estimator::{Attitude, Frames, ImuAndMagnetometer, InertialInput, InertialInputs};
+pub use estimator::{
+    Attitude, AttitudeOutput, AttitudeOutputs, AttitudeStatus, Frames, ImuAndMagnetometer, InertialInput,
+    InertialInputs,
+};
 pub use filter::AttitudeFilter;
 pub use fusion::{FusionFilter, FusionParams};
 pub use madgwick::{MadgwickFilter, MadgwickParams};
