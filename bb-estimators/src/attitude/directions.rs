@@ -24,10 +24,10 @@ pub(super) fn misalignment(
     };
     let (wz, xy, zz) = (w * z2, x * y2, z * z2);
     let world_north = Vector3::new(xy + wz, 1.0 - xx - zz, yz - wx);
-    let east = (1.0 - yy - zz) * field.x + (xy - wz) * field.y + (xz + wy) * field.z;
-    let north = world_north.dot(field);
     let vertical = world_up.dot(field);
-    let horizontal = (east * east + north * north).sqrt();
+    // Both are unit vectors but for rounding.
+    let squared = 1.0 - vertical * vertical;
+    let horizontal = if squared > 0.0 { squared.sqrt() } else { 0.0 };
     // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
     let error = (up + vertical * field).cross(&world_up) + horizontal * field.cross(&world_north);
     (error, world_up)

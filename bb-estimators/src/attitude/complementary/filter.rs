@@ -55,7 +55,7 @@ impl AttitudeFilter for ComplementaryFilter {
             orientation = turn_heading(&orientation, gain * error);
             self.since_field_s = 0.0;
         }
-        self.state.store(orientation, step.field);
+        self.state.store(&orientation, step.field);
         Ok(())
     }
 

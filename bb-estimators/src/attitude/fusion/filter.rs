@@ -101,7 +101,7 @@ impl AttitudeFilter for FusionFilter {
                 }
             }
         }
-        self.state.store(turn(&orientation, &correction), step.field);
+        self.state.store(&turn(&orientation, &correction), step.field);
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::MadgwickParams;
 use crate::attitude::directions::{horizontal_axis, misalignment};
-use crate::attitude::rotation::turn;
+use crate::attitude::rotation::{turn, turn_by_tangent};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
 
@@ -35,12 +35,16 @@ impl AttitudeFilter for MadgwickFilter {
             return Ok(());
         };
         // q̇ = ½ q ⊗ ω - β ∇F/‖∇F‖, and with ∇F = -2 q ⊗ e the second part is a turn at 2 β about e.
-        let mut orientation = turn(&step.world_from_body, &(sample.angular_velocity * step.dt_s));
-        if let Some(up) = step.up {
-            let descent = descent(&orientation, &up, step.field.as_ref());
-            orientation = turn(&orientation, &(2.0 * self.params.beta * step.dt_s * descent));
-        }
-        self.state.store(orientation, step.field);
+        let predicted = turn(&step.world_from_body, &(sample.angular_velocity * step.dt_s));
+        let Some(up) = step.up else {
+            self.state.store(&predicted, step.field);
+            return Ok(());
+        };
+        let descent = descent(&predicted, &up, step.field.as_ref());
+        // The tangent of half the angle, to the fourth order.
+        let half = self.params.beta * step.dt_s;
+        let tangent = half * (1.0 + half * half * (1.0 / 3.0));
+        self.state.store(&turn_by_tangent(&predicted, &(descent * tangent)), step.field);
         Ok(())
     }
 

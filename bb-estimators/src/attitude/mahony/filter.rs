@@ -4,12 +4,12 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::MahonyParams;
 use crate::attitude::directions::{horizontal_axis, misalignment};
-use crate::attitude::rotation::turn;
+use crate::attitude::rotation::{turn, turn_by_tangent};
 use crate::attitude::state::AttitudeState;
-use crate::attitude::{AttitudeFilter, ImuSample, MAX_ANGULAR_VELOCITY, ParamsError, SampleError};
+use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
 
-/// Below this squared norm an error upside down is none, which a lean to one side ends.
-const NO_ERROR: f64 = 1e-12;
+/// Below this norm an error upside down is none, which a lean to one side ends.
+const NO_ERROR: f64 = 1e-6;
 
 /// The explicit complementary filter with bias correction.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,19 +37,19 @@ impl AttitudeFilter for MahonyFilter {
             return Ok(());
         };
         // Ṙ = R [Ω - b + k_P ω_mes]×, ḃ = -k_I ω_mes.
-        let mut orientation = turn(&step.world_from_body, &((sample.angular_velocity - self.bias) * step.dt_s));
-        if let Some(up) = step.up {
-            let (mut error, world_up) = misalignment(&orientation, &up, step.field.as_ref());
-            if error.norm_squared() < NO_ERROR && up.dot(&world_up) < 0.0 {
-                error = horizontal_axis(&world_up);
-            }
-            // No angular velocity of a sensor is greater, nor is any bias.
-            let bias = self.bias - error * (self.params.integral_gain * step.dt_s);
-            self.bias = bias.cap_magnitude(MAX_ANGULAR_VELOCITY);
-            let gain = (self.params.proportional_gain * step.dt_s).min(1.0);
-            orientation = turn(&orientation, &(error * gain));
+        let predicted = turn(&step.world_from_body, &((sample.angular_velocity - self.bias) * step.dt_s));
+        let Some(up) = step.up else {
+            self.state.store(&predicted, step.field);
+            return Ok(());
+        };
+        let (mut error, world_up) = misalignment(&predicted, &up, step.field.as_ref());
+        if error.x.abs() < NO_ERROR && error.norm() < NO_ERROR && up.dot(&world_up) < 0.0 {
+            error = horizontal_axis(&world_up);
         }
-        self.state.store(orientation, step.field);
+        self.bias -= error * (self.params.integral_gain * step.dt_s);
+        let half = 0.5 * self.params.proportional_gain * step.dt_s;
+        let half = if half < 0.5 { half } else { 0.5 };
+        self.state.store(&turn_by_tangent(&predicted, &(error * half)), step.field);
         Ok(())
     }
 

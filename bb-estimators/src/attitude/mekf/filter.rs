@@ -153,7 +153,7 @@ impl AttitudeFilter for MekfFilter {
             self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
             self.heading_known = true;
         }
-        self.state.store(orientation, step.field);
+        self.state.store(&orientation, step.field);
         Ok(())
     }
 

@@ -65,7 +65,7 @@ impl AttitudeFilter for TiltFilter {
                 orientation = turn_heading(&orientation, error);
             }
         }
-        self.state.store(orientation, step.field);
+        self.state.store(&orientation, step.field);
         Ok(())
     }
 

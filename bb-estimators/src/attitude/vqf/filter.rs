@@ -83,7 +83,7 @@ impl AttitudeFilter for VqfFilter {
         if let (Some(direction), Some(field)) = (&step.field, &sample.magnetic_field) {
             self.turn_north(field.dot(direction), &(level_from_body * direction));
         }
-        self.state.store(self.heading.world_from(&level_from_body), step.field);
+        self.state.store(&self.heading.world_from(&level_from_body), step.field);
         Ok(())
     }
 
