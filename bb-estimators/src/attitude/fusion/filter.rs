@@ -34,6 +34,9 @@ pub struct FusionFilter {
     startup_s: f64,
     acceleration: Rejection,
     field: Rejection,
+    /// Squared sines of the greatest deviations that are not rejected.
+    near_acceleration: f64,
+    near_field: f64,
     /// Time since the last field, at most [`MAX_GAP_S`].
     since_field_s: f64,
 }
@@ -58,6 +61,8 @@ impl AttitudeFilter for FusionFilter {
             startup_s: 0.0,
             acceleration: Rejection::new(),
             field: Rejection::new(),
+            near_acceleration: squared_sine(params.acceleration_rejection),
+            near_field: squared_sine(params.magnetic_rejection),
             since_field_s: 0.0,
         })
     }
@@ -167,20 +172,20 @@ impl FusionFilter {
     }
 
     fn takes_acceleration(&mut self, dt_s: f64, deviation: &Deviation) -> bool {
-        let near = self.startup_s > 0.0 || is_near(deviation, self.params.acceleration_rejection);
+        let near = self.startup_s > 0.0 || deviation.squared_sine <= self.near_acceleration;
         self.acceleration.takes(dt_s, self.params.recovery_time, near)
     }
 
     fn takes_field(&mut self, dt_s: f64, deviation: &Deviation) -> bool {
-        let near = self.startup_s > 0.0 || is_near(deviation, self.params.magnetic_rejection);
+        let near = self.startup_s > 0.0 || deviation.squared_sine <= self.near_field;
         self.field.takes(dt_s, self.params.recovery_time, near)
     }
 }
 
-/// Whether the deviation is within a threshold, rad, of which 0 is none.
-fn is_near(deviation: &Deviation, threshold: f64) -> bool {
+/// Of a threshold, rad, of which 0 is none.
+fn squared_sine(threshold: f64) -> f64 {
     let sine = threshold.sin();
-    threshold == 0.0 || deviation.squared_sine <= sine * sine
+    if threshold > 0.0 { sine * sine } else { f64::INFINITY }
 }
 
 /// The deviation of two unit vectors; `axis` is what to turn about where they are opposite.

@@ -95,6 +95,25 @@ fn rest_shows_the_bias() {
 }
 
 #[test]
+fn the_uncertainty_is_that_of_the_body_and_of_the_size_of_the_errors() {
+    let (mut world, mut filter) = (World::new(), filter(true));
+    assert_eq!(filter.orientation_uncertainty(), None, "before the start");
+    world.truth = UnitQuaternion::from_euler_angles(1.2, -0.4, 2.0);
+    world.run(&mut filter, 60, true);
+    assert_eq!((filter.is_at_rest(), filter.is_magnetically_disturbed()), (Some(false), Some(false)));
+    let rotation = filter.world_from_body().unwrap().to_rotation_matrix();
+    let in_world = rotation * filter.orientation_uncertainty().unwrap() * rotation.transpose();
+    let deviation = in_world.diagonal().map(|variance| variance.sqrt().to_degrees());
+    assert!(
+        deviation.z > deviation.x && deviation.z > deviation.y,
+        "gravity shows more than the field: {deviation}"
+    );
+    assert!(deviation.x < 1.0 && deviation.z < 3.0, "{deviation}");
+    let error = world.error_of(&filter);
+    assert!(error.inclination < 5.0 * deviation.x && error.heading < 4.0 * deviation.z, "{error:?} {deviation}");
+}
+
+#[test]
 fn motion_shows_the_bias_and_the_calibration() {
     let (mut world, mut filter) = (World::new(), filter(true));
     world.bias = Vector3::new(0.005, -0.003, 0.004);
