@@ -34,7 +34,7 @@ fn a_filter_publishes_what_it_knows() {
     let mut simulation = builder.simulate().unwrap();
     let mut count = 0;
     while simulation.step() {
-        for (plain, orientation) in plain.drain().into_iter().zip(orientation.drain()) {
+        for (plain, orientation) in plain.drain().zip(orientation.drain()) {
             assert_eq!(plain.payload, orientation.payload, "the same filter");
             assert_eq!(plain.covariance, None, "this one keeps none");
             count += 1;

@@ -31,18 +31,18 @@ pub struct FusionParams {
     /// How far the accelerometer's direction may be from the expected one.
     ///
     /// Small: much is ignored, and the gyroscope drifts. Large: accelerations tilt the estimate. 0: nothing is
-    /// ignored. From 0 to 1.5707.
+    /// ignored. From 0 to 1.5.
     ///
     /// Unit: rad. Default: 10°. Source: the library's `accelerationRejection`.
-    #[cfg_attr(feature = "runtime", option(default = Self::default().acceleration_rejection, range = 0.0..=1.5707, unit = "rad"))]
+    #[cfg_attr(feature = "runtime", option(default = Self::default().acceleration_rejection, range = 0.0..=1.5, unit = "rad"))]
     pub acceleration_rejection: f64,
     /// How far the field's heading may be from the expected one.
     ///
     /// Small: much is ignored, and the gyroscope drifts. Large: disturbances turn the estimate. 0: nothing is
-    /// ignored. From 0 to 1.5707.
+    /// ignored. From 0 to 1.5.
     ///
     /// Unit: rad. Default: 10°. Source: the library's `magneticRejection`.
-    #[cfg_attr(feature = "runtime", option(default = Self::default().magnetic_rejection, range = 0.0..=1.5707, unit = "rad"))]
+    #[cfg_attr(feature = "runtime", option(default = Self::default().magnetic_rejection, range = 0.0..=1.5, unit = "rad"))]
     pub magnetic_rejection: f64,
     /// How long a sensor is ignored, if all its samples are rejected, before all of them are taken.
     ///
@@ -103,8 +103,8 @@ impl FusionParams {
     pub(super) fn check(&self) -> Result<(), ParamsError> {
         accept("gain", self.gain, (0.0, 1000.0), "1/s")?;
         accept("gyroscope_range", self.gyroscope_range, (0.0, 1000.0), "rad/s")?;
-        accept("acceleration_rejection", self.acceleration_rejection, (0.0, 1.5707), "rad")?;
-        accept("magnetic_rejection", self.magnetic_rejection, (0.0, 1.5707), "rad")?;
+        accept("acceleration_rejection", self.acceleration_rejection, (0.0, 1.5), "rad")?;
+        accept("magnetic_rejection", self.magnetic_rejection, (0.0, 1.5), "rad")?;
         accept("recovery_time", self.recovery_time, (0.0, 1e6), "s")?;
         accept("rest_angular_velocity", self.rest_angular_velocity, (0.0, 1000.0), "rad/s")?;
         accept("rest_time", self.rest_time, (0.0, 1e6), "s")
