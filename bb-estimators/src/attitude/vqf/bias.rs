@@ -93,7 +93,7 @@ impl Bias {
         self.correct(params, change);
     }
 
-    /// Keeps the low-passes going where nothing is measured in motion.
+    /// Low-passes rotation and bias, also where nothing is measured in motion.
     #[inline]
     pub(super) fn low_pass(
         &mut self,

@@ -70,6 +70,7 @@ impl AttitudeFilter for VqfFilter {
         let Some(step) = self.state.admit(sample)? else {
             let mean_gain = if self.state.heading_is_known() { 0.5 } else { 1.0 };
             self.begin(Heading::new(mean_gain), LowPass::new());
+            self.average_first(sample);
             return Ok(());
         };
         self.coefficients.follow(&self.params, step.dt_s);
@@ -133,6 +134,15 @@ impl VqfFilter {
         self.bias.forget_motion();
         self.disturbance.forget_motion();
         self.since_field_s = 0.0;
+    }
+
+    /// Lets the means of the low-passes begin with the sample that started the filter.
+    #[cold]
+    fn average_first(&mut self, sample: &ImuSample) {
+        let (coefficients, level_from_body) = (&self.coefficients, &self.inertial_from_body);
+        self.rest.average_first(coefficients, &sample.angular_velocity, &sample.specific_force);
+        self.forces.filter(&(level_from_body * sample.specific_force).into(), 0.0, &coefficients.tilt);
+        self.bias.low_pass(0.0, coefficients, level_from_body.to_rotation_matrix().matrix());
     }
 
     /// Integrates the gyroscope less its bias.

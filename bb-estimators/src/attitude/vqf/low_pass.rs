@@ -74,7 +74,8 @@ impl<const N: usize> LowPass<N> {
             *mean += (input - *mean) / samples;
         }
         self.elapsed_s += dt_s;
-        self.samples = (self.elapsed_s < time_constant_s).then_some(samples);
+        // Of the first sample it is not known what time it stands for: the same as this one.
+        self.samples = (self.elapsed_s + dt_s < time_constant_s).then_some(samples);
         self.low
     }
 }
@@ -106,7 +107,7 @@ mod tests {
     fn it_starts_with_the_mean_and_keeps_what_is_constant_at_any_rate() {
         let mut low_pass = LowPass::new();
         let at = |dt: f64| Coefficients::new(0.1, dt);
-        assert_eq!(low_pass.filter(&[2.0], 0.05, &at(0.05)), [2.0]);
+        assert_eq!(low_pass.filter(&[2.0], 0.0, &at(0.05)), [2.0]);
         assert_eq!(low_pass.filter(&[4.0], 0.05, &at(0.05)), [3.0]);
         for i in 1..100 {
             let dt = 0.01 * f64::from(i);

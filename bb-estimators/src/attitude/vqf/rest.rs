@@ -32,6 +32,17 @@ impl Rest {
         self.detected
     }
 
+    /// Lets the means begin with a sample.
+    pub(super) fn average_first(
+        &mut self,
+        coefficients: &InertialCoefficients,
+        rate: &Vector3<f64>,
+        force: &Vector3<f64>,
+    ) {
+        self.rate = self.rates.filter(&(*rate).into(), 0.0, &coefficients.rest).into();
+        self.forces.filter(&(*force).into(), 0.0, &coefficients.rest);
+    }
+
     /// Takes an angular velocity, rad/s, and ends rest if it differs too much or is too large for a bias.
     #[inline]
     pub(super) fn add_rate(
