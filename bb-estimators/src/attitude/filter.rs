@@ -17,7 +17,7 @@ use super::{ImuSample, ParamsError, SampleError};
 /// * The time step is the difference of two stamps. After a gap longer than [`MAX_GAP_S`](super::MAX_GAP_S)
 ///   nothing is integrated: tilt starts anew from the accelerometer, heading is kept until the next field
 ///   sets it at once (for ever without a magnetometer).
-/// * In free fall the filter follows the gyroscope alone.
+/// * In free fall the filter follows the gyroscope alone; one without a gyroscope stays as it is.
 /// * A sample that is refused leaves the filter as it was.
 ///
 /// The orientation has unit norm for ever.

@@ -1,4 +1,4 @@
-//! The orientation has unit norm for ever.
+//! The orientation has unit norm for ever, and whatever else a filter tells is finite.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -19,6 +19,10 @@ pub(in crate::attitude) fn unit_norm<F: Filter>(filter: &F, samples: &[ImuSample
         prop_assert!(orientation.is_some() || !started, "started filters have an orientation");
         prop_assert!(orientation.as_ref().is_none_or(is_unit), "{orientation:?} after {sample:?}");
         started = orientation.is_some();
+        let bias = filter.gyroscope_bias();
+        prop_assert!(bias.is_none_or(|bias| bias.norm().is_finite()), "{bias:?} after {sample:?}");
+        let uncertainty = filter.orientation_uncertainty();
+        prop_assert!(uncertainty.is_none_or(|covariance| covariance.norm().is_finite()), "after {sample:?}");
     }
     Ok(())
 }
