@@ -1,5 +1,6 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
+mod attitude;
 mod callbacks;
 mod components;
 mod control;
