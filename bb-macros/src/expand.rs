@@ -12,6 +12,7 @@
 //!     impl __Wiring { fn p0(&self, …) }     // what lies downstream of each publisher, by direct calls
 //!     impl Robot for Rover { … }
 //! };
+//! const _: () = { use rover::… as _; … };   // what the user refers to, for his editor
 //! pub mod rover { … }                       // a handle per publisher, at its path
 //! ```
 
@@ -25,6 +26,7 @@ mod literal;
 mod options;
 mod order;
 mod part;
+mod references;
 mod robot_impl;
 mod stub;
 mod topology;
@@ -51,6 +53,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let options = options::options(robot, name);
     let wiring = wiring::wiring(verified, &islands);
     let implementation = robot_impl::robot_impl(verified);
+    let references = references::references(verified);
     let handles = handles::handles(robot, name, handles::Accessors::Wired);
     quote! {
         #definition
@@ -63,6 +66,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
             #wiring
             #implementation
         };
+        #references
         #handles
     }
 }

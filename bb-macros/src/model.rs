@@ -62,6 +62,7 @@ pub(crate) struct Robot {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Link {
+    pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     /// Its name at run time; differs from the identifier only where a URDF's name is none.
     pub(crate) label: String,
@@ -74,6 +75,7 @@ pub(crate) struct Link {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
+    pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     /// Its name at run time, as a link's.
     pub(crate) label: String,

@@ -11,7 +11,9 @@ use super::part::Part;
 use super::types::Types;
 use super::wiring::{topic, visit_function};
 use super::{docs, path_text};
-use crate::model::{ActuatorId, CommandId, EstimatorId, ParameterId, PublisherId, Robot, SensorId, ServiceId};
+use crate::model::{
+    ActuatorId, CommandId, EstimatorId, From, ParameterId, PublisherId, Robot, SensorId, ServiceId,
+};
 use crate::names::module_name;
 use crate::parse::ServiceKind;
 use proc_macro2::{Ident, TokenStream};
@@ -85,6 +87,12 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
     }
     for (id, parameter) in robot.parameters.iter().enumerate() {
         root.add(&parameter.path, &parameter.name, Handle::Parameter(id));
+    }
+    for (path, attributes) in robot.places() {
+        for root_name in ["sensor", "estimator", "actuator"] {
+            let path: Vec<String> = std::iter::once(root_name.to_owned()).chain(path.iter().cloned()).collect();
+            root.describe(&path, attributes);
+        }
     }
     for group in &robot.parameter_groups {
         root.describe(&group.path, &group.attributes);
@@ -251,7 +259,12 @@ impl Handle {
                     Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),
                 };
                 let kind = quote!(::bb_core::OutputHandle<#this, #payload>);
-                (&estimator.attributes, path, kind, quote!(::bb_core::OutputHandle::new), arguments)
+                let output = match robot.publishers.get(publisher).map(|publisher| publisher.from) {
+                    Some(From::Estimator(_, output)) => output.and_then(|output| estimator.outputs.get(output)),
+                    _ => None,
+                };
+                let attributes = output.map_or(&estimator.attributes, |output| &output.attributes);
+                (attributes, path, kind, quote!(::bb_core::OutputHandle::new), arguments)
             }
             Self::Service(id) => {
                 let Some(service) = robot.services.get(id) else {

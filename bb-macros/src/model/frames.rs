@@ -1,7 +1,9 @@
 //! How one frame is reached from another: the joints between, and the transform if all of them are fixed.
 
 use super::{JointId, LinkId, Mount, Rigid, Robot};
+use crate::names::text;
 use crate::parse::JointKind;
+use syn::Attribute;
 
 /// The way from one frame to another through the tree.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +52,31 @@ impl Robot {
 
     fn moves(&self, joint: JointId) -> bool {
         self.joints.get(joint).is_some_and(|joint| joint.kind != JointKind::Fixed)
+    }
+
+    /// Every link and joint: the names from the root down to it, and its docs.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (Vec<String>, &[Attribute])> {
+        let links = self.links.iter().enumerate().map(|(id, link)| (self.place_of_link(id), &*link.attributes));
+        let joints = self.joints.iter().map(|joint| {
+            let mut place = self.place_of_link(joint.parent);
+            place.push(text(&joint.name));
+            (place, &*joint.attributes)
+        });
+        links.chain(joints)
+    }
+
+    /// `base`, `mount`, `mast`: the names of links and joints from the root on.
+    fn place_of_link(&self, link: LinkId) -> Vec<String> {
+        let mut place: Vec<String> = Vec::new();
+        let mut current = self.links.get(link);
+        while let Some(link) = current {
+            place.push(text(&link.name));
+            let joint = link.joint.and_then(|joint| self.joints.get(joint));
+            place.extend(joint.map(|joint| text(&joint.name)));
+            current = joint.and_then(|joint| self.links.get(joint.parent));
+        }
+        place.reverse();
+        place
     }
 
     /// The link that a mount is fixed to, and `link_from_mount`.

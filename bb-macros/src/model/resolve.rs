@@ -65,9 +65,10 @@ impl Robot {
     fn add_link(&mut self, link: parse::Link, joint: Option<JointId>, above: &[Ident]) -> LinkId {
         let id = self.links.len();
         let path = below(above, &link.name);
-        let parse::Link { name, label, sensors, estimators, joints, inertials, visuals, collisions } = link;
+        let parse::Link { attributes, name, label, sensors, estimators, joints, inertials, visuals, collisions } =
+            link;
         let label = label.unwrap_or_else(|| text(&name));
-        self.links.push(Link { name, label, joint, inertials, visuals, collisions });
+        self.links.push(Link { attributes, name, label, joint, inertials, visuals, collisions });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Link(id), &path);
         }
@@ -85,6 +86,7 @@ impl Robot {
         let id = self.joints.len();
         let path = below(above, &joint.name);
         let parse::Joint {
+            attributes,
             name,
             label,
             kind,
@@ -102,6 +104,7 @@ impl Robot {
         let from_urdf = label.is_some();
         let label = label.unwrap_or_else(|| text(&name));
         self.joints.push(Joint {
+            attributes,
             name,
             label,
             from_urdf,

@@ -12,11 +12,13 @@ use super::{Actuator, Link, Sensor};
 use crate::diagnostics::Diagnostics;
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::Ident;
+use syn::Attribute;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
+    pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     /// Its name as a URDF has it, which need not be an identifier.
     pub(crate) label: Option<String>,
@@ -83,6 +85,7 @@ impl Joint {
             .map_err(|_| syn::Error::new(place, "expected the type of the joint, as in `fixed` or `revolute`"))?;
         let kind = JointKind::parse(&kind_word);
         let mut joint = Self {
+            attributes: head.attributes,
             name,
             label: None,
             kind: kind.clone().unwrap_or(JointKind::Fixed),

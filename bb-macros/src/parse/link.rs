@@ -5,10 +5,12 @@ use super::component::name;
 use super::{Estimator, Inertial, Joint, Sensor, Shape};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
+use syn::Attribute;
 use syn::parse::ParseStream;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Link {
+    pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     /// Its name as a URDF has it, which need not be an identifier.
     pub(crate) label: Option<String>,
@@ -27,6 +29,7 @@ impl Link {
     pub(super) fn parse(head: &Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
         let mut link = Self {
+            attributes: head.attributes.clone(),
             name,
             label: None,
             sensors: Vec::new(),

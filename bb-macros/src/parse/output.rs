@@ -5,11 +5,12 @@ use super::component::name;
 use super::record::names;
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
-use syn::Token;
 use syn::parse::ParseStream;
+use syn::{Attribute, Token};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Output {
+    pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     /// The path that replaces the one below the estimator's.
     pub(crate) path: Option<Vec<Ident>>,
@@ -24,6 +25,6 @@ impl Output {
             path = Some(names(input, "a path has at least one name, as in `[nav, velocity]`")?);
         }
         semicolon(input, &format!("`{name}`"), diagnostics);
-        Ok(Self { name, path })
+        Ok(Self { attributes: head.attributes, name, path })
     }
 }

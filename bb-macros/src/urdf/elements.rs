@@ -50,6 +50,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         let visuals = self.children(node, "visual").into_iter().map(|node| self.shape(node, robot)).collect();
         let collisions = self.children(node, "collision").into_iter().map(|node| self.shape(node, robot)).collect();
         Link {
+            attributes: Vec::new(),
             name: self.name(&label),
             label: Some(label),
             sensors: Vec::new(),
@@ -118,6 +119,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         let mimics = mimics.collect();
         let origins = self.children(node, "origin").into_iter().map(|node| self.origin(node)).collect();
         Some(Joint {
+            attributes: Vec::new(),
             name: self.joint_name(&label, robot),
             kind,
             kind_word: self.word(kind_text),

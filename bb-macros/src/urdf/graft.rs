@@ -67,6 +67,7 @@ fn add_to_link(tree: &mut Robot, addition: Link, diagnostics: &mut Diagnostics) 
     };
     // Identifiers keep the span of the declaration, so that an editor finds it.
     link.name = addition.name;
+    link.attributes.extend(addition.attributes);
     link.sensors.extend(addition.sensors);
     link.estimators.extend(addition.estimators);
     link.joints.extend(addition.joints);
