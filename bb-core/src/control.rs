@@ -22,4 +22,4 @@ pub use parameters::{
 };
 pub use safety::{Safety, SafetyError};
 pub use system::SystemTopics;
-pub(crate) use system::{Control, Declared};
+pub(crate) use system::{Control, Declared, Setter};

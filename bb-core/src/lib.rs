@@ -12,6 +12,7 @@
 //! | a running estimator: fan-in, health, drops, counters | [`node`] |
 //! | states, commands, parameters, safety | [`control`] |
 //! | subscriptions | [`pubsub`] |
+//! | what came in, to run it again | [`journal`] |
 //! | start, run, stop | [`run`] |
 //!
 //! All stored quantities are SI: metres, seconds, radians, kilograms, tesla.
@@ -21,6 +22,7 @@ extern crate self as bb_core;
 
 pub mod component;
 pub mod control;
+pub mod journal;
 pub mod message;
 pub mod node;
 pub mod payload;
@@ -47,7 +49,7 @@ pub use node::{HealthReason, HealthState, HealthTransition};
 pub use pubsub::{DynamicMessage, DynamicSubscription, Overflow, Select, Subscription};
 pub use run::{
     ActuatorHandle, Builder, Bus, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Live, OutputHandle,
-    ParameterHandle, Report, Robot, Running, SensorHandle, Simulation, StartError,
+    ParameterHandle, Replay, ReplayError, Report, Robot, Running, SensorHandle, Simulation, StartError,
 };
 /// Handles of the topics that every robot has: subscribe to them as to any other.
 pub mod system {
@@ -94,15 +96,16 @@ pub mod __private {
         Binding, Cancel, CategoryDeclaration, Command, CommandDeclaration, FromParameter, ParameterDeclaration,
         ParameterDefault, ParameterValues, Prepared,
     };
+    pub use crate::journal::Journal;
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{
-        AnyIsland, EstimatorDeclaration, HealthDeclaration, InputDeclaration, Island, Node, Shore, Turn,
+        AnyIsland, EstimatorDeclaration, HealthDeclaration, InputDeclaration, Island, Key, Node, Shore, Turn,
         WorkerDeclaration,
     };
-    pub use crate::pubsub::{AnyTopic, Topic};
+    pub use crate::pubsub::{AnyTopic, DynamicMessage, Topic};
     pub use crate::run::{
         ActuatorDeclaration, ActuatorHandle, ActuatorNode, AnyActuator, AsBridge, AsController, AsSensor,
-        BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle, IslandOf,
+        BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle, FeedOf, IslandOf,
         OutputHandle, ParameterHandle, Periodic, Report, Robot, SensorDeclaration, SensorHandle, Source,
         StartError, Startup,
     };

@@ -14,7 +14,7 @@ mod timers;
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
 pub use declaration::{EstimatorDeclaration, HealthDeclaration, InputDeclaration, WorkerDeclaration};
 pub use health::{HealthReason, HealthState, HealthTransition};
-pub use island::{AnyIsland, Island, Shore};
+pub use island::{AnyIsland, Island, Key, Shore};
 pub use latency::LatencyStatistics;
 pub use running::{Node, Turn};
 pub(crate) use shared::SharedNode;

@@ -10,6 +10,7 @@ mod handle;
 mod live;
 mod machine;
 mod periodic;
+mod replay;
 mod report;
 mod robot;
 mod running;
@@ -32,8 +33,9 @@ pub use handle::{
 };
 pub use live::Live;
 pub use periodic::{AsBridge, AsController, AsSensor, Periodic};
+pub use replay::{Replay, ReplayError};
 pub use report::Report;
-pub use robot::{IslandOf, Robot};
+pub use robot::{FeedOf, IslandOf, Robot};
 pub use running::Running;
 pub use simulation::Simulation;
 pub use source::{SensorDeclaration, Source};

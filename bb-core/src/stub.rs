@@ -137,6 +137,7 @@ macro_rules! __stub_robot {
             const COMMANDS: &'static [$crate::__private::CommandDeclaration] = &[];
             const PARAMETERS: &'static [$crate::__private::ParameterDeclaration] = &[];
             const ISLANDS: &'static [$crate::__private::IslandOf<()>] = &[];
+            const FEEDS: &'static [::core::option::Option<$crate::__private::FeedOf<()>>] = &[];
             type Options = ();
             type Topics = ();
             type Wiring = ();

@@ -12,6 +12,7 @@ mod health;
 mod hygiene;
 mod outputs;
 mod real_time;
+mod replay;
 mod simulation;
 mod subscriptions;
 mod topology;

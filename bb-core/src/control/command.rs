@@ -1,11 +1,11 @@
 //! The contract of a command.
 
-use super::system::Control;
+use super::system::{Control, Setter};
 use super::tasks::Sleeper;
 use super::{ParameterError, ParameterValue};
 use crate::component::{Fault, NoOptions, Options};
 use crate::node::HealthTransition;
-use crate::time::{Clock, MonotonicTime};
+use crate::time::MonotonicTime;
 use std::future::Future;
 use std::pin::Pin;
 use std::task::{Context, Poll};
@@ -109,7 +109,6 @@ impl<T> Outcome<T> {
 pub struct CommandContext {
     pub(super) name: &'static str,
     pub(super) health: Option<HealthTransition>,
-    pub(super) clock: Clock,
     pub(super) control: Control,
 }
 
@@ -124,14 +123,14 @@ impl CommandContext {
         self.health.as_ref()
     }
 
-    /// The time now.
+    /// The time now: when the robot's commands have gone on, the same for all of them.
     pub fn now(&self) -> MonotonicTime {
-        self.clock.now()
+        self.control.moment()
     }
 
     /// Waits on the robot's clock.
     pub fn sleep(&self, duration: Duration) -> Sleep {
-        Sleep { until: self.now() + duration, clock: self.clock.clone(), sleeper: self.control.sleeper() }
+        Sleep { until: self.now() + duration, control: self.control.clone(), sleeper: self.control.sleeper() }
     }
 
     /// The operational state.
@@ -149,7 +148,7 @@ impl CommandContext {
     /// # Errors
     /// What was expected.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
-        self.control.set_parameter_at(path, value.into())
+        self.control.set_parameter_at(path, value.into(), Setter::Command)
     }
 }
 
@@ -157,7 +156,7 @@ impl CommandContext {
 #[derive(Debug)]
 pub struct Sleep {
     until: MonotonicTime,
-    clock: Clock,
+    control: Control,
     sleeper: Sleeper,
 }
 
@@ -165,7 +164,7 @@ impl Future for Sleep {
     type Output = ();
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        if self.clock.now() >= self.until {
+        if self.control.moment() >= self.until {
             return Poll::Ready(());
         }
         self.sleeper.wake_at(self.until, context.waker().clone());

@@ -7,6 +7,8 @@ mod arming;
 mod commands;
 mod parameters;
 
+pub(crate) use parameters::Setter;
+
 use super::commands::CommandStatistics;
 use super::event::{CommandEvent, CommandPhase, ParameterChange, SafetyTransition, StateTransition};
 use super::parameters::{ParameterDeclaration, ParameterValues};
@@ -14,14 +16,16 @@ use super::safety::{Hook, SafetyError};
 use super::state::Machine;
 use super::tasks::{Bell, Sleeper, Task, lock};
 use super::{CategoryDeclaration, CommandDeclaration, Prepared};
+use crate::journal::{Event, Journal};
 use crate::message::{Origin, Payload, Stamp};
 use crate::node::HealthTransition;
 use crate::pubsub::{AnyTopic, Topic};
-use crate::time::Clock;
+use crate::time::{Clock, MonotonicTime};
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// What `robot!` declares of all this.
 #[derive(Clone, Copy, Debug)]
@@ -77,8 +81,7 @@ struct Inner {
     origin: Origin,
     commands: Box<[Prepared]>,
     state: Mutex<State>,
-    /// Held while a command starts, so that two at once do not both find room.
-    starting: Mutex<()>,
+    acting: Mutex<()>,
     parameters: Mutex<ParameterValues>,
     bound: Mutex<Vec<Bound>>,
     hooks: Mutex<Vec<(&'static str, Hook)>>,
@@ -86,6 +89,11 @@ struct Inner {
     bell: Bell,
     /// Whether `State::waiting` holds anything.
     has_waiting: AtomicBool,
+    /// When commands go on: their time, so that a replay of them is the same.
+    moment_nanos: AtomicI64,
+    journal: Option<Journal>,
+    /// What making hardware safe answers in a replay.
+    replayed_answer: Mutex<Option<Vec<SafetyError>>>,
 }
 
 struct State {
@@ -125,6 +133,7 @@ impl Control {
         origin: Origin,
         commands: Vec<Prepared>,
         parameters: ParameterValues,
+        journal: Option<Journal>,
     ) -> Self {
         let statistics =
             |command: &CommandDeclaration| CommandStatistics { name: command.name, ..Default::default() };
@@ -143,13 +152,16 @@ impl Control {
             origin,
             commands: commands.into(),
             state: Mutex::new(state),
-            starting: Mutex::new(()),
+            acting: Mutex::new(()),
             parameters: Mutex::new(parameters),
             bound: Mutex::default(),
             hooks: Mutex::default(),
             sleeper: Sleeper::default(),
             bell: Bell::default(),
             has_waiting: AtomicBool::new(false),
+            moment_nanos: AtomicI64::new(0),
+            journal,
+            replayed_answer: Mutex::default(),
         }));
         for (number, command) in declared.commands.iter().enumerate() {
             let used = control.clone_weakly();
@@ -171,10 +183,33 @@ impl Control {
     pub(crate) fn health_changed(&self, transition: HealthTransition, command: Option<usize>) {
         let HealthTransition { estimator, source, from, to, reason, time } = transition;
         tracing::info!(estimator, source, %from, %to, %reason, %time, "health changed");
-        self.publish(&self.0.topics.health, transition);
+        self.publish(&self.0.topics.health, transition, time);
         if let Some(command) = command {
             self.leave(Waiting::Start(transition, command));
         }
+    }
+
+    /// Writes into the journal, if there is one.
+    fn write(&self, now: MonotonicTime, event: Event) {
+        if let Some(journal) = &self.0.journal {
+            journal.write(now, event);
+        }
+    }
+
+    /// Whoever does anything does it alone, so that two commands at once do not both find room, and a journal has an order.
+    /// A command that does something while it goes on is in here already.
+    fn act(&self) -> Acting<'_> {
+        if IS_ACTING.get() {
+            return Acting(None);
+        }
+        let guard = lock(&self.0.acting);
+        IS_ACTING.set(true);
+        Acting(Some(guard))
+    }
+
+    /// When commands go on.
+    pub(super) fn moment(&self) -> MonotonicTime {
+        MonotonicTime::from_nanos(self.0.moment_nanos.load(Ordering::Acquire))
     }
 
     fn leave(&self, waiting: Waiting) {
@@ -188,30 +223,36 @@ impl Control {
         self.0.bell.ring();
     }
 
-    fn publish_changes(&self, before: Machine, after: Machine, command: Option<&'static str>) {
+    fn publish_changes(&self, before: Machine, after: Machine, command: Option<&'static str>, now: MonotonicTime) {
         if before.safety != after.safety {
             let (from, to) = (before.safety, after.safety);
             tracing::info!(%from, %to, "safety changed");
-            self.publish(&self.0.topics.safety, SafetyTransition { from, to });
+            self.publish(&self.0.topics.safety, SafetyTransition { from, to }, now);
         }
         if before.state() != after.state() {
             let (from, to) = (before.state(), after.state());
             tracing::info!(from, to, command, "state changed");
-            self.publish(&self.0.topics.state, StateTransition { from, to, command });
+            self.publish(&self.0.topics.state, StateTransition { from, to, command }, now);
         }
     }
 
-    fn command_event(&self, number: usize, execution: u64, phase: CommandPhase, health: Option<HealthTransition>) {
+    fn command_event(
+        &self,
+        number: usize,
+        execution: u64,
+        phase: CommandPhase,
+        health: Option<HealthTransition>,
+        now: MonotonicTime,
+    ) {
         if let (Some(topic), Some(declared)) =
             (self.0.topics.commands.get(number), self.0.declared.commands.get(number))
         {
             tracing::debug!(command = declared.name, execution, ?phase, "command");
-            self.publish(topic, CommandEvent { command: declared.name, execution, phase, health });
+            self.publish(topic, CommandEvent { command: declared.name, execution, phase, health }, now);
         }
     }
 
-    fn publish<T: Payload>(&self, topic: &Topic<T>, payload: T) {
-        let monotonic_time = self.0.clock.now();
+    fn publish<T: Payload>(&self, topic: &Topic<T>, payload: T, monotonic_time: MonotonicTime) {
         let wall_time = self.0.clock.wall_at(monotonic_time);
         let stamp = Stamp { monotonic_time, wall_time, origin: self.0.origin, ..Stamp::default() };
         topic.publish(&stamp.message(payload));
@@ -219,6 +260,21 @@ impl Control {
 
     pub(crate) fn topics(&self) -> &SystemTopics {
         &self.0.topics
+    }
+}
+
+thread_local! {
+    static IS_ACTING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// See [`Control::act`].
+struct Acting<'a>(Option<MutexGuard<'a, ()>>);
+
+impl Drop for Acting<'_> {
+    fn drop(&mut self) {
+        if self.0.is_some() {
+            IS_ACTING.set(false);
+        }
     }
 }
 

@@ -8,6 +8,7 @@
 //! inbox, for the holder to deliver before it goes. So there is a single writer, and the order of every input is kept.
 
 use super::WorkerDeclaration;
+use crate::journal::{Event, Journal};
 use crate::run::StopSignal;
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
@@ -34,6 +35,8 @@ pub trait Shore: Sized + Send {
     type Message: Send;
     /// Messages that the inbox holds.
     const CAPACITY: usize = 1024;
+    /// Its number.
+    const NUMBER: usize;
     /// The path of its first estimator.
     const NAME: &'static str;
     /// How its own thread runs, if it has one.
@@ -43,6 +46,8 @@ pub trait Shore: Sized + Send {
     fn deliver(&mut self, wiring: &Self::Wiring, message: &Self::Message, now: MonotonicTime);
     /// Runs whatever is due: timers, ticks, restarts, losses.
     fn wake(&mut self, wiring: &Self::Wiring, now: MonotonicTime);
+    /// Where the robot's journal is written, if it is.
+    fn journal(wiring: &Self::Wiring) -> Option<&Journal>;
     /// Counts a message that did not fit in the inbox, wherever it would have gone.
     fn dropped(wiring: &Self::Wiring, message: &Self::Message);
     /// Stops its estimators.
@@ -61,10 +66,29 @@ pub struct Island<S: Shore> {
     arrived: Condvar,
     /// Whether a thread of its own serves it.
     served: AtomicBool,
+    /// Whether a journal says when its messages are delivered.
+    replayed: AtomicBool,
+}
+
+/// What a message is known by: which of the island's publishers it is from, and the number of its line in the journal, if
+/// there is one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// The publisher, as the island numbers them.
+    pub entry: usize,
+    /// The line; 0 if there is none.
+    pub line: u64,
+}
+
+/// A message that waits.
+struct Waiting<M> {
+    arrived: MonotonicTime,
+    key: Key,
+    message: M,
 }
 
 struct Inbox<M> {
-    messages: VecDeque<(MonotonicTime, M)>,
+    messages: VecDeque<Waiting<M>>,
     /// Something may be due since that time.
     woken: Option<MonotonicTime>,
 }
@@ -77,7 +101,7 @@ impl<M> Inbox<M> {
 
 /// What is taken from an inbox.
 enum Taken<M> {
-    Message(MonotonicTime, M),
+    Message(Waiting<M>),
     Wake(MonotonicTime),
 }
 
@@ -90,6 +114,7 @@ impl<S: Shore> Island<S> {
             pending: AtomicUsize::new(0),
             arrived: Condvar::new(),
             served: AtomicBool::new(false),
+            replayed: AtomicBool::new(false),
         }
     }
 
@@ -99,6 +124,7 @@ impl<S: Shore> Island<S> {
         &self,
         wiring: &S::Wiring,
         now: MonotonicTime,
+        key: Key,
         direct: impl FnOnce(&mut S),
         message: impl FnOnce() -> S::Message,
     ) {
@@ -106,19 +132,24 @@ impl<S: Shore> Island<S> {
             && !self.served.load(Ordering::Relaxed)
             && let Some(mut state) = self.try_lock()
         {
+            Self::write(wiring, now, key);
             direct(&mut state);
             return self.leave(wiring, state);
         }
-        self.post(wiring, now, message());
+        self.post(wiring, Waiting { arrived: now, key, message: message() });
     }
 
     /// Leaves a message in the inbox and sees to it that somebody delivers it.
     #[cold]
-    fn post(&self, wiring: &S::Wiring, now: MonotonicTime, message: S::Message) {
+    fn post(&self, wiring: &S::Wiring, waiting: Waiting<S::Message>) {
         let mut inbox = unpoisoned(self.inbox.lock());
         // Room is made once, at the first message that has to wait.
         if inbox.messages.capacity() == 0 {
             inbox.messages.reserve_exact(S::CAPACITY);
+        }
+        if self.replayed.load(Ordering::Relaxed) {
+            inbox.messages.push_back(waiting);
+            return;
         }
         if inbox.messages.len() >= S::CAPACITY && !self.served.load(Ordering::Relaxed) {
             drop(inbox);
@@ -126,11 +157,15 @@ impl<S: Shore> Island<S> {
             inbox = unpoisoned(self.inbox.lock());
         }
         let dropped = if inbox.messages.len() < S::CAPACITY { None } else { inbox.messages.pop_front() };
-        inbox.messages.push_back((now, message));
+        inbox.messages.push_back(waiting);
         self.pending.store(inbox.len(), Ordering::Relaxed);
         drop(inbox);
-        if let Some((_, dropped)) = dropped {
-            S::dropped(wiring, &dropped);
+        if let Some(dropped) = dropped {
+            if let Some(journal) = S::journal(wiring) {
+                let Key { entry, line } = dropped.key;
+                journal.write(dropped.arrived, Event::Drop { island: S::NUMBER, entry, message: line });
+            }
+            S::dropped(wiring, &dropped.message);
         }
         self.attend(wiring);
     }
@@ -145,6 +180,9 @@ impl<S: Shore> Island<S> {
     }
 
     fn wake_up(&self, wiring: &S::Wiring, now: MonotonicTime) {
+        if self.replayed.load(Ordering::Relaxed) {
+            return;
+        }
         {
             let mut inbox = unpoisoned(self.inbox.lock());
             inbox.woken = Some(now);
@@ -178,6 +216,9 @@ impl<S: Shore> Island<S> {
 
     #[cold]
     fn drain(&self, wiring: &S::Wiring) {
+        if self.replayed.load(Ordering::Relaxed) {
+            return;
+        }
         while self.pending.load(Ordering::Relaxed) != 0 {
             let Some(mut state) = self.try_lock() else { return };
             while let Some(taken) = self.take() {
@@ -190,15 +231,38 @@ impl<S: Shore> Island<S> {
 
     fn run(state: &mut S, wiring: &S::Wiring, taken: Taken<S::Message>) {
         match taken {
-            Taken::Message(now, message) => state.deliver(wiring, &message, now),
-            Taken::Wake(now) => state.wake(wiring, now),
+            Taken::Message(Waiting { arrived, key, message }) => {
+                Self::write(wiring, arrived, key);
+                state.deliver(wiring, &message, arrived);
+            }
+            Taken::Wake(now) => {
+                if let Some(journal) = S::journal(wiring) {
+                    journal.write(now, Event::Wake { island: S::NUMBER });
+                }
+                state.wake(wiring, now);
+            }
+        }
+    }
+
+    /// The first message of that key.
+    fn take_replayed(&self, key: Key) -> Option<Waiting<S::Message>> {
+        let mut inbox = unpoisoned(self.inbox.lock());
+        let position = inbox.messages.iter().position(|waiting| waiting.key == key)?;
+        inbox.messages.remove(position)
+    }
+
+    /// Writes into the journal, if there is one, what is delivered now; the island is held.
+    #[inline]
+    fn write(wiring: &S::Wiring, now: MonotonicTime, key: Key) {
+        if let Some(journal) = S::journal(wiring) {
+            journal.write(now, Event::Deliver { island: S::NUMBER, entry: key.entry, message: key.line });
         }
     }
 
     fn take(&self) -> Option<Taken<S::Message>> {
         let mut inbox = unpoisoned(self.inbox.lock());
         let taken = match inbox.messages.pop_front() {
-            Some((now, message)) => Some(Taken::Message(now, message)),
+            Some(waiting) => Some(Taken::Message(waiting)),
             None => inbox.woken.take().map(Taken::Wake),
         };
         self.pending.store(inbox.len(), Ordering::Relaxed);
@@ -255,6 +319,14 @@ pub trait AnyIsland<W>: Sync {
     fn give_to_thread(&self);
     /// Delivers what comes, on the calling thread, until the robot stops.
     fn serve(&self, wiring: &W, stop: &StopSignal);
+    /// From now on messages wait until [`Self::replay`] delivers them.
+    fn begin_replay(&self);
+    /// Delivers the first message of that key; false if there is none.
+    fn replay(&self, wiring: &W, key: Key, now: MonotonicTime) -> bool;
+    /// Drops the first message of that key; false if there is none.
+    fn replay_drop(&self, wiring: &W, key: Key) -> bool;
+    /// Does what is due.
+    fn replay_wake(&self, wiring: &W, now: MonotonicTime);
     /// Stops its estimators once they are free; false if they are still busy after `timeout`.
     fn terminate(&self, wiring: &W, timeout: Duration) -> bool;
 }
@@ -295,6 +367,28 @@ impl<S: Shore> AnyIsland<S::Wiring> for Island<S> {
             }
         }
         self.served.store(false, Ordering::SeqCst);
+    }
+
+    fn begin_replay(&self) {
+        self.replayed.store(true, Ordering::Relaxed);
+        // Whoever publishes finds it taken.
+        self.pending.store(usize::MAX / 2, Ordering::Relaxed);
+    }
+
+    fn replay(&self, wiring: &S::Wiring, key: Key, now: MonotonicTime) -> bool {
+        let Some(waiting) = self.take_replayed(key) else { return false };
+        unpoisoned(self.state.lock()).deliver(wiring, &waiting.message, now);
+        true
+    }
+
+    fn replay_drop(&self, wiring: &S::Wiring, key: Key) -> bool {
+        let Some(waiting) = self.take_replayed(key) else { return false };
+        S::dropped(wiring, &waiting.message);
+        true
+    }
+
+    fn replay_wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
+        unpoisoned(self.state.lock()).wake(wiring, now);
     }
 
     fn terminate(&self, wiring: &S::Wiring, timeout: Duration) -> bool {

@@ -315,7 +315,13 @@ impl<E: Estimator> Node<E> {
             elapsed = elapsed.saturating_add(self.shared.pretended_latency_nanos());
         }
         self.shared.counters().latency.add(elapsed.max(0) as u64);
-        (elapsed > budget_nanos).then_some(HealthReason::LatencyOverrun)
+        if elapsed <= budget_nanos {
+            return None;
+        }
+        if let Some(journal) = self.startup.journal() {
+            journal.overrun(start, self.shared.number());
+        }
+        Some(HealthReason::LatencyOverrun)
     }
 
     /// An input was let in.

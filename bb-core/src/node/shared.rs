@@ -16,6 +16,7 @@ pub(crate) struct SharedNode(Arc<Inner>);
 
 #[derive(Debug)]
 struct Inner {
+    number: usize,
     declaration: &'static EstimatorDeclaration,
     counters: Counters,
     health: AtomicU8,
@@ -31,8 +32,9 @@ struct Inner {
 }
 
 impl SharedNode {
-    pub(crate) fn new(declaration: &'static EstimatorDeclaration) -> Self {
+    pub(crate) fn new(number: usize, declaration: &'static EstimatorDeclaration) -> Self {
         Self(Arc::new(Inner {
+            number,
             declaration,
             counters: Counters::new(declaration),
             health: AtomicU8::new(0),
@@ -47,6 +49,11 @@ impl SharedNode {
     #[inline]
     pub(super) fn counters(&self) -> &Counters {
         &self.0.counters
+    }
+
+    /// Its number among the robot's estimators.
+    pub(crate) fn number(&self) -> usize {
+        self.0.number
     }
 
     pub(crate) fn declaration(&self) -> &'static EstimatorDeclaration {

@@ -38,7 +38,7 @@ impl<T: Payload> AnyMessage for Stamped<T> {
 }
 
 impl DynamicMessage {
-    pub(super) fn new<T: Payload>(path: &'static str, message: &Stamped<T>) -> Self {
+    pub(crate) fn new<T: Payload>(path: &'static str, message: &Stamped<T>) -> Self {
         Self { path, message: Arc::new(message.clone()) }
     }
 

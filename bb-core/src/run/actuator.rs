@@ -86,7 +86,12 @@ impl<A: Actuator> ActuatorNode<A> {
             joint: declaration.joint,
             clock: startup.clock().clone(),
         };
-        let made = startup.make(declaration.path, options, binding, |options| A::init(options, &context));
+        // A journal does not move anything.
+        let made = if startup.is_replay() {
+            Err("a journal is replayed".into())
+        } else {
+            startup.make(declaration.path, options, binding, |options| A::init(options, &context))
+        };
         let state = State { actuator: made.ok(), restart_at: None, attempt: 0, failed_at: MonotonicTime::ZERO };
         let inner = Arc::new(Inner {
             declaration,

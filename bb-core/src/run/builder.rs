@@ -3,11 +3,12 @@
 use super::bus::Wired;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::machine::Machine;
-use super::{Robot, Running, Simulation, Source, StartError, Startup, Supervision};
+use super::{Replay, Robot, Running, Simulation, Source, StartError, Startup, Supervision};
 use crate::component::Fault;
 use crate::control::{
     Control, Declared, ParameterError, ParameterType, ParameterValue, ParameterValues, SystemTopics,
 };
+use crate::journal::{Entry, Journal};
 use crate::message::Origin;
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
@@ -25,6 +26,7 @@ pub struct Builder<R: Robot> {
     system: Arc<SystemTopics>,
     parameters: Vec<ParameterValue>,
     supervision: Supervision,
+    journal: Option<Journal>,
 }
 
 impl<R: Robot> Builder<R> {
@@ -35,6 +37,7 @@ impl<R: Robot> Builder<R> {
             system: Arc::new(SystemTopics::new(declared::<R>())),
             parameters: R::PARAMETERS.iter().map(|parameter| parameter.default.into()).collect(),
             supervision: Supervision::default(),
+            journal: None,
         }
     }
 
@@ -68,6 +71,12 @@ impl<R: Robot> Builder<R> {
         &mut self.supervision
     }
 
+    /// Has all that comes in from outside written to `sink`, enough to run the robot again: see
+    /// [`journal`](crate::journal).
+    pub fn journal(&mut self, sink: impl Fn(Entry) + Send + Sync + 'static) {
+        self.journal = Some(Journal::new(Arc::new(sink)));
+    }
+
     /// Subscribes, with room for 1024 messages.
     pub fn subscribe<P: Publisher<R>>(&self, publisher: P) -> Subscription<P::Payload> {
         self.subscribe_with(publisher, Overflow::default())
@@ -95,7 +104,7 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
     pub fn start(self) -> Result<Running<R>, StartError> {
-        let (machine, sources) = self.assemble(Clock::real())?;
+        let (machine, sources) = self.assemble(Clock::real(), false)?;
         Running::start(machine, sources)
     }
 
@@ -105,23 +114,43 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
     pub fn simulate(self) -> Result<Simulation<R>, StartError> {
-        let (machine, sources) = self.assemble(Clock::virtual_at(MonotonicTime::ZERO))?;
+        let (machine, sources) = self.assemble(Clock::virtual_at(MonotonicTime::ZERO), false)?;
         Ok(Simulation::new(machine, sources))
     }
 
+    /// Prepares a robot to be run again from a journal, on virtual time and without sensors, services and actuators. Options
+    /// must be as they were.
+    ///
+    /// # Errors
+    /// Names the component that cannot start.
+    pub fn replay(self) -> Result<Replay<R>, StartError> {
+        let (machine, _) = self.assemble(Clock::virtual_at(MonotonicTime::from_nanos(i64::MIN)), true)?;
+        Ok(Replay::new(machine))
+    }
+
     /// Dropping what has started stops it in order.
-    fn assemble(self, clock: Clock) -> Result<Assembled<R>, StartError> {
+    fn assemble(self, clock: Clock, is_replay: bool) -> Result<Assembled<R>, StartError> {
         let origin = Origin { robot: R::NAME, node: "local" };
         let commands = R::commands(&self.options);
         let parameters = ParameterValues::new(self.parameters);
-        let control = Control::new(declared::<R>(), self.system, clock.clone(), origin, commands, parameters);
+        let journal = self.journal.filter(|_| !is_replay);
+        let control = Control::new(
+            declared::<R>(),
+            self.system,
+            clock.clone(),
+            origin,
+            commands,
+            parameters,
+            journal.clone(),
+        );
         if let Err((path, message)) = control.check_commands() {
             return Err(StartError::component(path, Fault::new(message)));
         }
-        let startup = Startup::new::<R>(clock, origin, control, self.supervision);
+        let startup = Startup::new::<R>(clock, origin, control, self.supervision).with_journal(journal);
+        let startup = if is_replay { startup.for_replay() } else { startup };
         let wiring = Arc::new(R::wire(self.topics, &self.options, &startup));
         startup.set_directory(Arc::new(Wired::<R>(Arc::downgrade(&wiring))));
-        let sources = R::sources(&wiring, &self.options, &startup);
+        let sources = if is_replay { Vec::new() } else { R::sources(&wiring, &self.options, &startup) };
         match startup.refusal() {
             Some(error) => Err(error),
             None => Ok((Machine { wiring, startup }, sources)),

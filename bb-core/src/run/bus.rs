@@ -3,7 +3,7 @@
 use super::Robot;
 use super::actuator::{Accepts, ActuatorError, AnyActuator};
 use crate::component::Fault;
-use crate::control::{Control, ParameterError, ParameterValue};
+use crate::control::{Control, ParameterError, ParameterValue, Setter};
 use crate::message::Payload;
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription, Topic};
 use crate::time::Clock;
@@ -116,7 +116,7 @@ impl Bus {
     /// # Errors
     /// What was expected.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
-        self.control.set_parameter_at(path, value.into())
+        self.control.set_parameter_at(path, value.into(), Setter::Outside(self.clock.now()))
     }
 
     /// The operational state.

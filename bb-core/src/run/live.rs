@@ -130,19 +130,19 @@ impl<R: Robot> Live<R> {
 
     /// Arms the robot, as a command would; true if it is armed now. In `error` it stays disarmed.
     pub fn arm(&self) -> bool {
-        self.0.startup.control.arm()
+        self.0.startup.control.arm(self.clock().now())
     }
 
     /// Disarms the robot: commands are cancelled, and whoever owns hardware makes it safe, within 5 s. True if all could;
     /// else the safety state is `error`.
     pub fn disarm(&self) -> bool {
-        self.0.startup.control.disarm(false)
+        self.0.startup.control.disarm(false, self.clock().now())
     }
 
     /// Leads out of the safety state `error`, even if something still cannot be made safe: whoever calls it has seen to
     /// that.
     pub fn force_disarm(&self) -> bool {
-        self.0.startup.control.disarm(true)
+        self.0.startup.control.disarm(true, self.clock().now())
     }
 
     /// What it has done so far.
@@ -154,6 +154,11 @@ impl<R: Robot> Live<R> {
     /// those that are busy on another thread or have one of their own.
     pub fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
         self.0.publish(sensor, time, payload);
+    }
+
+    /// A handle of its own, for another thread.
+    pub fn live(&self) -> Self {
+        self.clone()
     }
 
     /// Tells sensors, services and commands to stop, as `stop` of [`Running`](super::Running) does; nobody waits for them.

@@ -3,7 +3,7 @@
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher, Visitable};
 use super::{ActuatorError, Report, Robot, SensorHandle, Startup};
 use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
-use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal};
+use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal, Setter};
 use crate::message::Stamp;
 use crate::node::{AnyIsland, Node};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
@@ -80,7 +80,7 @@ impl<R: Robot> Machine<R> {
         command: CommandHandle<R, C>,
         arguments: C::Arguments,
     ) -> Result<Execution<C::Output>, Refusal> {
-        self.startup.control.execute(command.number(), Box::new(arguments))
+        self.startup.control.execute(command.number(), Box::new(arguments), self.startup.clock.now())
     }
 
     pub(super) fn actuate<A: Actuator>(
@@ -100,7 +100,8 @@ impl<R: Robot> Machine<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        self.startup.control.set_parameter(parameter.number(), value.into_value())
+        let setter = Setter::Outside(self.startup.clock.now());
+        self.startup.control.set_parameter(parameter.number(), value.into_value(), setter)
     }
 
     /// Wakes the estimators of an island.
@@ -132,7 +133,7 @@ impl<R: Robot> Machine<R> {
     /// Cancels commands and disarms, tells the subscribers that no more will come, and stops the estimators and actuators.
     /// An estimator that is still busy at `deadline` is left behind and reported as a fault.
     pub(super) fn terminate(&self, deadline: Instant) {
-        self.startup.control.stop();
+        self.startup.control.stop(self.startup.clock.now());
         for topic in self.topics() {
             topic.close();
         }

@@ -3,12 +3,16 @@
 use super::{ActuatorDeclaration, AnyActuator, Builder, SensorDeclaration, Source, Startup};
 use crate::control::{CategoryDeclaration, CommandDeclaration, ParameterDeclaration, Prepared};
 use crate::node::{AnyIsland, EstimatorDeclaration};
-use crate::pubsub::AnyTopic;
+use crate::pubsub::{AnyTopic, DynamicMessage};
+use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology, graph};
 use std::sync::Arc;
 
 /// Finds an island in a wiring.
 pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
+
+/// Publishes a message of a sensor or a service; false if its payload is another.
+pub type FeedOf<W> = fn(&W, &DynamicMessage, MonotonicTime) -> bool;
 
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
 pub trait Robot: Sized + Send + Sync + 'static {
@@ -35,6 +39,9 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// Where its islands are in the wiring.
     #[doc(hidden)]
     const ISLANDS: &'static [IslandOf<Self::Wiring>];
+    /// By publisher, how its messages are published again; none for an estimator's.
+    #[doc(hidden)]
+    const FEEDS: &'static [Option<FeedOf<Self::Wiring>>];
 
     /// The options of all components.
     #[doc(hidden)]

@@ -6,6 +6,7 @@ use super::supervision::{Supervisor, Verdict};
 use super::{Failed, Robot, Startup, caught, retire};
 use crate::component::{Fault, Next, Then};
 use crate::control::Binding;
+use crate::journal::Event;
 use crate::message::{Frame, Stamp, Stamped};
 use crate::time::MonotonicTime;
 use crate::topology::Transform;
@@ -180,6 +181,10 @@ where
         let supervisors = self.startup.supervisors();
         if now.duration_since(self.failed_at) > supervisors.calm() {
             self.attempt = 0;
+        }
+        if let Some(journal) = self.startup.journal() {
+            let (supervisor, path) = (self.declaration.supervisor, self.declaration.path);
+            journal.write(now, Event::Failed { supervisor, path });
         }
         let verdict = supervisors.failed(self.declaration.supervisor, now);
         self.due = (verdict != Verdict::GiveUp).then(|| now + supervisors.backoff(self.attempt));

@@ -7,10 +7,12 @@ use super::supervision::{Supervision, Supervisor, Supervisors, Verdict};
 use super::{Robot, StartError, StopSignal, caught};
 use crate::component::{Fault, Options, Then};
 use crate::control::{Binding, Control, ParameterValues};
-use crate::message::Origin;
+use crate::journal::{Event, Journal};
+use crate::message::{Origin, Payload, Stamped};
 use crate::node::{HealthTransition, SharedNode};
+use crate::pubsub::DynamicMessage;
 use crate::time::{Clock, MonotonicTime};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// What the components of a robot are started with, and report to while they run.
@@ -25,6 +27,11 @@ pub struct Startup {
     supervisors: Supervisors,
     nodes: Arc<[SharedNode]>,
     periodic: Periodic,
+    journal: Option<Journal>,
+    /// Whether a journal is replayed: nothing is opened that reaches the world.
+    is_replay: bool,
+    /// The line of the journal that is replayed.
+    replayed_line: Arc<AtomicU64>,
     directory: Arc<OnceLock<Arc<dyn Directory>>>,
     /// The first component that could not start; those behind it are not started any more.
     refusal: Arc<Mutex<Option<StartError>>>,
@@ -43,8 +50,15 @@ impl Startup {
             control,
             agenda: Agenda::default(),
             supervisors: Supervisors::new(R::TOPOLOGY, supervision),
-            nodes: R::ESTIMATORS.iter().map(SharedNode::new).collect(),
+            nodes: R::ESTIMATORS
+                .iter()
+                .enumerate()
+                .map(|(number, declared)| SharedNode::new(number, declared))
+                .collect(),
             periodic: Periodic::default(),
+            journal: None,
+            is_replay: false,
+            replayed_line: Arc::default(),
             directory: Arc::default(),
             refusal: Arc::default(),
         }
@@ -152,7 +166,7 @@ impl Startup {
         match self.nodes.get(number) {
             Some(node) => node.clone(),
             // Numbers and declarations come from one expansion.
-            None => SharedNode::new(&crate::node::EstimatorDeclaration::NONE),
+            None => SharedNode::new(usize::MAX, &crate::node::EstimatorDeclaration::NONE),
         }
     }
 
@@ -192,6 +206,48 @@ impl Startup {
 
     pub(super) fn bus(&self) -> Bus {
         Bus::new(Arc::clone(&self.directory), self.control.clone(), self.clock.clone())
+    }
+
+    pub(super) fn with_journal(mut self, journal: Option<Journal>) -> Self {
+        self.journal = journal;
+        self
+    }
+
+    pub(super) fn for_replay(mut self) -> Self {
+        self.is_replay = true;
+        self
+    }
+
+    pub(super) fn replay_line(&self, line: u64) {
+        self.replayed_line.store(line, Ordering::Relaxed);
+    }
+
+    pub(super) fn is_replay(&self) -> bool {
+        self.is_replay
+    }
+
+    /// Where the journal is written, if it is.
+    #[inline]
+    pub fn journal(&self) -> Option<&Journal> {
+        self.journal.as_ref()
+    }
+
+    /// Writes into the journal, if there is one, what a sensor or a service publishes; the number of the line, or 0.
+    #[inline]
+    pub fn write<T: Payload>(
+        &self,
+        publisher: usize,
+        path: &'static str,
+        message: &Stamped<T>,
+        now: MonotonicTime,
+    ) -> u64 {
+        match &self.journal {
+            None => self.replayed_line.load(Ordering::Relaxed),
+            Some(journal) => {
+                let message = DynamicMessage::new(path, message);
+                journal.write(now, Event::Message { publisher, message })
+            }
+        }
     }
 
     /// Counts a message that did not fit in the inbox of an estimator's island.

@@ -100,6 +100,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             const COMMANDS: &'static [::bb_core::__private::CommandDeclaration] = &__COMMANDS;
             const PARAMETERS: &'static [::bb_core::__private::ParameterDeclaration] = &__PARAMETERS;
             const ISLANDS: &'static [::bb_core::__private::IslandOf<__Wiring>] = &__ISLANDS;
+            const FEEDS: &'static [::core::option::Option<::bb_core::__private::FeedOf<__Wiring>>] = &__FEEDS;
 
             type Options = __Options;
             type Topics = __Topics;

@@ -60,6 +60,11 @@ impl<'a> Types<'a> {
         self.robot.publishers.get(publisher).map(|publisher| publisher.from)
     }
 
+    /// The path of a publisher.
+    pub(super) fn path_of_publisher(&self, id: PublisherId) -> String {
+        self.robot.publishers.get(id).map_or(String::new(), |publisher| super::path_text(&publisher.path))
+    }
+
     /// The path of an estimator.
     pub(super) fn path_of_estimator(&self, id: EstimatorId) -> String {
         self.robot.estimators.get(id).map_or(String::new(), |estimator| super::path_text(&estimator.path))

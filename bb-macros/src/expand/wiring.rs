@@ -76,6 +76,7 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
     });
     let count = islands.all.len();
     let actuators = actuators(&types);
+    let feeds = feeds(&types);
     quote! {
         pub struct __Wiring {
             topics: __Topics,
@@ -89,9 +90,29 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
         #list_topics
         #indices
         #shores
+        #feeds
         static __ISLANDS: [::bb_core::__private::IslandOf<__Wiring>; #count] = [#(#finders),*];
 
         impl __Wiring { #functions }
+    }
+}
+
+/// `static __FEEDS`: how a message of each publisher outside is published again.
+fn feeds(types: &Types<'_>) -> TokenStream {
+    let count = types.model().publishers.len();
+    let feeds = (0..count).map(|id| match types.from(id) {
+        Some(From::Sensor(_) | From::Service(_)) => {
+            let (name, payload) = (topic(id), types.payload(id));
+            let feed = quote!(|wiring, message, now| {
+                let message = message.downcast::<#payload>();
+                message.map(|message| wiring.#name(message, now)).is_some()
+            });
+            super::literal::option(Some(feed))
+        }
+        _ => super::literal::option(None),
+    });
+    quote! {
+        static __FEEDS: [::core::option::Option<::bb_core::__private::FeedOf<__Wiring>>; #count] = [#(#feeds),*];
     }
 }
 
@@ -166,6 +187,9 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
         Some(From::Estimator(estimator, _)) => islands.of.get(estimator).copied(),
         _ => None,
     };
+    let path = types.path_of_publisher(id);
+    let write = own.is_none().then(|| quote!(let line = self.startup.write(#id, #path, message, now);));
+    let line = if own.is_some() { quote!(0) } else { quote!(line) };
     let publish = if own.is_some() { quote!(publish_alone) } else { quote!(publish) };
     let message = quote!(message: &::bb_core::__private::Stamped<#payload>);
     let now = quote!(now: ::bb_core::__private::MonotonicTime);
@@ -184,10 +208,12 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
             }
             let (place, kind) = (group::path(*island, &self::island(*island)), message_enum(*island));
             let variant = variant(id, *runs);
+            let entry = 2 * id + usize::from(*runs);
             quote! {
                 self.islands.#place.enter(
                     self,
                     now,
+                    ::bb_core::__private::Key { entry: #entry, line: #line },
                     |island| self.#deliver(island, message, now),
                     || #kind::#variant(::core::clone::Clone::clone(message)),
                 );
@@ -201,6 +227,7 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
     quote! {
         #[inline]
         fn #name(&self, #island #message, #now) {
+            #write
             self.topics.#topic.#publish(message);
             #(#calls)*
         }
@@ -376,6 +403,7 @@ fn shore(types: &Types<'_>, islands: &Islands, number: IslandId, consumers: &[Ve
         impl ::bb_core::__private::Shore for #name {
             type Wiring = __Wiring;
             type Message = #message;
+            const NUMBER: usize = #number;
             const NAME: &'static str = #path;
             const WORKER: ::core::option::Option<::bb_core::__private::WorkerDeclaration> = #worker;
 
@@ -385,6 +413,11 @@ fn shore(types: &Types<'_>, islands: &Islands, number: IslandId, consumers: &[Ve
 
             fn wake(&mut self, wiring: &__Wiring, now: ::bb_core::__private::MonotonicTime) {
                 #(wiring.#turns(self, now);)*
+            }
+
+            #[inline]
+            fn journal(wiring: &__Wiring) -> ::core::option::Option<&::bb_core::__private::Journal> {
+                wiring.startup.journal()
             }
 
             fn dropped(wiring: &__Wiring, message: &#message) {

@@ -8,12 +8,22 @@ use crate::control::safety::Safety;
 use crate::control::state::IDLE;
 use crate::control::tasks::{Sleeper, Task, Value, lock};
 use crate::control::{CategoryDeclaration, CommandContext, CommandDeclaration, Outcome, Role};
+use crate::journal::Event;
 use crate::node::HealthTransition;
 use crate::time::MonotonicTime;
 use std::any::Any;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+
+/// Why a command is started.
+pub(super) enum Cause {
+    /// Somebody asked for it, with arguments or with the default ones.
+    Caller(Option<Box<dyn Any + Send>>),
+    /// A change of health.
+    Health(HealthTransition),
+}
 
 impl Control {
     pub(crate) fn state(&self) -> &'static str {
@@ -33,8 +43,14 @@ impl Control {
         &self,
         number: usize,
         arguments: Box<dyn Any + Send>,
+        now: MonotonicTime,
     ) -> Result<Execution<T>, Refusal> {
-        self.start(number, Some(arguments), None).map(Execution::new)
+        self.start(number, Cause::Caller(Some(arguments)), now).map(Execution::new)
+    }
+
+    /// Asks for a command again, with its default arguments; one that was refused is refused again.
+    pub(crate) fn replay(&self, number: usize, now: MonotonicTime) {
+        drop(self.start(number, Cause::Caller(None), now));
     }
 
     /// That all commands could start with their options as they are; else the path of one, and why not.
@@ -46,12 +62,7 @@ impl Control {
     }
 
     /// Starts a command, or says why not. It runs at the next [`Self::drive`].
-    pub(super) fn start(
-        &self,
-        number: usize,
-        arguments: Option<Box<dyn Any + Send>>,
-        health: Option<HealthTransition>,
-    ) -> Result<Arc<Slot>, Refusal> {
+    pub(super) fn start(&self, number: usize, cause: Cause, now: MonotonicTime) -> Result<Arc<Slot>, Refusal> {
         let (declared, prepared) = match (self.0.declared.commands.get(number), self.0.commands.get(number)) {
             (Some(declared), Some(prepared)) => (declared, &prepared.0),
             // Numbers and declarations come from one expansion.
@@ -60,8 +71,15 @@ impl Control {
                 return Err(Refusal { command: "", reason: RefusalReason::Stopping, state: "", category });
             }
         };
-        let _starting = lock(&self.0.starting);
+        let _acting = self.act();
         let mut state = lock(&self.0.state);
+        let (arguments, health) = match cause {
+            Cause::Caller(arguments) => {
+                self.write(now, Event::Command { command: number });
+                (arguments, None)
+            }
+            Cause::Health(health) => (None, Some(health)),
+        };
         if let Err(refusal) = self.may_start(&state, declared, &**prepared) {
             if let Some(statistics) = state.statistics.get_mut(number) {
                 statistics.refused += 1;
@@ -69,7 +87,7 @@ impl Control {
             }
             drop(state);
             tracing::warn!(command = declared.name, %refusal, "command refused");
-            self.command_event(number, 0, CommandPhase::Refused(refusal.clone()), health);
+            self.command_event(number, 0, CommandPhase::Refused(refusal.clone()), health, now);
             return Err(refusal);
         }
         let cancelled = state.tasks.iter().filter(|task| {
@@ -84,9 +102,8 @@ impl Control {
             statistics.started += 1;
         }
         let after = state.machine;
-        let context =
-            CommandContext { name: declared.name, health, clock: self.0.clock.clone(), control: self.clone() };
-        let deadline = declared.timeout_nanos.map(|timeout| self.0.clock.now().plus_nanos(timeout));
+        let context = CommandContext { name: declared.name, health, control: self.clone() };
+        let deadline = declared.timeout_nanos.map(|timeout| now.plus_nanos(timeout));
         let parameters = self.parameters();
         drop(state);
         // The user's code may run here already, so no lock is held.
@@ -95,8 +112,8 @@ impl Control {
         let task = Arc::new(Task::new(id, number, health, deadline, future, self.0.bell.clone()));
         let slot = Arc::clone(&task.slot);
         lock(&self.0.state).tasks.push(task);
-        self.command_event(number, id, CommandPhase::Started, health);
-        self.publish_changes(before, after, Some(declared.name));
+        self.command_event(number, id, CommandPhase::Started, health, now);
+        self.publish_changes(before, after, Some(declared.name), now);
         self.0.bell.ring();
         Ok(slot)
     }
@@ -146,31 +163,65 @@ impl Control {
 
     /// Does all that can be done at `now`.
     pub(crate) fn drive(&self, now: MonotonicTime) {
-        loop {
-            self.0.sleeper.advance(now);
-            let (waiting, due) = {
-                let mut state = lock(&self.0.state);
-                let waiting = std::mem::take(&mut state.waiting);
-                self.0.has_waiting.store(false, Ordering::Release);
-                let due = state.tasks.iter().filter(|task| task.is_due(now)).cloned().collect::<Vec<_>>();
-                (waiting, due)
-            };
-            if waiting.is_empty() && due.is_empty() {
-                return;
-            }
-            for waiting in waiting {
+        while self.turn(now, |waiting| std::mem::take(waiting).into()) {}
+    }
+
+    /// Does again what a journal says was done at `now`.
+    pub(crate) fn replay_drive(&self, now: MonotonicTime, health: &[HealthTransition], given_up: &[&'static str]) {
+        let is_same = |waiting: &Waiting| match waiting {
+            Waiting::Start(transition, _) => health.contains(transition),
+            Waiting::GiveUp(path) => given_up.contains(path),
+        };
+        self.turn(now, |waiting| {
+            let (mut taken, left): (Vec<_>, Vec<_>) = std::mem::take(waiting).into_iter().partition(is_same);
+            *waiting = left.into();
+            // Several islands may have left theirs in another order.
+            taken.sort_by_key(|waiting| match waiting {
+                Waiting::Start(transition, _) => health.iter().position(|other| other == transition),
+                Waiting::GiveUp(_) => None,
+            });
+            taken
+        });
+    }
+
+    /// Starts what `take` takes of the waiting, and goes on once with every task that can; false if there was nothing.
+    fn turn(&self, now: MonotonicTime, take: impl FnOnce(&mut VecDeque<Waiting>) -> Vec<Waiting>) -> bool {
+        let _acting = self.act();
+        self.0.moment_nanos.store(now.as_nanos(), Ordering::Release);
+        self.0.sleeper.advance(now);
+        let (waiting, due) = {
+            let mut state = lock(&self.0.state);
+            let waiting = take(&mut state.waiting);
+            self.0.has_waiting.store(!state.waiting.is_empty(), Ordering::Release);
+            let due = state.tasks.iter().filter(|task| task.is_due(now)).cloned().collect::<Vec<_>>();
+            (waiting, due)
+        };
+        if waiting.is_empty() && due.is_empty() {
+            return false;
+        }
+        if self.0.journal.is_some() {
+            let (mut health, mut given_up) = (Vec::new(), Vec::new());
+            for waiting in &waiting {
                 match waiting {
-                    // A refusal is counted and published.
-                    Waiting::Start(transition, command) => drop(self.start(command, None, Some(transition))),
-                    Waiting::GiveUp(path) => self.carry_out_giving_up(path),
+                    Waiting::Start(transition, _) => health.push(*transition),
+                    Waiting::GiveUp(path) => given_up.push(*path),
                 }
             }
-            for task in due {
-                if let Some(result) = task.poll(now) {
-                    self.finish(&task, result);
-                }
+            self.write(now, Event::Drive { health, given_up });
+        }
+        for waiting in waiting {
+            match waiting {
+                // A refusal is counted and published.
+                Waiting::Start(transition, command) => drop(self.start(command, Cause::Health(transition), now)),
+                Waiting::GiveUp(path) => self.carry_out_giving_up(path, now),
             }
         }
+        for task in due {
+            if let Some(result) = task.poll(now) {
+                self.finish(&task, result, now);
+            }
+        }
+        true
     }
 
     /// Waits until there may be something to drive, `longest` at most.
@@ -183,24 +234,28 @@ impl Control {
     }
 
     /// Cancels what runs; nothing is started any more. The robot is disarmed.
-    pub(crate) fn stop(&self) {
+    pub(crate) fn stop(&self, now: MonotonicTime) {
         {
             let mut state = lock(&self.0.state);
+            if state.is_stopping {
+                return;
+            }
+            self.write(now, Event::Stop);
             state.is_stopping = true;
             state.tasks.iter().for_each(|task| task.cancel());
         }
-        self.drive(self.0.clock.now());
+        self.drive(now);
         if self.safety() == Safety::Armed {
-            self.disarm(false);
+            self.disarm_except(None, None, false, now);
         }
     }
 
-    fn finish(&self, task: &Task, result: Result<Outcome<Value>, CommandError>) {
+    fn finish(&self, task: &Task, result: Result<Outcome<Value>, CommandError>, now: MonotonicTime) {
         let Some(declared) = self.0.declared.commands.get(task.command) else { return };
         let role = self.0.commands.get(task.command).map_or(Role::Plain, |command| command.0.role());
         let result = result.and_then(|outcome| self.checked(outcome));
         if result.is_ok() && role == Role::Disarming {
-            self.disarm_except(Some(task.id), Some(declared.name), false);
+            self.disarm_except(Some(task.id), Some(declared.name), false, now);
         }
         let phase = match &result {
             Ok(_) => CommandPhase::Succeeded,
@@ -233,8 +288,8 @@ impl Control {
             }
             (before, state.machine)
         };
-        self.command_event(task.command, task.id, phase, task.health);
-        self.publish_changes(before, after, Some(declared.name));
+        self.command_event(task.command, task.id, phase, task.health, now);
+        self.publish_changes(before, after, Some(declared.name), now);
         task.slot.set(result.map(|outcome| outcome.value));
     }
 

@@ -4,6 +4,17 @@ use super::{Bound, Control};
 use crate::control::event::ParameterChange;
 use crate::control::parameters::{ParameterError, ParameterValue, ParameterValues};
 use crate::control::tasks::lock;
+use crate::journal::Event;
+use crate::time::MonotonicTime;
+
+/// Who sets a parameter.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Setter {
+    /// Somebody outside, then.
+    Outside(MonotonicTime),
+    /// A command, whose time is that of all commands.
+    Command,
+}
 
 impl Control {
     pub(crate) fn parameters(&self) -> ParameterValues {
@@ -15,18 +26,36 @@ impl Control {
         self.parameters().0.get(number).cloned()
     }
 
-    pub(crate) fn set_parameter_at(&self, path: &str, value: ParameterValue) -> Result<(), ParameterError> {
+    pub(crate) fn set_parameter_at(
+        &self,
+        path: &str,
+        value: ParameterValue,
+        setter: Setter,
+    ) -> Result<(), ParameterError> {
         match self.0.declared.parameters.iter().position(|parameter| parameter.path == path) {
-            Some(number) => self.set_parameter(number, value),
+            Some(number) => self.set_parameter(number, value, setter),
             None => Err(ParameterError { path: path.to_owned(), message: "no such parameter is declared".into() }),
         }
     }
 
     /// Sets a parameter, unless it or the options of a component bound to it would be out of range.
-    pub(crate) fn set_parameter(&self, number: usize, value: ParameterValue) -> Result<(), ParameterError> {
+    pub(crate) fn set_parameter(
+        &self,
+        number: usize,
+        value: ParameterValue,
+        setter: Setter,
+    ) -> Result<(), ParameterError> {
         let Some(declared) = self.0.declared.parameters.get(number) else { return Ok(()) };
         declared.check(&value)?;
+        let _acting = self.act();
         let bound = lock(&self.0.bound);
+        let now = match setter {
+            Setter::Outside(now) => {
+                self.write(now, Event::Parameter { parameter: number, value: value.clone() });
+                now
+            }
+            Setter::Command => self.moment(),
+        };
         let from = {
             let mut values = lock(&self.0.parameters);
             let mut new = values.0.to_vec();
@@ -47,7 +76,7 @@ impl Control {
         }
         drop(bound);
         if let Some(topic) = self.0.topics.parameters.get(number) {
-            self.publish(topic, ParameterChange { path: declared.path, from, to: value });
+            self.publish(topic, ParameterChange { path: declared.path, from, to: value }, now);
         }
         Ok(())
     }

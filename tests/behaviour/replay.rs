@@ -1,0 +1,321 @@
+//! A run from a journal gives what the first run gave, bit for bit: outputs, transitions, drops.
+
+use crate::components::{Number, Seen, Snapshot, at};
+use bb_core::journal::{Entry, Event};
+use bb_core::prelude::*;
+use bb_core::{DynamicMessage, HealthTransition, Report};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What a sensor of a bad day gives: numbers that come late, twice, with a NaN, or not at all, and now and then it fails.
+#[derive(Debug)]
+pub(crate) struct BadDay {
+    random: u64,
+    reads: u32,
+}
+
+impl BadDay {
+    /// Xorshift: the same on every run.
+    fn next(&mut self) -> u64 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        self.random
+    }
+}
+
+/// Options of [`BadDay`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct BadDayOptions {
+    #[option(default = 1)]
+    pub(crate) seed: u64,
+    #[option(default = 0)]
+    pub(crate) reads: u32,
+}
+
+impl Sensor for BadDay {
+    type Options = BadDayOptions;
+    type Output = Number;
+
+    fn init(options: BadDayOptions, _: &SensorContext) -> Result<Self, Fault> {
+        // One that starts anew must not give the same again.
+        Ok(Self { random: options.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1, reads: options.reads })
+    }
+
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if self.reads == 0 {
+            return Ok(Reading::finished());
+        }
+        self.reads -= 1;
+        let number = Number((self.next() % 1000) as f64 - 20.0);
+        Ok(match self.next() % 200 {
+            0 => Reading::now(Number(f64::NAN)),
+            1 => Reading::at(now - Duration::from_millis(50), number),
+            2 => Reading::at(now + Duration::from_secs(5), number),
+            3..8 => Reading::nothing(),
+            _ => Reading::now(number),
+        })
+    }
+}
+
+/// Passes on; negative numbers diverge, −20 panics, −19 is an error; beyond 990 it works for a while.
+#[derive(Debug)]
+pub(crate) struct Moody {
+    sum: f64,
+    gain: f64,
+}
+
+/// Options of [`Moody`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct MoodyOptions {
+    #[option(default = 1.0)]
+    pub(crate) gain: f64,
+}
+
+impl Estimator for Moody {
+    type Options = MoodyOptions;
+    type Input = Number;
+    type Output = Number;
+    const REPORTS_DIVERGENCE: bool = true;
+
+    fn init(options: MoodyOptions, context: &Context) -> Result<Self, Fault> {
+        context.request(Request::Tick(Duration::from_millis(70)));
+        Ok(Self { sum: 0.0, gain: options.gain })
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        self.sum += self.gain * number.0;
+        let reply = Reply::emit(Number(self.sum));
+        match number.0 {
+            -20.0 => panic!("too low"),
+            -19.0 => Err(Fault::new("low")),
+            low if low < 0.0 => Ok(reply.diverged("negative")),
+            high if high > 990.0 => {
+                std::thread::sleep(Duration::from_micros(300));
+                Ok(reply.and(Request::Timer(1, Duration::from_millis(3))))
+            }
+            _ => Ok(reply),
+        }
+    }
+
+    fn handle_info(&mut self, _: Info) -> Result<Reply<Number>, Fault> {
+        self.sum *= 0.5;
+        Ok(Reply::emit(Number(self.sum)))
+    }
+
+    fn handle_options(&mut self, options: MoodyOptions, _: &Context) -> Result<(), Fault> {
+        self.gain = options.gain;
+        Ok(())
+    }
+}
+
+/// Takes a while, and names where it leads.
+#[derive(Debug)]
+pub(crate) struct Settle;
+
+impl Command for Settle {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.sleep(Duration::from_millis(15)).await;
+        if let Some(gain) = context.health().map(|health| if health.to == HealthState::Healthy { 1.0 } else { 0.5 })
+        {
+            // What a command sets follows from what came in, and is not in the journal.
+            context.set_parameter("param/gain", gain)?;
+        }
+        Ok(Outcome::done(()).next_state(if context.now() > at(200) { "settled" } else { "idle" }))
+    }
+}
+
+robot! {
+    robot Day;
+
+    parameters { gain: f64 = 1.0, range: 0.0..=2.0; }
+    states { settled; }
+    commands {
+        arm: Arm;
+        settle: Settle { allowed_states: [idle, executing, settled]; cancel: all; }
+    }
+
+    link base {
+        sensor a: BadDay() {
+            rate: 1 kHz;
+            estimator own: Moody(gain = param::gain) {
+                latency_budget: 200 us;
+                lost_after: 6 ms;
+                recover_after: 3;
+                on_degraded: settle;
+                on_lost: settle;
+                on_recovered: settle;
+            }
+        }
+        sensor b: BadDay(seed = 2) { rate: 900 Hz; }
+        sensor fed: External<Number>();
+        estimator pair: Snapshot() {
+            input driver: sensor::base::a::own, driver;
+            input second: sensor::base::b;
+            input third: sensor::base::fed, optional, within: 5 ms;
+            sync_tolerance: 2 ms;
+            latency_budget: 1 s;
+        }
+        estimator slow: Moody() { input number: sensor::base::b; runs_on: worker; }
+        estimator last: Moody() { input number: slow; }
+    }
+}
+
+/// What is published, as text that differs if a bit does.
+fn text(message: &DynamicMessage) -> String {
+    let stamp = message.stamp();
+    let payload = message
+        .downcast::<Number>()
+        .map(|number| format!("{:016x}", number.0.to_bits()))
+        .or_else(|| message.downcast::<Seen>().map(|seen| format!("{:?}", seen.payload)))
+        .or_else(|| message.downcast::<HealthTransition>().map(|change| change.to_string()))
+        .unwrap_or_else(|| format!("{message:?}"));
+    format!("{} {} {:?} {payload}", message.path(), stamp.monotonic_time, stamp.frame)
+}
+
+/// Whatever is published while the robot runs, path by path.
+type Heard = BTreeMap<&'static str, Vec<String>>;
+
+fn hear(subscription: &bb_core::DynamicSubscription, heard: &mut Heard) {
+    assert_eq!(subscription.lagged(), 0);
+    for message in subscription.drain() {
+        heard.entry(message.path()).or_default().push(text(&message));
+    }
+}
+
+/// Counts of estimators, topics and commands; how long callbacks took is no part of it.
+fn counts(report: &Report) -> String {
+    let estimators: Vec<String> = report
+        .estimators
+        .iter()
+        .map(|estimator| {
+            let mut estimator = estimator.clone();
+            estimator.latency = Default::default();
+            format!("{estimator:?}")
+        })
+        .collect();
+    let published: Vec<_> = report.topics.iter().map(|topic| (topic.path, topic.published)).collect();
+    format!("{estimators:#?} {published:?} {:#?} {} {}", report.commands, report.state, report.safety)
+}
+
+type Lines = Arc<Mutex<Vec<Entry>>>;
+
+fn builder(reads: u32) -> (bb_core::Builder<Day>, Lines) {
+    let mut builder = Day::builder();
+    builder.supervision().max_restarts = 1_000_000;
+    builder.options(day::sensor::base::a).reads = reads;
+    builder.options(day::sensor::base::b).reads = reads;
+    let lines = Lines::default();
+    let sink = Arc::clone(&lines);
+    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    (builder, lines)
+}
+
+fn overflow() -> Overflow {
+    Overflow::DropOldest { capacity: Overflow::MAX_CAPACITY }
+}
+
+fn replayed(lines: &Lines) -> Result<(Heard, Report), Box<dyn std::error::Error>> {
+    let mut builder = Day::builder();
+    builder.supervision().max_restarts = 1_000_000;
+    let all = builder.subscribe_any(Select::All, None, overflow());
+    let mut replay = builder.replay()?;
+    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    lines.sort_by_key(|line| line.number);
+    let mut heard = Heard::new();
+    for part in lines.chunks(100_000) {
+        replay.play(part.to_vec())?;
+        hear(&all, &mut heard);
+    }
+    let report = replay.stop();
+    hear(&all, &mut heard);
+    Ok((heard, report))
+}
+
+fn same(first: &Heard, again: &Heard) {
+    let paths = |heard: &Heard| heard.iter().map(|(path, texts)| (*path, texts.len())).collect::<Vec<_>>();
+    assert_eq!(paths(first), paths(again));
+    for ((path, first), (_, again)) in first.iter().zip(again) {
+        if let Some(line) = (0..first.len()).find(|line| first[*line] != again[*line]) {
+            panic!("{path}, message {line}: {} then, {} now", first[line], again[line]);
+        }
+    }
+}
+
+#[test]
+fn a_run_on_virtual_time_is_the_same_again() -> Result<(), Box<dyn std::error::Error>> {
+    // A million messages take a minute without optimisation.
+    let reads = if cfg!(debug_assertions) { 10_000 } else { 500_000 };
+    let (builder, lines) = builder(reads);
+    let all = builder.subscribe_any(Select::All, None, overflow());
+    let mut simulation = builder.simulate()?;
+    simulation.command(day::command::arm, NoArguments)?;
+    let mut first = Heard::new();
+    for step in 1..=i64::from(reads / 100) {
+        simulation.publish(day::sensor::base::fed, at(step * 100), Number(step as f64));
+        simulation.set_parameter(day::param::gain, (step % 20) as f64 / 10.0)?;
+        if step % 50 == 0 {
+            // Refused, or not, as its state has it.
+            let _ = simulation.command(day::command::settle, NoArguments);
+            hear(&all, &mut first);
+        }
+    }
+    let report = simulation.stop();
+    let (again, report_again) = replayed(&lines)?;
+    hear(&all, &mut first);
+    let of = |path: &str| first.get(path).map_or(0, Vec::len);
+    assert!(of("health") > 100 && of("command/settle") > 100 && of("estimator/base/pair") > 1000, "much happens");
+    assert!(report.estimators.iter().any(|estimator| estimator.restarts > 3));
+    same(&first, &again);
+    assert_eq!(counts(&report), counts(&report_again));
+    Ok(())
+}
+
+#[test]
+fn a_run_on_many_threads_is_the_same_again() -> Result<(), Box<dyn std::error::Error>> {
+    let (builder, lines) = builder(1500);
+    let all = builder.subscribe_any(Select::All, None, overflow());
+    let mut running = builder.start()?;
+    running.command(day::command::arm, NoArguments)?.wait()?;
+    let live = running.live();
+    let feeder = std::thread::spawn(move || {
+        for step in 0..300 {
+            live.publish(day::sensor::base::fed, live.clock().now(), Number(f64::from(step)));
+            if step % 30 == 0 {
+                let _ = live.command(day::command::settle, NoArguments);
+            }
+            std::thread::sleep(Duration::from_millis(3));
+        }
+    });
+    running.wait();
+    feeder.join().map_err(|_| "the feeder panicked")?;
+    std::thread::sleep(Duration::from_millis(50));
+    let report = running.stop();
+    let (again, report_again) = replayed(&lines)?;
+    let mut first = Heard::new();
+    hear(&all, &mut first);
+    same(&first, &again);
+    assert_eq!(counts(&report), counts(&report_again));
+    Ok(())
+}
+
+#[test]
+fn a_journal_of_another_robot_is_refused_with_its_line() -> Result<(), Box<dyn std::error::Error>> {
+    let play = |event| -> Result<_, StartError> {
+        let mut replay = Day::builder().replay()?;
+        Ok(replay.play(vec![Entry { number: 7, time: at(0), event }]).expect_err("it does not fit").to_string())
+    };
+    assert_eq!(
+        play(Event::Deliver { island: 0, entry: 0, message: 3 })?,
+        "line 7 of the journal cannot be replayed: no such message waits: it is of another robot, or lines are missing"
+    );
+    assert_eq!(
+        play(Event::Wake { island: 99 })?,
+        "line 7 of the journal cannot be replayed: the robot has no such island"
+    );
+    Ok(())
+}
