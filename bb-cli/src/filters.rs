@@ -7,7 +7,8 @@ pub(crate) use settings::near;
 
 use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::{
-    AttitudeFilter, ComplementaryFilter, ImuSample, MadgwickFilter, MekfFilter, SampleError,
+    AttitudeFilter, ComplementaryFilter, FusionFilter, ImuSample, MadgwickFilter, MahonyFilter, MekfFilter,
+    SampleError, TiltFilter, VqfFilter,
 };
 
 /// Makes the table: the name on the command line, the filter, and its parameters for `--set`.
@@ -39,7 +40,20 @@ filters! {
         magnetometer,
     },
     madgwick: MadgwickFilter { beta, magnetometer },
+    vqf: VqfFilter {
+        tilt_time_constant, heading_time_constant, rest_bias, motion_bias, initial_bias, bias_forgetting_time,
+        largest_bias, motion_bias_deviation, vertical_forgetting_factor, rest_bias_deviation, rest_time,
+        rest_time_constant, rest_angular_velocity, rest_specific_force, disturbance_rejection, field_time_constant,
+        reference_time_constant, field_norm_tolerance, field_dip_tolerance, new_field_time, first_field_time,
+        new_field_angular_velocity, undisturbed_time, rejection_time, rejection_factor, magnetometer,
+    },
     complementary: ComplementaryFilter { tilt_time_constant, heading_time_constant, magnetometer },
+    mahony: MahonyFilter { proportional_gain, integral_gain, magnetometer },
+    fusion: FusionFilter {
+        gain, gyroscope_range, acceleration_rejection, magnetic_rejection, recovery_time, offset_correction,
+        rest_angular_velocity, rest_time, magnetometer,
+    },
+    tilt: TiltFilter { time_constant, magnetometer },
 }
 
 /// The parameter that every filter of nine axes has: whether it uses the ninth.

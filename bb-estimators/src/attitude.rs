@@ -24,15 +24,21 @@
 
 pub mod average;
 pub mod complementary;
+mod directions;
 mod error;
 mod filter;
+pub mod fusion;
 pub mod initial;
+mod low_pass;
 pub mod madgwick;
+pub mod mahony;
 pub mod mekf;
 mod params;
 mod rotation;
 mod sample;
 mod state;
+pub mod tilt;
+pub mod vqf;
 
 #[cfg(feature = "runtime")]
 mod estimator;
@@ -42,10 +48,17 @@ mod laws;
 pub use complementary::{ComplementaryFilter, ComplementaryParams};
 pub use error::{ErrorStatistics, OrientationError};
 #[cfg(feature = "runtime")]
-pub use estimator::{Attitude, Frames, ImuAndMagnetometer, InertialInput, InertialInputs};
+pub use estimator::{
+    Attitude, AttitudeOutput, AttitudeOutputs, AttitudeStatus, Frames, ImuAndMagnetometer, InertialInput,
+    InertialInputs,
+};
 pub use filter::AttitudeFilter;
+pub use fusion::{FusionFilter, FusionParams};
 pub use madgwick::{MadgwickFilter, MadgwickParams};
+pub use mahony::{MahonyFilter, MahonyParams};
 pub use mekf::{MekfFilter, MekfParams};
 pub use params::ParamsError;
 pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};
 pub use state::MAX_GAP_S;
+pub use tilt::{TiltFilter, TiltParams};
+pub use vqf::{VqfFilter, VqfParams};

@@ -5,9 +5,10 @@
 //!
 //! | declared as | takes | emits |
 //! |---|---|---|
-//! | `Mekf(…)`, `Madgwick(beta = 0.1)`, `Complementary(…)` in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
-//! | `Mekf<Marg>(…)`, `Madgwick<Marg>(…)`, `Complementary<Marg>(…)` in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
+//! | `Mekf(…)`, `Vqf(…)`, `Madgwick(beta = 0.1)`, … in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
+//! | `Mekf<Marg>(…)`, `Vqf<Marg>(…)`, `Madgwick<Marg>(…)`, … in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
 //! | `Madgwick<ImuAndMagnetometer>(…)` on a link | `input imu`, driver, and `input magnetic_field`, of two sensors | `Orientation` of the link |
+//! | `Vqf<Marg, AttitudeOutputs>(…)`, … | as before | `output orientation`, and `output status`: bias, rest, disturbance |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
@@ -15,6 +16,9 @@
 pub mod attitude;
 #[cfg(feature = "simulation")]
 pub mod simulation;
+
+#[cfg(feature = "runtime")]
+use bb_core::payload::{Imu, Orientation};
 
 #[cfg(feature = "runtime")]
 pub use attitude::average::OrientationAverage;
@@ -25,14 +29,32 @@ pub use simulation::SimulatedImu;
 
 /// Madgwick's filter as an estimator: of six axes, `Madgwick<Marg>` and `Madgwick<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]
-pub type Madgwick<I = bb_core::payload::Imu> = Attitude<attitude::MadgwickFilter, I>;
+pub type Madgwick<I = Imu, O = Orientation> = Attitude<attitude::MadgwickFilter, I, O>;
+
+/// Mahony's filter as an estimator: of six axes, `Mahony<Marg>` and `Mahony<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Mahony<I = Imu, O = Orientation> = Attitude<attitude::MahonyFilter, I, O>;
+
+/// VQF as an estimator: of six axes, `Vqf<Marg>` and `Vqf<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Vqf<I = Imu, O = Orientation> = Attitude<attitude::VqfFilter, I, O>;
+
+/// The revised AHRS algorithm of x-io's Fusion library as an estimator: of six axes, `Fusion<Marg>` and
+/// `Fusion<ImuAndMagnetometer>` of nine.
+#[cfg(feature = "runtime")]
+pub type Fusion<I = Imu, O = Orientation> = Attitude<attitude::FusionFilter, I, O>;
+
+/// Inclination from gravity, without a gyroscope, as an estimator: `Tilt<Marg>` and `Tilt<ImuAndMagnetometer>` have a
+/// heading from the field, too.
+#[cfg(feature = "runtime")]
+pub type Tilt<I = Imu, O = Orientation> = Attitude<attitude::TiltFilter, I, O>;
 
 /// The self-calibrating Kalman filter as an estimator, the most accurate of all here: of six axes, `Mekf<Marg>` and
 /// `Mekf<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]
-pub type Mekf<I = bb_core::payload::Imu> = Attitude<attitude::MekfFilter, I>;
+pub type Mekf<I = Imu, O = Orientation> = Attitude<attitude::MekfFilter, I, O>;
 
 /// The complementary filter as an estimator: of six axes, `Complementary<Marg>` and
 /// `Complementary<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]
-pub type Complementary<I = bb_core::payload::Imu> = Attitude<attitude::ComplementaryFilter, I>;
+pub type Complementary<I = Imu, O = Orientation> = Attitude<attitude::ComplementaryFilter, I, O>;

@@ -25,6 +25,8 @@ mod states;
 mod topology;
 
 pub(crate) use actuator::Actuator;
+#[cfg(test)]
+pub(crate) use block::WORDS;
 #[cfg(feature = "urdf")]
 pub(crate) use body::Material;
 pub(crate) use body::{Geometry, Inertial, Shape};

@@ -7,6 +7,7 @@ mod model;
 mod mutations;
 mod parameters;
 mod recovery;
+mod reference;
 mod rules;
 
 use crate::diagnostics::{Diagnostic, Diagnostics};

@@ -102,6 +102,12 @@ const SI: &[(Dimension, &str)] = &[
 
 use std::f64::consts::PI;
 
+/// All units that stand by themselves.
+#[cfg(test)]
+pub(crate) fn symbols() -> impl Iterator<Item = &'static str> {
+    UNITS.iter().map(|(symbol, _, _)| *symbol)
+}
+
 /// Symbol, dimension, factor to SI.
 const UNITS: &[(&str, [i8; 6], f64)] = &[
     ("m", [1, 0, 0, 0, 0, 0], 1.0),

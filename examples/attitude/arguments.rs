@@ -40,7 +40,7 @@ impl Arguments {
         let mut params =
             ChosenParams { kind: self.filter, magnetometer: self.axes == "9", ..ChosenParams::default() };
         match (self.beta, self.filter) {
-            (Some(_), Kind::Complementary | Kind::Mekf) => {
+            (Some(_), kind) if kind != Kind::Madgwick => {
                 Err("--beta belongs to --filter madgwick; leave it out".into())
             }
             (Some(beta), _) if !(0.0..=1e3).contains(&beta) => {

@@ -15,13 +15,22 @@ fn the_command_and_a_robot_agree() -> Result<(), Box<dyn Error>> {
         ("complementary", Axes::Six, ""),
         ("mekf", Axes::Nine, ""),
         ("mekf", Axes::Six, ""),
+        ("mahony", Axes::Nine, "proportional_gain=0.74 integral_gain=0.0012"),
+        ("mahony", Axes::Six, "proportional_gain=0.18 integral_gain=0.0015"),
+        ("vqf", Axes::Nine, ""),
+        ("vqf", Axes::Six, ""),
+        ("fusion", Axes::Nine, "gain=0.1 recovery_time=20"),
+        ("fusion", Axes::Six, "gain=0.1 recovery_time=20"),
+        ("fusion", Axes::Nine, ""),
+        ("tilt", Axes::Nine, ""),
+        ("tilt", Axes::Six, ""),
     ];
     // One of them disturbed.
     for file in broad().into_iter().flatten().rev().take(2) {
         for ((name, axes, setting), robot) in runs.into_iter().zip(attitude::errors(&file)?) {
             let filter = FILTERS.iter().find(|filter| filter.name == name).ok_or("no such filter")?;
-            let settings = Some(setting).filter(|text| !text.is_empty()).map(str::parse::<Setting>).transpose()?;
-            let filters = Chosen::all(&[filter], axes, settings.as_slice())?;
+            let settings = setting.split_whitespace().map(str::parse::<Setting>).collect::<Result<Vec<_>, _>>()?;
+            let filters = Chosen::all(&[filter], axes, &settings)?;
             let (topics, before_motion_s, keep_errors) = (Topics::default(), None, false);
             let evaluator = Evaluator { filters, axes, topics, before_motion_s, keep_errors };
             let evaluation = evaluate(&file, &evaluator, &Progress::new("", 0));

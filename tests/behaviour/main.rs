@@ -1,8 +1,9 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
+mod attitude;
 mod callbacks;
-mod control;
 mod components;
+mod control;
 mod external;
 mod fan_in;
 mod faults;

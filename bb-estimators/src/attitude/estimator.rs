@@ -1,8 +1,10 @@
 //! Any attitude filter as an estimator to declare in `robot!`.
 
 mod input;
+mod output;
 
 pub use input::{Frames, ImuAndMagnetometer, InertialInput, InertialInputs};
+pub use output::{AttitudeOutput, AttitudeOutputs, AttitudeStatus};
 
 use super::AttitudeFilter;
 use bb_core::payload::{Imu, Orientation};
@@ -10,38 +12,60 @@ use bb_core::{Context, Estimator, Fault, Inputs, Options, Reply};
 use std::marker::PhantomData;
 
 /// The attitude filter `F` as an estimator that takes `I`: [`Imu`], [`Marg`](bb_core::payload::Marg) or
-/// [`ImuAndMagnetometer`].
+/// [`ImuAndMagnetometer`]; and that emits `O`: [`Orientation`], or [`AttitudeOutputs`] with what else it knows.
 ///
 /// It emits the orientation of the frame where it is declared: in a sensor that sensor's, on a link that link's, to
 /// which the samples are turned first. Angular velocity and field are those of the whole rigid body; specific force
 /// is taken as measured, without the lever arm between sensor and link.
 ///
+/// ```
+/// # fn main() {}
+/// use bb_core::prelude::*;
+/// use bb_estimators::Vqf;
+/// use bb_estimators::attitude::AttitudeOutputs;
+///
+/// robot! {
+///     robot Stick;
+///
+///     link body {
+///         sensor imu: External<Marg>() {
+///             estimator plain: Vqf<Marg>();
+///             estimator full: Vqf<Marg, AttitudeOutputs>() {
+///                 output orientation;
+///                 output status;
+///             }
+///         }
+///     }
+/// }
+/// ```
+///
 /// A sample that the filter refuses (time that stands still, absurd values) leaves it as it was and emits nothing.
 #[derive(Debug)]
-pub struct Attitude<F, I = Imu> {
+pub struct Attitude<F, I = Imu, O = Orientation> {
     filter: F,
     frames: Frames,
-    input: PhantomData<fn(I)>,
+    types: PhantomData<fn(I) -> O>,
 }
 
-impl<F, I> Estimator for Attitude<F, I>
+impl<F, I, O> Estimator for Attitude<F, I, O>
 where
     F: AttitudeFilter<Params: Options> + Send + 'static,
     I: InertialInput,
+    O: AttitudeOutput,
 {
     type Options = F::Params;
     type Input = I;
-    type Output = Orientation;
+    type Output = O;
 
     fn init(params: F::Params, context: &Context) -> Result<Self, Fault> {
-        Ok(Self { filter: F::new(params)?, frames: Frames::of(context), input: PhantomData })
+        Ok(Self { filter: F::new(params)?, frames: Frames::of(context), types: PhantomData })
     }
 
-    fn handle_input(&mut self, input: <I as Inputs>::View<'_>) -> Result<Reply<Orientation>, Fault> {
+    fn handle_input(&mut self, input: <I as Inputs>::View<'_>) -> Result<Reply<O>, Fault> {
         if let Err(error) = self.filter.update(&I::sample(&input, &self.frames)) {
             tracing::debug!(%error, "sample refused");
             return Ok(Reply::none());
         }
-        Ok(self.filter.world_from_body().map(Orientation::new).into())
+        Ok(O::of(&self.filter).into())
     }
 }

@@ -2,7 +2,7 @@
 
 use core::fmt::Debug;
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::{ImuSample, ParamsError, SampleError};
 
@@ -17,7 +17,7 @@ use super::{ImuSample, ParamsError, SampleError};
 /// * The time step is the difference of two stamps. After a gap longer than [`MAX_GAP_S`](super::MAX_GAP_S)
 ///   nothing is integrated: tilt starts anew from the accelerometer, heading is kept until the next field
 ///   sets it at once (for ever without a magnetometer).
-/// * In free fall the filter follows the gyroscope alone.
+/// * In free fall the filter follows the gyroscope alone; one without a gyroscope stays as it is.
 /// * A sample that is refused leaves the filter as it was.
 ///
 /// The orientation has unit norm for ever.
@@ -53,6 +53,30 @@ pub trait AttitudeFilter: Sized {
 
     /// The orientation after the last sample, or `None` before the filter has started.
     fn world_from_body(&self) -> Option<UnitQuaternion<f64>>;
+
+    /// The gyroscope's bias, rad/s in the body frame: what it reads more than the angular velocity. `None` if the
+    /// filter does not estimate it; zero as long as it knows nothing of it.
+    fn gyroscope_bias(&self) -> Option<Vector3<f64>> {
+        None
+    }
+
+    /// Covariance of the orientation's error as a small rotation of the body, rad²:
+    /// `true world_from_body = world_from_body ⊗ exp(½ error)`. `None` if the filter keeps none, or before it has
+    /// started.
+    fn orientation_uncertainty(&self) -> Option<Matrix3<f64>> {
+        None
+    }
+
+    /// Whether the sensor lies still. `None` if the filter does not tell.
+    fn is_at_rest(&self) -> Option<bool> {
+        None
+    }
+
+    /// Whether the magnetic field is disturbed, so that the heading does not follow it as usual. `None` if the
+    /// filter does not tell, or uses no magnetometer.
+    fn is_magnetically_disturbed(&self) -> Option<bool> {
+        None
+    }
 
     /// Forgets every sample; the parameters stay.
     fn reset(&mut self);

@@ -8,21 +8,26 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 /// Below this squared angle, rad², sine and cosine of the half angle are series.
 const SERIES_SQUARED_ANGLE: f64 = 0.01;
 
-/// `world_from_body ⊗ exp(½ rotation)`: turns the body by a rotation vector given in the body frame, rad.
-pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let squared_angle = rotation.norm_squared();
-    let (cos, scale) = if squared_angle < SERIES_SQUARED_ANGLE {
+/// Cosine of half an angle, and the factor that makes the sine of half of it of the angle, for its square, rad².
+#[inline]
+pub(super) fn half_angle(squared_angle: f64) -> (f64, f64) {
+    if squared_angle < SERIES_SQUARED_ANGLE {
         // With h = (θ/2)² below 0.0025 the first terms left out are below 1e-15.
         let h = 0.25 * squared_angle;
-        (
+        return (
             1.0 - h * (1.0 / 2.0 - h * (1.0 / 24.0 - h * (1.0 / 720.0))),
             0.5 - h * (1.0 / 12.0 - h * (1.0 / 240.0 - h * (1.0 / 10080.0))),
-        )
-    } else {
-        let angle = squared_angle.sqrt();
-        let (sin, cos) = (0.5 * angle).sin_cos();
-        (cos, sin / angle)
-    };
+        );
+    }
+    let angle = squared_angle.sqrt();
+    let (sin, cos) = (0.5 * angle).sin_cos();
+    (cos, sin / angle)
+}
+
+/// `world_from_body ⊗ exp(½ rotation)`: turns the body by a rotation vector given in the body frame, rad.
+#[inline]
+pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let (cos, scale) = half_angle(rotation.norm_squared());
     let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
     let q = world_from_body;
     unit(
@@ -33,9 +38,36 @@ pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64
     )
 }
 
+/// `world_from_body ⊗ (1, tangent)`: turns the body about a vector given in the body frame, by twice the arc tangent of
+/// its length. Cheaper than [`turn`], and the same but for the third order. The result is longer than 1.
+#[inline]
+pub(super) fn turn_by_tangent(world_from_body: &UnitQuaternion<f64>, tangent: &Vector3<f64>) -> Quaternion<f64> {
+    let (q, x, y, z) = (world_from_body, tangent.x, tangent.y, tangent.z);
+    Quaternion::new(
+        q.w - q.i * x - q.j * y - q.k * z,
+        q.i + q.w * x + q.j * z - q.k * y,
+        q.j + q.w * y + q.k * x - q.i * z,
+        q.k + q.w * z + q.i * y - q.j * x,
+    )
+}
+
+/// `quaternion` brought to unit norm; it is not zero.
+#[inline]
+pub(super) fn normalised(quaternion: &Quaternion<f64>) -> UnitQuaternion<f64> {
+    let q = quaternion;
+    let scale = 1.0 / (q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k).sqrt();
+    unit(q.w * scale, q.i * scale, q.j * scale, q.k * scale)
+}
+
 /// Turns `world_from_body` about the world's vertical by `angle`, rad, counter-clockwise seen from above.
 pub(super) fn turn_heading(world_from_body: &UnitQuaternion<f64>, angle: f64) -> UnitQuaternion<f64> {
-    let (s, c) = (0.5 * angle).sin_cos();
+    let (sin, cos) = (0.5 * angle).sin_cos();
+    turn_heading_by(world_from_body, [cos, sin])
+}
+
+/// Turns `world_from_body` about the world's vertical by an angle of whose half these are cosine and sine.
+#[inline]
+pub(super) fn turn_heading_by(world_from_body: &UnitQuaternion<f64>, [c, s]: [f64; 2]) -> UnitQuaternion<f64> {
     let q = world_from_body;
     unit(c * q.w - s * q.k, c * q.i - s * q.j, c * q.j + s * q.i, c * q.k + s * q.w)
 }
@@ -105,6 +137,17 @@ mod tests {
         }
         let upright = turn_upright(&start, &-Vector3::z()) * start.inverse();
         assert!((upright * Vector3::z() + Vector3::z()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn a_turn_by_a_tangent_is_by_twice_its_arc() {
+        let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
+        let axis = Vector3::new(0.48, -0.6, 0.64);
+        for tangent in [0.0, 1e-9, 0.01, 1.0, 50.0_f64] {
+            let exact = start * UnitQuaternion::from_scaled_axis(axis * (2.0 * tangent.atan()));
+            let turned = normalised(&turn_by_tangent(&start, &(axis * tangent)));
+            assert!(turned.angle_to(&exact) < 1e-14 && (turned.norm() - 1.0).abs() < 1e-15);
+        }
     }
 
     #[test]

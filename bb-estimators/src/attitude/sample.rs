@@ -95,33 +95,43 @@ impl fmt::Display for SampleError {
 
 impl Error for SampleError {}
 
+/// Squared norms of a sample that has been checked.
+pub(super) struct SquaredNorms {
+    /// (m/s²)².
+    pub(super) specific_force: f64,
+    /// In the square of the field's unit; `None` if there is no field to use.
+    pub(super) magnetic_field: Option<f64>,
+}
+
 impl ImuSample {
     /// Whether every value is finite and one that a sensor can give.
     #[inline]
-    pub(super) fn check(&self, magnetometer: bool) -> Result<(), SampleError> {
+    pub(super) fn check(&self, magnetometer: bool) -> Result<SquaredNorms, SampleError> {
         check(Quantity::AngularVelocity, &self.angular_velocity, MAX_ANGULAR_VELOCITY)?;
-        check(Quantity::SpecificForce, &self.specific_force, MAX_SPECIFIC_FORCE)?;
-        match &self.magnetic_field {
-            Some(field) if magnetometer => check(Quantity::MagneticField, field, MAX_MAGNETIC_FIELD),
-            _ => Ok(()),
-        }
+        let specific_force = check(Quantity::SpecificForce, &self.specific_force, MAX_SPECIFIC_FORCE)?;
+        let magnetic_field = match &self.magnetic_field {
+            Some(field) if magnetometer => Some(check(Quantity::MagneticField, field, MAX_MAGNETIC_FIELD)?),
+            _ => None,
+        };
+        Ok(SquaredNorms { specific_force, magnetic_field })
     }
 }
 
+/// The squared norm, if every component is finite and within the limit.
 #[inline]
-fn check(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> Result<(), SampleError> {
-    let within = |component: f64| component.abs() <= limit;
-    if within(value.x) && within(value.y) && within(value.z) {
-        return Ok(());
-    }
-    Err(refusal(quantity, value, limit))
+fn check(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> Result<f64, SampleError> {
+    // Most samples are within the sphere in the cube, of which the squared norm is needed anyway.
+    let squared = value.norm_squared();
+    if squared <= limit * limit { Ok(squared) } else { check_components(quantity, value, limit).map(|()| squared) }
 }
 
 #[cold]
-fn refusal(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> SampleError {
-    if value.iter().all(|component| component.is_finite()) {
-        SampleError::OutOfRange { quantity, value: value.amax(), limit }
-    } else {
-        SampleError::NonFinite { quantity }
+fn check_components(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> Result<(), SampleError> {
+    if !value.iter().all(|component| component.is_finite()) {
+        return Err(SampleError::NonFinite { quantity });
     }
+    if value.amax() > limit {
+        return Err(SampleError::OutOfRange { quantity, value: value.amax(), limit });
+    }
+    Ok(())
 }

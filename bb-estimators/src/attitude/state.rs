@@ -1,9 +1,9 @@
 //! What every filter remembers, and how it starts, steps and restarts.
 
-use nalgebra::{Unit, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::initial::{FREE_FALL, heading_error};
-use super::rotation::{renormalised, turn_heading, turn_upright};
+use super::rotation::{normalised, turn_heading, turn_upright};
 use super::{ImuSample, Quantity, SampleError};
 
 /// The longest time between two samples that a filter integrates over, seconds.
@@ -47,7 +47,7 @@ impl AttitudeState {
     /// Checks a sample. `None` if the state has started or restarted with it and there is nothing to step.
     #[inline]
     pub(super) fn admit(&mut self, sample: &ImuSample) -> Result<Option<Step>, SampleError> {
-        sample.check(self.magnetometer)?;
+        let squared = sample.check(self.magnetometer)?;
         let time_ns = sample.time_ns;
         if let Some(previous_ns) = self.previous_ns
             && time_ns <= previous_ns
@@ -56,9 +56,9 @@ impl AttitudeState {
         }
 
         let previous_ns = self.previous_ns.replace(time_ns);
-        let up = direction(&sample.specific_force, FREE_FALL * FREE_FALL);
-        let field = match sample.magnetic_field {
-            Some(field) if self.magnetometer => direction(&field, NO_FIELD),
+        let up = direction(&sample.specific_force, squared.specific_force, FREE_FALL * FREE_FALL);
+        let field = match (&sample.magnetic_field, squared.magnetic_field) {
+            (Some(field), Some(squared)) => direction(field, squared, NO_FIELD),
             _ => None,
         };
 
@@ -74,18 +74,25 @@ impl AttitudeState {
         Ok(None)
     }
 
-    /// Keeps the orientation that a step ended with. The first field sets its heading.
+    /// Keeps the orientation that a step ended with, of any norm but 0. The first field sets its heading.
     #[inline]
-    pub(super) fn store(&mut self, world_from_body: UnitQuaternion<f64>, field: Option<Vector3<f64>>) {
-        let mut world_from_body = world_from_body;
+    pub(super) fn store(&mut self, world_from_body: &Quaternion<f64>, field: Option<Vector3<f64>>) {
+        self.world_from_body = Some(normalised(world_from_body));
         if !self.heading_known
             && let Some(field) = field
+        {
+            self.face_north(&field);
+        }
+    }
+
+    #[cold]
+    fn face_north(&mut self, field: &Vector3<f64>) {
+        if let Some(world_from_body) = self.world_from_body
             && let Some(error) = heading_error(&(world_from_body * field))
         {
-            world_from_body = turn_heading(&world_from_body, error);
+            self.world_from_body = Some(normalised(&turn_heading(&world_from_body, error)));
             self.heading_known = true;
         }
-        self.world_from_body = Some(renormalised(&world_from_body));
     }
 
     /// Starts from a known orientation.
@@ -109,6 +116,11 @@ impl AttitudeState {
         self.world_from_body
     }
 
+    /// Whether a field has set the heading, or it was given.
+    pub(super) fn heading_is_known(&self) -> bool {
+        self.heading_known
+    }
+
     /// Forgets every sample.
     pub(super) fn reset(&mut self) {
         *self = Self::new(self.magnetometer);
@@ -124,14 +136,13 @@ impl AttitudeState {
             turn_upright(&stale, &(stale * up))
         });
         if let Some(world_from_body) = fresh.or(stale) {
-            self.store(world_from_body, field);
+            self.store(&world_from_body, field);
         }
     }
 }
 
 /// The unit vector along `vector`, or `None` if its squared norm is at most `least`.
 #[inline]
-fn direction(vector: &Vector3<f64>, least: f64) -> Option<Vector3<f64>> {
-    let squared = vector.norm_squared();
+fn direction(vector: &Vector3<f64>, squared: f64, least: f64) -> Option<Vector3<f64>> {
     (squared > least).then(|| vector * (1.0 / squared.sqrt()))
 }

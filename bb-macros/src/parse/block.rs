@@ -9,7 +9,7 @@ use syn::parse::{ParseBuffer, ParseStream};
 use syn::{Attribute, Token};
 
 /// All words of the language that start an item: where reading can start anew.
-const WORDS: &[&str] = &[
+pub(crate) const WORDS: &[&str] = &[
     "parameters",
     "states",
     "commands",

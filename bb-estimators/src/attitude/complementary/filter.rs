@@ -4,6 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::ComplementaryParams;
 use crate::attitude::initial::heading_error;
+use crate::attitude::low_pass::gain;
 use crate::attitude::rotation::{turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, SampleError};
@@ -54,7 +55,7 @@ impl AttitudeFilter for ComplementaryFilter {
             orientation = turn_heading(&orientation, gain * error);
             self.since_field_s = 0.0;
         }
-        self.state.store(orientation, step.field);
+        self.state.store(&orientation, step.field);
         Ok(())
     }
 
@@ -72,14 +73,6 @@ impl AttitudeFilter for ComplementaryFilter {
         self.state.reset();
         self.since_field_s = 0.0;
     }
-}
-
-/// The gain of a first-order low-pass over `dt_s`: `1 - exp(-dt/τ)`, which is 1 for τ = 0.
-fn gain(dt_s: f64, time_constant_s: f64) -> f64 {
-    if time_constant_s == 0.0 {
-        return 1.0;
-    }
-    -(-dt_s / time_constant_s).exp_m1()
 }
 
 /// One step of the low-pass on the specific force in the world frame, and the turn that makes its output

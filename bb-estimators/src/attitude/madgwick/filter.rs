@@ -3,7 +3,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::MadgwickParams;
-use crate::attitude::rotation::turn;
+use crate::attitude::directions::{horizontal_axis, misalignment};
+use crate::attitude::rotation::{turn, turn_by_tangent};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
 
@@ -34,12 +35,16 @@ impl AttitudeFilter for MadgwickFilter {
             return Ok(());
         };
         // q̇ = ½ q ⊗ ω - β ∇F/‖∇F‖, and with ∇F = -2 q ⊗ e the second part is a turn at 2 β about e.
-        let mut orientation = turn(&step.world_from_body, &(sample.angular_velocity * step.dt_s));
-        if let Some(up) = step.up {
-            let descent = descent(&orientation, &up, step.field.as_ref());
-            orientation = turn(&orientation, &(2.0 * self.params.beta * step.dt_s * descent));
-        }
-        self.state.store(orientation, step.field);
+        let predicted = turn(&step.world_from_body, &(sample.angular_velocity * step.dt_s));
+        let Some(up) = step.up else {
+            self.state.store(&predicted, step.field);
+            return Ok(());
+        };
+        let descent = descent(&predicted, &up, step.field.as_ref());
+        // The tangent of half the angle, to the fourth order.
+        let half = self.params.beta * step.dt_s;
+        let tangent = half * (1.0 + half * half * (1.0 / 3.0));
+        self.state.store(&turn_by_tangent(&predicted, &(descent * tangent)), step.field);
         Ok(())
     }
 
@@ -60,9 +65,7 @@ impl AttitudeFilter for MadgwickFilter {
 ///
 /// `F(q) = ½ ‖Rᵀẑ - a‖² + ½ ‖Rᵀb - m‖²`,
 ///
-/// with the measured unit vectors `a` and `m`, `R(q)` taking body to world, and the field's reference
-/// `b = (0, √(h_x² + h_y²), h_z)`, `h = R m`: the measured field itself, its horizontal part turned north
-/// (the report's section on magnetic distortion).
+/// with the measured unit vectors `a` and `m` and the field's reference b (see [`misalignment`], which gives e).
 ///
 /// A turn by the small body vector δ changes `Rᵀv` to `Rᵀv + Rᵀv × δ`, so that
 /// `∂F/∂δ = -(a × Rᵀẑ + m × Rᵀb) = -e`. On the unit sphere `dq = ½ q ⊗ δ`, hence `∇F = -2 q ⊗ e`: the
@@ -70,27 +73,9 @@ impl AttitudeFilter for MadgwickFilter {
 ///
 /// Zero where there is nothing to gain, except at the top of F, upside down, which is left about the body's
 /// x or y axis.
+#[inline]
 fn descent(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f64>, field: Option<&Vector3<f64>>) -> Vector3<f64> {
-    let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
-    let (x2, y2, z2) = (x + x, y + y, z + z);
-    let (wx, wy, xx, xz, yy, yz) = (w * x2, w * y2, x * x2, x * z2, y * y2, y * z2);
-    // Rᵀẑ, the third row of R.
-    let world_up = Vector3::new(xz - wy, yz + wx, 1.0 - xx - yy);
-
-    let error = match field {
-        None => up.cross(&world_up),
-        Some(field) => {
-            let (wz, xy, zz) = (w * z2, x * y2, z * z2);
-            let world_north = Vector3::new(xy + wz, 1.0 - xx - zz, yz - wx);
-            let east = (1.0 - yy - zz) * field.x + (xy - wz) * field.y + (xz + wy) * field.z;
-            let north = world_north.dot(field);
-            let vertical = world_up.dot(field);
-            let horizontal = (east * east + north * north).sqrt();
-            // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
-            (up + vertical * field).cross(&world_up) + horizontal * field.cross(&world_north)
-        }
-    };
-
+    let (error, world_up) = misalignment(world_from_body, up, field);
     let squared = error.norm_squared();
     if squared > NO_GRADIENT * NO_GRADIENT {
         return error * (1.0 / squared.sqrt());
@@ -98,6 +83,5 @@ fn descent(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f64>, field: Opti
     if up.dot(&world_up) > 0.0 {
         return Vector3::zeros();
     }
-    let axis = if world_up.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
-    axis.cross(&world_up).normalize()
+    horizontal_axis(&world_up)
 }

@@ -1,5 +1,7 @@
 //! The error state: its mean, its covariance, and the two things a Kalman filter does with them.
 
+use nalgebra::Matrix3;
+
 use super::window::Window;
 
 /// How many numbers the filter estimates.
@@ -66,6 +68,11 @@ impl Errors {
 
     pub(super) fn variance(&self, state: usize) -> f64 {
         self.covariance[state][state]
+    }
+
+    /// Covariance of the rotation error, world axes, rad².
+    pub(super) fn rotation(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, k| self.covariance[ROTATION + i][ROTATION + k])
     }
 
     /// Whether every mean and variance is a number to compute with.

@@ -78,6 +78,11 @@ impl FieldReference {
         norm(self.reference)
     }
 
+    /// Whether the greatest disturbance of late is beyond what counts as unchanged.
+    pub(super) fn is_disturbed(&self) -> bool {
+        self.disturbance > SAME * SAME
+    }
+
     /// In the field's own unit, squared.
     pub(super) fn squared_norm(&self) -> f64 {
         self.norm() * self.norm()

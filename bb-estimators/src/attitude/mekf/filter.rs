@@ -153,7 +153,7 @@ impl AttitudeFilter for MekfFilter {
             self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
             self.heading_known = true;
         }
-        self.state.store(orientation, step.field);
+        self.state.store(&orientation, step.field);
         Ok(())
     }
 
@@ -170,6 +170,26 @@ impl AttitudeFilter for MekfFilter {
         self.state.world_from_body()
     }
 
+    fn gyroscope_bias(&self) -> Option<Vector3<f64>> {
+        Some(self.bias)
+    }
+
+    /// As of the last window's end, at most 0.1 s ago. Without a magnetometer the heading's own variance is 0: it is
+    /// right by definition at the start, and what it drifts by since is in here.
+    fn orientation_uncertainty(&self) -> Option<Matrix3<f64>> {
+        self.state.world_from_body()?;
+        Some(self.rotation.transpose() * self.errors.rotation() * self.rotation)
+    }
+
+    fn is_at_rest(&self) -> Option<bool> {
+        Some(self.rest.is_detected())
+    }
+
+    /// By norm and dip: a field that differs from the reference by more than a tenth of its norm.
+    fn is_magnetically_disturbed(&self) -> Option<bool> {
+        self.params.magnetometer.then(|| self.field.as_ref().is_some_and(FieldReference::is_disturbed))
+    }
+
     fn reset(&mut self) {
         if let Ok(new) = Self::new(self.params) {
             *self = new;
@@ -178,11 +198,6 @@ impl AttitudeFilter for MekfFilter {
 }
 
 impl MekfFilter {
-    /// The gyroscope's bias, rad/s: what it reads more than the angular velocity.
-    pub fn gyroscope_bias(&self) -> Vector3<f64> {
-        self.bias
-    }
-
     /// The gyroscope's scale and misalignment errors: what it reads is `(1 + E)` times the angular velocity and
     /// the bias, for small E.
     pub fn gyroscope_calibration(&self) -> Matrix3<f64> {

@@ -1,0 +1,52 @@
+//! How far an orientation misses the measured directions of gravity and field.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// The small turn of the body, rad, body frame, that would bring the expected directions onto the measured ones,
+/// and the expected vertical in the body frame.
+///
+/// The turn is `e = a × Rᵀẑ + m × Rᵀb`, with the measured unit vectors `a` and `m`, `R` taking body to world, and
+/// the field's reference `b = (0, √(h_x² + h_y²), h_z)`, `h = R m`: the measured field itself, its horizontal part
+/// turned north. Source: section 3.4 of Madgwick's report for `b`; equation (32c) of Mahony, Hamel, Pflimlin for e.
+#[inline]
+pub(super) fn misalignment(
+    world_from_body: &UnitQuaternion<f64>,
+    up: &Vector3<f64>,
+    field: Option<&Vector3<f64>>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
+    let (x2, y2, z2) = (x + x, y + y, z + z);
+    let (wx, wy, xx, xz, yy, yz) = (w * x2, w * y2, x * x2, x * z2, y * y2, y * z2);
+    // Rᵀẑ, the third row of R.
+    let world_up = Vector3::new(xz - wy, yz + wx, 1.0 - xx - yy);
+    let Some(field) = field else {
+        return (up.cross(&world_up), world_up);
+    };
+    let (wz, xy, zz) = (w * z2, x * y2, z * z2);
+    let world_north = Vector3::new(xy + wz, 1.0 - xx - zz, yz - wx);
+    let vertical = world_up.dot(field);
+    // Both are unit vectors but for rounding.
+    let squared = 1.0 - vertical * vertical;
+    let horizontal = if squared > 0.0 { squared.sqrt() } else { 0.0 };
+    // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
+    let error = (up + vertical * field).cross(&world_up) + horizontal * field.cross(&world_north);
+    (error, world_up)
+}
+
+/// A unit vector, body frame, perpendicular to the expected vertical: about it a body that is exactly upside down,
+/// where the misalignment is zero, is turned upright.
+#[cold]
+pub(super) fn horizontal_axis(world_up: &Vector3<f64>) -> Vector3<f64> {
+    let axis = if world_up.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
+    axis.cross(world_up).normalize()
+}
+
+/// East and up, as they are expected in the body frame: the first and third row of R.
+#[inline]
+pub(super) fn expected(world_from_body: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
+    let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
+    let (x2, y2, z2) = (x + x, y + y, z + z);
+    let (xx, yy, zz, xy, xz, yz) = (x * x2, y * y2, z * z2, x * y2, x * z2, y * z2);
+    let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+    [Vector3::new(1.0 - yy - zz, xy - wz, xz + wy), Vector3::new(xz - wy, yz + wx, 1.0 - xx - yy)]
+}

@@ -1,0 +1,55 @@
+//! What an attitude estimator emits: the orientation alone, or what else its filter knows beside it.
+
+use crate::attitude::AttitudeFilter;
+use bb_core::payload::Orientation;
+use bb_core::{Outputs, Payload};
+use nalgebra::Vector3;
+
+/// An output that can be made of a filter after a sample.
+#[diagnostic::on_unimplemented(
+    message = "an attitude filter cannot emit `{Self}`",
+    label = "not an output of attitude filters",
+    note = "it emits `Orientation`, or `AttitudeOutputs`"
+)]
+pub trait AttitudeOutput: Outputs + Sized {
+    /// What there is to emit; `None` before the filter has started.
+    fn of<F: AttitudeFilter>(filter: &F) -> Option<Self>;
+}
+
+/// What a filter knows beside the orientation; `None` where its algorithm has no such notion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
+pub struct AttitudeStatus {
+    /// The gyroscope's bias, rad/s, in the frame of the orientation.
+    pub gyroscope_bias: Option<Vector3<f64>>,
+    /// Whether the sensor lies still.
+    pub is_at_rest: Option<bool>,
+    /// Whether the magnetic field is disturbed.
+    pub is_magnetically_disturbed: Option<bool>,
+}
+
+/// The outputs of `Vqf<Marg, AttitudeOutputs>` and its like: `output orientation;`, `output status;`.
+#[derive(Clone, Copy, Debug, Default, Outputs)]
+pub struct AttitudeOutputs {
+    /// The orientation, with every sample.
+    pub orientation: Option<Orientation>,
+    /// What else the filter knows, with every sample.
+    pub status: Option<AttitudeStatus>,
+}
+
+impl AttitudeOutput for Orientation {
+    fn of<F: AttitudeFilter>(filter: &F) -> Option<Self> {
+        let world_from_body = filter.world_from_body()?;
+        Some(Self { world_from_body, covariance: filter.orientation_uncertainty() })
+    }
+}
+
+impl AttitudeOutput for AttitudeOutputs {
+    fn of<F: AttitudeFilter>(filter: &F) -> Option<Self> {
+        let status = AttitudeStatus {
+            gyroscope_bias: filter.gyroscope_bias(),
+            is_at_rest: filter.is_at_rest(),
+            is_magnetically_disturbed: filter.is_magnetically_disturbed(),
+        };
+        Some(Self { orientation: Some(Orientation::of(filter)?), status: Some(status) })
+    }
+}

@@ -1,0 +1,29 @@
+//! Mahony's explicit complementary filter, with six axes or nine.
+//!
+//! R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE
+//! Transactions on Automatic Control 53(5), 2008: the explicit complementary filter with bias correction, their
+//! equations (32).
+//!
+//! The gyroscope is integrated. What gravity and field miss their expected directions by is an angular velocity,
+//! the cross products of measured and expected directions: in proportion it turns the orientation, and its
+//! integral is the gyroscope's bias.
+//!
+//! # Differences from the paper
+//!
+//! * The paper's reference vectors are known. Here the field's reference is the measured field turned north, as in
+//!   [`madgwick`](super::madgwick): its dip need not be known.
+//! * The weights `k_i` of the directions are all 1.
+//! * The error is taken where the gyroscope leads, not at the previous orientation: what was measured now is
+//!   compared with what is expected now.
+//! * A step turns by the angle whose half has the correction as its tangent, which spares an exponential and differs
+//!   in the third order of one sample's correction.
+//! * Exactly upside down the error is zero; the paper leaves this set of measure zero out, and here it is left
+//!   about a horizontal axis.
+
+mod filter;
+mod params;
+#[cfg(test)]
+mod tests;
+
+pub use filter::MahonyFilter;
+pub use params::MahonyParams;

@@ -1,0 +1,50 @@
+//! What Mahony's filter alone does; the laws of all filters are checked here for it, too.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::{MahonyFilter, MahonyParams};
+use crate::attitude::laws::{at_rest, attitude_laws};
+use crate::attitude::{AttitudeFilter, ImuSample};
+
+fn filter(proportional_gain: f64, integral_gain: f64, magnetometer: bool) -> MahonyFilter {
+    MahonyFilter::new(MahonyParams { proportional_gain, integral_gain, magnetometer }).unwrap()
+}
+
+attitude_laws!(nine_axes: filter(1.0, 0.1, true), six_axes: filter(1.0, 0.1, false));
+
+#[test]
+fn a_wrong_tilt_decays_by_the_proportional_gain() {
+    let mut filter = filter(0.5, 0.0, false);
+    filter.start_at(0, UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 1.0)).unwrap();
+    for i in 1..=2000 {
+        filter.update(&at_rest(i * 1_000_000, &UnitQuaternion::identity())).unwrap();
+    }
+    // θ̇ = -k sin θ: tan(θ/2) decays exponentially.
+    let left = 2.0 * (0.5_f64.tan() * (-0.5_f64 * 2.0).exp()).atan();
+    assert!((filter.world_from_body().unwrap().angle() - left).abs() < 1e-3);
+}
+
+#[test]
+fn the_integral_finds_the_bias() {
+    let bias = Vector3::new(0.02, -0.03, 0.01);
+    let truth = UnitQuaternion::from_euler_angles(0.4, -0.2, 1.0);
+    let mut filter = filter(1.0, 0.1, true);
+    for i in 0..20_000 {
+        let sample = ImuSample { angular_velocity: bias, ..at_rest(i * 10_000_000, &truth) };
+        filter.update(&sample).unwrap();
+    }
+    let found = filter.gyroscope_bias().unwrap();
+    assert!((found - bias).norm() < 1e-6, "{found}");
+    assert!(filter.world_from_body().unwrap().angle_to(&truth) < 1e-5);
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let good = MahonyParams::default();
+    for value in [-0.1, f64::NAN, f64::INFINITY, 1001.0] {
+        let proportional = MahonyParams { proportional_gain: value, ..good };
+        assert_eq!(MahonyFilter::new(proportional).unwrap_err().parameter, "proportional_gain");
+        let integral = MahonyParams { integral_gain: value, ..good };
+        assert_eq!(MahonyFilter::new(integral).unwrap_err().parameter, "integral_gain");
+    }
+}

@@ -1,0 +1,142 @@
+//! Whether the magnetic field is disturbed: section 3.6 of the paper.
+
+use nalgebra::Vector3;
+
+use super::VqfParams;
+use super::coefficients::FieldCoefficients;
+use super::low_pass::LowPass;
+
+/// What a rotation about the vertical leaves alone of a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Field {
+    /// In the field's own unit.
+    norm: f64,
+    /// How far it points below the horizon, rad.
+    dip: f64,
+}
+
+impl Field {
+    fn is_near(self, reference: Self, params: &VqfParams) -> bool {
+        (self.norm - reference.norm).abs() < params.field_norm_tolerance * reference.norm
+            && (self.dip - reference.dip).abs() < params.field_dip_tolerance
+    }
+
+    fn approach(&mut self, field: Self, gain: f64) {
+        self.norm += gain * (field.norm - self.norm);
+        self.dip += gain * (field.dip - self.dip);
+    }
+}
+
+/// The reference, and the field that may become the next one.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Disturbance {
+    fields: LowPass<2>,
+    reference: Option<Field>,
+    candidate: Option<Field>,
+    candidate_s: f64,
+    undisturbed_s: f64,
+    rejected_s: f64,
+    detected: bool,
+}
+
+impl Disturbance {
+    pub(super) fn new(params: &VqfParams) -> Self {
+        Self {
+            fields: LowPass::new(),
+            reference: None,
+            candidate: None,
+            candidate_s: 0.0,
+            undisturbed_s: 0.0,
+            rejected_s: params.rejection_time,
+            detected: true,
+        }
+    }
+
+    /// After a gap: the reference stays, what was about to change it does not.
+    pub(super) fn forget_motion(&mut self) {
+        self.fields = LowPass::new();
+        self.candidate = None;
+        self.candidate_s = 0.0;
+        self.undisturbed_s = 0.0;
+    }
+
+    pub(super) fn is_detected(&self) -> bool {
+        self.detected
+    }
+
+    /// Takes a field of this norm, in its own unit, and its direction in the level frame; `turning` if the body turns enough to tell the world's field from one that
+    /// goes along with it. Returns what the heading's gain is to be multiplied by.
+    #[inline]
+    pub(super) fn observe(
+        &mut self,
+        params: &VqfParams,
+        dt_s: f64,
+        coefficients: &FieldCoefficients,
+        norm: f64,
+        direction: &Vector3<f64>,
+        turning: bool,
+    ) -> f64 {
+        let dip = (-direction.z).clamp(-1.0, 1.0).asin();
+        let [norm, dip] = self.fields.filter(&[norm, dip], dt_s, &coefficients.field);
+        let field = Field { norm, dip };
+        self.compare(params, dt_s, coefficients, field);
+        self.consider(params, dt_s, coefficients, field, turning);
+        self.trust(params, dt_s)
+    }
+
+    /// Compares the field with the reference, which follows it while it is undisturbed.
+    fn compare(&mut self, params: &VqfParams, dt_s: f64, coefficients: &FieldCoefficients, field: Field) {
+        match &mut self.reference {
+            Some(reference) if field.is_near(*reference, params) => {
+                self.undisturbed_s += dt_s;
+                if self.undisturbed_s >= params.undisturbed_time {
+                    self.detected = false;
+                    reference.approach(field, coefficients.reference_gain);
+                }
+            }
+            _ => {
+                self.undisturbed_s = 0.0;
+                self.detected = true;
+            }
+        }
+    }
+
+    /// Lets a field that stays the same in motion become the reference.
+    fn consider(
+        &mut self,
+        params: &VqfParams,
+        dt_s: f64,
+        coefficients: &FieldCoefficients,
+        field: Field,
+        turning: bool,
+    ) {
+        let Some(candidate) = self.candidate.as_mut().filter(|candidate| field.is_near(**candidate, params)) else {
+            self.candidate = Some(field);
+            self.candidate_s = 0.0;
+            return;
+        };
+        if turning {
+            self.candidate_s += dt_s;
+        }
+        candidate.approach(field, coefficients.reference_gain);
+        let needed_s = if self.reference.is_none() { params.first_field_time } else { params.new_field_time };
+        if self.detected && self.candidate_s >= needed_s {
+            self.reference = Some(*candidate);
+            self.detected = false;
+            self.undisturbed_s = params.undisturbed_time;
+        }
+    }
+
+    /// A disturbed field counts for nothing at first, and for less when it lasts.
+    fn trust(&mut self, params: &VqfParams, dt_s: f64) -> f64 {
+        if !self.detected {
+            self.rejected_s = (self.rejected_s - params.rejection_factor * dt_s).max(0.0);
+            return 1.0;
+        }
+        if self.rejected_s > params.rejection_time {
+            return 1.0 / params.rejection_factor;
+        }
+        self.rejected_s += dt_s;
+        0.0
+    }
+}

@@ -1,0 +1,118 @@
+//! Second-order Butterworth low-passes in state-variable form.
+//!
+//! `H(s) = 1 / (s²/ω² + √2 s/ω + 1)` with `ω = √2/τ`, by the bilinear transform: section 3.2 of the paper. The form
+//! is the one of A. Simper, "Linear trapezoidal integrated state variable filter", 2013: two trapezoidal integrators,
+//! whose states are the output and its derivative but for half a sample. At a constant input they are the input and
+//! zero, whatever the coefficients.
+
+use core::f64::consts::SQRT_2;
+
+/// The greatest `dt / (√2 τ)`: beyond it the low-pass lets everything through in one sample, and the tangent ends.
+const MAX_ANGLE: f64 = 1.5;
+
+/// What a low-pass of one time constant multiplies by, at one sample time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Coefficients {
+    time_constant_s: f64,
+    integrator: f64,
+    band_from_band: f64,
+    band_from_input: f64,
+}
+
+impl Coefficients {
+    pub(super) fn new(time_constant_s: f64, dt_s: f64) -> Self {
+        let integrator = (dt_s / (SQRT_2 * time_constant_s)).min(MAX_ANGLE).tan();
+        let band_from_band = 1.0 / (1.0 + integrator * (integrator + SQRT_2));
+        Self { time_constant_s, integrator, band_from_band, band_from_input: integrator * band_from_band }
+    }
+}
+
+/// The state of `N` low-passes with common coefficients.
+///
+/// For the first time constant the output is the mean of all that came.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct LowPass<const N: usize> {
+    band: [f64; N],
+    low: [f64; N],
+    /// How many samples the mean has so far; `None` once it is over.
+    samples: Option<f64>,
+    elapsed_s: f64,
+}
+
+impl<const N: usize> LowPass<N> {
+    /// One that begins with the mean of its first inputs.
+    pub(super) fn new() -> Self {
+        Self { band: [0.0; N], low: [0.0; N], samples: Some(0.0), elapsed_s: 0.0 }
+    }
+
+    /// One that has had this input for ever.
+    pub(super) fn settled(value: [f64; N]) -> Self {
+        Self { band: [0.0; N], low: value, samples: None, elapsed_s: 0.0 }
+    }
+
+    /// Takes an input that came `dt_s` after the last one; returns the output.
+    #[inline]
+    pub(super) fn filter(&mut self, input: &[f64; N], dt_s: f64, coefficients: &Coefficients) -> [f64; N] {
+        if let Some(samples) = self.samples {
+            return self.mean(input, samples + 1.0, dt_s, coefficients.time_constant_s);
+        }
+        let mut output = [0.0; N];
+        for i in 0..N {
+            let difference = input[i] - self.low[i];
+            let band = coefficients.band_from_band * self.band[i] + coefficients.band_from_input * difference;
+            let step = coefficients.integrator * band;
+            output[i] = self.low[i] + step;
+            self.low[i] = output[i] + step;
+            self.band[i] = band + band - self.band[i];
+        }
+        output
+    }
+
+    #[cold]
+    fn mean(&mut self, input: &[f64; N], samples: f64, dt_s: f64, time_constant_s: f64) -> [f64; N] {
+        for (mean, input) in self.low.iter_mut().zip(input) {
+            *mean += (input - *mean) / samples;
+        }
+        self.elapsed_s += dt_s;
+        // Of the first sample it is not known what time it stands for: the same as this one.
+        self.samples = (self.elapsed_s + dt_s < time_constant_s).then_some(samples);
+        self.low
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_step_response_is_the_bilinear_butterworths() {
+        // The difference equation in its direct form, from the bilinear transform by hand.
+        let (time_constant, dt) = (0.5, 0.01);
+        let c = (dt / (SQRT_2 * time_constant)).tan();
+        let d = c * c + SQRT_2 * c + 1.0;
+        let (b0, a1, a2) = (c * c / d, 2.0 * (c * c - 1.0) / d, (1.0 - SQRT_2 * c + c * c) / d);
+        let (mut x1, mut x2, mut y1, mut y2) = (0.0, 0.0, 0.0, 0.0);
+        let coefficients = Coefficients::new(time_constant, dt);
+        let mut low_pass = LowPass::settled([0.0]);
+        for i in 0..1000 {
+            let x = if i % 300 < 100 { 1.0 } else { -0.3 };
+            let y = b0 * (x + 2.0 * x1 + x2) - a1 * y1 - a2 * y2;
+            (x2, x1, y2, y1) = (x1, x, y1, y);
+            let [output] = low_pass.filter(&[x], dt, &coefficients);
+            assert!((output - y).abs() < 1e-12, "{output} {y} at {i}");
+        }
+    }
+
+    #[test]
+    fn it_starts_with_the_mean_and_keeps_what_is_constant_at_any_rate() {
+        let mut low_pass = LowPass::new();
+        let at = |dt: f64| Coefficients::new(0.1, dt);
+        assert_eq!(low_pass.filter(&[2.0], 0.0, &at(0.05)), [2.0]);
+        assert_eq!(low_pass.filter(&[4.0], 0.05, &at(0.05)), [3.0]);
+        for i in 1..100 {
+            let dt = 0.01 * f64::from(i);
+            let [output] = low_pass.filter(&[3.0], dt, &at(dt));
+            assert!((output - 3.0).abs() < 1e-12);
+        }
+    }
+}
