@@ -5,9 +5,7 @@ use super::actuator::{Accepts, ActuatorError, AnyActuator};
 use crate::component::Fault;
 use crate::control::{Control, ParameterError, ParameterValue};
 use crate::message::Payload;
-use crate::pubsub::{
-    AnyTopic, DynamicSubscription, Overflow, Select, SubscriberStatistics, Subscription, Topic,
-};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, SubscriberStatistics, Subscription, Topic};
 use crate::time::Clock;
 use std::fmt;
 use std::sync::{Arc, OnceLock, Weak};
