@@ -14,6 +14,17 @@ fn the_story_on_virtual_time_is_the_stored_one() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn what_the_readme_shows_is_a_part_of_it() {
+    let readme = include_str!("../../README.md");
+    let shown: Vec<&str> = readme.split("```text\n").filter_map(|rest| rest.split("```").next()).collect();
+    assert!(
+        shown.iter().any(|block| block.contains("  hardware  ") && include_str!("expected.txt").contains(block))
+    );
+    let rover = include_str!("rover.rs").replace("\n        ", "\n");
+    assert!(shown.iter().any(|block| block.contains("on_lost: stop;") && rover.contains(block)));
+}
+
+#[test]
 fn what_has_not_happened_in_its_order_is_missing() -> Result<(), Box<dyn Error>> {
     let lines = run::on_virtual_time(&mut std::io::sink())?;
     assert_eq!(expected::missing(&lines), []);
