@@ -22,6 +22,22 @@ fn a_slow_subscriber_keeps_what_it_asked_for() -> Result<(), StartError> {
     Ok(())
 }
 
+#[test]
+fn the_subscribers_of_a_path_are_listed() -> Result<(), StartError> {
+    let mut simulation = Talker::builder().simulate()?;
+    let bus = simulation.bus();
+    let slow = simulation.subscribe_with(talker::sensor::numbers, Overflow::DropOldest { capacity: 3 });
+    let any = simulation.subscribe_any(Select::Below("sensor"), None, Overflow::default());
+    simulation.run_to_end();
+    let subscribers: Vec<_> = bus.subscribers("sensor/numbers");
+    let told: Vec<_> = subscribers.iter().map(|one| (one.is_typed, one.waiting, one.capacity, one.lost)).collect();
+    assert_eq!(told, [(true, 3, 3, 7), (false, 20, 1024, 0)]);
+    drop((slow, any));
+    assert_eq!(bus.subscribers("sensor/numbers"), []);
+    assert_eq!(bus.subscribers("sensor/nobody"), []);
+    Ok(())
+}
+
 #[tokio::test]
 async fn a_subscription_can_be_awaited() -> Result<(), StartError> {
     let builder = Talker::builder();

@@ -11,3 +11,11 @@ struct Components;
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/attitude.md")]
 struct Attitude;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/runtime.md")]
+struct Runtime;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/beam-bots.md")]
+struct BeamBots;

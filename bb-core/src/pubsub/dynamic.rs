@@ -84,6 +84,8 @@ pub enum Select<'a> {
     Path(&'a str),
     /// One, and all below it: `sensor/base_link`.
     Below(&'a str),
+    /// What any of these includes.
+    AnyOf(&'a [Select<'a>]),
 }
 
 impl Select<'_> {
@@ -95,6 +97,7 @@ impl Select<'_> {
             Self::Below(above) => {
                 path.strip_prefix(above).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
             }
+            Self::AnyOf(several) => several.iter().any(|select| select.includes(path)),
         }
     }
 }
@@ -169,5 +172,12 @@ mod tests {
         assert!(below.includes("sensor/base") && below.includes("sensor/base/imu"));
         assert!(!below.includes("sensor/base_link/imu") && !below.includes("estimator/sensor/base"));
         assert!(Select::All.includes("anything") && !Select::Path("a").includes("a/b"));
+    }
+
+    #[test]
+    fn several_are_selected_at_once() {
+        let several = Select::AnyOf(&[Select::Path("health"), Select::Below("command")]);
+        assert!(several.includes("health") && several.includes("command/stop"));
+        assert!(!several.includes("sensor/base/imu") && !Select::AnyOf(&[]).includes("health"));
     }
 }

@@ -5,7 +5,7 @@ use super::actuator::{Accepts, ActuatorError, AnyActuator};
 use crate::component::Fault;
 use crate::control::{Control, ParameterError, ParameterValue, Setter};
 use crate::message::Payload;
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription, Topic};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, SubscriberStatistics, Subscription, Topic};
 use crate::time::Clock;
 use std::fmt;
 use std::sync::{Arc, OnceLock, Weak};
@@ -83,6 +83,13 @@ impl Bus {
     /// All paths that are published at.
     pub fn paths(&self) -> Vec<&'static str> {
         self.with_topics(|topics| topics.iter().map(|topic| topic.path()).collect())
+    }
+
+    /// Who listens at `path`; nobody where nothing is published.
+    pub fn subscribers(&self, path: &str) -> Vec<SubscriberStatistics> {
+        self.with_topics(|topics| {
+            topics.iter().find(|topic| topic.path() == path).map_or_else(Vec::new, |topic| topic.subscribers())
+        })
     }
 
     /// The actuator at `path`, which takes commands of type `T`.

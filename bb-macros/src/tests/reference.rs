@@ -75,7 +75,7 @@ fn the_units_of_the_reference_are_those_that_are_read() {
     let described: Vec<String> = quoted(list);
     for symbol in symbols() {
         let plain = symbol.replace('µ', "u");
-        assert!(described.iter().any(|unit| *unit == plain), "`{symbol}` is not in the reference");
+        assert!(described.contains(&plain), "`{symbol}` is not in the reference");
     }
     for unit in described.iter().filter(|unit| !["µ", "u"].contains(&unit.as_str())) {
         assert!(symbols().any(|symbol| symbol == unit), "`{unit}` is no unit");

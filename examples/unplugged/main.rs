@@ -1,0 +1,62 @@
+//! What a robot does when its sensors fail, as a story on a terminal.
+//!
+//! A rover drives in a circle and estimates its pose from an IMU and its wheels. The wheels stall, the IMU is unplugged,
+//! both come back; the health of the estimator starts the commands that slow the rover down, stop it and let it drive on.
+//! On virtual time, which takes a moment and gives the same output every time; with `--real-time` live. It fails if
+//! anything that belongs to the story did not happen, or not in its order.
+
+mod commands;
+mod dead_reckoning;
+mod expected;
+mod rover;
+mod run;
+mod script;
+mod sensors;
+#[cfg(test)]
+mod tests;
+mod timeline;
+
+use clap::Parser;
+use std::error::Error;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Stalls the wheels of a rover, unplugs its IMU, and shows what becomes of it.
+#[derive(Debug, Parser)]
+#[command(name = "unplugged")]
+struct Arguments {
+    /// Takes as long as the story does, instead of running on virtual time.
+    #[arg(long)]
+    real_time: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match tell(&arguments, &mut std::io::stdout().lock()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        // A reader that has read enough (`| head`) knows that it has not read the end.
+        Err(error) if error.downcast_ref::<std::io::Error>().is_some_and(is_broken_pipe) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &std::io::Error) -> bool {
+    error.kind() == std::io::ErrorKind::BrokenPipe
+}
+
+/// Runs the story; whether all of it happened.
+fn tell(arguments: &Arguments, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
+    let lines = if arguments.real_time { run::in_real_time(out)? } else { run::on_virtual_time(out)? };
+    let missing = expected::missing(&lines);
+    if missing.is_empty() {
+        writeln!(out, "\nAll that was expected happened, in its order.")?;
+    }
+    for (kind, event) in &missing {
+        writeln!(out, "\nmissing: {} {event}", kind.name())?;
+    }
+    Ok(missing.is_empty())
+}

@@ -1,0 +1,115 @@
+//! Runs the script on virtual time or in real time, and writes down what happens.
+
+use crate::rover::{Rover, rover};
+use crate::script::{self, Deed};
+use crate::timeline::{Kind, Line, TOPICS};
+use bb_core::prelude::*;
+use bb_core::{Builder, DynamicSubscription};
+use std::error::Error;
+use std::io::Write;
+
+/// What has happened so far.
+struct Story<'a> {
+    events: DynamicSubscription,
+    poses: Subscription<Pose>,
+    /// Has happened after what is written so far.
+    next: Option<Line>,
+    lines: Vec<Line>,
+    out: &'a mut dyn Write,
+}
+
+pub(crate) fn on_virtual_time(out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
+    let builder = Rover::builder();
+    let mut story = Story::new(&builder, out)?;
+    let mut simulation = builder.simulate()?;
+    for (time, deed) in script::steps() {
+        simulation.run_until(time);
+        story.go_on(time)?;
+        story.take_place(&simulation, time, deed)?;
+    }
+    simulation.run_until(script::END);
+    story.end()
+}
+
+pub(crate) fn in_real_time(out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
+    let builder = Rover::builder();
+    let mut story = Story::new(&builder, out)?;
+    let running = builder.start()?;
+    for (time, deed) in script::steps() {
+        story.wait_until(&running, time)?;
+        story.take_place(&running, time, deed)?;
+    }
+    story.wait_until(&running, script::END)?;
+    story.end()
+}
+
+impl<'a> Story<'a> {
+    fn new(builder: &Builder<Rover>, out: &'a mut dyn Write) -> std::io::Result<Self> {
+        let events = builder.subscribe_any(TOPICS, None, Overflow::default());
+        let poses = builder.subscribe_with(rover::estimator::base::pose, Overflow::KeepLatest);
+        writeln!(out, "{}", Line::header())?;
+        Ok(Self { events, poses, next: None, lines: Vec::new(), out })
+    }
+
+    /// Does one step of the script. What becomes of a command is seen on its topic.
+    fn take_place(&mut self, robot: &Live<Rover>, time: MonotonicTime, deed: Deed) -> std::io::Result<()> {
+        let (kind, event, detail) = match deed {
+            Deed::Hardware(event, detail) => (Kind::Hardware, event, detail),
+            Deed::Arm => (Kind::Operator, "arm!", ""),
+            Deed::Drive => (Kind::Operator, "drive!", ""),
+            Deed::Disarm => (Kind::Operator, "disarm!", ""),
+        };
+        self.write(Line::new(time, kind, event, detail))?;
+        match deed {
+            Deed::Hardware(..) => {}
+            Deed::Arm => drop(robot.command(rover::command::arm, NoArguments)),
+            Deed::Drive => drop(robot.command(rover::command::drive, NoArguments)),
+            Deed::Disarm => drop(robot.command(rover::command::disarm, NoArguments)),
+        }
+        Ok(())
+    }
+
+    /// Writes down what has happened before `time`.
+    fn go_on(&mut self, time: MonotonicTime) -> std::io::Result<()> {
+        loop {
+            if self.next.is_none() {
+                self.next = self.events.try_recv().and_then(|message| Line::of(&message));
+            }
+            match self.next.take_if(|line| line.time < time) {
+                Some(line) => self.write(line)?,
+                None => return Ok(()),
+            }
+        }
+    }
+
+    /// Writes down what happens before `time`, as it does.
+    fn wait_until(&mut self, robot: &Live<Rover>, time: MonotonicTime) -> std::io::Result<()> {
+        loop {
+            self.go_on(time)?;
+            let left = time.duration_since(robot.clock().now());
+            if left.is_zero() {
+                return Ok(());
+            }
+            match self.next {
+                Some(_) => std::thread::sleep(left),
+                None => self.next = self.events.recv_timeout(left).and_then(|message| Line::of(&message)),
+            }
+        }
+    }
+
+    fn end(mut self) -> Result<Vec<Line>, Box<dyn Error>> {
+        self.go_on(MonotonicTime::MAX)?;
+        if let Some(pose) = self.poses.try_recv() {
+            let (x, y) = (pose.position.x, pose.position.y);
+            let yaw_deg = pose.world_from_body.euler_angles().2.to_degrees();
+            writeln!(self.out, "\nWhere it believes to be: x {x:.2} m, y {y:.2} m, yaw {yaw_deg:.1} deg.")?;
+        }
+        Ok(self.lines)
+    }
+
+    fn write(&mut self, line: Line) -> std::io::Result<()> {
+        writeln!(self.out, "{line}")?;
+        self.lines.push(line);
+        Ok(())
+    }
+}
