@@ -23,6 +23,7 @@ mod threads;
 
 pub use actuator::{ActuatorDeclaration, ActuatorError, ActuatorNode, AnyActuator};
 pub use builder::Builder;
+pub(crate) use bus::Directory;
 pub use bus::{ActuatorLink, Bus};
 pub use error::{ComponentFault, StartError};
 pub(crate) use error::{Failed, caught, retire};

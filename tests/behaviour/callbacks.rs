@@ -186,16 +186,16 @@ fn calls_are_answered_and_casts_are_taken() -> Result<(), Box<dyn std::error::Er
     let sums = builder.subscribe(sum);
     let mut simulation = builder.simulate()?;
     simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
-    simulation.cast(sum, Add(40.0)).map_err(|fault| fault.to_string())?;
-    assert_eq!(simulation.call(sum, HowMuch).map_err(|fault| fault.to_string())?, 42.0);
+    simulation.cast(sum, Add(40.0))?;
+    assert_eq!(simulation.call(sum, HowMuch)?, 42.0);
     assert_eq!(emitted(&sums), [(5, 42.0)], "a call may emit as well");
     // One that fails fails the estimator, and the caller hears of it.
     let error = simulation.call(sum, Break).expect_err("it breaks").to_string();
-    assert_eq!(error, "sensor/base/number/sum failed at this call");
+    assert_eq!(error, "sensor/base/number/sum failed at this call: broken on request");
     let error = simulation.call(sum, HowMuch).expect_err("it waits for its restart").to_string();
     assert_eq!(error, "sensor/base/number/sum does not run");
     simulation.run_until(at(100));
-    assert_eq!(simulation.call(sum, HowMuch).map_err(|fault| fault.to_string())?, 0.0, "it is as new");
+    assert_eq!(simulation.call(sum, HowMuch)?, 0.0, "it is as new");
     Ok(())
 }
 
@@ -208,7 +208,7 @@ fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Box<dyn std::erro
     simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
     simulation.set_parameter(summing::param::sum::gain, 5.0)?;
     simulation.publish(summing::sensor::base::number, at(10), Number(1.0));
-    let sum = simulation.call(summing::sensor::base::number::sum, HowMuch).map_err(|fault| fault.to_string())?;
+    let sum = simulation.call(summing::sensor::base::number::sum, HowMuch)?;
     assert_eq!(sum, 8.0, "it keeps its state");
     let change = changes.try_recv().expect("a change is published");
     assert_eq!((&change.from, &change.to), (&ParameterValue::Float(3.0), &ParameterValue::Float(5.0)));

@@ -61,6 +61,12 @@ impl<E: Into<Box<dyn Error + Send + Sync>>> From<E> for Fault {
     }
 }
 
+impl From<Fault> for Box<dyn Error> {
+    fn from(fault: Fault) -> Self {
+        fault.error
+    }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.error)?;

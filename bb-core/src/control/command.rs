@@ -5,6 +5,7 @@ use super::tasks::Sleeper;
 use super::{ParameterError, ParameterValue};
 use crate::component::{Fault, NoOptions, Options};
 use crate::node::HealthTransition;
+use crate::run::Bus;
 use crate::time::MonotonicTime;
 use std::future::Future;
 use std::pin::Pin;
@@ -136,6 +137,11 @@ impl CommandContext {
     /// The operational state.
     pub fn state(&self) -> &'static str {
         self.control.state()
+    }
+
+    /// Topics and actuators, by path.
+    pub fn bus(&self) -> Bus {
+        Bus::new(self.control.clone())
     }
 
     /// The value of the parameter at `path`: `param/imu/beta`.

@@ -20,12 +20,13 @@ use crate::journal::{Event, Journal};
 use crate::message::{Origin, Payload, Stamp};
 use crate::node::HealthTransition;
 use crate::pubsub::{AnyTopic, Topic};
+use crate::run::Directory;
 use crate::time::{Clock, MonotonicTime};
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 
 /// What `robot!` declares of all this.
 #[derive(Clone, Copy, Debug)]
@@ -89,6 +90,8 @@ struct Inner {
     bell: Bell,
     /// Whether `State::waiting` holds anything.
     has_waiting: AtomicBool,
+    /// Where topics and actuators are, once they are made.
+    directory: OnceLock<Arc<dyn Directory>>,
     /// When commands go on: their time, so that a replay of them is the same.
     moment_nanos: AtomicI64,
     journal: Option<Journal>,
@@ -159,6 +162,7 @@ impl Control {
             sleeper: Sleeper::default(),
             bell: Bell::default(),
             has_waiting: AtomicBool::new(false),
+            directory: OnceLock::new(),
             moment_nanos: AtomicI64::new(0),
             journal,
             replayed_answer: Mutex::default(),
@@ -205,6 +209,11 @@ impl Control {
         let guard = lock(&self.0.acting);
         IS_ACTING.set(true);
         Acting(Some(guard))
+    }
+
+    /// Who sets a parameter now: a command that goes on, or somebody outside.
+    pub(crate) fn setter(&self) -> Setter {
+        if IS_ACTING.get() { Setter::Command } else { Setter::Outside(self.0.clock.now()) }
     }
 
     /// When commands go on.
@@ -256,6 +265,19 @@ impl Control {
         let wall_time = self.0.clock.wall_at(monotonic_time);
         let stamp = Stamp { monotonic_time, wall_time, origin: self.0.origin, ..Stamp::default() };
         topic.publish(&stamp.message(payload));
+    }
+
+    pub(crate) fn set_directory(&self, directory: Arc<dyn Directory>) {
+        // It is set once.
+        let _ = self.0.directory.set(directory);
+    }
+
+    pub(crate) fn directory(&self) -> Option<&Arc<dyn Directory>> {
+        self.0.directory.get()
+    }
+
+    pub(crate) fn clock(&self) -> &Clock {
+        &self.0.clock
     }
 
     pub(crate) fn topics(&self) -> &SystemTopics {

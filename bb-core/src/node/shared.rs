@@ -80,6 +80,10 @@ impl SharedNode {
         self.0.health.store(state as u8, Ordering::Relaxed);
     }
 
+    pub(super) fn stopped(&self) -> Option<String> {
+        lock(&self.0.stopped).clone()
+    }
+
     pub(super) fn set_stopped(&self, reason: Option<String>) {
         *lock(&self.0.stopped) = reason;
     }

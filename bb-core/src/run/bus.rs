@@ -3,15 +3,15 @@
 use super::Robot;
 use super::actuator::{Accepts, ActuatorError, AnyActuator};
 use crate::component::Fault;
-use crate::control::{Control, ParameterError, ParameterValue, Setter};
+use crate::control::{Control, ParameterError, ParameterValue};
 use crate::message::Payload;
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, SubscriberStatistics, Subscription, Topic};
 use crate::time::Clock;
 use std::fmt;
-use std::sync::{Arc, OnceLock, Weak};
+use std::sync::{Arc, Weak};
 
 /// Where topics and actuators are.
-pub(super) trait Directory: Send + Sync {
+pub(crate) trait Directory: Send + Sync {
     fn with_topics(&self, call: &mut dyn FnMut(Vec<&dyn AnyTopic>));
     fn with_actuators(&self, call: &mut dyn FnMut(Vec<&dyn AnyActuator>));
 }
@@ -44,14 +44,12 @@ impl<R: Robot> Directory for Wired<R> {
 /// Topics, actuators, parameters and states, by path. Clones are the same.
 #[derive(Clone)]
 pub struct Bus {
-    directory: Arc<OnceLock<Arc<dyn Directory>>>,
     control: Control,
-    clock: Clock,
 }
 
 impl Bus {
-    pub(super) fn new(directory: Arc<OnceLock<Arc<dyn Directory>>>, control: Control, clock: Clock) -> Self {
-        Self { directory, control, clock }
+    pub(crate) fn new(control: Control) -> Self {
+        Self { control }
     }
 
     /// Subscribes to what is published at `path`.
@@ -98,7 +96,7 @@ impl Bus {
     /// No actuator is there, or one that takes other commands.
     pub fn actuator<T: Payload>(&self, path: &str) -> Result<ActuatorLink<T>, Fault> {
         let mut found = Err(Fault::new(format!("no actuator is at `{path}`")));
-        if let Some(directory) = self.directory.get() {
+        if let Some(directory) = self.control.directory() {
             directory.with_actuators(&mut |actuators| {
                 let Some(actuator) = actuators.iter().find(|actuator| actuator.path() == path) else { return };
                 found = match actuator.accepts().downcast::<Arc<dyn Accepts<T>>>() {
@@ -123,7 +121,7 @@ impl Bus {
     /// # Errors
     /// What was expected.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
-        self.control.set_parameter_at(path, value.into(), Setter::Outside(self.clock.now()))
+        self.control.set_parameter_at(path, value.into(), self.control.setter())
     }
 
     /// The operational state.
@@ -133,13 +131,13 @@ impl Bus {
 
     /// The clock of the run.
     pub fn clock(&self) -> &Clock {
-        &self.clock
+        self.control.clock()
     }
 
     fn with_topics<T>(&self, call: impl Fn(&[&dyn AnyTopic]) -> T) -> T {
         let system = self.control.topics().all();
         let mut result = None;
-        if let Some(directory) = self.directory.get() {
+        if let Some(directory) = self.control.directory() {
             directory.with_topics(&mut |topics| {
                 let all: Vec<_> = topics.into_iter().chain(system.iter().copied()).collect();
                 result = Some(call(&all));

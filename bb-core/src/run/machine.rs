@@ -3,7 +3,7 @@
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher, Visitable};
 use super::{ActuatorError, Report, Robot, SensorHandle, Startup};
 use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
-use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal, Setter};
+use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal};
 use crate::message::Stamp;
 use crate::node::{AnyIsland, Node};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
@@ -100,7 +100,7 @@ impl<R: Robot> Machine<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        let setter = Setter::Outside(self.startup.clock.now());
+        let setter = self.startup.control.setter();
         self.startup.control.set_parameter(parameter.number(), value.into_value(), setter)
     }
 

@@ -92,7 +92,8 @@ impl<R: Robot> Replay<R> {
                 }
             }
             Event::Wake { island: number } => {
-                self.slowly(slow, || Ok(island(number)?.replay_wake(&machine.wiring, time)))?;
+                let island = island(number)?;
+                self.slowly(slow, || island.replay_wake(&machine.wiring, time));
             }
             Event::Failed { supervisor, path } => {
                 let verdict = startup.supervisors().failed(supervisor, time);

@@ -13,7 +13,7 @@ use crate::node::{HealthTransition, SharedNode};
 use crate::pubsub::DynamicMessage;
 use crate::time::{Clock, MonotonicTime};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What the components of a robot are started with, and report to while they run.
 #[derive(Clone, Debug)]
@@ -32,7 +32,6 @@ pub struct Startup {
     is_replay: bool,
     /// The line of the journal that is replayed.
     replayed_line: Arc<AtomicU64>,
-    directory: Arc<OnceLock<Arc<dyn Directory>>>,
     /// The first component that could not start; those behind it are not started any more.
     refusal: Arc<Mutex<Option<StartError>>>,
 }
@@ -59,7 +58,6 @@ impl Startup {
             journal: None,
             is_replay: false,
             replayed_line: Arc::default(),
-            directory: Arc::default(),
             refusal: Arc::default(),
         }
     }
@@ -200,12 +198,11 @@ impl Startup {
 
     /// Says where topics and actuators are, once they are made.
     pub(super) fn set_directory(&self, directory: Arc<dyn Directory>) {
-        // It is set once.
-        let _ = self.directory.set(directory);
+        self.control.set_directory(directory);
     }
 
     pub(super) fn bus(&self) -> Bus {
-        Bus::new(Arc::clone(&self.directory), self.control.clone(), self.clock.clone())
+        Bus::new(self.control.clone())
     }
 
     pub(super) fn with_journal(mut self, journal: Option<Journal>) -> Self {

@@ -33,7 +33,8 @@ impl<E: Estimator> Node<E> {
         match turn {
             Turn::Emitted(stamp) => (response, Some(stamp)),
             Turn::Idle | Turn::Quiet if self.estimator.is_none() => {
-                (Err(Fault::new(format!("{} failed at this call", self.declaration.path))), None)
+                let (path, reason) = (self.declaration.path, self.shared.stopped().unwrap_or_default());
+                (Err(Fault::new(format!("{path} failed at this call: {reason}"))), None)
             }
             Turn::Idle | Turn::Quiet => (response, None),
         }
