@@ -5,7 +5,8 @@ use crate::component::{
     Context, Estimator, Fault, InputAt, InputField, Inputs, NoOptions, OutputAt, Outputs, Reading, Reply, Sensor,
     SensorContext, Slot, SyncMiss,
 };
-use crate::message::{Finite, Payload, Stamped};
+use crate::message::codec::{Reader, Shape, Writer};
+use crate::message::{DecodeError, Field, Finite, Payload, Stamped};
 use crate::time::MonotonicTime;
 
 /// A payload, a sensor and an estimator, wherever one is needed that is not known.
@@ -26,6 +27,17 @@ pub(crate) const UNKNOWN_INDEX: usize = usize::MAX;
 impl Finite for Unknown {
     fn is_finite(&self) -> bool {
         true
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl Field for Unknown {
+    const SHAPE: Shape = <()>::SHAPE;
+
+    fn write(&self, _: &mut Writer<'_>) {}
+
+    fn read(_: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        stub()
     }
 }
 
