@@ -165,7 +165,7 @@ pub struct DynamicSubscription {
 
 impl DynamicSubscription {
     /// Subscribes to those `topics` that are selected and whose payload's type has the name `payload`, if one is given.
-    pub(crate) fn new<'a>(
+    pub fn new<'a>(
         topics: impl IntoIterator<Item = &'a dyn AnyTopic>,
         select: Select<'_>,
         payload: Option<&str>,
