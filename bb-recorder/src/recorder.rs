@@ -1,5 +1,8 @@
 //! Writes what a subscription gets.
 
+#[cfg(test)]
+mod tests;
+
 use crate::channels::{Description, Layout, Shared};
 use crate::error::{RecordingErrorKind, write_error};
 use crate::{BackgroundRecorder, RecorderOptions, RecordingError};

@@ -138,12 +138,15 @@ impl Drop for Temporary {
     }
 }
 
-/// Records `millis` of virtual time.
-pub(crate) fn record(path: &Path, millis: u64, change: impl FnOnce(&mut RecorderOptions)) {
+/// Records all of `millis` of virtual time.
+pub(crate) fn record(path: &Path, millis: u64) {
+    record_some(path, millis, Select::All, RecorderOptions::of::<Rover>());
+}
+
+/// Records some of `millis` of virtual time.
+pub(crate) fn record_some(path: &Path, millis: u64, select: Select<'_>, options: RecorderOptions) {
     let builder = Rover::builder();
-    let all = builder.subscribe_any(Select::All, None, Overflow::default());
-    let mut options = RecorderOptions::of::<Rover>();
-    change(&mut options);
+    let all = builder.subscribe_any(select, None, Overflow::default());
     let mut recorder = Recorder::new(path, all, options).expect("it can be created");
     let mut simulation = builder.simulate().expect("it starts");
     for _ in 0..millis / 10 {

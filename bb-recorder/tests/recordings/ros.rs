@@ -8,7 +8,7 @@ use bb_recorder::{Recording, RecordingErrorKind};
 #[test]
 fn the_reader_of_ros_bags_reads_it() {
     let file = Temporary::new("bag");
-    record(&file, 200, |_| {});
+    record(&file, 200);
     let bag = Bag::open(&file).expect("it is a bag");
     let names: Vec<_> = bag.topics().iter().map(|topic| (&*topic.name, &*topic.schema)).collect();
     for expected in [
@@ -26,21 +26,24 @@ fn the_reader_of_ros_bags_reads_it() {
     let recording = Recording::open(&file).expect("it was recorded");
     let mut imu = recording.messages::<Imu>("sensor/base/imu").expect("it was recorded");
     let mut field = recording.messages::<MagneticField>("sensor/base/compass").expect("it was recorded");
-    let topics =
-        ["/sensor/base/imu", "/sensor/base/compass", "/sensor/base/locator", "/sensor/base/arm/encoder"];
+    let topics = ["/sensor/base/imu", "/sensor/base/compass", "/sensor/base/locator", "/sensor/base/arm/encoder"];
     for message in bag.messages(&topics).expect("they are read") {
         let message = message.expect("it is whole");
         match message.payload {
             RosMessage::Imu(ros) => {
                 let ours = imu.next().expect("as many").expect("it is whole");
-                assert_eq!((ros.header.stamp.nanoseconds(), &*ros.header.frame_id), (ours.wall_time.as_unix_nanos(), "base"));
+                assert_eq!(
+                    (ros.header.stamp.nanoseconds(), &*ros.header.frame_id),
+                    (ours.wall_time.as_unix_nanos(), "base")
+                );
                 assert_eq!([ros.angular_velocity.x, ros.linear_acceleration.z], [ours.angular_velocity.x, 9.81]);
                 assert_eq!(ros.orientation_covariance[0] == -1.0, ours.orientation.is_none());
             }
             RosMessage::MagneticField(ros) => {
                 let ours = field.next().expect("as many").expect("it is whole");
                 assert_eq!(ros.magnetic_field.y, ours.magnetic_field.y);
-                let covariance = ours.covariance.map_or([0.0; 9], |of| of.transpose().as_slice().try_into().expect("nine"));
+                let covariance =
+                    ours.covariance.map_or([0.0; 9], |of| of.transpose().as_slice().try_into().expect("nine"));
                 assert_eq!(ros.magnetic_field_covariance, covariance);
             }
             RosMessage::Odometry(ros) => {
@@ -61,7 +64,7 @@ fn the_reader_of_ros_bags_reads_it() {
 #[test]
 fn bags_of_other_programs_are_recognised() {
     let file = Temporary::new("foreign");
-    record(&file, 20, |_| {});
+    record(&file, 20);
     let mut bytes = std::fs::read(&file).expect("it was recorded");
     let ours = b"bb-recorder";
     let at = bytes.windows(ours.len()).position(|window| window == ours).expect("it says so");

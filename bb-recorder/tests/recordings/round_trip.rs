@@ -55,7 +55,8 @@ fn a_simulated_run_is_read_back_bit_for_bit() {
         assert_eq!(read::<Gripper>(&recording, "sensor/base/arm/hand/grip"), bytes_of(grip.drain()));
         assert_eq!(read::<JointState>(&recording, "sensor/base/arm/encoder"), bytes_of(encoder.drain()));
 
-        let all: Vec<_> = recording.all().expect("it is there").map(|message| message.expect("it is whole")).collect();
+        let all: Vec<_> =
+            recording.all().expect("it is there").map(|message| message.expect("it is whole")).collect();
         assert_eq!(all.len() as u64, drained);
         let counted: u64 = recording.channels().iter().map(|channel| channel.messages).sum();
         assert_eq!(counted, drained);
@@ -116,7 +117,7 @@ fn stamps_that_do_not_follow_from_ros_are_read_back_too() {
 #[test]
 fn asking_for_what_is_not_there_says_what_is() {
     let file = Temporary::new("ask");
-    record(&file, 100, |_| {});
+    record(&file, 100);
     let recording = Recording::open(&file).expect("it was recorded");
     let no_path = recording.messages::<Imu>("sensor/imu").expect_err("it is elsewhere").to_string();
     assert!(no_path.contains("nothing was recorded at `sensor/imu`; there are `sensor/base/imu`"), "{no_path}");
@@ -137,7 +138,7 @@ fn asking_for_what_is_not_there_says_what_is() {
 #[test]
 fn files_that_cannot_be_written_or_are_something_else_are_named() {
     let file = Temporary::new("exists");
-    record(&file, 50, |_| {});
+    record(&file, 50);
     let new = |path: &std::path::Path| {
         let all = Rover::builder().subscribe_any(Select::All, None, Overflow::KeepLatest);
         Recorder::new(path, all, RecorderOptions::default()).map(drop)
