@@ -1,7 +1,6 @@
 //! Components that fail: at the start, in a callback, by a panic. The others go on.
 
 use crate::components::{Counter, Number, Scale, at};
-use bb_core::Field as _;
 use bb_core::message::DecodeError;
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::node::DropReason;

@@ -11,3 +11,7 @@ struct Components;
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/attitude.md")]
 struct Attitude;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/recording.md")]
+struct Recording;
