@@ -74,8 +74,8 @@ fn wrong_bytes_never_panic() {
         let (wrong, repaired) = (Temporary::new(&format!("wrong-{compression:?}")), Temporary::new("of-wrong"));
         std::fs::copy(&whole, &wrong).expect("there is room");
         let file = OpenOptions::new().write(true).open(&wrong).expect("it was copied");
-        for at in 0..bytes.len() {
-            for value in [0xff, bytes[at] ^ 1] {
+        for (at, good) in bytes.iter().enumerate() {
+            for value in [0xff, good ^ 1] {
                 put(&file, at, value).expect("it is there");
                 readable(&wrong);
                 if at % 7 == 0 {
@@ -83,7 +83,7 @@ fn wrong_bytes_never_panic() {
                     let _ = recover(&wrong, &repaired);
                 }
             }
-            put(&file, at, bytes[at]).expect("it is there");
+            put(&file, at, *good).expect("it is there");
         }
     }
 }
