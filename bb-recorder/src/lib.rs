@@ -22,7 +22,8 @@
 //!     let running = builder.start()?;
 //!     std::thread::sleep(Duration::from_secs(1));
 //!     running.stop();
-//!     println!("{} messages, {} lost", recorder.stop()?.messages, 0);
+//!     let report = recorder.stop()?;
+//!     println!("{} messages, {} lost", report.messages, report.lost);
 //!
 //!     for message in Recording::open("walk.mcap")?.messages::<Marg>("sensor/base/imu")? {
 //!         let message = message?;
