@@ -5,7 +5,7 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | messages: a payload with its time, frame and origin | [`message`], [`payload`] |
+//! | messages: a payload with its time, frame and origin; as bytes | [`message`], [`payload`], [`message::codec`] |
 //! | what a user implements: [`Sensor`], [`Estimator`], [`Actuator`], [`Controller`], [`Bridge`], [`Command`], and the derives for options, inputs, outputs, payloads | [`component`] |
 //! | time, real or virtual | [`time`] |
 //! | links, joints and the transforms between them | [`topology`] |
@@ -44,7 +44,7 @@ pub use component::{
 pub use control::{
     Command, CommandContext, Execution, Outcome, ParameterError, ParameterValue, Refusal, Role, Safety,
 };
-pub use message::{Finite, Frame, Origin, Payload, Stamped};
+pub use message::{Field, Finite, Frame, Origin, Payload, Stamped};
 pub use node::{HealthReason, HealthState, HealthTransition};
 pub use pubsub::{DynamicMessage, DynamicSubscription, Overflow, Select, Subscription};
 pub use run::{
@@ -66,7 +66,7 @@ pub mod prelude {
         Info, Input, NoOptions, Reading, Reply, Request, Sensor, SensorContext, ServiceContext,
     };
     pub use crate::control::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Role, Safety};
-    pub use crate::message::Stamped;
+    pub use crate::message::{RosMessage, Stamped};
     pub use crate::node::{HealthReason, HealthState, HealthTransition};
     pub use crate::payload::*;
     pub use crate::pubsub::{Overflow, Select, Subscription};
@@ -97,6 +97,10 @@ pub mod __private {
         ParameterDefault, ParameterValues, Prepared,
     };
     pub use crate::journal::Journal;
+    pub use crate::message::codec::{
+        DecodeError, EnumShape, FieldOf, FieldShape, NotField, Reader, RosLayout, Shape, StructShape, Writer,
+        is_finite,
+    };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{
         AnyIsland, EstimatorDeclaration, HealthDeclaration, InputDeclaration, Island, Key, Node, Shore, Turn,

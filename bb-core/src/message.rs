@@ -1,8 +1,10 @@
 //! Messages: a payload with its time, its frame and its origin.
 
+pub mod codec;
 mod finite;
 mod stamped;
 
+pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};
 pub use finite::Finite;
 pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 
@@ -23,14 +25,21 @@ pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 ///
 /// Payloads are handed on by reference; a clone is made only for a subscriber and for the cache of an input that is
 /// not the driver, so large data belongs behind an `Arc`.
+///
+/// The derive also writes how it is recorded and read back, bit for bit: see [`codec`]. All its fields must be
+/// [`Field`]s; `#[payload(ros)]` says that ROS has a message for it, which a [`RosMessage`] makes.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a payload",
     label = "cannot be the payload of a message",
     note = "derive it: `#[derive(Clone, Debug, Payload)]`"
 )]
-pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Finite + 'static {
+pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     /// The type's name, for people: `Imu`.
     const NAME: &'static str;
+
+    /// How ROS writes it, if ROS has a message for it.
+    #[doc(hidden)]
+    const ROS: Option<RosLayout<Self>> = None;
 
     /// False for the stand-in of a payload that is not known, in a robot that does not compile.
     #[doc(hidden)]

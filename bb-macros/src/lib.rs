@@ -43,8 +43,9 @@ fn pipeline(tokens: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
     quote::quote!(#errors #tracked #expansion)
 }
 
-/// Makes a struct or an enum the payload of messages. See the trait.
-#[proc_macro_derive(Payload)]
+/// Makes a struct or an enum the payload of messages; `#[payload(ros)]` if ROS has a message for it,
+/// `#[payload(name = "package/Name")]` for the name of its definition. See the trait.
+#[proc_macro_derive(Payload, attributes(payload))]
 pub fn payload(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::payload).into()
 }

@@ -1,6 +1,8 @@
 //! Components that fail: at the start, in a callback, by a panic. The others go on.
 
 use crate::components::{Counter, Number, Scale, at};
+use bb_core::message::DecodeError;
+use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::node::DropReason;
 use bb_core::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -146,6 +148,18 @@ impl bb_core::Finite for Cursed {
     fn is_finite(&self) -> bool {
         assert!(self.0 < 3, "cursed");
         true
+    }
+}
+
+impl bb_core::Field for Cursed {
+    const SHAPE: Shape = <u32 as bb_core::Field>::SHAPE;
+
+    fn write(&self, writer: &mut Writer<'_>) {
+        self.0.write(writer);
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        bb_core::Field::read(reader).map(Self)
     }
 }
 

@@ -19,3 +19,7 @@ struct Runtime;
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/beam-bots.md")]
 struct BeamBots;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/recording.md")]
+struct Recording;

@@ -1,7 +1,9 @@
 //! Whether data holds no NaN and no infinity.
 
+use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{Dim, Isometry3, Matrix, Quaternion, RawStorage, Unit};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Data that knows whether all its numbers are finite. A message that is not is dropped before an estimator sees it.
 #[diagnostic::on_unimplemented(
@@ -48,7 +50,10 @@ always_finite!(
     u128,
     usize,
     String,
-    &'static str
+    &'static str,
+    Duration,
+    MonotonicTime,
+    WallTime
 );
 
 impl<T: Finite> Finite for Option<T> {

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 /// How a body is turned in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
 pub struct Orientation {
     /// Takes vectors of the body to the world (east, north, up).
     pub world_from_body: UnitQuaternion<f64>,
@@ -21,6 +22,7 @@ impl Orientation {
 
 /// Where a body is and how it is turned in the world (`geometry_msgs/PoseWithCovariance`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
 pub struct Pose {
     /// The body's origin in the world, m.
     pub position: Vector3<f64>,

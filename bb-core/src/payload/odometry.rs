@@ -6,6 +6,7 @@ use nalgebra::{Matrix6, Vector3};
 
 /// How a body moves, in its own frame (`geometry_msgs/TwistWithCovariance`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
 pub struct Twist {
     /// Velocity of the body's origin, in the body's frame, m/s.
     pub linear: Vector3<f64>,
@@ -17,6 +18,7 @@ pub struct Twist {
 
 /// Where a body is and how it moves (`nav_msgs/Odometry`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
 pub struct Odometry {
     /// The pose in the world.
     pub pose: Pose,

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// One sample of an inertial measurement unit, in the frame of its sensor (`sensor_msgs/Imu`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
 pub struct Imu {
     /// Angular velocity, rad/s.
     pub angular_velocity: Vector3<f64>,
@@ -36,6 +37,7 @@ impl Imu {
 
 /// The magnetic field, in the frame of its sensor (`sensor_msgs/MagneticField`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
 pub struct MagneticField {
     /// The field, tesla.
     pub magnetic_field: Vector3<f64>,

@@ -2,7 +2,8 @@
 
 use super::queue::Queue;
 use super::{AnyTopic, Overflow};
-use crate::message::{Payload, Stamp, Stamped};
+use crate::message::codec::{encode, encode_as_ros, is_exact_as_ros, to_json};
+use crate::message::{Payload, Schema, Stamp, Stamped};
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
@@ -20,6 +21,12 @@ trait AnyMessage: Send + Sync {
     fn stamp(&self) -> Stamp;
     fn as_any(&self) -> &dyn Any;
     fn fmt_payload(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
+    fn encode(&self, bytes: &mut Vec<u8>);
+    fn schema(&self) -> Schema;
+    fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool;
+    fn ros_schema(&self) -> Option<Schema>;
+    fn is_exact_as_ros(&self) -> bool;
+    fn to_json(&self) -> String;
 }
 
 impl<T: Payload> AnyMessage for Stamped<T> {
@@ -34,6 +41,24 @@ impl<T: Payload> AnyMessage for Stamped<T> {
     }
     fn fmt_payload(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(&self.payload, f)
+    }
+    fn encode(&self, bytes: &mut Vec<u8>) {
+        encode(self, bytes);
+    }
+    fn schema(&self) -> Schema {
+        Self::schema()
+    }
+    fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool {
+        encode_as_ros(self, bytes)
+    }
+    fn ros_schema(&self) -> Option<Schema> {
+        Self::ros_schema()
+    }
+    fn is_exact_as_ros(&self) -> bool {
+        is_exact_as_ros(self)
+    }
+    fn to_json(&self) -> String {
+        to_json(self)
     }
 }
 
@@ -60,6 +85,38 @@ impl DynamicMessage {
     /// The message, if its payload is a `T`.
     pub fn downcast<T: Payload>(&self) -> Option<&Stamped<T>> {
         self.message.as_any().downcast_ref()
+    }
+
+    /// Appends the message with its stamp, bit for bit, as CDR that [`schema`](Self::schema) describes and
+    /// [`codec::decode`](crate::message::codec::decode) reads as a `Stamped<T>`.
+    pub fn encode(&self, bytes: &mut Vec<u8>) {
+        self.message.encode(bytes);
+    }
+
+    /// What a program that does not know the payload needs to read it.
+    pub fn schema(&self) -> Schema {
+        self.message.schema()
+    }
+
+    /// Appends the message as ROS writes it; false, and nothing, if ROS has no message for its payload. The monotonic
+    /// time and the origin are not in it.
+    pub fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool {
+        self.message.encode_as_ros(bytes)
+    }
+
+    /// ROS's definition, if ROS has a message for its payload.
+    pub fn ros_schema(&self) -> Option<Schema> {
+        self.message.ros_schema()
+    }
+
+    /// Whether payload and wall time can be read back from ROS's layout bit for bit.
+    pub fn is_exact_as_ros(&self) -> bool {
+        self.message.is_exact_as_ros()
+    }
+
+    /// The message with its stamp as JSON, for dashboards. See [`codec::to_json`](crate::message::codec::to_json).
+    pub fn to_json(&self) -> String {
+        self.message.to_json()
     }
 }
 
@@ -147,6 +204,11 @@ impl DynamicSubscription {
     /// The messages that wait now; those that arrive meanwhile are left.
     pub fn drain(&self) -> impl Iterator<Item = DynamicMessage> + '_ {
         (0..self.queue.len()).map_while(|_| self.try_recv())
+    }
+
+    /// How many messages wait now.
+    pub fn waiting(&self) -> usize {
+        self.queue.len()
     }
 
     /// How many messages were lost because this subscriber was slow.

@@ -79,10 +79,9 @@ impl<R: Robot> Replay<R> {
                 }
             }
             Event::Deliver { island: number, entry, message } => {
-                let done = self.slowly(slow, || {
-                    Ok(island(number)?.replay(&machine.wiring, Key { entry, line: message }, time))
-                });
-                if !done? {
+                let island = island(number)?;
+                let key = Key { entry, line: message };
+                if !self.slowly(slow, || island.replay(&machine.wiring, key, time)) {
                     return Err(MISSING);
                 }
             }

@@ -6,7 +6,8 @@ use crate::component::{
     NoOptions, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, ServiceContext, Slot, SyncMiss,
 };
 use crate::control::{Command, CommandContext, NoArguments, Outcome};
-use crate::message::{Finite, Payload, Stamped};
+use crate::message::codec::{Reader, Shape, Writer};
+use crate::message::{DecodeError, Field, Finite, Payload, Stamped};
 use crate::time::MonotonicTime;
 
 /// A payload, a sensor, an estimator and all the rest, wherever one is needed that is not known.
@@ -27,6 +28,17 @@ pub(crate) const UNKNOWN_INDEX: usize = usize::MAX;
 impl Finite for Unknown {
     fn is_finite(&self) -> bool {
         true
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl Field for Unknown {
+    const SHAPE: Shape = <()>::SHAPE;
+
+    fn write(&self, _: &mut Writer<'_>) {}
+
+    fn read(_: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        stub()
     }
 }
 

@@ -1,12 +1,24 @@
-//! `#[derive(Payload)]`: its name, and whether all its numbers are finite.
+//! `#[derive(Payload)]`: its name, whether all its numbers are finite, and how it is written and read.
+
+mod codec;
 
 use crate::diagnostics::Diagnostics;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{Data, DeriveInput, Fields};
+use syn::{Data, DeriveInput, Fields, LitStr};
+
+/// What `#[payload(…)]` says.
+#[derive(Default)]
+struct Attributes {
+    /// ROS has a message for it.
+    is_ros: bool,
+    /// The name of its definition, where that is not its own.
+    name: Option<LitStr>,
+}
 
 pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
+    let attributes = attributes(item, diagnostics);
     let name = &item.ident;
     let text = crate::names::text(name);
     let (generics, arguments, bounds) = item.generics.split_for_impl();
@@ -26,10 +38,19 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
             quote!(_ => true,)
         }
     };
+    let shape_name = attributes.name.as_ref().map_or_else(|| quote!(#text), |name| quote!(#name));
+    let field = codec::field(item, &shape_name);
+    let ros = attributes.is_ros.then(|| {
+        quote!(
+            const ROS: ::core::option::Option<::bb_core::__private::RosLayout<Self>> =
+                ::core::option::Option::Some(::bb_core::__private::RosLayout::of());
+        )
+    });
     quote! {
         #[automatically_derived]
         impl #generics ::bb_core::Payload for #name #arguments #bounds {
             const NAME: &'static str = #text;
+            #ros
         }
         #[automatically_derived]
         impl #generics ::bb_core::Finite for #name #arguments #bounds {
@@ -37,25 +58,48 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
                 match self { #finite }
             }
         }
+        #field
     }
+}
+
+fn attributes(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Attributes {
+    let mut attributes = Attributes::default();
+    for attribute in item.attrs.iter().filter(|attribute| attribute.path().is_ident("payload")) {
+        let parsed = attribute.parse_nested_meta(|meta| {
+            if meta.path.is_ident("ros") {
+                attributes.is_ros = true;
+            } else if meta.path.is_ident("name") {
+                attributes.name = Some(meta.value()?.parse()?);
+            } else {
+                return Err(meta.error("expected `ros` or `name = \"package/Name\"`"));
+            }
+            Ok(())
+        });
+        if let Err(error) = parsed {
+            diagnostics.syntax(&error);
+        }
+    }
+    attributes
 }
 
 /// `Self { a: f0, b: f1 } => f0 is finite && f1 is finite,`
 fn arm(head: &TokenStream, fields: &Fields) -> TokenStream {
-    let mut patterns = TokenStream::new();
+    let patterns = patterns(fields);
     let mut checks = quote!(true);
     for (index, field) in fields.iter().enumerate() {
         let bound = format_ident!("f{index}");
-        let member = match &field.ident {
-            Some(name) => quote!(#name),
-            None => {
-                let index = syn::Index::from(index);
-                quote!(#index)
-            }
-        };
-        patterns.extend(quote!(#member: #bound,));
         let kind = &field.ty;
-        checks.extend(quote_spanned!(kind.span()=> && <#kind as ::bb_core::Finite>::is_finite(#bound)));
+        // The only place that requires the type to be a field, so that one that is not is reported once.
+        checks.extend(quote_spanned!(kind.span()=> && ::bb_core::__private::is_finite::<#kind>(#bound)));
     }
     quote!(#head { #patterns } => #checks,)
+}
+
+/// `a: f0, b: f1,`
+fn patterns(fields: &Fields) -> TokenStream {
+    let members = fields.members().enumerate().map(|(index, member)| {
+        let bound = format_ident!("f{index}");
+        quote!(#member: #bound,)
+    });
+    members.collect()
 }

@@ -1,0 +1,132 @@
+//! Payloads as bytes, bit for bit, in a layout that other programs read.
+//!
+//! | what | where |
+//! |---|---|
+//! | what a field of a payload must be able to do | [`Field`]; `#[derive(Payload)]` writes it for structs and enums |
+//! | plain CDR, little endian, as ROS 2 writes it | [`Writer`], [`Reader`] |
+//! | what the bytes mean | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
+//! | a message in the layout that ROS has for it | [`RosMessage`] |
+//! | a message as JSON | [`to_json`] |
+//!
+//! A message has an *exact* layout, [`Stamped`](crate::Stamped) with all it holds, and may have the layout of a ROS
+//! message beside, which viewers know and in which some values cannot be told apart.
+//!
+//! Reading takes bytes from anywhere: it never panics, allocates no more than the bytes at hand justify, and names the
+//! field that is wrong.
+
+mod algebra;
+mod collections;
+mod derive;
+mod error;
+mod intern;
+mod json;
+mod plain;
+mod reader;
+pub mod ros;
+mod schema;
+mod shape;
+mod stamped;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+#[doc(hidden)]
+pub use derive::{FieldOf, NotField, is_finite};
+pub use error::DecodeError;
+pub use intern::MAX_NAME_BYTES;
+pub use json::to_json;
+pub use reader::Reader;
+pub use ros::{RosLayout, RosMessage};
+pub use schema::Schema;
+pub use shape::{EnumShape, FieldShape, Shape, StructShape};
+pub use stamped::{decode_as_ros, encode_as_ros, is_exact_as_ros};
+pub use writer::Writer;
+
+use super::Finite;
+
+/// Data that can be written as bytes and read back the same, bit for bit, NaN included.
+///
+/// Numbers, `bool`, `char`, text, `Option`, `Vec`, arrays, `Arc`, times and nalgebra's fixed and dynamic matrices,
+/// quaternions and isometries are fields; `#[derive(Payload)]` makes structs and enums of fields fields. A type that
+/// contains itself is none, since its shape would have no end.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` cannot be written to a recording and read back",
+    label = "cannot be a field of a payload",
+    note = "derive it: `#[derive(Clone, Debug, Payload)]`, or make it of numbers, text, `Option`, `Vec`, arrays and \
+            nalgebra's types"
+)]
+pub trait Field: Finite + Sized {
+    /// What its bytes mean.
+    const SHAPE: Shape;
+
+    /// Appends it.
+    fn write(&self, writer: &mut Writer<'_>);
+
+    /// Reads what [`write`](Self::write) has written.
+    ///
+    /// # Errors
+    /// The field that is wrong, and what was expected there.
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError>;
+
+    /// Appends all of `values`.
+    #[doc(hidden)]
+    fn write_all(values: &[Self], writer: &mut Writer<'_>) {
+        for value in values {
+            value.write(writer);
+        }
+    }
+
+    /// Reads so many.
+    #[doc(hidden)]
+    fn read_all(length: usize, reader: &mut Reader<'_>) -> Result<Vec<Self>, DecodeError> {
+        // A length from outside makes room only for what the bytes that follow may hold.
+        let mut values = Vec::with_capacity(length.min(reader.left() / size_of::<Self>().max(1)));
+        for index in 0..length {
+            values.push(Self::read(reader).map_err(|error| error.at_index(index))?);
+        }
+        Ok(values)
+    }
+}
+
+/// The bytes before the data: plain CDR, little endian.
+const HEADER: [u8; 4] = [0, 1, 0, 0];
+
+/// Writers may pad to a multiple of four bytes. More than that left over is another type.
+const PADDING: usize = 3;
+
+/// Appends `value` as CDR, with the four bytes before it that name the encoding.
+pub fn encode<T: Field>(value: &T, bytes: &mut Vec<u8>) {
+    encode_with(bytes, |writer| value.write(writer));
+}
+
+/// Reads a value that [`encode`] has written.
+///
+/// # Errors
+/// The field that is wrong, and what was expected there.
+pub fn decode<T: Field>(bytes: &[u8]) -> Result<T, DecodeError> {
+    decode_with(bytes, T::read)
+}
+
+fn encode_with(bytes: &mut Vec<u8>, write: impl FnOnce(&mut Writer<'_>)) {
+    bytes.extend(HEADER);
+    write(&mut Writer::new(bytes));
+}
+
+fn decode_with<T>(
+    bytes: &[u8],
+    read: impl FnOnce(&mut Reader<'_>) -> Result<T, DecodeError>,
+) -> Result<T, DecodeError> {
+    let Some((header, body)) = bytes.split_first_chunk::<4>() else {
+        return Err(DecodeError::new(0, "the four bytes that name the encoding", format!("{} bytes", bytes.len())));
+    };
+    if header[..2] != HEADER[..2] {
+        let found = format!("{:#04x}{:02x}", header[0], header[1]);
+        return Err(DecodeError::new(0, "the encoding 0x0001, plain CDR in little endian", found));
+    }
+    let mut reader = Reader::new(body);
+    let value = read(&mut reader)?;
+    match reader.left() {
+        0..=PADDING => Ok(value),
+        left => Err(reader.error("the end", format!("{left} more bytes"))),
+    }
+}

@@ -1,0 +1,68 @@
+//! Options, lists and arrays.
+
+use super::{DecodeError, Field, Reader, Shape, Writer};
+use std::sync::Arc;
+
+impl<T: Field> Field for Option<T> {
+    const SHAPE: Shape = Shape::Option(&T::SHAPE);
+    fn write(&self, writer: &mut Writer<'_>) {
+        writer.length(usize::from(self.is_some()));
+        if let Some(value) = self {
+            value.write(writer);
+        }
+    }
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        Ok(if reader.is_present()? { Some(T::read(reader)?) } else { None })
+    }
+}
+
+impl<T: Field> Field for Vec<T> {
+    const SHAPE: Shape = Shape::List(&T::SHAPE);
+    fn write(&self, writer: &mut Writer<'_>) {
+        writer.length(self.len());
+        T::write_all(self, writer);
+    }
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        let length = reader.length()?;
+        T::read_all(length, reader)
+    }
+}
+
+/// An array without elements has no counterpart in ROS and is written as a list that is always empty.
+impl<T: Field, const N: usize> Field for [T; N] {
+    const SHAPE: Shape = if N == 0 { Shape::Option(&T::SHAPE) } else { Shape::Array(&T::SHAPE, N) };
+    fn write(&self, writer: &mut Writer<'_>) {
+        if N == 0 {
+            writer.length(0);
+        }
+        T::write_all(self, writer);
+    }
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        if N == 0 {
+            reader.absent(1)?;
+        }
+        let values = T::read_all(N, reader)?;
+        values.try_into().map_err(|values: Vec<T>| reader.error("all elements", values.len().to_string()))
+    }
+}
+
+impl<T: Field> Field for Arc<T> {
+    const SHAPE: Shape = T::SHAPE;
+    fn write(&self, writer: &mut Writer<'_>) {
+        T::write(self, writer);
+    }
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        T::read(reader).map(Self::new)
+    }
+}
+
+impl<T: Field> Field for Arc<[T]> {
+    const SHAPE: Shape = Shape::List(&T::SHAPE);
+    fn write(&self, writer: &mut Writer<'_>) {
+        writer.length(self.len());
+        T::write_all(self, writer);
+    }
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        Vec::read(reader).map(Self::from)
+    }
+}

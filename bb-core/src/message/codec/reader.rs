@@ -1,0 +1,136 @@
+//! Plain CDR in. Nothing is believed that the bytes at hand do not bear out.
+
+use super::{DecodeError, Field};
+
+/// Reads values off bytes.
+#[derive(Clone, Debug)]
+pub struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads `bytes`, which begin behind those that name the encoding.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0 }
+    }
+
+    /// How many bytes are left.
+    pub fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    /// That something else was expected here.
+    pub fn error(&self, expected: &'static str, found: impl Into<std::borrow::Cow<'static, str>>) -> DecodeError {
+        DecodeError::new(self.at, expected, found)
+    }
+
+    /// A number, which stands at a multiple of its size, in little endian.
+    ///
+    /// # Errors
+    /// The bytes end before.
+    pub fn number<const SIZE: usize>(&mut self, expected: &'static str) -> Result<[u8; SIZE], DecodeError> {
+        let padding = self.at.next_multiple_of(SIZE) - self.at;
+        let number = self.bytes.get(self.at + padding..).and_then(|rest| rest.first_chunk::<SIZE>());
+        let Some(number) = number else { return Err(self.ends(expected)) };
+        self.at += padding + SIZE;
+        Ok(*number)
+    }
+
+    /// Bytes as they are.
+    ///
+    /// # Errors
+    /// There are fewer.
+    pub fn raw(&mut self, length: usize, expected: &'static str) -> Result<&'a [u8], DecodeError> {
+        let Some(raw) = self.bytes[self.at..].get(..length) else { return Err(self.ends(expected)) };
+        self.at += length;
+        Ok(raw)
+    }
+
+    /// How many values follow. Every value has a byte at least, so there cannot be more than bytes are left.
+    ///
+    /// # Errors
+    /// The bytes end before, or cannot hold so many.
+    pub fn length(&mut self) -> Result<usize, DecodeError> {
+        let length = u32::from_le_bytes(self.number("a length")?);
+        match usize::try_from(length) {
+            Ok(length) if length <= self.left() => Ok(length),
+            _ => Err(self.error("a length that fits", format!("{length}, with {} bytes left", self.left()))),
+        }
+    }
+
+    /// Text.
+    ///
+    /// # Errors
+    /// It does not end where it says, or is not UTF-8.
+    pub fn text(&mut self) -> Result<&'a str, DecodeError> {
+        let length = self.length()?;
+        let bytes = self.raw(length, "text")?;
+        let Some((0, text)) = bytes.split_last() else {
+            return Err(self.error("a zero that ends the text", "none"));
+        };
+        std::str::from_utf8(text).map_err(|_| self.error("text in UTF-8", "other bytes before it"))
+    }
+
+    /// The field `name`.
+    ///
+    /// # Errors
+    /// What is wrong with it, by its name.
+    pub fn field<T: Field>(&mut self, name: &'static str) -> Result<T, DecodeError> {
+        T::read(self).map_err(|error| error.within(name))
+    }
+
+    /// A list of none or one: whether there is one.
+    ///
+    /// # Errors
+    /// There are more.
+    pub fn is_present(&mut self) -> Result<bool, DecodeError> {
+        match u32::from_le_bytes(self.number("a length of 0 or 1")?) {
+            0 => Ok(false),
+            1 => Ok(true),
+            length => Err(self.error("a length of 0 or 1", length.to_string())),
+        }
+    }
+
+    /// What stands for a struct without fields.
+    #[doc(hidden)]
+    pub fn nothing(&mut self) -> Result<(), DecodeError> {
+        self.raw(1, "a byte").map(drop)
+    }
+
+    /// Which variant of an enum.
+    #[doc(hidden)]
+    pub fn variant(&mut self) -> Result<u32, DecodeError> {
+        self.number("the number of a variant").map(u32::from_le_bytes)
+    }
+
+    /// That a variant has no such number.
+    #[doc(hidden)]
+    pub fn no_variant<T>(&self, number: u32) -> Result<T, DecodeError> {
+        Err(self.error("the number of a variant", number.to_string()))
+    }
+
+    /// The empty lists of so many other variants.
+    #[doc(hidden)]
+    pub fn absent(&mut self, count: usize) -> Result<(), DecodeError> {
+        for _ in 0..count {
+            if self.is_present()? {
+                return Err(self.error("no fields of another variant", "some"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The list of one that holds the fields of the variant that there is.
+    #[doc(hidden)]
+    pub fn present(&mut self) -> Result<(), DecodeError> {
+        match self.is_present()? {
+            true => Ok(()),
+            false => Err(self.error("the fields of the variant", "none")),
+        }
+    }
+
+    fn ends(&self, expected: &'static str) -> DecodeError {
+        self.error(expected, "the end")
+    }
+}

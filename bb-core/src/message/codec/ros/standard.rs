@@ -1,0 +1,134 @@
+//! Headers, times and transforms.
+
+use crate::Payload;
+use crate::message::codec::intern::intern;
+use crate::message::codec::{DecodeError, Field, Reader, Writer};
+use crate::message::{Finite, Stamped};
+use crate::time::WallTime;
+use crate::topology::{JointKind, Topology};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+const NANOS_PER_SECOND: i64 = 1_000_000_000;
+
+/// `builtin_interfaces/msg/Time`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+#[payload(name = "builtin_interfaces/Time")]
+pub struct Time {
+    /// Whole seconds since the Unix epoch.
+    pub sec: i32,
+    /// Nanoseconds on top of them.
+    pub nanosec: u32,
+}
+
+impl Time {
+    /// The time, or the nearest that 32 bits of seconds hold.
+    pub fn of(time: WallTime) -> Self {
+        let nanos = time.as_unix_nanos();
+        match i32::try_from(nanos.div_euclid(NANOS_PER_SECOND)) {
+            // The remainder is below 1e9.
+            Ok(sec) => Self { sec, nanosec: nanos.rem_euclid(NANOS_PER_SECOND) as u32 },
+            Err(_) if nanos < 0 => Self { sec: i32::MIN, nanosec: 0 },
+            Err(_) => Self { sec: i32::MAX, nanosec: 999_999_999 },
+        }
+    }
+
+    /// The same as nanoseconds.
+    pub fn wall_time(self) -> WallTime {
+        WallTime::from_unix_nanos(i64::from(self.sec) * NANOS_PER_SECOND + i64::from(self.nanosec))
+    }
+}
+
+/// `std_msgs/msg/Header`
+#[derive(Clone, Debug, Default, PartialEq, Eq, Payload)]
+#[payload(name = "std_msgs/Header")]
+pub struct Header {
+    /// When it was measured.
+    pub stamp: Time,
+    /// The frame of the values.
+    pub frame_id: String,
+}
+
+impl Header {
+    /// Of a message whose values are in its frame.
+    pub fn of<T>(message: &Stamped<T>) -> Self {
+        Self::in_frame(message, message.frame.name())
+    }
+
+    /// Of a message whose values are in another frame.
+    pub fn in_frame<T>(message: &Stamped<T>, frame: &str) -> Self {
+        Self { stamp: Time::of(message.wall_time), frame_id: frame.to_owned() }
+    }
+
+    /// Writes one without making it.
+    pub(in crate::message::codec) fn write_parts(time: WallTime, frame: &str, writer: &mut Writer<'_>) {
+        Time::of(time).write(writer);
+        writer.text(frame);
+    }
+
+    /// Reads one of which only the frame is needed, and kept.
+    pub(in crate::message::codec) fn read_frame(reader: &mut Reader<'_>) -> Result<&'static str, DecodeError> {
+        Time::read(reader).map_err(|error| error.within("stamp"))?;
+        let frame = reader.text().map_err(|error| error.within("frame_id"))?;
+        intern(frame).ok_or_else(|| reader.error("a name", "one more than are kept").within("frame_id"))
+    }
+}
+
+/// `std_msgs/msg/String`
+#[derive(Clone, Debug, Default, PartialEq, Eq, Payload)]
+#[payload(name = "std_msgs/String")]
+pub struct Text {
+    /// The text.
+    pub data: String,
+}
+
+/// `geometry_msgs/msg/TransformStamped`
+#[derive(Clone, Debug, PartialEq, Payload)]
+#[payload(name = "geometry_msgs/TransformStamped")]
+pub struct TransformStamped {
+    /// Time, and the frame that the transform leads to.
+    pub header: Header,
+    /// The frame that it leads from.
+    pub child_frame_id: String,
+    /// Takes points of the child to the frame of the header.
+    pub transform: Isometry3<f64>,
+}
+
+/// `tf2_msgs/msg/TFMessage`
+#[derive(Clone, Debug, PartialEq, Payload)]
+#[payload(name = "tf2_msgs/TFMessage")]
+pub struct TransformsMessage {
+    /// One per frame.
+    pub transforms: Vec<TransformStamped>,
+}
+
+impl TransformsMessage {
+    /// Where the links and joints of a robot are when every joint is at rest: the frame of a joint in that of the link it
+    /// is mounted on, and that of the link it carries in the joint's. What a joint that moves carries is placed as if
+    /// it were at rest.
+    pub fn at_rest(topology: &Topology, time: WallTime) -> Self {
+        let stamp = Time::of(time);
+        let name = |link: usize| topology.links.get(link).map_or("", |link| link.name);
+        let mut transforms = Vec::new();
+        for joint in topology.joints {
+            let at_joint = joint.parent_from_joint.isometry();
+            let mut place = |parent: &str, child: &str, transform: Isometry3<f64>| {
+                let header = Header { stamp, frame_id: parent.to_owned() };
+                transforms.push(TransformStamped { header, child_frame_id: child.to_owned(), transform });
+            };
+            // A fixed joint carries the link itself; nothing is measured in its frame.
+            if joint.kind == JointKind::Fixed || joint.name == name(joint.child) {
+                place(name(joint.parent), name(joint.child), at_joint);
+            } else {
+                place(name(joint.parent), joint.name, at_joint);
+                let unmoved = Isometry3::from_parts(Vector3::zeros().into(), UnitQuaternion::identity());
+                place(joint.name, name(joint.child), unmoved);
+            }
+        }
+        Self { transforms }
+    }
+}
+
+const _: () = {
+    const fn is_payload<T: Payload + Finite>() {}
+    is_payload::<TransformsMessage>();
+};

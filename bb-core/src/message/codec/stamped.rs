@@ -1,0 +1,93 @@
+//! Whole messages: the exact layout, and that of ROS.
+
+use super::ros::Header;
+use super::{DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, decode_with, encode_with};
+use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
+use crate::time::WallTime;
+
+impl<T: Payload> Stamped<T> {
+    /// What a program that does not know the payload needs to read a message in the exact layout.
+    pub fn schema() -> Schema {
+        Schema::new(&format!("{}Stamped", T::NAME), Self::SHAPE)
+    }
+
+    /// ROS's definition of a message, if ROS has one for the payload.
+    pub fn ros_schema() -> Option<Schema> {
+        T::ROS.and_then(|layout| match layout.shape {
+            Shape::Struct(shape) => Some(Schema::new(shape.name, layout.shape)),
+            _ => None,
+        })
+    }
+}
+
+impl<T: Payload> Finite for Stamped<T> {
+    fn is_finite(&self) -> bool {
+        T::is_finite(&self.payload)
+    }
+}
+
+/// The exact layout: a `std_msgs/Header` for viewers, the rest of the stamp, and the payload.
+impl<T: Payload> Field for Stamped<T> {
+    const SHAPE: Shape = Shape::Struct(&StructShape {
+        name: "Stamped",
+        fields: &[
+            FieldShape::new("header", Header::SHAPE),
+            FieldShape::new("monotonic_time", Shape::I64),
+            FieldShape::new("wall_time", Shape::I64),
+            FieldShape::new("robot", Shape::Text),
+            FieldShape::new("node", Shape::Text),
+            FieldShape::new("payload", T::SHAPE),
+        ],
+    });
+
+    fn write(&self, writer: &mut Writer<'_>) {
+        Header::write_parts(self.wall_time, self.frame.name(), writer);
+        self.monotonic_time.write(writer);
+        self.wall_time.write(writer);
+        writer.text(self.origin.robot);
+        writer.text(self.origin.node);
+        self.payload.write(writer);
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        let frame = Header::read_frame(reader).map_err(|error| error.within("header"))?;
+        let stamp = Stamp {
+            frame: Frame::new(frame),
+            monotonic_time: reader.field("monotonic_time")?,
+            wall_time: reader.field("wall_time")?,
+            origin: Origin { robot: reader.field("robot")?, node: reader.field("node")? },
+        };
+        Ok(stamp.message(reader.field("payload")?))
+    }
+}
+
+/// Appends a message in ROS's layout; false, and nothing, if ROS has none for its payload.
+pub fn encode_as_ros<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> bool {
+    let Some(layout) = T::ROS else { return false };
+    encode_with(bytes, |writer| (layout.write)(message, writer));
+    true
+}
+
+/// The payload and the wall time of a message in ROS's layout. Its frame, origin and monotonic time are not there.
+///
+/// # Errors
+/// ROS has no layout for the payload, or the bytes are wrong.
+pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeError> {
+    match T::ROS {
+        Some(layout) => decode_with(bytes, layout.read),
+        None => Err(DecodeError::new(0, "a payload that ROS has a message for", T::NAME)),
+    }
+}
+
+/// Whether payload and wall time of a message are read back from ROS's layout as they are, bit for bit.
+pub fn is_exact_as_ros<T: Payload>(message: &Stamped<T>) -> bool {
+    let mut bytes = Vec::new();
+    if !encode_as_ros(message, &mut bytes) {
+        return false;
+    }
+    let Ok((payload, wall_time)) = decode_as_ros::<T>(&bytes) else { return false };
+    let (mut read, mut written) = (Vec::new(), Vec::new());
+    payload.write(&mut Writer::new(&mut read));
+    message.payload.write(&mut Writer::new(&mut written));
+    wall_time == message.wall_time && read == written
+}

@@ -1,0 +1,79 @@
+//! Plain CDR out: every number at a multiple of its own size.
+
+use super::Field;
+
+/// Appends values to bytes.
+#[derive(Debug)]
+pub struct Writer<'a> {
+    bytes: &'a mut Vec<u8>,
+    /// Where alignment counts from: behind the four bytes that name the encoding.
+    start: usize,
+}
+
+impl<'a> Writer<'a> {
+    /// Appends to `bytes`; alignment counts from here.
+    pub fn new(bytes: &'a mut Vec<u8>) -> Self {
+        let start = bytes.len();
+        Self { bytes, start }
+    }
+
+    /// Appends a number at a multiple of its size.
+    pub fn number<const SIZE: usize>(&mut self, little_endian: [u8; SIZE]) {
+        let length = self.bytes.len() - self.start;
+        let padding = length.next_multiple_of(SIZE) - length;
+        if padding > 0 {
+            self.bytes.resize(self.bytes.len() + padding, 0);
+        }
+        self.bytes.extend(little_endian);
+    }
+
+    /// Appends bytes as they are.
+    pub fn raw(&mut self, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// Appends how many values follow. Lengths of CDR have 32 bits; what is longer cannot be read back.
+    pub fn length(&mut self, length: usize) {
+        self.number(u32::try_from(length).unwrap_or(u32::MAX).to_le_bytes());
+    }
+
+    /// Appends text: its length with the zero that ends it, and both.
+    pub fn text(&mut self, text: &str) {
+        self.length(text.len() + 1);
+        self.raw(text.as_bytes());
+        self.raw(&[0]);
+    }
+
+    /// Appends what stands for a struct without fields, as ROS has it.
+    #[doc(hidden)]
+    pub fn nothing(&mut self) {
+        self.raw(&[0]);
+    }
+
+    /// Begins an enum: which variant, and an empty list for each variant with fields before it.
+    #[doc(hidden)]
+    pub fn variant(&mut self, number: u32, before: usize) {
+        self.number(number.to_le_bytes());
+        self.absent(before);
+    }
+
+    /// Appends so many empty lists.
+    #[doc(hidden)]
+    pub fn absent(&mut self, count: usize) {
+        for _ in 0..count {
+            self.length(0);
+        }
+    }
+
+    /// Begins the fields of the variant that there is: a list of one.
+    #[doc(hidden)]
+    pub fn present(&mut self) {
+        self.length(1);
+    }
+
+    /// Appends a field.
+    #[doc(hidden)]
+    pub fn field<T: Field>(&mut self, value: &T) {
+        value.write(self);
+    }
+}

@@ -1,0 +1,140 @@
+//! The implementation of `Field`: the shape, writing, reading.
+//!
+//! ```text
+//! const SHAPE: Shape = Shape::Struct(&StructShape { name: "Imu", fields: &[FieldShape::new("rate", …::SHAPE)] });
+//! fn write(…) { match self { Self { rate: f0 } => { FieldOf::write(f0, writer); } } }
+//! fn read(…) { Ok(Self { rate: FieldOf::<f64>::read(reader, "rate")? }) }
+//! ```
+
+use super::patterns;
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+use syn::{Data, DataEnum, DeriveInput, Fields, Member};
+
+pub(super) fn field(item: &DeriveInput, text: &TokenStream) -> TokenStream {
+    let name = &item.ident;
+    let (generics, arguments, bounds) = item.generics.split_for_impl();
+    let Parts { shape, write, read } = match &item.data {
+        Data::Struct(data) => of_struct(&data.fields, text),
+        Data::Enum(data) => of_enum(data, text),
+        Data::Union(_) => of_struct(&Fields::Unit, text),
+    };
+    quote! {
+        const _: () = {
+            #[allow(unused_imports)]
+            use ::bb_core::__private::{EnumShape, FieldOf, FieldShape, NotField as _, Reader, Shape, StructShape, Writer};
+
+            #[automatically_derived]
+            impl #generics ::bb_core::Field for #name #arguments #bounds {
+                const SHAPE: Shape = #shape;
+                fn write(&self, writer: &mut Writer<'_>) {
+                    match self { #write }
+                }
+                fn read(reader: &mut Reader<'_>) -> ::core::result::Result<Self, ::bb_core::__private::DecodeError> {
+                    #read
+                }
+            }
+        };
+    }
+}
+
+struct Parts {
+    shape: TokenStream,
+    write: TokenStream,
+    read: TokenStream,
+}
+
+fn of_struct(fields: &Fields, text: &TokenStream) -> Parts {
+    let shape = struct_shape(fields, text);
+    let (patterns, writes, reads) = (patterns(fields), writes(fields), reads(fields, ""));
+    let (nothing_out, nothing_in) = match fields.is_empty() {
+        true => (quote!(writer.nothing();), quote!(reader.nothing()?;)),
+        false => (quote!(), quote!()),
+    };
+    Parts {
+        shape: quote!(Shape::Struct(&#shape)),
+        write: quote!(Self { #patterns } => { #writes #nothing_out }),
+        read: quote!(#nothing_in ::core::result::Result::Ok(Self { #reads })),
+    }
+}
+
+/// The number of the variant, then for each variant with fields a list of none or one.
+fn of_enum(data: &DataEnum, text: &TokenStream) -> Parts {
+    let lists = data.variants.iter().filter(|variant| !variant.fields.is_empty()).count();
+    let mut before = 0;
+    let (mut shapes, mut write, mut read) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+    for (number, variant) in (0u32..).zip(&data.variants) {
+        let (name, fields) = (&variant.ident, &variant.fields);
+        let variant_text = crate::names::text(name);
+        let shape = match fields.is_empty() {
+            true => quote!(StructShape { name: #variant_text, fields: &[] }),
+            false => struct_shape(fields, &quote!(#variant_text)),
+        };
+        shapes.extend(quote!(#shape,));
+        let (patterns, writes) = (patterns(fields), writes(fields));
+        let reads = reads(fields, &format!("{variant_text}."));
+        if fields.is_empty() {
+            write.extend(quote!(Self::#name { #patterns } => writer.variant(#number, #lists),));
+            read.extend(quote!(#number => { reader.absent(#lists)?; Self::#name { #reads } }));
+        } else {
+            let after = lists - before - 1;
+            write.extend(quote!(Self::#name { #patterns } => {
+                writer.variant(#number, #before);
+                writer.present();
+                #writes
+                writer.absent(#after);
+            }));
+            read.extend(quote!(#number => {
+                reader.absent(#before)?;
+                reader.present()?;
+                let value = Self::#name { #reads };
+                reader.absent(#after)?;
+                value
+            }));
+            before += 1;
+        }
+    }
+    if data.variants.is_empty() {
+        write = quote!(_ => { let _ = writer; });
+    }
+    Parts {
+        shape: quote!(Shape::Enum(&EnumShape { name: #text, variants: &[#shapes] })),
+        write,
+        read: quote!(::core::result::Result::Ok(match reader.variant()? {
+            #read
+            other => return reader.no_variant(other),
+        })),
+    }
+}
+
+fn struct_shape(fields: &Fields, text: &TokenStream) -> TokenStream {
+    let shapes = fields.iter().zip(fields.members()).map(|(field, member)| {
+        let (name, kind) = (text_of(&member), &field.ty);
+        quote!(FieldShape::new(#name, FieldOf::<#kind>::SHAPE),)
+    });
+    let shapes: TokenStream = if fields.is_empty() { quote!(FieldShape::NOTHING) } else { shapes.collect() };
+    quote!(StructShape { name: #text, fields: &[#shapes] })
+}
+
+fn writes(fields: &Fields) -> TokenStream {
+    let writes = fields.iter().enumerate().map(|(index, field)| {
+        let (bound, kind) = (format_ident!("f{index}"), &field.ty);
+        quote!(FieldOf::<#kind>::write(#bound, writer);)
+    });
+    writes.collect()
+}
+
+fn reads(fields: &Fields, within: &str) -> TokenStream {
+    let reads = fields.iter().zip(fields.members()).map(|(field, member)| {
+        let (path, kind) = (format!("{within}{}", text_of(&member)), &field.ty);
+        quote!(#member: FieldOf::<#kind>::read(reader, #path)?,)
+    });
+    reads.collect()
+}
+
+fn text_of(member: &Member) -> String {
+    match member {
+        Member::Named(name) => crate::names::text(name),
+        Member::Unnamed(index) => index.index.to_string(),
+    }
+}
