@@ -7,10 +7,16 @@
 //! lock: whoever publishes takes it and runs all that lies downstream; who finds it taken leaves the message in the
 //! inbox, for the holder to deliver before it goes. So there is a single writer, and the order of every input is kept.
 
+mod inbox;
+mod inside;
+#[cfg(all(test, loom))]
+mod model;
+
+use self::inbox::{Inbox, Pending, Taken};
+use self::inside::{Inside, Within};
 use super::WorkerDeclaration;
 use crate::run::StopSignal;
 use crate::time::MonotonicTime;
-use std::collections::VecDeque;
 use std::fmt;
 use std::time::Duration;
 
@@ -56,38 +62,28 @@ const LONGEST_WAIT: Duration = Duration::from_millis(100);
 pub struct Island<S: Shore> {
     state: Mutex<S>,
     inbox: Mutex<Inbox<S::Message>>,
-    /// Whether the inbox holds anything: the one word that the holder looks at before it goes.
+    /// What the inbox holds: the one word that the holder looks at before it goes.
     pending: AtomicUsize,
+    /// Callers that wait for the island, and publishers that wait for room in its inbox.
+    waiting: AtomicUsize,
+    /// A publisher has waited for room in vain: the holder hangs, until it takes the next message.
+    hangs: AtomicBool,
     arrived: Condvar,
     /// Whether a thread of its own serves it.
     served: AtomicBool,
 }
 
-struct Inbox<M> {
-    messages: VecDeque<(MonotonicTime, M)>,
-    /// Something may be due since that time.
-    woken: Option<MonotonicTime>,
-}
-
-impl<M> Inbox<M> {
-    fn len(&self) -> usize {
-        self.messages.len() + usize::from(self.woken.is_some())
-    }
-}
-
-/// What is taken from an inbox.
-enum Taken<M> {
-    Message(MonotonicTime, M),
-    Wake(MonotonicTime),
-}
+type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S: Shore> Island<S> {
     /// An island that nobody runs yet.
     pub fn new(state: S) -> Self {
         Self {
             state: Mutex::new(state),
-            inbox: Mutex::new(Inbox { messages: VecDeque::new(), woken: None }),
+            inbox: Mutex::new(Inbox::new()),
             pending: AtomicUsize::new(0),
+            waiting: AtomicUsize::new(0),
+            hangs: AtomicBool::new(false),
             arrived: Condvar::new(),
             served: AtomicBool::new(false),
         }
@@ -115,40 +111,46 @@ impl<S: Shore> Island<S> {
     /// Leaves a message in the inbox and sees to it that somebody delivers it.
     #[cold]
     fn post(&self, wiring: &S::Wiring, now: MonotonicTime, message: S::Message) {
-        let mut inbox = unpoisoned(self.inbox.lock());
+        let mut inbox = self.inbox();
         // Room is made once, at the first message that has to wait.
-        if inbox.messages.capacity() == 0 {
-            inbox.messages.reserve_exact(S::CAPACITY);
-        }
-        if inbox.messages.len() >= S::CAPACITY && !self.served.load(Ordering::Relaxed) {
+        inbox.reserve(S::CAPACITY);
+        if !inbox.has_room(S::CAPACITY) && !self.served.load(Ordering::Relaxed) {
             drop(inbox);
             self.wait_for_room();
-            inbox = unpoisoned(self.inbox.lock());
+            self.attend(wiring);
+            inbox = self.inbox();
         }
-        let dropped = if inbox.messages.len() < S::CAPACITY { None } else { inbox.messages.pop_front() };
-        inbox.messages.push_back((now, message));
-        self.pending.store(inbox.len(), Ordering::Relaxed);
+        let dropped = if inbox.has_room(S::CAPACITY) { None } else { inbox.pop() };
+        inbox.push(now, message);
+        self.pending.store(inbox.pending().0, Ordering::Relaxed);
         drop(inbox);
-        if let Some((_, dropped)) = dropped {
+        if let Some(dropped) = dropped {
             S::dropped(wiring, &dropped);
         }
         self.attend(wiring);
     }
 
     /// Somebody runs the island and delivers as fast as he can: whoever floods it meanwhile waits for him, but not for one
-    /// that hangs.
+    /// that hangs, nor for himself.
     fn wait_for_room(&self) {
-        let start = std::time::Instant::now();
-        while self.pending.load(Ordering::Relaxed) >= S::CAPACITY && start.elapsed() < LONGEST_WAIT {
-            std::thread::yield_now();
+        if self.hangs.load(Ordering::Relaxed) || Inside::is_here() {
+            return;
         }
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        let has_room = || Pending(self.pending.load(Ordering::Relaxed)).has_room(S::CAPACITY);
+        let in_time = inside::until(LONGEST_WAIT, || has_room() || self.is_free());
+        if !in_time {
+            self.hangs.store(true, Ordering::Relaxed);
+        }
+        // Before it attends to the inbox: see `drain`.
+        self.waiting.fetch_sub(1, Ordering::Relaxed);
     }
 
     fn wake_up(&self, wiring: &S::Wiring, now: MonotonicTime) {
         {
-            let mut inbox = unpoisoned(self.inbox.lock());
-            inbox.woken = Some(now);
-            self.pending.store(inbox.len(), Ordering::Relaxed);
+            let mut inbox = self.inbox();
+            inbox.wake(now);
+            self.pending.store(inbox.pending().0, Ordering::Relaxed);
         }
         self.attend(wiring);
     }
@@ -168,7 +170,7 @@ impl<S: Shore> Island<S> {
 
     /// Delivers what has come into the inbox meanwhile, and lets go.
     #[inline]
-    fn leave(&self, wiring: &S::Wiring, state: MutexGuard<'_, S>) {
+    fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
         drop(state);
         fence(Ordering::SeqCst);
         if self.pending.load(Ordering::Relaxed) != 0 {
@@ -176,16 +178,29 @@ impl<S: Shore> Island<S> {
         }
     }
 
+    /// Once it has delivered as much as an inbox holds, it lets those who wait go on in its place: they attend to the inbox
+    /// after they have ceased to wait, and the fences make sure that one of the two sees the other.
     #[cold]
     fn drain(&self, wiring: &S::Wiring) {
+        let mut delivered = 0;
         while self.pending.load(Ordering::Relaxed) != 0 {
             let Some(mut state) = self.try_lock() else { return };
-            while let Some(taken) = self.take() {
+            while !self.gives_way(delivered)
+                && let Some(taken) = self.take()
+            {
                 Self::run(&mut state, wiring, taken);
+                delivered += 1;
             }
             drop(state);
             fence(Ordering::SeqCst);
+            if self.gives_way(delivered) {
+                return;
+            }
         }
+    }
+
+    fn gives_way(&self, delivered: usize) -> bool {
+        delivered >= S::CAPACITY && self.waiting.load(Ordering::Relaxed) != 0
     }
 
     fn run(state: &mut S, wiring: &S::Wiring, taken: Taken<S::Message>) {
@@ -196,16 +211,15 @@ impl<S: Shore> Island<S> {
     }
 
     fn take(&self) -> Option<Taken<S::Message>> {
-        let mut inbox = unpoisoned(self.inbox.lock());
-        let taken = match inbox.messages.pop_front() {
-            Some((now, message)) => Some(Taken::Message(now, message)),
-            None => inbox.woken.take().map(Taken::Wake),
-        };
-        self.pending.store(inbox.len(), Ordering::Relaxed);
+        let mut inbox = self.inbox();
+        let taken = inbox.take();
+        self.pending.store(inbox.pending().0, Ordering::Relaxed);
+        self.hangs.store(false, Ordering::Relaxed);
         taken
     }
 
-    /// Runs `call` once the island is free, then what has come meanwhile; none after `timeout`.
+    /// Runs `call` once the island is free, then what has come meanwhile; none after `timeout`, and none if the caller has
+    /// been called by an estimator's message himself: he could wait for ever.
     pub fn with<T>(
         &self,
         wiring: &S::Wiring,
@@ -213,7 +227,13 @@ impl<S: Shore> Island<S> {
         call: impl FnOnce(&mut S) -> T,
     ) -> Option<T> {
         let mut state = match timeout {
-            None => unpoisoned(self.state.lock()),
+            None if Inside::is_here() => return None,
+            None => {
+                self.waiting.fetch_add(1, Ordering::Relaxed);
+                let state = Within::new(unpoisoned(self.state.lock()));
+                self.waiting.fetch_sub(1, Ordering::Relaxed);
+                state
+            }
             Some(timeout) => self.lock_within(timeout)?,
         };
         let result = call(&mut state);
@@ -221,7 +241,8 @@ impl<S: Shore> Island<S> {
         Some(result)
     }
 
-    fn lock_within(&self, timeout: Duration) -> Option<MutexGuard<'_, S>> {
+    fn lock_within(&self, timeout: Duration) -> Option<Held<'_, S>> {
+        let timeout = if Inside::is_here() { Duration::ZERO } else { timeout };
         let start = std::time::Instant::now();
         loop {
             if let Some(state) = self.try_lock() {
@@ -234,12 +255,21 @@ impl<S: Shore> Island<S> {
         }
     }
 
-    fn try_lock(&self) -> Option<MutexGuard<'_, S>> {
+    #[inline]
+    fn try_lock(&self) -> Option<Held<'_, S>> {
         match self.state.try_lock() {
-            Ok(state) => Some(state),
-            Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+            Ok(state) => Some(Within::new(state)),
+            Err(TryLockError::Poisoned(poisoned)) => Some(Within::new(poisoned.into_inner())),
             Err(TryLockError::WouldBlock) => None,
         }
+    }
+
+    fn is_free(&self) -> bool {
+        self.try_lock().is_some()
+    }
+
+    fn inbox(&self) -> MutexGuard<'_, Inbox<S::Message>> {
+        unpoisoned(self.inbox.lock())
     }
 }
 
@@ -274,25 +304,31 @@ impl<S: Shore> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn give_to_thread(&self) {
-        unpoisoned(self.inbox.lock()).messages.reserve_exact(S::CAPACITY);
+        self.inbox().reserve(S::CAPACITY);
         self.served.store(true, Ordering::SeqCst);
     }
 
     fn serve(&self, wiring: &S::Wiring, stop: &StopSignal) {
         while !stop.is_set() {
-            let mut inbox = unpoisoned(self.inbox.lock());
-            if inbox.len() == 0 {
+            let inbox = self.inbox();
+            if inbox.pending() == Pending::NOTHING {
                 // Told when a message comes; the time is for `stop`.
-                inbox = unpoisoned(self.arrived.wait_timeout(inbox, Duration::from_millis(50))).0;
+                drop(unpoisoned(self.arrived.wait_timeout(inbox, Duration::from_millis(50))));
+            } else {
+                drop(inbox);
             }
-            drop(inbox);
-            let mut state = unpoisoned(self.state.lock());
-            while let Some(taken) = self.take() {
+            let mut state = Within::new(unpoisoned(self.state.lock()));
+            while !stop.is_set()
+                && let Some(taken) = self.take()
+            {
                 Self::run(&mut state, wiring, taken);
-                if stop.is_set() {
+                if self.waiting.load(Ordering::Relaxed) != 0 {
                     break;
                 }
             }
+            drop(state);
+            // A lock is not fair, and this thread would be faster than those who have to be woken.
+            inside::until(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
         }
         self.served.store(false, Ordering::SeqCst);
     }
