@@ -24,7 +24,7 @@ pub use actuator::{ActuatorDeclaration, ActuatorError, ActuatorNode, AnyActuator
 pub use builder::Builder;
 pub use bus::{ActuatorLink, Bus};
 pub use error::{ComponentFault, StartError};
-pub(crate) use error::{Failed, caught, retire};
+pub(crate) use error::{Failed, caught, retire, wake};
 pub use handle::{
     ActuatorHandle, BridgeHandle, CommandHandle, Configurable, ControllerHandle, EstimatorHandle,
     EstimatorOfSeveralHandle, Health, OutputHandle, ParameterHandle, Publisher, SafetyErrors, SafetyState,
