@@ -21,11 +21,7 @@ impl Command for Move {
     type Arguments = Target;
     type Output = MonotonicTime;
 
-    async fn run(
-        _: NoOptions,
-        target: Target,
-        context: CommandContext,
-    ) -> Result<Outcome<MonotonicTime>, Fault> {
+    async fn run(_: NoOptions, target: Target, context: CommandContext) -> Result<Outcome<MonotonicTime>, Fault> {
         context.sleep(Duration::from_millis(target.millis)).await;
         let outcome = Outcome::done(context.now());
         match target.does {
@@ -167,7 +163,8 @@ fn millis(millis: u64) -> Target {
 }
 
 #[test]
-fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Result<(), Box<dyn std::error::Error>> {
+fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Result<(), Box<dyn std::error::Error>>
+{
     let _alone = alone();
     let builder = Commanded::builder();
     let (states, safety) = (builder.subscribe(system::StateMachine), builder.subscribe(system::SafetyState));
@@ -345,10 +342,8 @@ fn an_actuator_that_fails_is_made_anew() -> Result<(), Box<dyn std::error::Error
 fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Box<dyn std::error::Error>> {
     let _alone = alone();
     let builder = Commanded::builder();
-    let (follow, counts) = (
-        builder.subscribe(commanded::controller::follow),
-        builder.subscribe(commanded::bridge::dashboard),
-    );
+    let (follow, counts) =
+        (builder.subscribe(commanded::controller::follow), builder.subscribe(commanded::bridge::dashboard));
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(150));
     simulation.arm();

@@ -1,8 +1,10 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
 mod callbacks;
-mod control;
+mod command_faults;
 mod components;
+mod contention;
+mod control;
 mod external;
 mod fan_in;
 mod faults;
@@ -11,6 +13,8 @@ mod health;
 mod hygiene;
 mod outputs;
 mod real_time;
+mod safety;
 mod simulation;
 mod subscriptions;
+mod timing;
 mod topology;

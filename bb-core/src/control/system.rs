@@ -4,17 +4,19 @@
 //! `Control::drive` does what is to be done, on the thread that drives commands (in a simulation, the caller's).
 
 mod arming;
+mod changes;
 mod commands;
 mod parameters;
 
+use self::changes::Change;
 use super::commands::CommandStatistics;
-use super::event::{CommandEvent, CommandPhase, ParameterChange, SafetyTransition, StateTransition};
+use super::event::{CommandEvent, ParameterChange, SafetyTransition, StateTransition};
 use super::parameters::{ParameterDeclaration, ParameterValues};
-use super::safety::{Hook, SafetyError};
+use super::safety::{Hooks, SafetyError};
 use super::state::Machine;
 use super::tasks::{Bell, Sleeper, Task, lock};
 use super::{CategoryDeclaration, CommandDeclaration, Prepared};
-use crate::message::{Origin, Payload, Stamp};
+use crate::message::Origin;
 use crate::node::HealthTransition;
 use crate::pubsub::{AnyTopic, Topic};
 use crate::time::Clock;
@@ -77,11 +79,9 @@ struct Inner {
     origin: Origin,
     commands: Box<[Prepared]>,
     state: Mutex<State>,
-    /// Held while a command starts, so that two at once do not both find room.
-    starting: Mutex<()>,
     parameters: Mutex<ParameterValues>,
     bound: Mutex<Vec<Bound>>,
-    hooks: Mutex<Vec<(&'static str, Hook)>>,
+    hooks: Mutex<Hooks>,
     sleeper: Sleeper,
     bell: Bell,
     /// Whether `State::waiting` holds anything.
@@ -95,6 +95,10 @@ struct State {
     statistics: Vec<CommandStatistics>,
     next_id: u64,
     is_stopping: bool,
+    /// What is to be published, in the order in which it happened.
+    changes: VecDeque<Change>,
+    /// Somebody publishes it.
+    is_told: bool,
 }
 
 /// What was left to do.
@@ -103,7 +107,8 @@ enum Waiting {
     GiveUp(&'static str),
 }
 
-/// Changes of health that wait for their commands; beyond it the oldest is refused.
+/// Changes of health that wait for their commands; beyond it the oldest is refused. (That a component is given up is never
+/// lost.)
 const MAX_WAITING: usize = 1024;
 
 /// A component whose options are bound to parameters.
@@ -135,6 +140,8 @@ impl Control {
             statistics: declared.commands.iter().map(statistics).collect(),
             next_id: 1,
             is_stopping: false,
+            changes: VecDeque::new(),
+            is_told: false,
         };
         let control = Self(Arc::new(Inner {
             declared,
@@ -143,7 +150,6 @@ impl Control {
             origin,
             commands: commands.into(),
             state: Mutex::new(state),
-            starting: Mutex::new(()),
             parameters: Mutex::new(parameters),
             bound: Mutex::default(),
             hooks: Mutex::default(),
@@ -179,42 +185,17 @@ impl Control {
 
     fn leave(&self, waiting: Waiting) {
         let mut state = lock(&self.0.state);
-        if state.waiting.len() == MAX_WAITING {
-            state.waiting.pop_front();
+        let oldest = state.waiting.iter().position(|waiting| matches!(waiting, Waiting::Start(..)));
+        if state.waiting.len() >= MAX_WAITING
+            && let Some(Waiting::Start(health, command)) = oldest.and_then(|oldest| state.waiting.remove(oldest))
+        {
+            self.refuse_waiting(&mut state, command, health);
         }
         state.waiting.push_back(waiting);
         self.0.has_waiting.store(true, Ordering::Release);
         drop(state);
+        self.tell();
         self.0.bell.ring();
-    }
-
-    fn publish_changes(&self, before: Machine, after: Machine, command: Option<&'static str>) {
-        if before.safety != after.safety {
-            let (from, to) = (before.safety, after.safety);
-            tracing::info!(%from, %to, "safety changed");
-            self.publish(&self.0.topics.safety, SafetyTransition { from, to });
-        }
-        if before.state() != after.state() {
-            let (from, to) = (before.state(), after.state());
-            tracing::info!(from, to, command, "state changed");
-            self.publish(&self.0.topics.state, StateTransition { from, to, command });
-        }
-    }
-
-    fn command_event(&self, number: usize, execution: u64, phase: CommandPhase, health: Option<HealthTransition>) {
-        if let (Some(topic), Some(declared)) =
-            (self.0.topics.commands.get(number), self.0.declared.commands.get(number))
-        {
-            tracing::debug!(command = declared.name, execution, ?phase, "command");
-            self.publish(topic, CommandEvent { command: declared.name, execution, phase, health });
-        }
-    }
-
-    fn publish<T: Payload>(&self, topic: &Topic<T>, payload: T) {
-        let monotonic_time = self.0.clock.now();
-        let wall_time = self.0.clock.wall_at(monotonic_time);
-        let stamp = Stamp { monotonic_time, wall_time, origin: self.0.origin, ..Stamp::default() };
-        topic.publish(&stamp.message(payload));
     }
 
     pub(crate) fn topics(&self) -> &SystemTopics {
