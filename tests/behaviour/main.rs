@@ -13,6 +13,7 @@ mod frames;
 mod health;
 mod hygiene;
 mod outputs;
+mod parameters;
 mod real_time;
 mod safety;
 mod simulation;
