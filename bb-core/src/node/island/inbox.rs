@@ -100,7 +100,7 @@ mod tests {
     }
 
     fn taken(inbox: &mut Inbox<char>) -> String {
-        let text = |taken| match taken {
+        let text = |taken: Taken<char>| match taken {
             Taken::Message(_, message) => message.to_string(),
             Taken::Wake(time) => time.as_nanos().to_string(),
         };
