@@ -1,7 +1,8 @@
 //! Every order in which threads can meet at an island, by a model checker: `RUSTFLAGS="--cfg loom"`.
 //!
 //! In each, every message is delivered or counted as dropped, the order of each publisher is kept, and nothing stays in
-//! the inbox: nobody misses to be told. That one thread at a time is inside is the lock's own type.
+//! the inbox: nobody misses to be told. That one thread at a time is inside is the lock's own type. (The checker's locks order
+//! more than real ones do: what the fences are for, they say where they stand.)
 
 use super::{Island, Shore, WorkerDeclaration};
 use crate::time::MonotonicTime;
