@@ -267,7 +267,11 @@ fn events_of_a_command_come_in_their_order_from_many_threads() {
                 });
             }
         });
-        std::thread::sleep(Duration::from_millis(100));
+        while running.state() != "idle" {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let live = (*running).clone();
+        running.stop();
         let mut started = std::collections::HashSet::new();
         for event in events.drain() {
             match event.phase {
@@ -281,6 +285,7 @@ fn events_of_a_command_come_in_their_order_from_many_threads() {
             assert_eq!(change.from, state);
             state = change.to;
         }
-        assert_eq!(state, running.state());
+        assert_eq!((state, live.state()), ("disarmed", "disarmed"));
+        assert!(started.is_empty());
     });
 }
