@@ -102,7 +102,7 @@ pub trait Estimator: Sized + Send + 'static {
 
 /// An estimator that answers requests of type `Q`; one may implement it for several.
 ///
-/// Sent with [`Running::call`](crate::Running::call) or [`Simulation::call`](crate::Simulation::call).
+/// Sent with [`Live::call`](crate::Live::call).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not answer requests of type `{Q}`",
     label = "no `HandleCall<{Q}>`"
@@ -120,7 +120,7 @@ pub trait HandleCall<Q>: Estimator {
 
 /// An estimator that takes one-way requests of type `Q`; one may implement it for several.
 ///
-/// Sent with [`Running::cast`](crate::Running::cast) or [`Simulation::cast`](crate::Simulation::cast).
+/// Sent with [`Live::cast`](crate::Live::cast).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not take requests of type `{Q}`",
     label = "no `HandleCast<{Q}>`"

@@ -8,7 +8,7 @@ use std::marker::PhantomData;
 /// A sensor whose messages come from elsewhere: a driver's callback, a network, a test.
 ///
 /// Declare `sensor imu: External<Imu>();` and hand in its readings with
-/// [`Running::publish`](crate::Running::publish) or [`Simulation::publish`](crate::Simulation::publish).
+/// [`Live::publish`](crate::Live::publish) (a simulation first moves time there: [`Simulation::publish`](crate::Simulation::publish)).
 #[derive(Debug)]
 pub struct External<T>(PhantomData<fn() -> T>);
 
