@@ -7,8 +7,8 @@ use std::marker::PhantomData;
 
 /// A sensor whose messages come from elsewhere: a driver's callback, a network, a test.
 ///
-/// Declare `sensor imu: External<Imu>();` and hand in its readings with
-/// [`Live::publish`](crate::Live::publish) (a simulation first moves time there: [`Simulation::publish`](crate::Simulation::publish)).
+/// Declare `sensor imu: External<Imu>();` and hand in its readings with [`Live::publish`](crate::Live::publish), on virtual
+/// time with [`Simulation::publish`](crate::Simulation::publish), which moves time there first.
 #[derive(Debug)]
 pub struct External<T>(PhantomData<fn() -> T>);
 
