@@ -26,7 +26,7 @@ pub use builder::Builder;
 pub(crate) use bus::Directory;
 pub use bus::{ActuatorLink, Bus};
 pub use error::{ComponentFault, StartError};
-pub(crate) use error::{Failed, caught, retire};
+pub(crate) use error::{Failed, caught, retire, wake};
 pub use handle::{
     ActuatorHandle, BridgeHandle, CommandHandle, Configurable, ControllerHandle, EstimatorHandle,
     EstimatorOfSeveralHandle, Health, OutputHandle, ParameterHandle, Publisher, SafetyErrors, SafetyState,

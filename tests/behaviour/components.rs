@@ -119,3 +119,16 @@ impl Estimator for Snapshot {
 pub(crate) fn at(millis: i64) -> MonotonicTime {
     MonotonicTime::from_nanos(millis * 1_000_000)
 }
+
+/// Runs a test that might hang; panics if it is not over after `seconds`.
+pub(crate) fn within(seconds: u64, test: impl FnOnce() + Send + 'static) {
+    let thread = std::thread::spawn(test);
+    let start = std::time::Instant::now();
+    while !thread.is_finished() {
+        assert!(start.elapsed() < Duration::from_secs(seconds), "it hangs");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    if let Err(panic) = thread.join() {
+        std::panic::resume_unwind(panic);
+    }
+}

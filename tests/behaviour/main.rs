@@ -2,8 +2,11 @@
 
 mod attitude;
 mod callbacks;
+mod command_faults;
 mod components;
+mod contention;
 mod control;
+mod everything;
 mod external;
 mod fan_in;
 mod faults;
@@ -11,8 +14,13 @@ mod frames;
 mod health;
 mod hygiene;
 mod outputs;
+mod parameters;
 mod real_time;
 mod replay;
+mod safety;
 mod simulation;
 mod subscriptions;
+mod supervision;
+mod timing;
 mod topology;
+mod workers;

@@ -123,7 +123,8 @@ pub struct SensorContext {
 
 impl SensorContext {
     /// Registers what makes its hardware safe when the robot is disarmed: a lidar's motor, a laser. All callbacks run at
-    /// the same time, and must have come back within 5 s; one that fails leads to the safety state `error`.
+    /// the same time, and must have come back within 5 s; one that fails leads to the safety state `error`. What it registers
+    /// when it is made anew takes the place of what it had registered before.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.control.on_disarm(self.declaration.path, Arc::new(hook));
     }

@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 /// What an estimator asks for beside its outputs: from a callback with [`Reply::and`](super::Reply::and), from `init`
-/// with [`Context::request`](super::Context::request).
+/// with [`Context::request`](super::Context::request). Nothing is due sooner than a microsecond after it was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
-    /// [`handle_continue`](super::Estimator::handle_continue) with this number, before anything else happens to it.
+    /// [`handle_continue`](super::Estimator::handle_continue) with this number, before anything else happens to it. A million
+    /// in a row stop it: nobody else would ever be served.
     Continue(u32),
     /// [`Info::Timeout`], if nothing else happens to it for so long.
     Timeout(Duration),

@@ -1,7 +1,7 @@
 //! The contract of a command.
 
 use super::system::{Control, Setter};
-use super::tasks::Sleeper;
+use super::tasks::{Alarm, Sleeper};
 use super::{ParameterError, ParameterValue};
 use crate::component::{Fault, NoOptions, Options};
 use crate::node::HealthTransition;
@@ -131,7 +131,8 @@ impl CommandContext {
 
     /// Waits on the robot's clock.
     pub fn sleep(&self, duration: Duration) -> Sleep {
-        Sleep { until: self.now() + duration, control: self.control.clone(), sleeper: self.control.sleeper() }
+        let until = self.now() + duration;
+        Sleep { until, control: self.control.clone(), sleeper: self.control.sleeper(), alarm: None }
     }
 
     /// The operational state.
@@ -164,17 +165,26 @@ pub struct Sleep {
     until: MonotonicTime,
     control: Control,
     sleeper: Sleeper,
+    alarm: Option<Alarm>,
 }
 
 impl Future for Sleep {
     type Output = ();
 
-    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
         if self.control.moment() >= self.until {
             return Poll::Ready(());
         }
-        self.sleeper.wake_at(self.until, context.waker().clone());
+        self.alarm = Some(self.sleeper.wake_at(self.until, self.alarm, context.waker().clone()));
         Poll::Pending
+    }
+}
+
+impl Drop for Sleep {
+    fn drop(&mut self) {
+        if let Some(alarm) = self.alarm {
+            self.sleeper.forget(alarm);
+        }
     }
 }
 

@@ -37,7 +37,17 @@ pub(super) struct Slot {
 #[derive(Default)]
 struct State {
     result: Option<Result<Value, CommandError>>,
+    /// Once there is or was a result; the first one counts.
+    has_ended: bool,
     waker: Option<Waker>,
+}
+
+impl State {
+    /// The result; an error if somebody has taken it already.
+    fn take(&mut self) -> Option<Result<Value, CommandError>> {
+        let taken = || Err(CommandError::Failed("its result was taken already".into()));
+        self.has_ended.then(|| self.result.take().unwrap_or_else(taken))
+    }
 }
 
 impl Slot {
@@ -47,12 +57,15 @@ impl Slot {
 
     pub(super) fn set(&self, result: Result<Value, CommandError>) {
         let mut state = lock(&self.state);
-        state.result = Some(result);
+        if state.has_ended {
+            return;
+        }
+        (state.result, state.has_ended) = (Some(result), true);
         let waker = state.waker.take();
         drop(state);
         self.changed.notify_all();
         if let Some(waker) = waker {
-            waker.wake();
+            crate::run::wake(waker);
         }
     }
 }
@@ -75,7 +88,7 @@ impl<T: 'static> Execution<T> {
     pub fn wait(self) -> Result<T, CommandError> {
         let mut state = lock(&self.slot.state);
         loop {
-            if let Some(result) = state.result.take() {
+            if let Some(result) = state.take() {
                 return typed(result);
             }
             state = self.slot.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -84,13 +97,16 @@ impl<T: 'static> Execution<T> {
 
     /// Waits for the result, `timeout` at most; none after that.
     pub fn wait_timeout(&self, timeout: Duration) -> Option<Result<T, CommandError>> {
-        let deadline = Instant::now() + timeout;
+        let deadline = Instant::now().checked_add(timeout);
         let mut state = lock(&self.slot.state);
         loop {
-            if let Some(result) = state.result.take() {
+            if let Some(result) = state.take() {
                 return Some(typed(result));
             }
-            let left = deadline.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())?;
+            let left = match deadline {
+                Some(deadline) => deadline.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())?,
+                None => Duration::MAX,
+            };
             state = self.slot.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
@@ -111,7 +127,7 @@ impl<T: 'static> Future for Execution<T> {
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
         let mut state = lock(&self.slot.state);
-        match state.result.take() {
+        match state.take() {
             Some(result) => Poll::Ready(typed(result)),
             None => {
                 state.waker = Some(context.waker().clone());

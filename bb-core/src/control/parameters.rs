@@ -131,20 +131,21 @@ impl ParameterDeclaration {
         if expected != value.type_name() {
             return refuse(format!("expected a value of type `{expected}`, found `{value}`"));
         }
-        let number = match value {
-            ParameterValue::Float(value) if !value.is_finite() => {
-                return refuse(format!("expected a finite number, found `{value}`"));
-            }
-            ParameterValue::Float(value) => *value,
-            ParameterValue::Integer(value) => *value as f64,
-            ParameterValue::Bool(_) | ParameterValue::Text(_) => return Ok(()),
-        };
-        match self.range {
-            Some(range) if !(range.start..=range.end).contains(&number) => {
-                refuse(format!("expected a number in {}, found `{value}`", range.text))
-            }
-            _ => Ok(()),
+        if let ParameterValue::Float(value) = value
+            && !value.is_finite()
+        {
+            return refuse(format!("expected a finite number, found `{value}`"));
         }
+        let Some(range) = self.range else { return Ok(()) };
+        let is_inside = match value {
+            ParameterValue::Float(value) => (range.start..=range.end).contains(value),
+            // As integers: a large one would be rounded to a float inside.
+            ParameterValue::Integer(value) => {
+                (range.start.ceil() as i128..=range.end.floor() as i128).contains(&i128::from(*value))
+            }
+            ParameterValue::Bool(_) | ParameterValue::Text(_) => true,
+        };
+        if is_inside { Ok(()) } else { refuse(format!("expected a number in {}, found `{value}`", range.text)) }
     }
 }
 
@@ -215,7 +216,7 @@ macro_rules! from_parameter {
 
 from_parameter! {
     bool => bool: |value| value;
-    f64 => f64: |value| value, f32: |value| value as f32, Duration: |value| crate::component::FromQuantity::from_quantity(value);
+    f64 => f64: |value| value, f32: |value| (value as f32).clamp(f32::MIN, f32::MAX), Duration: |value| crate::component::FromQuantity::from_quantity(value);
     // Beyond the option's own range the nearest number: what is out of the range that it states is refused.
     i64 => i64: |value| value,
         i32: |value| clamped(value),
@@ -289,6 +290,18 @@ mod tests {
         assert_eq!(refused(f64::NAN.into()), "param/imu/beta is not set: expected a finite number, found `NaN`");
         assert_eq!(refused(true.into()), "param/imu/beta is not set: expected a value of type `f64`, found `true`");
         assert_eq!(BETA.check(&1.0.into()), Ok(()));
+    }
+
+    #[test]
+    fn the_largest_integers_are_not_rounded_into_their_range() {
+        let (start, end) = (-9_007_199_254_740_992.0, 9_007_199_254_740_992.0);
+        let default = ParameterDefault::Integer(0);
+        let count = ParameterDeclaration { default, range: Some(Range { start, end, text: "" }), ..BETA };
+        let accepts = |value: i64| count.check(&value.into()).is_ok();
+        assert!(accepts(1 << 53) && accepts(-(1 << 53)));
+        assert!(!accepts((1 << 53) + 1) && !accepts(-(1 << 53) - 1));
+        assert!(!accepts(i64::MAX) && !accepts(i64::MIN));
+        assert_eq!(<f32 as FromParameter<f64>>::from_parameter(-1e300), f32::MIN);
     }
 
     #[test]

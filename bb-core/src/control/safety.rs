@@ -43,6 +43,39 @@ pub struct SafetyError {
 /// How long all disarm callbacks together may take.
 pub(super) const DISARM_WITHIN: Duration = Duration::from_secs(5);
 
+/// What makes hardware safe, in the order in which they were registered.
+#[derive(Default)]
+pub(super) struct Hooks {
+    all: Vec<(&'static str, u64, Hook)>,
+    next: u64,
+}
+
+impl Hooks {
+    pub(super) fn add(&mut self, path: &'static str, hook: Hook) {
+        self.all.push((path, self.next, hook));
+        self.next += 1;
+    }
+
+    /// What is registered from now on has a number from this one on.
+    pub(super) fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// Whether the component at `path` has registered any from `number` on.
+    pub(super) fn any_since(&self, path: &str, number: u64) -> bool {
+        self.all.iter().any(|(other, own, _)| *other == path && *own >= number)
+    }
+
+    /// Takes those of a component out that were registered before `number`, or since; to be dropped without a lock.
+    pub(super) fn take(&mut self, path: &str, number: u64, before: bool) -> Vec<(&'static str, u64, Hook)> {
+        self.all.extract_if(.., |(other, own, _)| *other == path && (*own < number) == before).collect()
+    }
+
+    pub(super) fn all(&self) -> Vec<(&'static str, Hook)> {
+        self.all.iter().map(|(path, _, hook)| (*path, Arc::clone(hook))).collect()
+    }
+}
+
 /// Makes hardware safe.
 pub(super) type Hook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
 

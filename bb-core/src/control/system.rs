@@ -4,20 +4,21 @@
 //! `Control::drive` does what is to be done, on the thread that drives commands (in a simulation, the caller's).
 
 mod arming;
+mod changes;
 mod commands;
 mod parameters;
 
-pub(crate) use parameters::Setter;
-
+use self::changes::Change;
+pub(crate) use self::parameters::Setter;
 use super::commands::CommandStatistics;
-use super::event::{CommandEvent, CommandPhase, ParameterChange, SafetyTransition, StateTransition};
+use super::event::{CommandEvent, ParameterChange, SafetyTransition, StateTransition};
 use super::parameters::{ParameterDeclaration, ParameterValues};
-use super::safety::{Hook, SafetyError};
+use super::safety::{Hooks, SafetyError};
 use super::state::Machine;
 use super::tasks::{Bell, Sleeper, Task, lock};
 use super::{CategoryDeclaration, CommandDeclaration, Prepared};
 use crate::journal::{Event, Journal};
-use crate::message::{Origin, Payload, Stamp};
+use crate::message::Origin;
 use crate::node::HealthTransition;
 use crate::pubsub::{AnyTopic, Topic};
 use crate::run::Directory;
@@ -27,6 +28,7 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use std::time::Duration;
 
 /// What `robot!` declares of all this.
 #[derive(Clone, Copy, Debug)]
@@ -82,10 +84,9 @@ struct Inner {
     origin: Origin,
     commands: Box<[Prepared]>,
     state: Mutex<State>,
-    acting: Mutex<()>,
     parameters: Mutex<ParameterValues>,
     bound: Mutex<Vec<Bound>>,
-    hooks: Mutex<Vec<(&'static str, Hook)>>,
+    hooks: Mutex<Hooks>,
     sleeper: Sleeper,
     bell: Bell,
     /// Whether `State::waiting` holds anything.
@@ -95,6 +96,8 @@ struct Inner {
     /// When commands go on: their time, so that a replay of them is the same.
     moment_nanos: AtomicI64,
     journal: Option<Journal>,
+    /// See [`Control::act`].
+    acting: Mutex<()>,
     /// What making hardware safe answers in a replay.
     replayed_answer: Mutex<Option<Vec<SafetyError>>>,
 }
@@ -106,6 +109,10 @@ struct State {
     statistics: Vec<CommandStatistics>,
     next_id: u64,
     is_stopping: bool,
+    /// What is to be published, in the order in which it happened.
+    changes: VecDeque<(MonotonicTime, Change)>,
+    /// Somebody publishes it.
+    is_told: bool,
 }
 
 /// What was left to do.
@@ -114,7 +121,8 @@ enum Waiting {
     GiveUp(&'static str),
 }
 
-/// Changes of health that wait for their commands; beyond it the oldest is refused.
+/// Changes of health that wait for their commands; beyond it the oldest is refused. (That a component is given up is never
+/// lost.)
 const MAX_WAITING: usize = 1024;
 
 /// A component whose options are bound to parameters.
@@ -147,6 +155,8 @@ impl Control {
             statistics: declared.commands.iter().map(statistics).collect(),
             next_id: 1,
             is_stopping: false,
+            changes: VecDeque::new(),
+            is_told: false,
         };
         let control = Self(Arc::new(Inner {
             declared,
@@ -155,7 +165,6 @@ impl Control {
             origin,
             commands: commands.into(),
             state: Mutex::new(state),
-            acting: Mutex::new(()),
             parameters: Mutex::new(parameters),
             bound: Mutex::default(),
             hooks: Mutex::default(),
@@ -165,6 +174,7 @@ impl Control {
             directory: OnceLock::new(),
             moment_nanos: AtomicI64::new(0),
             journal,
+            acting: Mutex::new(()),
             replayed_answer: Mutex::default(),
         }));
         for (number, command) in declared.commands.iter().enumerate() {
@@ -193,6 +203,21 @@ impl Control {
         }
     }
 
+    fn leave(&self, waiting: Waiting) {
+        let mut state = lock(&self.0.state);
+        let oldest = state.waiting.iter().position(|waiting| matches!(waiting, Waiting::Start(..)));
+        if state.waiting.len() >= MAX_WAITING
+            && let Some(Waiting::Start(health, command)) = oldest.and_then(|oldest| state.waiting.remove(oldest))
+        {
+            self.refuse_waiting(&mut state, command, health, health.time);
+        }
+        state.waiting.push_back(waiting);
+        self.0.has_waiting.store(true, Ordering::Release);
+        drop(state);
+        self.tell();
+        self.0.bell.ring();
+    }
+
     /// Writes into the journal, if there is one.
     fn write(&self, now: MonotonicTime, event: Event) {
         if let Some(journal) = &self.0.journal {
@@ -200,71 +225,33 @@ impl Control {
         }
     }
 
-    /// Whoever does anything does it alone, so that two commands at once do not both find room, and a journal has an order.
-    /// A command that does something while it goes on is in here already.
+    /// With a journal, whoever does anything does it alone, so that it has an order. A command that does something while it
+    /// goes on is in here already; and nobody waits long for one that does not come back from its code.
     fn act(&self) -> Acting<'_> {
-        if IS_ACTING.get() {
+        if self.0.journal.is_none() || IS_ACTING.get() {
             return Acting(None);
         }
-        let guard = lock(&self.0.acting);
-        IS_ACTING.set(true);
-        Acting(Some(guard))
+        let start = std::time::Instant::now();
+        loop {
+            match self.0.acting.try_lock() {
+                Ok(guard) => {
+                    IS_ACTING.set(true);
+                    return Acting(Some(guard));
+                }
+                Err(_) if start.elapsed() > LONGEST_ACT => return Acting(None),
+                Err(_) => std::thread::sleep(Duration::from_micros(50)),
+            }
+        }
     }
 
     /// Who sets a parameter now: a command that goes on, or somebody outside.
     pub(crate) fn setter(&self) -> Setter {
-        if IS_ACTING.get() { Setter::Command } else { Setter::Outside(self.0.clock.now()) }
+        if GOES_ON.get() { Setter::Command } else { Setter::Outside(self.0.clock.now()) }
     }
 
     /// When commands go on.
     pub(super) fn moment(&self) -> MonotonicTime {
         MonotonicTime::from_nanos(self.0.moment_nanos.load(Ordering::Acquire))
-    }
-
-    fn leave(&self, waiting: Waiting) {
-        let mut state = lock(&self.0.state);
-        if state.waiting.len() == MAX_WAITING {
-            state.waiting.pop_front();
-        }
-        state.waiting.push_back(waiting);
-        self.0.has_waiting.store(true, Ordering::Release);
-        drop(state);
-        self.0.bell.ring();
-    }
-
-    fn publish_changes(&self, before: Machine, after: Machine, command: Option<&'static str>, now: MonotonicTime) {
-        if before.safety != after.safety {
-            let (from, to) = (before.safety, after.safety);
-            tracing::info!(%from, %to, "safety changed");
-            self.publish(&self.0.topics.safety, SafetyTransition { from, to }, now);
-        }
-        if before.state() != after.state() {
-            let (from, to) = (before.state(), after.state());
-            tracing::info!(from, to, command, "state changed");
-            self.publish(&self.0.topics.state, StateTransition { from, to, command }, now);
-        }
-    }
-
-    fn command_event(
-        &self,
-        number: usize,
-        execution: u64,
-        phase: CommandPhase,
-        health: Option<HealthTransition>,
-        now: MonotonicTime,
-    ) {
-        if let (Some(topic), Some(declared)) =
-            (self.0.topics.commands.get(number), self.0.declared.commands.get(number))
-        {
-            tracing::debug!(command = declared.name, execution, ?phase, "command");
-            self.publish(topic, CommandEvent { command: declared.name, execution, phase, health }, now);
-        }
-    }
-
-    fn publish<T: Payload>(&self, topic: &Topic<T>, payload: T, monotonic_time: MonotonicTime) {
-        let wall_time = self.0.clock.wall_at(monotonic_time);
-        let stamp = Stamp { monotonic_time, wall_time, origin: self.0.origin, ..Stamp::default() };
-        topic.publish(&stamp.message(payload));
     }
 
     pub(crate) fn set_directory(&self, directory: Arc<dyn Directory>) {
@@ -285,8 +272,13 @@ impl Control {
     }
 }
 
+/// How long anything waits for its turn in the journal.
+const LONGEST_ACT: Duration = Duration::from_millis(100);
+
 thread_local! {
     static IS_ACTING: Cell<bool> = const { Cell::new(false) };
+    /// A command goes on, on this thread.
+    static GOES_ON: Cell<bool> = const { Cell::new(false) };
 }
 
 /// See [`Control::act`].

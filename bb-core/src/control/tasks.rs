@@ -6,8 +6,7 @@ use crate::component::Fault;
 use crate::node::HealthTransition;
 use crate::time::MonotonicTime;
 use std::any::Any;
-use std::cmp::Ordering as Compared;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::future::Future;
 use std::pin::Pin;
@@ -30,8 +29,16 @@ pub(super) struct Task {
     pub(super) deadline: Option<MonotonicTime>,
     pub(super) slot: Arc<Slot>,
     future: Mutex<Option<Running>>,
+    /// Whether the future is here: not before [`Self::begin`], nor while somebody polls it, nor once it has ended.
+    is_here: AtomicBool,
+    has_begun: AtomicBool,
+    /// When it was polled last, and how often at that instant.
+    polled: Mutex<(MonotonicTime, u32)>,
     signal: Arc<Signal>,
 }
+
+/// Polls at one instant of virtual time before a command is taken to be stuck.
+const STUCK_AFTER: u32 = 1_000_000;
 
 /// Set by wakers and by whoever cancels.
 #[derive(Debug)]
@@ -61,30 +68,69 @@ impl Task {
         command: usize,
         health: Option<HealthTransition>,
         deadline: Option<MonotonicTime>,
-        future: Running,
         bell: Bell,
     ) -> Self {
         let signal = Signal { woken: AtomicBool::new(true), cancelled: AtomicBool::new(false), bell };
         let signal = Arc::new(signal);
-        let slot = Arc::new(Slot::new(Arc::clone(&signal)));
-        Self { id, command, health, deadline, slot, future: Mutex::new(Some(future)), signal }
+        Self {
+            id,
+            command,
+            health,
+            deadline,
+            slot: Arc::new(Slot::new(Arc::clone(&signal))),
+            future: Mutex::new(None),
+            is_here: AtomicBool::new(false),
+            has_begun: AtomicBool::new(false),
+            polled: Mutex::new((MonotonicTime::MAX, 0)),
+            signal,
+        }
+    }
+
+    /// Takes what it is to do.
+    pub(super) fn begin(&self, future: Running) {
+        self.has_begun.store(true, Ordering::Release);
+        self.put(future);
+        self.signal.bell.ring();
     }
 
     pub(super) fn cancel(&self) {
         self.signal.cancel();
     }
 
-    /// Whether [`Self::poll`] would do anything at `now`.
-    pub(super) fn is_due(&self, now: MonotonicTime) -> bool {
-        self.signal.woken.load(Ordering::Acquire)
-            || self.signal.cancelled.load(Ordering::Acquire)
-            || self.deadline.is_some_and(|deadline| deadline <= now)
+    pub(super) fn is_cancelled(&self) -> bool {
+        self.signal.cancelled.load(Ordering::Acquire)
     }
 
-    /// Goes on with it; how it has ended, if it has. User code runs here: a panic fails the command.
-    pub(super) fn poll(&self, now: MonotonicTime) -> Option<Result<super::Outcome<Value>, CommandError>> {
+    /// Whether it has begun.
+    pub(super) fn has_begun(&self) -> bool {
+        self.has_begun.load(Ordering::Acquire)
+    }
+
+    /// Whether [`Self::poll`] would do anything at `now`.
+    pub(super) fn is_due(&self, now: MonotonicTime) -> bool {
+        let has_cause = || {
+            self.signal.woken.load(Ordering::Acquire)
+                || self.is_cancelled()
+                || self.deadline.is_some_and(|deadline| deadline <= now)
+        };
+        self.is_here.load(Ordering::Acquire) && has_cause()
+    }
+
+    fn put(&self, future: Running) {
+        *lock(&self.future) = Some(future);
+        self.is_here.store(true, Ordering::Release);
+    }
+
+    /// Goes on with it; how it has ended, if it has. User code runs here: a panic fails the command. One that wakes itself
+    /// again and again would keep virtual time from going on: it fails as well.
+    pub(super) fn poll(
+        &self,
+        now: MonotonicTime,
+        is_virtual: bool,
+    ) -> Option<Result<super::Outcome<Value>, CommandError>> {
         let mut future = lock(&self.future).take()?;
-        let ended = if self.signal.cancelled.load(Ordering::Acquire) {
+        self.is_here.store(false, Ordering::Release);
+        let ended = if self.is_cancelled() {
             Some(Err(CommandError::Cancelled))
         } else if self.signal.woken.swap(false, Ordering::AcqRel) {
             let waker = Waker::from(Arc::clone(&self.signal));
@@ -101,8 +147,9 @@ impl Task {
         // What is ready at its deadline has made it.
         let is_late = || self.deadline.is_some_and(|deadline| deadline <= now);
         let ended = ended.or_else(|| is_late().then_some(Err(CommandError::TimedOut)));
+        let ended = ended.or_else(|| self.is_stuck(now, is_virtual).map(Err));
         if ended.is_none() {
-            *lock(&self.future) = Some(future);
+            self.put(future);
         } else {
             // Dropping it is the command's clean-up.
             let _ = crate::run::caught(|| {
@@ -111,6 +158,21 @@ impl Task {
             });
         }
         ended
+    }
+
+    /// Why it is stuck, if it is.
+    fn is_stuck(&self, now: MonotonicTime, is_virtual: bool) -> Option<CommandError> {
+        if !is_virtual {
+            return None;
+        }
+        let mut polled = lock(&self.polled);
+        *polled = if polled.0 == now { (now, polled.1 + 1) } else { (now, 1) };
+        (polled.1 >= STUCK_AFTER).then(|| {
+            CommandError::Failed(format!(
+                "it woke itself {STUCK_AFTER} times at {now}, and virtual time cannot go on: await \
+                 `CommandContext::sleep` between two looks"
+            ))
+        })
     }
 }
 
@@ -132,65 +194,58 @@ impl Bell {
     }
 }
 
-/// Futures that wait for a time.
+/// Futures that wait for a time, in the order of their times and then of their numbers.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sleeper(Arc<Mutex<BinaryHeap<Alarm>>>);
+pub(super) struct Sleeper(Arc<Mutex<Alarms>>);
 
-#[derive(Debug)]
-struct Alarm {
-    time: MonotonicTime,
-    waker: Waker,
+#[derive(Debug, Default)]
+struct Alarms {
+    set: BTreeMap<Alarm, Waker>,
+    next_number: u64,
 }
 
+/// One that was set: its time, and a number of its own.
+pub(super) type Alarm = (MonotonicTime, u64);
+
 impl Sleeper {
-    pub(super) fn wake_at(&self, time: MonotonicTime, waker: Waker) {
+    /// Sets an alarm; `set` is the one that was set before, if any.
+    pub(super) fn wake_at(&self, time: MonotonicTime, set: Option<Alarm>, waker: Waker) -> Alarm {
         let mut alarms = lock(&self.0);
-        // A future that is polled again before its time is in here already.
-        if !alarms.iter().any(|alarm| alarm.time == time && alarm.waker.will_wake(&waker)) {
-            alarms.push(Alarm { time, waker });
-        }
+        let alarm = set.unwrap_or((time, alarms.next_number));
+        alarms.next_number += 1;
+        let replaced = alarms.set.insert(alarm, waker);
+        // Whatever a waker does when it is dropped, it does without the lock.
+        drop(alarms);
+        drop(replaced);
+        alarm
+    }
+
+    /// Whoever has set it does not wait any more.
+    pub(super) fn forget(&self, alarm: Alarm) {
+        let waker = lock(&self.0).set.remove(&alarm);
+        drop(waker);
     }
 
     pub(super) fn next(&self) -> Option<MonotonicTime> {
-        lock(&self.0).peek().map(|alarm| alarm.time)
+        lock(&self.0).set.first_key_value().map(|((time, _), _)| *time)
     }
 
     /// Wakes all whose time has come.
     pub(super) fn advance(&self, now: MonotonicTime) {
         loop {
             let mut alarms = lock(&self.0);
-            if alarms.peek().is_none_or(|alarm| alarm.time > now) {
-                return;
-            }
-            let alarm = alarms.pop();
+            let Some(first) = alarms.set.first_entry().filter(|first| first.key().0 <= now) else { return };
+            let waker = first.remove();
             drop(alarms);
-            if let Some(Alarm { waker, .. }) = alarm {
-                waker.wake();
-            }
+            crate::run::wake(waker);
         }
     }
-}
 
-// The earliest is the greatest: a heap gives the greatest first.
-impl Ord for Alarm {
-    fn cmp(&self, other: &Self) -> Compared {
-        other.time.cmp(&self.time)
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        lock(&self.0).set.len()
     }
 }
-
-impl PartialOrd for Alarm {
-    fn partial_cmp(&self, other: &Self) -> Option<Compared> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Alarm {
-    fn eq(&self, other: &Self) -> bool {
-        self.time == other.time
-    }
-}
-
-impl Eq for Alarm {}
 
 impl fmt::Debug for Task {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -200,4 +255,24 @@ impl fmt::Debug for Task {
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_alarm_is_forgotten_with_whoever_set_it_and_set_once() {
+        let sleeper = Sleeper::default();
+        let (hour, waker) = (MonotonicTime::ZERO + Duration::from_secs(3600), Waker::noop());
+        let mut alarm = None;
+        for _ in 0..100 {
+            alarm = Some(sleeper.wake_at(hour, alarm, waker.clone()));
+        }
+        sleeper.wake_at(MonotonicTime::ZERO, None, waker.clone());
+        assert_eq!((sleeper.len(), sleeper.next()), (2, Some(MonotonicTime::ZERO)));
+        sleeper.advance(MonotonicTime::ZERO);
+        alarm.into_iter().for_each(|alarm| sleeper.forget(alarm));
+        assert_eq!(sleeper.len(), 0);
+    }
 }

@@ -67,6 +67,9 @@ impl Count {
 pub(super) struct InputCounters {
     pub(super) received: Count,
     pub(super) dropped: [Count; REASONS],
+    /// Messages that did not fit in the inbox. Those who published them count, whoever holds the estimator meanwhile; they
+    /// are not among the other two.
+    overflowed: AtomicU64,
 }
 
 #[derive(Debug, Default)]
@@ -94,6 +97,13 @@ impl Counters {
         }
     }
 
+    /// Counts a message that did not fit in an inbox; on any thread.
+    pub(super) fn overflow(&self, input: usize) {
+        if let Some(counters) = self.inputs.get(input) {
+            counters.overflowed.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
     pub(super) fn diverge(&self, reason: &'static str) {
         self.diverged.increment();
         *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason);
@@ -105,11 +115,12 @@ impl Counters {
         health: HealthState,
         stopped: Option<String>,
     ) -> EstimatorStatistics {
-        let inputs = declaration.inputs.iter().zip(&self.inputs).map(|(declared, counters)| InputStatistics {
-            name: declared.name,
-            source: declared.source,
-            received: counters.received.get(),
-            dropped: counters.dropped.each_ref().map(Count::get),
+        let inputs = declaration.inputs.iter().zip(&self.inputs).map(|(declared, counters)| {
+            let overflowed = counters.overflowed.load(Ordering::Relaxed);
+            let mut dropped = counters.dropped.each_ref().map(Count::get);
+            dropped[DropReason::Overflow as usize] = overflowed;
+            let received = counters.received.get() + overflowed;
+            InputStatistics { name: declared.name, source: declared.source, received, dropped }
         });
         EstimatorStatistics {
             path: declaration.path,

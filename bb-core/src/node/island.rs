@@ -7,11 +7,17 @@
 //! lock: whoever publishes takes it and runs all that lies downstream; who finds it taken leaves the message in the
 //! inbox, for the holder to deliver before it goes. So there is a single writer, and the order of every input is kept.
 
+mod inbox;
+mod inside;
+#[cfg(all(test, loom))]
+mod model;
+
+use self::inbox::{Inbox, Pending, Taken};
+use self::inside::{Inside, Within};
 use super::WorkerDeclaration;
 use crate::journal::{Event, Journal};
 use crate::run::StopSignal;
 use crate::time::MonotonicTime;
-use std::collections::VecDeque;
 use std::fmt;
 use std::time::Duration;
 
@@ -60,9 +66,13 @@ const LONGEST_WAIT: Duration = Duration::from_millis(100);
 /// An island behind its lock.
 pub struct Island<S: Shore> {
     state: Mutex<S>,
-    inbox: Mutex<Inbox<S::Message>>,
-    /// Whether the inbox holds anything: the one word that the holder looks at before it goes.
+    inbox: Mutex<Inbox<Keyed<S::Message>>>,
+    /// What the inbox holds: the one word that the holder looks at before it goes.
     pending: AtomicUsize,
+    /// Callers that wait for the island, and publishers that wait for room in its inbox.
+    waiting: AtomicUsize,
+    /// A publisher has waited for room in vain: the holder hangs, until it takes the next message.
+    hangs: AtomicBool,
     arrived: Condvar,
     /// Whether a thread of its own serves it.
     served: AtomicBool,
@@ -81,37 +91,22 @@ pub struct Key {
 }
 
 /// A message that waits.
-struct Waiting<M> {
-    arrived: MonotonicTime,
+struct Keyed<M> {
     key: Key,
     message: M,
 }
 
-struct Inbox<M> {
-    messages: VecDeque<Waiting<M>>,
-    /// Something may be due since that time.
-    woken: Option<MonotonicTime>,
-}
-
-impl<M> Inbox<M> {
-    fn len(&self) -> usize {
-        self.messages.len() + usize::from(self.woken.is_some())
-    }
-}
-
-/// What is taken from an inbox.
-enum Taken<M> {
-    Message(Waiting<M>),
-    Wake(MonotonicTime),
-}
+type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S: Shore> Island<S> {
     /// An island that nobody runs yet.
     pub fn new(state: S) -> Self {
         Self {
             state: Mutex::new(state),
-            inbox: Mutex::new(Inbox { messages: VecDeque::new(), woken: None }),
+            inbox: Mutex::new(Inbox::new()),
             pending: AtomicUsize::new(0),
+            waiting: AtomicUsize::new(0),
+            hangs: AtomicBool::new(false),
             arrived: Condvar::new(),
             served: AtomicBool::new(false),
             replayed: AtomicBool::new(false),
@@ -136,34 +131,32 @@ impl<S: Shore> Island<S> {
             direct(&mut state);
             return self.leave(wiring, state);
         }
-        self.post(wiring, Waiting { arrived: now, key, message: message() });
+        self.post(wiring, now, Keyed { key, message: message() });
     }
 
     /// Leaves a message in the inbox and sees to it that somebody delivers it.
     #[cold]
-    fn post(&self, wiring: &S::Wiring, waiting: Waiting<S::Message>) {
-        let mut inbox = unpoisoned(self.inbox.lock());
+    fn post(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
+        let mut inbox = self.inbox();
         // Room is made once, at the first message that has to wait.
-        if inbox.messages.capacity() == 0 {
-            inbox.messages.reserve_exact(S::CAPACITY);
-        }
+        inbox.reserve(S::CAPACITY);
         if self.replayed.load(Ordering::Relaxed) {
-            inbox.messages.push_back(waiting);
-            return;
+            return inbox.push(now, message);
         }
-        if inbox.messages.len() >= S::CAPACITY && !self.served.load(Ordering::Relaxed) {
+        if !inbox.has_room(S::CAPACITY) && !self.served.load(Ordering::Relaxed) {
             drop(inbox);
             self.wait_for_room();
-            inbox = unpoisoned(self.inbox.lock());
+            self.attend(wiring);
+            inbox = self.inbox();
         }
-        let dropped = if inbox.messages.len() < S::CAPACITY { None } else { inbox.messages.pop_front() };
-        inbox.messages.push_back(waiting);
-        self.pending.store(inbox.len(), Ordering::Relaxed);
+        let dropped = if inbox.has_room(S::CAPACITY) { None } else { inbox.pop() };
+        inbox.push(now, message);
+        self.pending.store(inbox.pending().0, Ordering::Relaxed);
         drop(inbox);
         if let Some(dropped) = dropped {
             if let Some(journal) = S::journal(wiring) {
                 let Key { entry, line } = dropped.key;
-                journal.write(dropped.arrived, Event::Drop { island: S::NUMBER, entry, message: line });
+                journal.write(now, Event::Drop { island: S::NUMBER, entry, message: line });
             }
             S::dropped(wiring, &dropped.message);
         }
@@ -171,12 +164,19 @@ impl<S: Shore> Island<S> {
     }
 
     /// Somebody runs the island and delivers as fast as he can: whoever floods it meanwhile waits for him, but not for one
-    /// that hangs.
+    /// that hangs, nor for himself.
     fn wait_for_room(&self) {
-        let start = std::time::Instant::now();
-        while self.pending.load(Ordering::Relaxed) >= S::CAPACITY && start.elapsed() < LONGEST_WAIT {
-            std::thread::yield_now();
+        if self.hangs.load(Ordering::Relaxed) || Inside::is_here() {
+            return;
         }
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        let has_room = || Pending(self.pending.load(Ordering::Relaxed)).has_room(S::CAPACITY);
+        let in_time = inside::until(LONGEST_WAIT, || has_room() || self.is_free());
+        if !in_time {
+            self.hangs.store(true, Ordering::Relaxed);
+        }
+        // Before it attends to the inbox: see `drain`.
+        self.waiting.fetch_sub(1, Ordering::Relaxed);
     }
 
     fn wake_up(&self, wiring: &S::Wiring, now: MonotonicTime) {
@@ -184,9 +184,9 @@ impl<S: Shore> Island<S> {
             return;
         }
         {
-            let mut inbox = unpoisoned(self.inbox.lock());
-            inbox.woken = Some(now);
-            self.pending.store(inbox.len(), Ordering::Relaxed);
+            let mut inbox = self.inbox();
+            inbox.wake(now);
+            self.pending.store(inbox.pending().0, Ordering::Relaxed);
         }
         self.attend(wiring);
     }
@@ -206,7 +206,7 @@ impl<S: Shore> Island<S> {
 
     /// Delivers what has come into the inbox meanwhile, and lets go.
     #[inline]
-    fn leave(&self, wiring: &S::Wiring, state: MutexGuard<'_, S>) {
+    fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
         drop(state);
         fence(Ordering::SeqCst);
         if self.pending.load(Ordering::Relaxed) != 0 {
@@ -214,26 +214,39 @@ impl<S: Shore> Island<S> {
         }
     }
 
+    /// Once it has delivered as much as an inbox holds, it lets those who wait go on in its place: they attend to the inbox
+    /// after they have ceased to wait, and the fences make sure that one of the two sees the other.
     #[cold]
     fn drain(&self, wiring: &S::Wiring) {
+        let mut delivered = 0;
         if self.replayed.load(Ordering::Relaxed) {
             return;
         }
         while self.pending.load(Ordering::Relaxed) != 0 {
             let Some(mut state) = self.try_lock() else { return };
-            while let Some(taken) = self.take() {
+            while !self.gives_way(delivered)
+                && let Some(taken) = self.take()
+            {
                 Self::run(&mut state, wiring, taken);
+                delivered += 1;
             }
             drop(state);
             fence(Ordering::SeqCst);
+            if self.gives_way(delivered) {
+                return;
+            }
         }
     }
 
-    fn run(state: &mut S, wiring: &S::Wiring, taken: Taken<S::Message>) {
+    fn gives_way(&self, delivered: usize) -> bool {
+        delivered >= S::CAPACITY && self.waiting.load(Ordering::Relaxed) != 0
+    }
+
+    fn run(state: &mut S, wiring: &S::Wiring, taken: Taken<Keyed<S::Message>>) {
         match taken {
-            Taken::Message(Waiting { arrived, key, message }) => {
-                Self::write(wiring, arrived, key);
-                state.deliver(wiring, &message, arrived);
+            Taken::Message(now, Keyed { key, message }) => {
+                Self::write(wiring, now, key);
+                state.deliver(wiring, &message, now);
             }
             Taken::Wake(now) => {
                 if let Some(journal) = S::journal(wiring) {
@@ -244,13 +257,6 @@ impl<S: Shore> Island<S> {
         }
     }
 
-    /// The first message of that key.
-    fn take_replayed(&self, key: Key) -> Option<Waiting<S::Message>> {
-        let mut inbox = unpoisoned(self.inbox.lock());
-        let position = inbox.messages.iter().position(|waiting| waiting.key == key)?;
-        inbox.messages.remove(position)
-    }
-
     /// Writes into the journal, if there is one, what is delivered now; the island is held.
     #[inline]
     fn write(wiring: &S::Wiring, now: MonotonicTime, key: Key) {
@@ -259,17 +265,16 @@ impl<S: Shore> Island<S> {
         }
     }
 
-    fn take(&self) -> Option<Taken<S::Message>> {
-        let mut inbox = unpoisoned(self.inbox.lock());
-        let taken = match inbox.messages.pop_front() {
-            Some(waiting) => Some(Taken::Message(waiting)),
-            None => inbox.woken.take().map(Taken::Wake),
-        };
-        self.pending.store(inbox.len(), Ordering::Relaxed);
+    fn take(&self) -> Option<Taken<Keyed<S::Message>>> {
+        let mut inbox = self.inbox();
+        let taken = inbox.take();
+        self.pending.store(inbox.pending().0, Ordering::Relaxed);
+        self.hangs.store(false, Ordering::Relaxed);
         taken
     }
 
-    /// Runs `call` once the island is free, then what has come meanwhile; none after `timeout`.
+    /// Runs `call` once the island is free, then what has come meanwhile; none after `timeout`, and none if the caller has
+    /// been called by an estimator's message himself: he could wait for ever.
     pub fn with<T>(
         &self,
         wiring: &S::Wiring,
@@ -277,7 +282,13 @@ impl<S: Shore> Island<S> {
         call: impl FnOnce(&mut S) -> T,
     ) -> Option<T> {
         let mut state = match timeout {
-            None => unpoisoned(self.state.lock()),
+            None if Inside::is_here() => return None,
+            None => {
+                self.waiting.fetch_add(1, Ordering::Relaxed);
+                let state = Within::new(unpoisoned(self.state.lock()));
+                self.waiting.fetch_sub(1, Ordering::Relaxed);
+                state
+            }
             Some(timeout) => self.lock_within(timeout)?,
         };
         let result = call(&mut state);
@@ -285,7 +296,8 @@ impl<S: Shore> Island<S> {
         Some(result)
     }
 
-    fn lock_within(&self, timeout: Duration) -> Option<MutexGuard<'_, S>> {
+    fn lock_within(&self, timeout: Duration) -> Option<Held<'_, S>> {
+        let timeout = if Inside::is_here() { Duration::ZERO } else { timeout };
         let start = std::time::Instant::now();
         loop {
             if let Some(state) = self.try_lock() {
@@ -298,12 +310,21 @@ impl<S: Shore> Island<S> {
         }
     }
 
-    fn try_lock(&self) -> Option<MutexGuard<'_, S>> {
+    #[inline]
+    fn try_lock(&self) -> Option<Held<'_, S>> {
         match self.state.try_lock() {
-            Ok(state) => Some(state),
-            Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+            Ok(state) => Some(Within::new(state)),
+            Err(TryLockError::Poisoned(poisoned)) => Some(Within::new(poisoned.into_inner())),
             Err(TryLockError::WouldBlock) => None,
         }
+    }
+
+    fn is_free(&self) -> bool {
+        self.try_lock().is_some()
+    }
+
+    fn inbox(&self) -> MutexGuard<'_, Inbox<Keyed<S::Message>>> {
+        unpoisoned(self.inbox.lock())
     }
 }
 
@@ -346,25 +367,31 @@ impl<S: Shore> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn give_to_thread(&self) {
-        unpoisoned(self.inbox.lock()).messages.reserve_exact(S::CAPACITY);
+        self.inbox().reserve(S::CAPACITY);
         self.served.store(true, Ordering::SeqCst);
     }
 
     fn serve(&self, wiring: &S::Wiring, stop: &StopSignal) {
         while !stop.is_set() {
-            let mut inbox = unpoisoned(self.inbox.lock());
-            if inbox.len() == 0 {
+            let inbox = self.inbox();
+            if inbox.pending() == Pending::NOTHING {
                 // Told when a message comes; the time is for `stop`.
-                inbox = unpoisoned(self.arrived.wait_timeout(inbox, Duration::from_millis(50))).0;
+                drop(unpoisoned(self.arrived.wait_timeout(inbox, Duration::from_millis(50))));
+            } else {
+                drop(inbox);
             }
-            drop(inbox);
-            let mut state = unpoisoned(self.state.lock());
-            while let Some(taken) = self.take() {
+            let mut state = Within::new(unpoisoned(self.state.lock()));
+            while !stop.is_set()
+                && let Some(taken) = self.take()
+            {
                 Self::run(&mut state, wiring, taken);
-                if stop.is_set() {
+                if self.waiting.load(Ordering::Relaxed) != 0 {
                     break;
                 }
             }
+            drop(state);
+            // A lock is not fair, and this thread would be faster than those who have to be woken.
+            inside::until(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
         }
         self.served.store(false, Ordering::SeqCst);
     }
@@ -372,23 +399,23 @@ impl<S: Shore> AnyIsland<S::Wiring> for Island<S> {
     fn begin_replay(&self) {
         self.replayed.store(true, Ordering::Relaxed);
         // Whoever publishes finds it taken.
-        self.pending.store(usize::MAX / 2, Ordering::Relaxed);
+        self.pending.store(usize::MAX, Ordering::Relaxed);
     }
 
     fn replay(&self, wiring: &S::Wiring, key: Key, now: MonotonicTime) -> bool {
-        let Some(waiting) = self.take_replayed(key) else { return false };
-        unpoisoned(self.state.lock()).deliver(wiring, &waiting.message, now);
+        let Some(waiting) = self.inbox().take_first(|waiting| waiting.key == key) else { return false };
+        Within::new(unpoisoned(self.state.lock())).deliver(wiring, &waiting.message, now);
         true
     }
 
     fn replay_drop(&self, wiring: &S::Wiring, key: Key) -> bool {
-        let Some(waiting) = self.take_replayed(key) else { return false };
+        let Some(waiting) = self.inbox().take_first(|waiting| waiting.key == key) else { return false };
         S::dropped(wiring, &waiting.message);
         true
     }
 
     fn replay_wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
-        unpoisoned(self.state.lock()).wake(wiring, now);
+        Within::new(unpoisoned(self.state.lock())).wake(wiring, now);
     }
 
     fn terminate(&self, wiring: &S::Wiring, timeout: Duration) -> bool {

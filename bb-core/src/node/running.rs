@@ -13,7 +13,7 @@ use super::{DropReason, EstimatorDeclaration, HealthReason, HealthState, HealthT
 use crate::component::{Context, Estimator, Fault, InputAt, Inputs, Reply, Request, SyncMiss};
 use crate::control::Binding;
 use crate::message::{Stamp, Stamped};
-use crate::run::{Startup, caught, retire};
+use crate::run::{Failed, Startup, caught, retire};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 
@@ -33,14 +33,19 @@ pub struct Node<E: Estimator> {
     /// When the last input was let in.
     last_input: MonotonicTime,
     timers: Timers,
-    /// When its island is next woken for it.
+    /// When its island is woken for it, or before.
     scheduled: Option<MonotonicTime>,
+    /// How often in a row it has gone on with its work.
+    continued: u32,
     /// What it asked for in `init`, until the run begins.
     requested: Vec<Request>,
     has_begun: bool,
     restart: Restart,
     recipe: Recipe<E>,
 }
+
+/// How often in a row it may go on with its work before it is taken to be stuck.
+const STUCK_AFTER: u32 = 1_000_000;
 
 /// What it is made of, at the start and at every restart.
 struct Recipe<E: Estimator> {
@@ -100,6 +105,7 @@ impl<E: Estimator> Node<E> {
             last_input: now,
             timers: Timers::default(),
             scheduled: None,
+            continued: 0,
             requested: context.into_requests(),
             has_begun: false,
             restart: Restart::default(),
@@ -209,8 +215,9 @@ impl<E: Estimator> Node<E> {
             return Turn::Idle;
         }
         if let Some(step) = self.timers.continue_with.take() {
-            return self.run(now, emitted, |estimator| estimator.handle_continue(step));
+            return self.go_on(step, now, emitted);
         }
+        self.continued = 0;
         if self.shared.take_changed_options() {
             self.change_options(now);
             return Turn::Quiet;
@@ -236,10 +243,23 @@ impl<E: Estimator> Node<E> {
     /// Lets the estimator clean up and drops it; messages that still come are counted as dropped.
     pub fn terminate(&mut self) {
         self.restart.at = None;
+        self.shared.refuse_casts();
         if let Some(fault) = self.estimator.take().and_then(|estimator| retire(estimator, false, E::terminate)) {
             self.startup.fault(self.declaration.path, &fault);
             self.shared.set_stopped(Some(fault.to_string()));
         }
+    }
+
+    fn go_on(&mut self, step: u32, now: MonotonicTime, emitted: &mut Option<E::Output>) -> Turn {
+        self.continued += 1;
+        if self.continued <= STUCK_AFTER {
+            return self.run(now, emitted, |estimator| estimator.handle_continue(step));
+        }
+        self.continued = 0;
+        let message =
+            format!("it asked {STUCK_AFTER} times in a row to go on at {now}, and nothing else could happen");
+        self.fail(Failed { fault: Fault::permanent(message), panicked: false }, now);
+        Turn::Quiet
     }
 
     /// Any callback but `handle_input`.
@@ -370,7 +390,8 @@ impl<E: Estimator> Node<E> {
                 self.timers.request(request, now);
             }
         }
-        self.scheduled = self.scheduled.filter(|scheduled| *scheduled > now);
+        // Whoever is woken says anew when to be woken next.
+        self.scheduled = None;
     }
 
     fn lost_at(&self) -> Option<MonotonicTime> {

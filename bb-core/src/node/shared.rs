@@ -2,6 +2,7 @@
 
 use super::counters::Counters;
 use super::{EstimatorDeclaration, EstimatorStatistics, HealthState};
+use crate::component::Fault;
 use std::any::Any;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, Ordering};
@@ -22,7 +23,8 @@ struct Inner {
     health: AtomicU8,
     /// Why it does not run, if it does not.
     stopped: Mutex<Option<String>>,
-    casts: Mutex<VecDeque<Box<dyn Any + Send>>>,
+    /// None once the robot has stopped.
+    casts: Mutex<Option<VecDeque<Box<dyn Any + Send>>>>,
     /// A parameter that its options are bound to has changed.
     options_changed: AtomicBool,
     /// Its supervisor starts it anew, though it has not failed.
@@ -39,7 +41,7 @@ impl SharedNode {
             counters: Counters::new(declaration),
             health: AtomicU8::new(0),
             stopped: Mutex::new(None),
-            casts: Mutex::default(),
+            casts: Mutex::new(Some(VecDeque::new())),
             options_changed: AtomicBool::new(false),
             restart: AtomicBool::new(false),
             pretended_latency_nanos: AtomicI64::new(0),
@@ -62,10 +64,7 @@ impl SharedNode {
 
     /// Counts a message that did not fit in an inbox.
     pub(crate) fn overflow(&self, input: usize) {
-        if let Some(counters) = self.0.counters.inputs.get(input) {
-            counters.received.increment();
-        }
-        self.0.counters.drop(input, super::DropReason::Overflow);
+        self.0.counters.overflow(input);
     }
 
     pub(crate) fn statistics(&self) -> EstimatorStatistics {
@@ -88,18 +87,29 @@ impl SharedNode {
         *lock(&self.0.stopped) = reason;
     }
 
-    /// Leaves a one-way request; false if too many wait.
-    pub(crate) fn leave_cast(&self, cast: Box<dyn Any + Send>) -> bool {
-        let mut casts = lock(&self.0.casts);
-        let has_room = casts.len() < MAX_CASTS;
-        if has_room {
-            casts.push_back(cast);
+    /// Leaves a one-way request; or says why not.
+    pub(crate) fn leave_cast(&self, cast: Box<dyn Any + Send>) -> Result<(), Fault> {
+        let path = self.0.declaration.path;
+        match lock(&self.0.casts).as_mut() {
+            None => Err(Fault::new(format!("{path} does not run any more"))),
+            Some(casts) if casts.len() >= MAX_CASTS => {
+                Err(Fault::new(format!("too many requests wait for {path}")))
+            }
+            Some(casts) => {
+                casts.push_back(cast);
+                Ok(())
+            }
         }
-        has_room
     }
 
     pub(super) fn take_cast(&self) -> Option<Box<dyn Any + Send>> {
-        lock(&self.0.casts).pop_front()
+        lock(&self.0.casts).as_mut()?.pop_front()
+    }
+
+    /// Takes no requests any more; those that wait are dropped.
+    pub(super) fn refuse_casts(&self) {
+        let casts = lock(&self.0.casts).take();
+        drop(casts);
     }
 
     pub(crate) fn change_options(&self) {

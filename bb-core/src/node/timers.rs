@@ -16,34 +16,26 @@ pub(super) struct Timers {
 /// Timers that one estimator may have running; one more replaces the latest.
 const MAX_TIMERS: usize = 64;
 
+/// Nothing is due sooner after it was asked for, so that time goes on between: on virtual time, whoever asks for less again
+/// and again would keep it from doing so.
+const SHORTEST: Duration = Duration::from_micros(1);
+
 impl Timers {
-    /// Takes a request; the time at which it is due, if it is later.
+    /// Takes a request.
     #[cold]
-    pub(super) fn request(&mut self, request: Request, now: MonotonicTime) -> Option<MonotonicTime> {
+    pub(super) fn request(&mut self, request: Request, now: MonotonicTime) {
+        let after = |duration: Duration| now + duration.max(SHORTEST);
         match request {
-            Request::Continue(step) => {
-                self.continue_with = Some(step);
-                None
-            }
-            Request::Timeout(duration) => {
-                self.timeout = Some(now + duration);
-                self.timeout
-            }
-            Request::Tick(Duration::ZERO) => {
-                self.tick = None;
-                None
-            }
-            Request::Tick(period) => {
-                self.tick = Some((period, now + period));
-                Some(now + period)
-            }
+            Request::Continue(step) => self.continue_with = Some(step),
+            Request::Timeout(duration) => self.timeout = Some(after(duration)),
+            Request::Tick(Duration::ZERO) => self.tick = None,
+            Request::Tick(period) => self.tick = Some((period.max(SHORTEST), after(period))),
             Request::Timer(number, duration) => {
                 self.timers.retain(|(other, _)| *other != number);
                 if self.timers.len() == MAX_TIMERS {
                     self.timers.pop();
                 }
-                self.timers.push((number, now + duration));
-                Some(now + duration)
+                self.timers.push((number, after(duration)));
             }
         }
     }
@@ -56,7 +48,9 @@ impl Timers {
 
     pub(super) fn next(&self) -> Option<MonotonicTime> {
         let timers = self.timers.iter().map(|(_, time)| *time);
-        timers.chain(self.timeout).chain(self.tick.map(|(_, time)| time)).min()
+        let all = timers.chain(self.timeout).chain(self.tick.map(|(_, time)| time));
+        // The last instant is one that never comes.
+        all.min().filter(|time| *time < MonotonicTime::MAX)
     }
 
     /// Takes what is due first, with the time it was due.
@@ -67,7 +61,7 @@ impl Timers {
         }
         if let Some((period, time)) = self.tick.filter(|(_, time)| *time == due) {
             // What was missed is skipped, the phase kept.
-            let period_nanos = i64::try_from(period.as_nanos()).unwrap_or(i64::MAX).max(1);
+            let period_nanos = i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
             let periods = now.nanos_since(time) / period_nanos + 1;
             self.tick = Some((period, time.plus_nanos(period_nanos.saturating_mul(periods))));
             return Some(Info::Tick);

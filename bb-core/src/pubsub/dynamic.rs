@@ -229,6 +229,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_silent_topic_forgets_those_who_have_left() {
+        let topic = super::super::Topic::<crate::payload::JointState>::new("sensor/arm/encoder");
+        let listen =
+            || DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::KeepLatest);
+        let left: Vec<_> = (0..100).map(|_| Arc::downgrade(&listen().queue)).collect();
+        let _last = listen();
+        assert_eq!(left.iter().filter(|queue| queue.strong_count() > 0).count(), 0);
+    }
+
+    #[test]
     fn a_subtree_ends_at_whole_names() {
         let below = Select::Below("sensor/base");
         assert!(below.includes("sensor/base") && below.includes("sensor/base/imu"));

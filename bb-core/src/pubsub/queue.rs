@@ -91,13 +91,15 @@ impl<M> Queue<M> {
         // Several threads may wait for the same subscription, and none of them will get a message any more.
         self.arrived.notify_all();
         if let Some(waker) = waker {
-            waker.wake();
+            crate::run::wake(waker);
         }
     }
 
-    /// Says that nobody reads it any more.
+    /// Says that nobody reads it any more; what waits is dropped.
     pub(super) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Release);
+        let messages = std::mem::take(&mut self.lock().messages);
+        drop(messages);
     }
 
     pub(super) fn is_abandoned(&self) -> bool {
@@ -175,7 +177,7 @@ impl<M> Queue<M> {
             self.arrived.notify_one();
         }
         if let Some(waker) = waker {
-            waker.wake();
+            crate::run::wake(waker);
         }
     }
 

@@ -185,7 +185,9 @@ impl<T: Payload> AnyTopic for Topic<T> {
     fn tap(&self, tap: &Tap) {
         let mut subscribers = lock(&self.subscribers);
         if !subscribers.closed {
-            subscribers.taps = subscribers.taps.iter().chain([&tap.0]).map(Arc::clone).collect();
+            // Those that were dropped leave the list here too: nothing may ever be published at this topic.
+            let others = subscribers.taps.iter().filter(|other| !other.is_abandoned());
+            subscribers.taps = others.chain([&tap.0]).map(Arc::clone).collect();
             self.listening.store(subscribers.count(), Ordering::Release);
         }
     }

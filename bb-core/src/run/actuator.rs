@@ -10,7 +10,8 @@ use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
 
 /// An actuator as declared.
 #[derive(Clone, Copy, Debug)]
@@ -199,7 +200,8 @@ impl<A: Actuator> Inner<A> {
     fn fail(&self, state: &mut State<A>, Failed { fault, panicked }: Failed, now: MonotonicTime) {
         self.startup.fault(self.declaration.path, &fault);
         if let Some(mut actuator) = state.actuator.take() {
-            if !panicked && let Err(failed) = caught(|| actuator.disarm()) {
+            // After a panic too: hardware that may still move is worse than a second panic, which is caught.
+            if let Err(failed) = caught(|| actuator.disarm()) {
                 self.startup.fault(self.declaration.path, &failed.fault);
             }
             let _ = retire(actuator, panicked, A::terminate);
@@ -229,9 +231,9 @@ pub trait AnyActuator {
     /// What takes its commands, for whoever knows their type.
     #[doc(hidden)]
     fn accepts(&self) -> Box<dyn Any>;
-    /// Stops it.
+    /// Stops it once it is free; false if it is still busy after `timeout`.
     #[doc(hidden)]
-    fn terminate(&self);
+    fn terminate(&self, timeout: Duration) -> bool;
 }
 
 impl<A: Actuator> AnyActuator for ActuatorNode<A> {
@@ -252,12 +254,13 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
         Box::new(accepts)
     }
 
-    fn terminate(&self) {
-        let mut state = lock(&self.0.state);
+    fn terminate(&self, timeout: Duration) -> bool {
+        let Some(mut state) = lock_within(&self.0.state, timeout) else { return false };
         state.restart_at = None;
         if let Some(fault) = state.actuator.take().and_then(|actuator| retire(actuator, false, A::terminate)) {
             self.0.startup.fault(self.0.declaration.path, &fault);
         }
+        true
     }
 }
 
@@ -274,6 +277,18 @@ impl<A: Actuator> Drop for Inner<A> {
 impl<A: Actuator> fmt::Debug for ActuatorNode<A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ActuatorNode").field("path", &self.0.declaration.path).finish_non_exhaustive()
+    }
+}
+
+fn lock_within<T>(mutex: &Mutex<T>, timeout: Duration) -> Option<MutexGuard<'_, T>> {
+    let start = Instant::now();
+    loop {
+        match mutex.try_lock() {
+            Ok(guard) => return Some(guard),
+            Err(TryLockError::Poisoned(poisoned)) => return Some(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) if start.elapsed() >= timeout => return None,
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(1)),
+        }
     }
 }
 

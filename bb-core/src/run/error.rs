@@ -5,6 +5,7 @@ use std::any::Any;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Waker;
 
 /// Why a robot does not start: which component, and what keeps it. `Debug` prints the same as `Display`, since that is
 /// what a `main` that returns it shows.
@@ -97,6 +98,17 @@ pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fa
         Ok(Ok(value)) => Ok(value),
         Ok(Err(fault)) => Err(Failed { fault, panicked: false }),
         Err(panic) => Err(Failed { fault: of_panic(&*panic), panicked: true }),
+    }
+}
+
+/// Wakes whoever waits. What a user's waker does belongs to nobody here: a panic in it must not end the thread that wakes.
+pub(crate) fn wake(waker: Waker) {
+    let woken = caught(|| {
+        waker.wake();
+        Ok(())
+    });
+    if let Err(failed) = woken {
+        tracing::error!(fault = %failed.fault, "a waker failed");
     }
 }
 

@@ -54,7 +54,8 @@ impl<R: Robot> Live<R> {
     /// Asks an estimator, and waits for its answer. What it emits beside is published as always.
     ///
     /// # Errors
-    /// The estimator does not run, or fails at this request.
+    /// The estimator does not run, or fails at this request; or an estimator's message has woken the caller on this very
+    /// thread, so that he would wait for himself.
     pub fn call<V: Visitable<R>, Q>(
         &self,
         estimator: V,
@@ -69,7 +70,7 @@ impl<R: Robot> Live<R> {
     /// Tells an estimator something. It takes it when it is free; nobody waits.
     ///
     /// # Errors
-    /// More than a thousand requests wait for it.
+    /// More than a thousand requests wait for it, or the robot has stopped.
     pub fn cast<V: Visitable<R>, Q: Send + 'static>(&self, estimator: V, request: Q) -> Result<(), Fault>
     where
         V::Estimator: HandleCast<Q>,

@@ -58,7 +58,13 @@ impl<R: Robot> Machine<R> {
             response = Some(answer);
             stamp
         });
-        response.unwrap_or_else(|| Err(Fault::new("the estimator was not reached")))
+        response.unwrap_or_else(|| {
+            let path = self.startup.node(estimator.number()).declaration().path;
+            Err(Fault::new(format!(
+                "{path} cannot be asked by code that an estimator's message has woken, which would wait for itself: use \
+                 `cast`, or another thread"
+            )))
+        })
     }
 
     pub(super) fn cast<V: Visitable<R>, Q: Send + 'static>(&self, estimator: V, request: Q) -> Result<(), Fault>
@@ -66,9 +72,7 @@ impl<R: Robot> Machine<R> {
         V::Estimator: HandleCast<Q>,
     {
         let node = self.startup.node(estimator.number());
-        if !node.leave_cast(Node::<V::Estimator>::cast(request)) {
-            return Err(Fault::new(format!("too many requests wait for {}", node.declaration().path)));
-        }
+        node.leave_cast(Node::<V::Estimator>::cast(request))?;
         if let Some(island) = self.island(node.declaration().island) {
             island.wake(&self.wiring, self.startup.clock.now());
         }
@@ -131,21 +135,25 @@ impl<R: Robot> Machine<R> {
     }
 
     /// Cancels commands and disarms, tells the subscribers that no more will come, and stops the estimators and actuators.
-    /// An estimator that is still busy at `deadline` is left behind and reported as a fault.
-    pub(super) fn terminate(&self, deadline: Instant) {
-        self.startup.control.stop(self.startup.clock.now());
+    /// What is still busy `within` so long after that is left behind and reported as a fault.
+    pub(super) fn terminate(&self, within: Duration) {
+        for path in self.startup.control.stop(self.startup.clock.now()) {
+            self.fault(path, "did not come back when the robot stopped");
+        }
+        let deadline = Instant::now() + within;
+        let left = || deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
         for topic in self.topics() {
             topic.close();
         }
         for island in (0..R::ISLANDS.len()).filter_map(|number| self.island(number)) {
-            let left = deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
-            if !island.terminate(&self.wiring, left) {
-                let message = "did not come back from its input in time";
-                self.startup.faults.add(island.name(), message.into());
+            if !island.terminate(&self.wiring, left()) {
+                self.fault(island.name(), "did not come back from its input in time");
             }
         }
         for actuator in R::all_actuators(&self.wiring) {
-            actuator.terminate();
+            if !actuator.terminate(left()) {
+                self.fault(actuator.path(), "did not come back from its command, or from disarming, in time");
+            }
         }
     }
 

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::Duration;
 
 /// A robot that is run again from its journal, on the caller's thread. Whoever subscribes gets what was published then,
 /// bit for bit.
@@ -59,7 +59,7 @@ impl<R: Robot> Replay<R> {
 
     /// Stops it, and gives the last report.
     pub fn stop(self) -> Report {
-        self.live.0.terminate(Instant::now());
+        self.live.0.terminate(Duration::ZERO);
         self.live.report()
     }
 
@@ -106,7 +106,7 @@ impl<R: Robot> Replay<R> {
             Event::Drive { health, given_up } => startup.control.replay_drive(time, &health, &given_up),
             Event::Arm => drop(startup.control.arm(time)),
             Event::Disarm { force } => drop(startup.control.disarm(force, time)),
-            Event::Stop => startup.control.stop(time),
+            Event::Stop => drop(startup.control.stop(time)),
             Event::Overrun { .. } | Event::Unsafe { .. } => {}
         }
         // The journal says when islands wake.

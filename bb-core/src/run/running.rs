@@ -59,7 +59,7 @@ impl<R: Robot> Running<R> {
                 self.live.0.fault(path, message);
             }
         }
-        self.live.0.terminate(Instant::now() + STOP_WITHIN);
+        self.live.0.terminate(STOP_WITHIN);
     }
 }
 

@@ -119,7 +119,9 @@ where
         if self.options_changed.load(Ordering::Relaxed) && self.options_changed.swap(false, Ordering::AcqRel) {
             let options = self.startup.bound(&self.options, self.binding)?;
             if let Some(component) = &mut self.component {
-                component.handle_options(options, &self.context)?;
+                let path = self.declaration.path;
+                let change = || component.handle_options(options, &self.context);
+                self.startup.control.replacing_hooks(path, false, change)?;
             }
         }
         let Some(component) = &mut self.component else { return Ok(None) };
@@ -147,7 +149,7 @@ where
     ) -> Result<Option<MonotonicTime>, Fault> {
         let is_virtual = self.startup.clock.is_virtual();
         let next = match (next, self.declaration.period_nanos) {
-            (Next::Never, _) => return Ok(None),
+            (Next::Never, _) | (Next::At(MonotonicTime::MAX), _) => return Ok(None),
             (Next::At(time), _) if !is_virtual && time.nanos_since(now) > FARTHEST_NANOS => {
                 return Err(Fault::permanent(format!(
                     "it asks to be read at {time}, and now is {now}; a recording with stamps of its own needs virtual \
@@ -197,7 +199,10 @@ where
     fn make_anew(&mut self) {
         let made = self.startup.bound(&self.options, self.binding);
         let made = match made {
-            Ok(options) => caught(|| S::init(options, &self.context)),
+            Ok(options) => {
+                let make = || caught(|| S::init(options, &self.context));
+                self.startup.control.replacing_hooks(self.declaration.path, true, make)
+            }
             Err(fault) => Err(Failed { fault, panicked: false }),
         };
         match made {

@@ -2,7 +2,7 @@
 //! `runs_on: worker`, one for what is due, one for commands.
 
 use super::machine::Machine;
-use super::{Robot, Source, StartError, Startup};
+use super::{Robot, Source, StartError, Startup, caught};
 use crate::component::Fault;
 use crate::node::WorkerDeclaration;
 use std::sync::Arc;
@@ -26,8 +26,10 @@ pub(super) fn serve<R: Robot>(machine: &Arc<Machine<R>>, threads: &mut Vec<Threa
             if let Err(message) = set_up(worker) {
                 tracing::warn!(estimator = name, message, "its thread runs as any other");
             }
-            if let Some(island) = served.island(number) {
-                island.serve(&served.wiring, &served.startup.stop);
+            while !served.startup.stop.is_set()
+                && let Some(island) = served.island(number)
+            {
+                survive(&served.startup, name, || island.serve(&served.wiring, &served.startup.stop));
             }
         })?);
     }
@@ -58,6 +60,9 @@ pub(super) fn source(mut source: Box<dyn Source>, startup: &Startup) -> Result<T
 
 /// Waits for the thread until `deadline`; what went wrong.
 pub(super) fn join(thread: JoinHandle<()>, deadline: Option<Instant>) -> Result<(), &'static str> {
+    if thread.thread().id() == std::thread::current().id() {
+        return Err("has stopped the robot itself, and cannot be waited for");
+    }
     while let Some(deadline) = deadline
         && !thread.is_finished()
     {
@@ -82,21 +87,35 @@ fn wake_what_is_due<R: Robot>(machine: &Machine<R>) {
     let agenda = machine.startup.agenda();
     while !stop.is_set() {
         let now = clock.now();
-        if let Some(island) = agenda.take(now) {
-            machine.wake(island, now);
-            continue;
+        match agenda.take(now) {
+            Some(number) => {
+                let path = machine.island(number).map_or("agenda", |island| island.name());
+                survive(&machine.startup, path, || machine.wake(number, now));
+            }
+            None => agenda.wait(clock, LONGEST_WAIT),
         }
-        let wait = agenda.next().map_or(LONGEST_WAIT, |next| next.duration_since(now));
-        agenda.wait(wait.min(LONGEST_WAIT));
     }
 }
 
 fn drive_commands(startup: &Startup) {
     while !startup.stop.is_set() {
         let now = startup.clock.now();
-        startup.control.drive(now);
+        survive(startup, "commands", || startup.control.drive(now));
         let wait = startup.control.next_due(now).map_or(LONGEST_WAIT, |next| next.duration_since(now));
         startup.control.wait(wait.min(LONGEST_WAIT));
+    }
+    // Those that came back late are ended.
+    survive(startup, "commands", || startup.control.drive(startup.clock.now()));
+}
+
+/// A panic that no component has caught, in the code of a payload say, must not end a thread that serves others.
+fn survive(startup: &Startup, path: &'static str, run: impl FnOnce()) {
+    let survived = caught(|| {
+        run();
+        Ok(())
+    });
+    if let Err(failed) = survived {
+        startup.fault(path, &failed.fault);
     }
 }
 

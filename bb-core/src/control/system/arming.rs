@@ -1,11 +1,13 @@
 //! Arming, disarming, and what leads to the safety state `error`.
 
+use super::changes::Change;
 use super::{Control, Waiting};
-use crate::control::safety::{Hook, Safety, SafetyError, disarm, disarm_in_order};
+use crate::control::safety::{DISARM_WITHIN, Hook, Safety, SafetyError, disarm, disarm_in_order};
 use crate::control::state::IDLE;
 use crate::control::tasks::lock;
 use crate::journal::Event;
 use crate::time::MonotonicTime;
+use std::time::{Duration, Instant};
 
 impl Control {
     pub(crate) fn safety(&self) -> Safety {
@@ -23,8 +25,9 @@ impl Control {
             state.machine.resting = IDLE;
         }
         let after = state.machine;
+        state.note(now, Change::Machine(before, after, None));
         drop(state);
-        self.publish_changes(before, after, None, now);
+        self.tell();
         after.safety == Safety::Armed
     }
 
@@ -53,10 +56,11 @@ impl Control {
         }
         state.machine.safety = Safety::Disarming;
         let between = state.machine;
+        state.note(now, Change::Machine(before, between, command));
         state.tasks.iter().filter(|task| Some(task.id) != except).for_each(|task| task.cancel());
         drop(state);
-        self.publish_changes(before, between, command, now);
-        let hooks = lock(&self.0.hooks).clone();
+        self.tell();
+        let hooks = lock(&self.0.hooks).all();
         let errors = match lock(&self.0.replayed_answer).take() {
             Some(errors) => errors,
             None if self.0.clock.is_virtual() => disarm_in_order(hooks),
@@ -66,15 +70,19 @@ impl Control {
             journal.could_not_be_made_safe(now, errors.clone());
         }
         let is_safe = errors.is_empty();
-        let after = {
-            let mut state = lock(&self.0.state);
-            state.machine.safety = if is_safe || force { Safety::Disarmed } else { Safety::Error };
-            state.machine
-        };
         for error in errors {
             self.report(error, now);
         }
-        self.publish_changes(between, after, command, now);
+        let mut state = lock(&self.0.state);
+        let before = state.machine;
+        // Unless a component was given up meanwhile, which is an error whatever is safe now.
+        if before.safety == Safety::Disarming {
+            state.machine.safety = if is_safe || force { Safety::Disarmed } else { Safety::Error };
+        }
+        let after = state.machine;
+        state.note(now, Change::Machine(before, after, command));
+        drop(state);
+        self.tell();
         is_safe
     }
 
@@ -89,18 +97,25 @@ impl Control {
     }
 
     pub(super) fn carry_out_giving_up(&self, path: &'static str, now: MonotonicTime) {
-        self.report(
-            SafetyError { path, message: "failed too often, and is not started anew any more".into() },
-            now,
-        );
+        let message = "failed too often, and is not started anew any more".into();
+        self.report(SafetyError { path, message }, now);
         self.disarm_except(None, None, false, now);
-        let (before, after) = {
-            let mut state = lock(&self.0.state);
-            let before = state.machine;
-            state.machine.safety = Safety::Error;
-            (before, state.machine)
-        };
-        self.publish_changes(before, after, None, now);
+        let mut state = lock(&self.0.state);
+        let before = state.machine;
+        state.machine.safety = Safety::Error;
+        let after = state.machine;
+        state.note(now, Change::Machine(before, after, None));
+        drop(state);
+        self.tell();
+    }
+
+    /// Waits until whoever disarms the robot has done so: no longer than that may take.
+    pub(super) fn wait_for_disarm(&self) {
+        let start = Instant::now();
+        let longest = DISARM_WITHIN + Duration::from_secs(1);
+        while !self.0.clock.is_virtual() && self.safety() == Safety::Disarming && start.elapsed() < longest {
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 
     fn report(&self, error: SafetyError, now: MonotonicTime) {
@@ -110,6 +125,25 @@ impl Control {
 
     /// Remembers what makes hardware safe.
     pub(crate) fn on_disarm(&self, path: &'static str, hook: Hook) {
-        lock(&self.0.hooks).push((path, hook));
+        lock(&self.0.hooks).add(path, hook);
+    }
+
+    /// Runs `make`, which makes the component at `path` anew or changes it. What it registers takes the place of what was
+    /// registered before, once it has succeeded; `always` even if it registers nothing. There is no time between in which
+    /// its hardware would not be made safe.
+    pub(crate) fn replacing_hooks<T, E>(
+        &self,
+        path: &'static str,
+        always: bool,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<T, E> {
+        let first = lock(&self.0.hooks).next();
+        let made = make();
+        let mut hooks = lock(&self.0.hooks);
+        let is_replaced = made.is_ok() && (always || hooks.any_since(path, first));
+        let gone = if is_replaced || made.is_err() { hooks.take(path, first, is_replaced) } else { Vec::new() };
+        drop(hooks);
+        drop(gone);
+        made
     }
 }

@@ -1,7 +1,8 @@
 //! Commands: which may start, how they go on, how they end.
 
-use super::{Control, State, Waiting};
-use crate::control::commands::{AnyCommand, CommandStatistics, Refusal, RefusalReason};
+use super::changes::Change;
+use super::{Control, GOES_ON, State, Waiting};
+use crate::control::commands::{CommandStatistics, Refusal, RefusalReason};
 use crate::control::event::CommandPhase;
 use crate::control::execution::{CommandError, Execution, Slot};
 use crate::control::safety::Safety;
@@ -80,14 +81,10 @@ impl Control {
             }
             Cause::Health(health) => (None, Some(health)),
         };
-        if let Err(refusal) = self.may_start(&state, declared, &**prepared) {
-            if let Some(statistics) = state.statistics.get_mut(number) {
-                statistics.refused += 1;
-                statistics.last_refusal = Some(refusal.clone());
-            }
+        if let Err(refusal) = self.may_start(&state, declared, prepared.role()) {
+            self.refuse(&mut state, number, refusal.clone(), health, now);
             drop(state);
-            tracing::warn!(command = declared.name, %refusal, "command refused");
-            self.command_event(number, 0, CommandPhase::Refused(refusal.clone()), health, now);
+            self.tell();
             return Err(refusal);
         }
         let cancelled = state.tasks.iter().filter(|task| {
@@ -102,46 +99,82 @@ impl Control {
             statistics.started += 1;
         }
         let after = state.machine;
-        let context = CommandContext { name: declared.name, health, control: self.clone() };
         let deadline = declared.timeout_nanos.map(|timeout| now.plus_nanos(timeout));
-        let parameters = self.parameters();
-        drop(state);
-        // The user's code may run here already, so no lock is held.
-        let started = crate::run::caught(|| prepared.start(arguments, &parameters, context));
-        let future = started.unwrap_or_else(|failed| Box::pin(std::future::ready(Err(failed.fault))));
-        let task = Arc::new(Task::new(id, number, health, deadline, future, self.0.bell.clone()));
+        // It is among those that run before it begins: it takes its room, and whoever cancels all reaches it.
+        let task = Arc::new(Task::new(id, number, health, deadline, self.0.bell.clone()));
         let slot = Arc::clone(&task.slot);
-        lock(&self.0.state).tasks.push(task);
-        self.command_event(number, id, CommandPhase::Started, health, now);
-        self.publish_changes(before, after, Some(declared.name), now);
-        self.0.bell.ring();
+        state.tasks.push(Arc::clone(&task));
+        state.note(now, Change::Command(number, id, CommandPhase::Started, health));
+        state.note(now, Change::Machine(before, after, Some(declared.name)));
+        drop(state);
+        self.tell();
+        // The user's code may run here already, and start other commands: no lock is held.
+        let parameters = self.parameters();
+        let context = CommandContext { name: declared.name, health, control: self.clone() };
+        let started = crate::run::caught(|| prepared.start(arguments, &parameters, context));
+        task.begin(started.unwrap_or_else(|failed| Box::pin(std::future::ready(Err(failed.fault)))));
+        if lock(&self.0.state).is_stopping {
+            // Nobody else drives commands any more.
+            self.drive(now);
+        }
         Ok(slot)
     }
 
-    fn may_start(
+    /// Counts a refusal and has it published.
+    fn refuse(
         &self,
-        state: &State,
-        declared: &CommandDeclaration,
-        prepared: &dyn AnyCommand,
-    ) -> Result<(), Refusal> {
+        state: &mut State,
+        number: usize,
+        refusal: Refusal,
+        health: Option<HealthTransition>,
+        now: MonotonicTime,
+    ) {
+        tracing::warn!(command = refusal.command, %refusal, "command refused");
+        if let Some(statistics) = state.statistics.get_mut(number) {
+            statistics.refused += 1;
+            statistics.last_refusal = Some(refusal.clone());
+        }
+        state.note(now, Change::Command(number, 0, CommandPhase::Refused(refusal), health));
+    }
+
+    /// Refuses the command of a change of health since too many wait.
+    pub(super) fn refuse_waiting(
+        &self,
+        state: &mut State,
+        number: usize,
+        health: HealthTransition,
+        now: MonotonicTime,
+    ) {
+        if let Some(declared) = self.0.declared.commands.get(number) {
+            let refusal = self.refusal(state, declared, RefusalReason::Busy);
+            self.refuse(state, number, refusal, Some(health), now);
+        }
+    }
+
+    fn refusal(&self, state: &State, declared: &CommandDeclaration, reason: RefusalReason) -> Refusal {
         let category = self.0.declared.categories.get(declared.category).copied();
         let category = category.unwrap_or(CategoryDeclaration { name: "default", concurrency: 1 });
-        let refuse =
-            |reason| Err(Refusal { command: declared.name, reason, state: state.machine.state(), category });
+        Refusal { command: declared.name, reason, state: state.machine.state(), category }
+    }
+
+    fn may_start(&self, state: &State, declared: &CommandDeclaration, role: Role) -> Result<(), Refusal> {
+        let refuse = |reason| Err(self.refusal(state, declared, reason));
         if state.is_stopping {
             return refuse(RefusalReason::Stopping);
         }
         if matches!(state.machine.safety, Safety::Error | Safety::Disarming) {
             return refuse(RefusalReason::Safety);
         }
-        if !declared.allowed(prepared.role(), state.machine.state()) {
+        if !declared.allowed(role, state.machine.state()) {
             return refuse(RefusalReason::State);
         }
         let in_category = |task: &&Arc<Task>| {
             self.0.declared.commands.get(task.command).is_some_and(|other| other.category == declared.category)
         };
         let running = state.tasks.iter().filter(in_category).count();
-        if running >= category.concurrency && !declared.cancel.includes(declared.category) {
+        let concurrency =
+            self.0.declared.categories.get(declared.category).map_or(1, |category| category.concurrency);
+        if running >= concurrency && !declared.cancel.includes(declared.category) {
             return refuse(RefusalReason::Busy);
         }
         Ok(())
@@ -161,9 +194,9 @@ impl Control {
         !self.0.has_waiting.load(Ordering::Acquire) && lock(&self.0.state).tasks.is_empty()
     }
 
-    /// Does all that can be done at `now`.
+    /// Does what can be done at `now`, each command once: time may go on before those are gone on with that wake themselves.
     pub(crate) fn drive(&self, now: MonotonicTime) {
-        while self.turn(now, |waiting| std::mem::take(waiting).into()) {}
+        self.turn(now, |waiting| std::mem::take(waiting).into());
     }
 
     /// Does again what a journal says was done at `now`.
@@ -184,31 +217,28 @@ impl Control {
         });
     }
 
-    /// Starts what `take` takes of the waiting, and goes on once with every task that can; false if there was nothing.
-    fn turn(&self, now: MonotonicTime, take: impl FnOnce(&mut VecDeque<Waiting>) -> Vec<Waiting>) -> bool {
+    /// Starts what `take` takes of what waits, and goes on once with every command that can.
+    fn turn(&self, now: MonotonicTime, take: impl FnOnce(&mut VecDeque<Waiting>) -> Vec<Waiting>) {
         let _acting = self.act();
         self.0.moment_nanos.store(now.as_nanos(), Ordering::Release);
         self.0.sleeper.advance(now);
-        let (waiting, due) = {
+        let waiting = {
             let mut state = lock(&self.0.state);
             let waiting = take(&mut state.waiting);
             self.0.has_waiting.store(!state.waiting.is_empty(), Ordering::Release);
-            let due = state.tasks.iter().filter(|task| task.is_due(now)).cloned().collect::<Vec<_>>();
-            (waiting, due)
-        };
-        if waiting.is_empty() && due.is_empty() {
-            return false;
-        }
-        if self.0.journal.is_some() {
-            let (mut health, mut given_up) = (Vec::new(), Vec::new());
-            for waiting in &waiting {
-                match waiting {
-                    Waiting::Start(transition, _) => health.push(*transition),
-                    Waiting::GiveUp(path) => given_up.push(*path),
+            if self.0.journal.is_some() && (!waiting.is_empty() || state.tasks.iter().any(|task| task.is_due(now)))
+            {
+                let (mut health, mut given_up) = (Vec::new(), Vec::new());
+                for waiting in &waiting {
+                    match waiting {
+                        Waiting::Start(transition, _) => health.push(*transition),
+                        Waiting::GiveUp(path) => given_up.push(*path),
+                    }
                 }
+                self.write(now, Event::Drive { health, given_up });
             }
-            self.write(now, Event::Drive { health, given_up });
-        }
+            waiting
+        };
         for waiting in waiting {
             match waiting {
                 // A refusal is counted and published.
@@ -216,12 +246,15 @@ impl Control {
                 Waiting::GiveUp(path) => self.carry_out_giving_up(path, now),
             }
         }
+        let due: Vec<_> = lock(&self.0.state).tasks.iter().filter(|task| task.is_due(now)).cloned().collect();
         for task in due {
-            if let Some(result) = task.poll(now) {
+            let before = GOES_ON.replace(true);
+            let polled = task.poll(now, self.0.clock.is_virtual());
+            GOES_ON.set(before);
+            if let Some(result) = polled {
                 self.finish(&task, result, now);
             }
         }
-        true
     }
 
     /// Waits until there may be something to drive, `longest` at most.
@@ -233,29 +266,53 @@ impl Control {
         self.0.bell.ring();
     }
 
-    /// Cancels what runs; nothing is started any more. The robot is disarmed.
-    pub(crate) fn stop(&self, now: MonotonicTime) {
+    /// Cancels what runs; nothing is started any more. The robot is disarmed. Gives the paths of the commands that do not
+    /// come back from their code on another thread; their callers are told all the same.
+    pub(crate) fn stop(&self, now: MonotonicTime) -> Vec<&'static str> {
         {
             let mut state = lock(&self.0.state);
-            if state.is_stopping {
-                return;
+            if !state.is_stopping {
+                self.write(now, Event::Stop);
             }
-            self.write(now, Event::Stop);
             state.is_stopping = true;
             state.tasks.iter().for_each(|task| task.cancel());
         }
         self.drive(now);
+        let tasks = lock(&self.0.state).tasks.clone();
+        let left = tasks.iter().filter(|task| task.has_begun());
+        let left = left.inspect(|task| task.slot.set(Err(CommandError::Cancelled)));
+        let left = left.filter_map(|task| self.0.declared.commands.get(task.command)).map(|command| command.path);
+        let left = left.collect();
+        self.wait_for_disarm();
         if self.safety() == Safety::Armed {
             self.disarm_except(None, None, false, now);
         }
+        left
     }
 
     fn finish(&self, task: &Task, result: Result<Outcome<Value>, CommandError>, now: MonotonicTime) {
         let Some(declared) = self.0.declared.commands.get(task.command) else { return };
         let role = self.0.commands.get(task.command).map_or(Role::Plain, |command| command.0.role());
-        let result = result.and_then(|outcome| self.checked(outcome));
+        let mut result = result.and_then(|outcome| self.checked(outcome));
         if result.is_ok() && role == Role::Disarming {
             self.disarm_except(Some(task.id), Some(declared.name), false, now);
+        }
+        let mut state = lock(&self.0.state);
+        let before = state.machine;
+        state.tasks.retain(|other| other.id != task.id);
+        state.machine.running = state.machine.running.saturating_sub(1);
+        // Whoever has disarmed the robot meanwhile has cancelled it.
+        let is_overruled = role == Role::Arming && (task.is_cancelled() || state.is_stopping);
+        let overruled =
+            (is_overruled && result.is_ok()).then(|| std::mem::replace(&mut result, Err(CommandError::Cancelled)));
+        if let Ok(outcome) = &result {
+            if role == Role::Arming && state.machine.safety == Safety::Disarmed {
+                state.machine.safety = Safety::Armed;
+                state.machine.resting = IDLE;
+            }
+            if let Some(next) = outcome.next_state {
+                state.machine.resting = next;
+            }
         }
         let phase = match &result {
             Ok(_) => CommandPhase::Succeeded,
@@ -263,33 +320,22 @@ impl Control {
             Err(CommandError::TimedOut) => CommandPhase::TimedOut,
             Err(CommandError::Cancelled) => CommandPhase::Cancelled,
         };
-        let (before, after) = {
-            let mut state = lock(&self.0.state);
-            let before = state.machine;
-            state.tasks.retain(|other| other.id != task.id);
-            state.machine.running = state.machine.running.saturating_sub(1);
-            if let Ok(outcome) = &result {
-                if role == Role::Arming && state.machine.safety == Safety::Disarmed {
-                    state.machine.safety = Safety::Armed;
-                    state.machine.resting = IDLE;
-                }
-                if let Some(next) = outcome.next_state {
-                    state.machine.resting = next;
-                }
+        if let Some(statistics) = state.statistics.get_mut(task.command) {
+            match &phase {
+                CommandPhase::Succeeded => statistics.succeeded += 1,
+                CommandPhase::Failed(_) => statistics.failed += 1,
+                CommandPhase::TimedOut => statistics.timed_out += 1,
+                CommandPhase::Cancelled => statistics.cancelled += 1,
+                CommandPhase::Started | CommandPhase::Refused(_) => {}
             }
-            if let Some(statistics) = state.statistics.get_mut(task.command) {
-                match &phase {
-                    CommandPhase::Succeeded => statistics.succeeded += 1,
-                    CommandPhase::Failed(_) => statistics.failed += 1,
-                    CommandPhase::TimedOut => statistics.timed_out += 1,
-                    CommandPhase::Cancelled => statistics.cancelled += 1,
-                    CommandPhase::Started | CommandPhase::Refused(_) => {}
-                }
-            }
-            (before, state.machine)
-        };
-        self.command_event(task.command, task.id, phase, task.health, now);
-        self.publish_changes(before, after, Some(declared.name), now);
+        }
+        let after = state.machine;
+        state.note(now, Change::Command(task.command, task.id, phase, task.health));
+        state.note(now, Change::Machine(before, after, Some(declared.name)));
+        drop(state);
+        // What a command gave may do anything when it is dropped.
+        drop(overruled);
+        self.tell();
         task.slot.set(result.map(|outcome| outcome.value));
     }
 

@@ -1,7 +1,7 @@
 //! Parameters: what is set, by whom it is checked, who is told.
 
+use super::changes::Change;
 use super::{Bound, Control};
-use crate::control::event::ParameterChange;
 use crate::control::parameters::{ParameterError, ParameterValue, ParameterValues};
 use crate::control::tasks::lock;
 use crate::journal::Event;
@@ -74,10 +74,9 @@ impl Control {
         for component in bound.iter().filter(|component| component.parameters.contains(&number)) {
             (component.notify)();
         }
+        lock(&self.0.state).note(now, Change::Parameter(number, from, value));
         drop(bound);
-        if let Some(topic) = self.0.topics.parameters.get(number) {
-            self.publish(topic, ParameterChange { path: declared.path, from, to: value }, now);
-        }
+        self.tell();
         Ok(())
     }
 

@@ -1,0 +1,291 @@
+//! Commands that misbehave: that never sleep, that block, that start others while they start.
+
+use crate::components::{Number, at, within};
+use bb_core::control::CommandError;
+use bb_core::prelude::*;
+use std::future::Future;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
+
+/// What a [`Misbehave`] does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Kind {
+    #[default]
+    Sleep,
+    /// Wakes itself and never gives way.
+    Spin,
+    /// Does not come back until it may.
+    Block,
+    /// Panics when it is dropped.
+    Mine,
+    /// Sleeps so long that it never ends.
+    Endless,
+}
+
+static MAY_GO_ON: AtomicBool = AtomicBool::new(false);
+static BLOCKS: AtomicBool = AtomicBool::new(false);
+
+/// Panics when it is dropped.
+struct Mine;
+
+impl Drop for Mine {
+    fn drop(&mut self) {
+        panic!("a mine");
+    }
+}
+
+/// Does what it is told.
+#[derive(Debug)]
+pub(crate) struct Misbehave;
+
+impl Command for Misbehave {
+    type Options = NoOptions;
+    type Arguments = Kind;
+    type Output = ();
+
+    async fn run(_: NoOptions, kind: Kind, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        match kind {
+            Kind::Sleep => context.sleep(Duration::from_millis(10)).await,
+            Kind::Spin => {
+                std::future::poll_fn(|polled| -> Poll<()> {
+                    polled.waker().wake_by_ref();
+                    Poll::Pending
+                })
+                .await;
+            }
+            Kind::Block => {
+                BLOCKS.store(true, Ordering::SeqCst);
+                while !MAY_GO_ON.load(Ordering::SeqCst) {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+            }
+            Kind::Mine => {
+                let _mine = Mine;
+                context.sleep(Duration::from_millis(10)).await;
+                std::mem::forget(_mine);
+            }
+            Kind::Endless => context.sleep(Duration::from_secs(3_600_000)).await,
+        }
+        Ok(Outcome::done(()))
+    }
+}
+
+type Starts = Box<dyn FnOnce() + Send>;
+static STARTS: Mutex<Option<Starts>> = Mutex::new(None);
+
+/// Does something before it gives its future.
+#[derive(Debug)]
+pub(crate) struct Nested;
+
+impl Command for Nested {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    fn run(
+        _: NoOptions,
+        _: NoArguments,
+        _: CommandContext,
+    ) -> impl Future<Output = Result<Outcome<()>, Fault>> + Send {
+        let starts = STARTS.lock().expect("nobody panics with it").take();
+        if let Some(starts) = starts {
+            starts();
+        }
+        std::future::ready(Ok(Outcome::done(())))
+    }
+}
+
+/// Arms once it may.
+#[derive(Debug)]
+pub(crate) struct SlowArm;
+
+impl Command for SlowArm {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+    const ROLE: Role = Role::Arming;
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        ARMING.store(true, Ordering::SeqCst);
+        while ARMING.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(Outcome::done(()))
+    }
+}
+
+static ARMING: AtomicBool = AtomicBool::new(false);
+
+robot! {
+    robot Unruly;
+
+    commands {
+        category many { concurrency: 20000; }
+        category others { concurrency: 2; }
+        misbehave: Misbehave { category: many; timeout: 200 ms; allowed_states: [disarmed, idle, executing]; }
+        patient: Misbehave { category: many; allowed_states: [disarmed, idle, executing]; }
+        nested: Nested { category: others; allowed_states: [disarmed, idle, executing]; }
+        slow_arm: SlowArm { category: others; allowed_states: [disarmed]; }
+    }
+
+    link base { sensor number: External<Number>(); }
+}
+
+#[test]
+fn a_command_that_wakes_itself_for_ever_fails_on_virtual_time() {
+    within(60, || {
+        let mut simulation = Unruly::builder().simulate().expect("it starts");
+        let spinning = simulation.command(unruly::command::patient, Kind::Spin).expect("it is allowed");
+        let sleeping = simulation.command(unruly::command::patient, Kind::Sleep).expect("it is allowed");
+        simulation.run_until(at(100));
+        assert_eq!(sleeping.try_result(), Some(Ok(())));
+        let error = spinning.try_result().expect("it has ended").expect_err("it never would").to_string();
+        assert_eq!(
+            error,
+            "the command failed: it woke itself 1000000 times at 0.000000000 s, and virtual time cannot go on: await \
+             `CommandContext::sleep` between two looks"
+        );
+    });
+}
+
+#[test]
+fn a_command_that_wakes_itself_for_ever_does_not_hold_up_time() {
+    within(60, || {
+        let running = Unruly::builder().start().expect("it starts");
+        let sleeping = running.command(unruly::command::patient, Kind::Sleep).expect("it is allowed");
+        let spinning = running.command(unruly::command::misbehave, Kind::Spin).expect("it is allowed");
+        assert_eq!(sleeping.wait_timeout(Duration::from_secs(10)), Some(Ok(())));
+        assert_eq!(spinning.wait_timeout(Duration::from_secs(10)), Some(Err(CommandError::TimedOut)));
+    });
+}
+
+#[test]
+fn a_command_that_does_not_come_back_does_not_keep_the_robot_from_stopping() {
+    within(60, || {
+        let running = Unruly::builder().start().expect("it starts");
+        let blocked = running.command(unruly::command::patient, Kind::Block).expect("it is allowed");
+        while !BLOCKS.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let report = running.stop();
+        assert_eq!(blocked.wait(), Err(CommandError::Cancelled));
+        let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
+        assert!(
+            faults.iter().any(|fault| fault == "command/patient failed: did not come back when the robot stopped"),
+            "{faults:?}"
+        );
+        MAY_GO_ON.store(true, Ordering::SeqCst);
+    });
+}
+
+#[test]
+fn a_command_may_start_another_while_it_starts() {
+    within(60, || {
+        let mut simulation = Unruly::builder().simulate().expect("it starts");
+        let live = (*simulation).clone();
+        let starts = move || drop(live.command(unruly::command::nested, NoArguments).expect("there is room"));
+        *STARTS.lock().expect("nobody panics with it") = Some(Box::new(starts));
+        let nested = simulation.command(unruly::command::nested, NoArguments).expect("it is allowed");
+        simulation.run_until(at(1));
+        assert_eq!(nested.try_result(), Some(Ok(())));
+        let report = simulation.stop();
+        let statistics = report.commands.iter().find(|command| command.name == "nested").expect("it is declared");
+        assert_eq!((statistics.started, statistics.succeeded), (2, 2));
+    });
+}
+
+#[test]
+fn a_future_that_panics_when_it_is_dropped_ends_as_it_would_have() {
+    within(60, || {
+        let mut simulation = Unruly::builder().simulate().expect("it starts");
+        let mine = simulation.command(unruly::command::patient, Kind::Mine).expect("it is allowed");
+        simulation.run_until(at(1));
+        mine.cancel();
+        simulation.run_until(at(2));
+        assert_eq!(mine.try_result(), Some(Err(CommandError::Cancelled)));
+    });
+}
+
+#[test]
+fn a_result_is_waited_for_as_long_as_one_likes_and_taken_once() {
+    within(60, || {
+        let running = Unruly::builder().start().expect("it starts");
+        let sleeping = running.command(unruly::command::patient, Kind::Sleep).expect("it is allowed");
+        assert_eq!(sleeping.wait_timeout(Duration::MAX), Some(Ok(())));
+        assert_eq!(sleeping.wait(), Err(CommandError::Failed("its result was taken already".into())));
+    });
+}
+
+#[test]
+fn ten_thousand_commands_end_at_their_time() {
+    within(120, || {
+        let mut simulation = Unruly::builder().simulate().expect("it starts");
+        let start = |kind| simulation.command(unruly::command::misbehave, kind).expect("it is allowed");
+        let slept: Vec<_> = (0..5000).map(|_| start(Kind::Sleep)).collect();
+        let late: Vec<_> = (0..5000).map(|_| start(Kind::Endless)).collect();
+        simulation.run_until(at(1000));
+        assert!(slept.iter().all(|command| command.try_result() == Some(Ok(()))));
+        assert!(late.iter().all(|command| command.try_result() == Some(Err(CommandError::TimedOut))));
+    });
+}
+
+#[test]
+fn one_that_arms_does_not_arm_a_robot_that_was_disarmed_meanwhile() {
+    within(60, || {
+        let running = Unruly::builder().start().expect("it starts");
+        let arming = running.command(unruly::command::slow_arm, NoArguments).expect("it is disarmed");
+        while !ARMING.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        // Somebody else arms and disarms it meanwhile.
+        assert!(running.arm() && running.disarm());
+        ARMING.store(false, Ordering::SeqCst);
+        assert_eq!(arming.wait(), Err(CommandError::Cancelled));
+        assert_eq!(running.safety(), Safety::Disarmed);
+    });
+}
+
+#[test]
+fn events_of_a_command_come_in_their_order_from_many_threads() {
+    within(60, || {
+        use bb_core::control::CommandPhase::{Started, Succeeded};
+        let builder = Unruly::builder();
+        let roomy = Overflow::DropOldest { capacity: 1 << 15 };
+        let events = builder.subscribe_with(unruly::command::patient, roomy);
+        let states = builder.subscribe_with(system::StateMachine, roomy);
+        let running = builder.start().expect("it starts");
+        running.arm();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..200 {
+                        let command = running.command(unruly::command::patient, Kind::Sleep);
+                        drop(command.expect("it is allowed"));
+                        std::thread::sleep(Duration::from_micros(50));
+                    }
+                });
+            }
+        });
+        while running.state() != "idle" {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let live = (*running).clone();
+        running.stop();
+        let mut started = std::collections::HashSet::new();
+        for event in events.drain() {
+            match event.phase {
+                Started => assert!(started.insert(event.execution)),
+                Succeeded => assert!(started.remove(&event.execution), "it ended before it started"),
+                _ => {}
+            }
+        }
+        let mut state = "disarmed";
+        for change in states.drain() {
+            assert_eq!(change.from, state);
+            state = change.to;
+        }
+        assert_eq!((state, live.state()), ("disarmed", "disarmed"));
+        assert!(started.is_empty());
+    });
+}

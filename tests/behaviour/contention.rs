@@ -1,0 +1,302 @@
+//! Several threads at once: nothing is lost uncounted, orders are kept, nobody waits for ever.
+
+use crate::components::{Number, within};
+use bb_core::DynamicSubscription;
+use bb_core::node::DropReason;
+use bb_core::prelude::*;
+use std::future::Future;
+use std::pin::pin;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::task::{Context as Polled, Wake, Waker};
+
+/// Numbers of two publishers, which must never go back.
+#[derive(Clone, Copy, Debug, Inputs)]
+pub(crate) struct Two<'a> {
+    pub(crate) first: Input<'a, Number>,
+    pub(crate) second: Option<Input<'a, Number>>,
+}
+
+/// Options of [`Ordered`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct OrderedOptions {
+    #[option(default = 1.0)]
+    pub(crate) gain: f64,
+}
+
+/// Fails if something is out of order; half a number is a fault, [`HANG`] hangs it.
+#[derive(Debug, Default)]
+pub(crate) struct Ordered([f64; 2]);
+
+const HANG: f64 = 1e9;
+static HANGS: AtomicBool = AtomicBool::new(false);
+
+impl Estimator for Ordered {
+    type Options = OrderedOptions;
+    type Input = Two<'static>;
+    type Output = Number;
+
+    fn init(_: OrderedOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self::default())
+    }
+
+    fn handle_input(&mut self, two: Two<'_>) -> Result<Reply<Number>, Fault> {
+        if two.first.0.fract() != 0.0 {
+            return Err(Fault::new("asked to fail"));
+        }
+        if two.first.0 == HANG {
+            HANGS.store(true, Ordering::SeqCst);
+            while HANGS.load(Ordering::SeqCst) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        let now = [two.first.0, two.second.map_or(0.0, |second| second.0)];
+        assert!(now[0] >= self.0[0] && now[1] >= self.0[1], "out of order");
+        self.0 = now;
+        Ok(Reply::emit(Number(two.first.0)))
+    }
+
+    fn handle_options(&mut self, _: OrderedOptions, _: &Context) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+pub(crate) struct Ask;
+pub(crate) struct Tell;
+
+impl HandleCall<Ask> for Ordered {
+    type Response = f64;
+    fn handle_call(&mut self, Ask: Ask) -> Result<(f64, Reply<Number>), Fault> {
+        Ok((self.0[0], Reply::none()))
+    }
+}
+
+static TOLD: AtomicU64 = AtomicU64::new(0);
+
+impl HandleCast<Tell> for Ordered {
+    fn handle_cast(&mut self, Tell: Tell) -> Result<Reply<Number>, Fault> {
+        TOLD.fetch_add(1, Ordering::SeqCst);
+        Ok(Reply::none())
+    }
+}
+
+robot! {
+    robot Crowded;
+
+    parameters { gain: f64 = 1.0; }
+
+    link base {
+        sensor a: External<Number>();
+        sensor b: External<Number>();
+        estimator ordered: Ordered(gain = param::gain) {
+            input first: sensor::base::a, driver;
+            input second: sensor::base::b, optional;
+        }
+        estimator beside: Ordered() {
+            input first: sensor::base::b, driver;
+            input second: sensor::base::a, optional;
+        }
+        estimator apart: Ordered() {
+            input first: sensor::base::a, driver;
+            input second: sensor::base::b, optional;
+            runs_on: worker;
+        }
+        estimator behind: Behind() { input number: estimator::base::ordered; }
+    }
+}
+
+/// Stands behind another.
+#[derive(Debug)]
+pub(crate) struct Behind;
+
+impl Estimator for Behind {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(number.payload))
+    }
+}
+
+/// Tests that hang estimators do so one after the other.
+static ALONE: Mutex<()> = Mutex::new(());
+
+const ORDERED: &str = "estimator/base/ordered";
+
+#[test]
+fn nothing_is_lost_uncounted_whoever_publishes_and_whatever_fails() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        const EACH: u64 = 20_000;
+        let mut builder = Crowded::builder();
+        builder.supervision().max_restarts = usize::MAX;
+        builder.supervision().first_backoff = Duration::from_micros(100);
+        builder.supervision().longest_backoff = Duration::from_millis(1);
+        let running = builder.start().expect("it starts");
+        let told = TOLD.load(Ordering::SeqCst);
+        let mut casts = 0;
+        std::thread::scope(|scope| {
+            for sensor in [crowded::sensor::base::a, crowded::sensor::base::b] {
+                let live = (*running).clone();
+                scope.spawn(move || {
+                    for number in 1..=EACH {
+                        let time = live.clock().now();
+                        // A fault now and then, and a pause of another length each time.
+                        let payload = if number % 3000 == 0 { number as f64 + 0.5 } else { number as f64 };
+                        live.publish(sensor, time, Number(payload));
+                        (0..number % 7).for_each(|_| std::hint::spin_loop());
+                    }
+                });
+            }
+            for round in 0..2000 {
+                casts += u64::from(running.cast(crowded::estimator::base::ordered, Tell).is_ok());
+                let _ = running.call(crowded::estimator::base::beside, Ask);
+                let _ = running.call(crowded::estimator::base::apart, Ask);
+                running.set_parameter(crowded::param::gain, f64::from(round)).expect("it is finite");
+            }
+        });
+        let report = running.stop();
+        for path in [ORDERED, "estimator/base/beside", "estimator/base/apart"] {
+            let estimator = report.estimator(path).expect("it is declared");
+            for input in &estimator.inputs {
+                assert_eq!(input.received, EACH, "{path} {}", input.name);
+            }
+            let dropped = |reason| estimator.inputs[0].dropped(reason);
+            let all: u64 = DropReason::ALL.iter().map(|reason| dropped(*reason)).sum();
+            assert_eq!(estimator.dispatched + all, EACH, "{path}: {report}");
+            assert!(estimator.restarts > 0, "{path}");
+        }
+        assert!(report.faults.iter().all(|fault| fault.message == "asked to fail"), "{:?}", report.faults);
+        // Those that waited when it stopped are not taken any more.
+        assert!(TOLD.load(Ordering::SeqCst) - told <= casts);
+    });
+}
+
+#[test]
+fn one_that_hangs_does_not_hold_up_those_who_publish() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        let running = Crowded::builder().start().expect("it starts");
+        let live = (*running).clone();
+        let hung = std::thread::spawn(move || {
+            let time = live.clock().now();
+            live.publish(crowded::sensor::base::a, time, Number(HANG));
+        });
+        while !HANGS.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let start = std::time::Instant::now();
+        for number in 0..1100 {
+            running.publish(crowded::sensor::base::b, running.clock().now(), Number(f64::from(number)));
+        }
+        assert!(start.elapsed() < Duration::from_secs(2), "it took {:?}", start.elapsed());
+        let full = running.report().estimator(ORDERED).map(|node| node.inputs[1].dropped(DropReason::Overflow));
+        assert_eq!(full, Some(1100 - 1024));
+        // Both that hang, `ordered` and `apart`, go on.
+        for _ in 0..100 {
+            HANGS.store(false, Ordering::SeqCst);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        hung.join().expect("it does not panic");
+    });
+}
+
+/// Runs a function when it is woken.
+struct Wakes(Mutex<Box<dyn FnMut() + Send>>);
+
+impl Wake for Wakes {
+    fn wake(self: Arc<Self>) {
+        (self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))();
+    }
+}
+
+/// Has `run` called on the publisher's thread at the next message.
+fn when_woken(subscription: &mut Subscription<Number>, run: impl FnMut() + Send + 'static) {
+    let waker = Waker::from(Arc::new(Wakes(Mutex::new(Box::new(run)))));
+    let awaited = pin!(subscription.recv_async());
+    assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
+}
+
+#[test]
+fn a_waker_may_publish_subscribe_and_stop_and_a_call_from_there_is_refused() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        let builder = Crowded::builder();
+        let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
+        let running = builder.start().expect("it starts");
+        let (live, answers) = ((*running).clone(), Arc::new(Mutex::new(Vec::new())));
+        let said = Arc::clone(&answers);
+        let taps: Mutex<Vec<DynamicSubscription>> = Mutex::default();
+        when_woken(&mut ordered, move || {
+            let time = live.clock().now();
+            live.publish(crowded::sensor::base::b, time, Number(1.0));
+            let tap = live.subscribe_any(Select::All, None, Overflow::KeepLatest);
+            taps.lock().expect("nobody else has it").push(tap);
+            let answer = live.call(crowded::estimator::base::ordered, Ask).map_err(|fault| fault.to_string());
+            said.lock().expect("nobody else has it").push(answer);
+            live.request_stop();
+        });
+        running.publish(crowded::sensor::base::a, running.clock().now(), Number(1.0));
+        let answers = answers.lock().expect("nobody else has it").clone();
+        let refused = "estimator/base/ordered cannot be asked by code that an estimator's message has woken, which \
+                       would wait for itself: use `cast`, or another thread";
+        assert_eq!(answers, [Err(refused.to_owned())]);
+        let report = running.stop();
+        assert_eq!(report.estimator(ORDERED).map(|ordered| ordered.inputs[1].received), Some(1));
+    });
+}
+
+#[test]
+fn a_waker_that_panics_harms_nobody() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        let builder = Crowded::builder();
+        let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
+        let behind = builder.subscribe(crowded::estimator::base::behind);
+        let running = builder.start().expect("it starts");
+        when_woken(&mut ordered, || panic!("a waker of a subscriber"));
+        running.publish(crowded::sensor::base::a, running.clock().now(), Number(1.0));
+        assert_eq!(behind.recv_timeout(Duration::from_secs(5)).map(|number| number.0), Some(1.0));
+        assert!(running.stop().ok().is_ok());
+    });
+}
+
+#[test]
+fn a_robot_may_be_dropped_by_code_that_it_calls() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        let builder = Crowded::builder();
+        let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
+        let mut running = Some(builder.start().expect("it starts"));
+        let live = running.as_deref().expect("it runs").clone();
+        when_woken(&mut ordered, move || drop(running.take()));
+        let start = std::time::Instant::now();
+        live.publish(crowded::sensor::base::a, live.clock().now(), Number(1.0));
+        assert!(start.elapsed() < Duration::from_secs(4), "it took {:?}", start.elapsed());
+        assert_eq!(live.safety(), Safety::Disarmed);
+    });
+}
+
+#[test]
+fn a_robot_that_has_stopped_answers_whatever_it_is_asked() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        let running = Crowded::builder().start().expect("it starts");
+        let live = (*running).clone();
+        running.stop();
+        live.publish(crowded::sensor::base::a, live.clock().now(), Number(1.0));
+        assert!(live.call(crowded::estimator::base::ordered, Ask).is_err());
+        assert!(live.cast(crowded::estimator::base::ordered, Tell).is_err());
+        assert!(!live.arm() && live.disarm());
+        assert!(live.subscribe(crowded::sensor::base::a).recv().is_none());
+        live.set_parameter(crowded::param::gain, 2.0).expect("it is finite");
+        let report = live.report();
+        let dropped = report.estimator(ORDERED).map(|ordered| ordered.inputs[0].dropped(DropReason::Stopped));
+        assert_eq!(dropped, Some(1));
+    });
+}

@@ -1,0 +1,193 @@
+//! What makes hardware safe, and when that itself goes wrong.
+
+use crate::components::{Number, at, within};
+use bb_core::prelude::*;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+/// Options of [`Lidar`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct LidarOptions {
+    #[option(default = false)]
+    pub(crate) breaks: bool,
+}
+
+/// Its motor is stopped when the robot is disarmed. Each one made has its own.
+#[derive(Debug)]
+pub(crate) struct Lidar(bool);
+
+static MADE: AtomicU32 = AtomicU32::new(0);
+static STOPPED: Mutex<Vec<u32>> = Mutex::new(Vec::new());
+
+impl Sensor for Lidar {
+    type Options = LidarOptions;
+    type Output = Number;
+
+    fn init(options: LidarOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let number = MADE.fetch_add(1, Ordering::SeqCst);
+        context.on_disarm(move || {
+            STOPPED.lock().expect("nobody panics with it").push(number);
+            Ok(())
+        });
+        Ok(Self(options.breaks))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if self.0 { Err(Fault::new("no echo")) } else { Ok(Reading::now(Number(1.0))) }
+    }
+}
+
+/// A motor whose command says what is wrong with it.
+#[derive(Debug)]
+pub(crate) struct Motor {
+    hangs: bool,
+    panics: bool,
+}
+
+static TORQUE: AtomicBool = AtomicBool::new(false);
+static LET_GO: AtomicBool = AtomicBool::new(false);
+
+const PANICS: f64 = -1.0;
+const HANGS_AT_DISARM: f64 = -2.0;
+const PANICS_AT_DISARM: f64 = -3.0;
+
+impl Actuator for Motor {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self { hangs: false, panics: false })
+    }
+
+    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
+        TORQUE.store(true, Ordering::SeqCst);
+        assert!(command.0 != PANICS, "a wire is loose");
+        self.hangs = command.0 == HANGS_AT_DISARM;
+        self.panics = command.0 == PANICS_AT_DISARM;
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        assert!(!self.panics, "no brake");
+        while self.hangs && !LET_GO.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        TORQUE.store(false, Ordering::SeqCst);
+        Ok(())
+    }
+}
+
+robot! {
+    robot Powered;
+
+    link base {
+        joint pan: continuous {
+            axis: z;
+            actuator motor: Motor();
+            sensor encoder: External<Number>();
+            link head { sensor lidar: Lidar() { rate: 10 Hz; } }
+        }
+    }
+}
+
+/// The hardware of these tests is there once.
+static ALONE: Mutex<()> = Mutex::new(());
+
+#[test]
+fn a_sensor_that_was_made_anew_is_made_safe_once() -> Result<(), StartError> {
+    let _alone = ALONE.lock();
+    let mut builder = Powered::builder();
+    builder.options(powered::sensor::base::pan::head::lidar).breaks = true;
+    builder.supervision().max_restarts = 1000;
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(3000));
+    simulation.arm();
+    STOPPED.lock().expect("nobody panics with it").clear();
+    assert!(simulation.disarm());
+    let last = MADE.load(Ordering::SeqCst) - 1;
+    assert!(last > 3, "it has broken");
+    assert_eq!(*STOPPED.lock().expect("nobody panics with it"), [last]);
+    Ok(())
+}
+
+#[test]
+fn an_actuator_that_panics_is_made_safe() -> Result<(), StartError> {
+    let _alone = ALONE.lock();
+    let simulation = Powered::builder().simulate()?;
+    simulation.arm();
+    assert!(simulation.actuate(powered::actuator::base::pan::motor, Number(PANICS)).is_err());
+    assert!(!TORQUE.load(Ordering::SeqCst));
+    Ok(())
+}
+
+#[test]
+fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<(), StartError> {
+    let _alone = ALONE.lock();
+    let builder = Powered::builder();
+    let errors = builder.subscribe(system::SafetyErrors);
+    let running = builder.start()?;
+    running.arm();
+    running.actuate(powered::actuator::base::pan::motor, Number(PANICS_AT_DISARM)).expect("it does as told");
+    assert!(!running.disarm());
+    assert_eq!(running.safety(), Safety::Error);
+    let message = errors.try_recv().map(|error| error.payload.message);
+    assert_eq!(message.as_deref(), Some("disarming failed: panicked: no brake"));
+    assert!(!running.force_disarm(), "it still cannot");
+    assert_eq!(running.safety(), Safety::Disarmed);
+    Ok(())
+}
+
+#[test]
+fn a_disarm_that_hangs_is_an_error_and_does_not_keep_the_robot_from_stopping() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        LET_GO.store(false, Ordering::SeqCst);
+        let running = Powered::builder().start().expect("it starts");
+        running.arm();
+        running.actuate(powered::actuator::base::pan::motor, Number(HANGS_AT_DISARM)).expect("it does as told");
+        let start = std::time::Instant::now();
+        assert!(!running.disarm());
+        assert!((5..8).contains(&start.elapsed().as_secs()));
+        assert_eq!(running.safety(), Safety::Error);
+        let start = std::time::Instant::now();
+        let report = running.stop();
+        assert!(start.elapsed() < Duration::from_secs(20));
+        let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            faults,
+            ["actuator/base/pan/motor failed: did not come back from its command, or from disarming, in time"]
+        );
+        LET_GO.store(true, Ordering::SeqCst);
+    });
+}
+
+#[test]
+fn whoever_arms_and_disarms_at_once_agrees_in_the_end() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        let builder = Powered::builder();
+        let changes = builder.subscribe_with(system::SafetyState, Overflow::DropOldest { capacity: 1 << 15 });
+        let running = builder.start().expect("it starts");
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let running = &running;
+                scope.spawn(move || {
+                    for round in 0..200 {
+                        if (thread + round) % 2 == 0 {
+                            running.arm()
+                        } else {
+                            running.disarm()
+                        };
+                    }
+                });
+            }
+        });
+        running.disarm();
+        let mut safety = Safety::Disarmed;
+        for change in changes.drain() {
+            assert_eq!(change.from, safety);
+            safety = change.to;
+        }
+        assert_eq!((safety, running.safety()), (Safety::Disarmed, Safety::Disarmed));
+    });
+}
