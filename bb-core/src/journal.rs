@@ -9,6 +9,10 @@
 //! Not in a journal: requests to estimators ([`Live::call`](crate::Live::call), [`Live::cast`](crate::Live::cast)) and the
 //! arguments of commands, which may be of any type; a command replayed has its default ones.
 
+mod line;
+
+pub use line::{JournalLine, JournalReader};
+
 use crate::control::{ParameterValue, SafetyError};
 use crate::node::HealthTransition;
 use crate::pubsub::DynamicMessage;

@@ -53,7 +53,7 @@ pub use run::{
 };
 /// Handles of the topics that every robot has: subscribe to them as to any other.
 pub mod system {
-    pub use crate::run::{Health, SafetyErrors, SafetyState, StateMachine};
+    pub use crate::run::{Health, JournalLines, SafetyErrors, SafetyState, StateMachine};
 }
 pub use time::{Clock, MonotonicTime, WallTime};
 

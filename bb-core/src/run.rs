@@ -29,8 +29,8 @@ pub use error::{ComponentFault, StartError};
 pub(crate) use error::{Failed, caught, retire, wake};
 pub use handle::{
     ActuatorHandle, BridgeHandle, CommandHandle, Configurable, ControllerHandle, EstimatorHandle,
-    EstimatorOfSeveralHandle, Health, OutputHandle, ParameterHandle, Publisher, SafetyErrors, SafetyState,
-    SensorHandle, StateMachine, Visitable,
+    EstimatorOfSeveralHandle, Health, JournalLines, OutputHandle, ParameterHandle, Publisher, SafetyErrors,
+    SafetyState, SensorHandle, StateMachine, Visitable,
 };
 pub use live::Live;
 pub use periodic::{AsBridge, AsController, AsSensor, Periodic};

@@ -307,15 +307,19 @@ fn a_run_on_many_threads_is_the_same_again() -> Result<(), Box<dyn std::error::E
 fn a_journal_of_another_robot_is_refused_with_its_line() -> Result<(), Box<dyn std::error::Error>> {
     let play = |event| -> Result<_, StartError> {
         let mut replay = Day::builder().replay()?;
-        Ok(replay.play(vec![Entry { number: 7, time: at(0), event }]).expect_err("it does not fit").to_string())
+        Ok(replay.play(vec![Entry { number: 1, time: at(0), event }]).expect_err("it does not fit").to_string())
     };
     assert_eq!(
         play(Event::Deliver { island: 0, entry: 0, message: 3 })?,
-        "line 7 of the journal cannot be replayed: no such message waits: it is of another robot, or lines are missing"
+        "line 1 of the journal cannot be replayed: no such message waits: it is of another robot, or lines are missing"
     );
     assert_eq!(
         play(Event::Wake { island: 99 })?,
-        "line 7 of the journal cannot be replayed: the robot has no such island"
+        "line 1 of the journal cannot be replayed: the robot has no such island"
     );
+    let mut replay = Day::builder().replay()?;
+    let gap = replay.play(vec![Entry { number: 3, time: at(0), event: Event::Arm }]).expect_err("two are missing");
+    let message = "line 3 of the journal cannot be replayed: it follows line 0; the lines between are missing";
+    assert_eq!(gap.to_string(), message);
     Ok(())
 }

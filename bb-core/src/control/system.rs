@@ -17,7 +17,7 @@ use super::safety::{Hooks, SafetyError};
 use super::state::Machine;
 use super::tasks::{Bell, Sleeper, Task, lock};
 use super::{CategoryDeclaration, CommandDeclaration, Prepared};
-use crate::journal::{Event, Journal};
+use crate::journal::{Event, Journal, JournalLine};
 use crate::message::Origin;
 use crate::node::HealthTransition;
 use crate::pubsub::{AnyTopic, Topic};
@@ -46,6 +46,7 @@ pub struct SystemTopics {
     pub(crate) safety: Topic<SafetyTransition>,
     pub(crate) safety_error: Topic<SafetyError>,
     pub(crate) health: Topic<HealthTransition>,
+    pub(crate) journal: Topic<JournalLine>,
     pub(crate) commands: Box<[Topic<CommandEvent>]>,
     pub(crate) parameters: Box<[Topic<ParameterChange>]>,
 }
@@ -57,13 +58,15 @@ impl SystemTopics {
             safety: Topic::new("safety"),
             safety_error: Topic::new("safety/error"),
             health: Topic::new("health"),
+            journal: Topic::new("journal"),
             commands: declared.commands.iter().map(|command| Topic::new(command.path)).collect(),
             parameters: declared.parameters.iter().map(|parameter| Topic::new(parameter.path)).collect(),
         }
     }
 
     pub(crate) fn all(&self) -> Vec<&dyn AnyTopic> {
-        let fixed: [&dyn AnyTopic; 4] = [&self.state, &self.safety, &self.safety_error, &self.health];
+        let fixed: [&dyn AnyTopic; 5] =
+            [&self.state, &self.safety, &self.safety_error, &self.health, &self.journal];
         let commands = self.commands.iter().map(|topic| topic as &dyn AnyTopic);
         fixed
             .into_iter()

@@ -4,7 +4,7 @@ use super::dynamic::Tap;
 use super::queue::Queue;
 use super::{DynamicMessage, Overflow, Subscription};
 use crate::Payload;
-use crate::message::Stamped;
+use crate::message::{DecodeError, Stamped};
 use std::any::Any;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -157,6 +157,9 @@ pub trait AnyTopic {
     /// Hands every message to `tap` as well.
     #[doc(hidden)]
     fn tap(&self, tap: &Tap);
+    /// A message from its bytes, as [`DynamicMessage::encode`] has made them.
+    #[doc(hidden)]
+    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
     /// Itself, for whoever knows the payload.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
@@ -190,6 +193,11 @@ impl<T: Payload> AnyTopic for Topic<T> {
             subscribers.taps = others.chain([&tap.0]).map(Arc::clone).collect();
             self.listening.store(subscribers.count(), Ordering::Release);
         }
+    }
+
+    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError> {
+        let message: Stamped<T> = crate::message::codec::decode(bytes)?;
+        Ok(DynamicMessage::new(self.path, &message))
     }
 
     fn as_any(&self) -> &dyn Any {

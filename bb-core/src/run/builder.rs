@@ -8,8 +8,8 @@ use crate::component::Fault;
 use crate::control::{
     Control, Declared, ParameterError, ParameterType, ParameterValue, ParameterValues, SystemTopics,
 };
-use crate::journal::{Entry, Journal};
-use crate::message::Origin;
+use crate::journal::{Entry, Journal, JournalLine};
+use crate::message::{Origin, Stamp};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
@@ -30,6 +30,8 @@ pub struct Builder<R: Robot> {
 }
 
 impl<R: Robot> Builder<R> {
+    const ORIGIN: Origin = Origin { robot: R::NAME, node: "local" };
+
     pub(super) fn new() -> Self {
         Self {
             options: R::options(),
@@ -75,6 +77,16 @@ impl<R: Robot> Builder<R> {
     /// [`journal`](crate::journal).
     pub fn journal(&mut self, sink: impl Fn(Entry) + Send + Sync + 'static) {
         self.journal = Some(Journal::new(Arc::new(sink)));
+    }
+
+    /// Has the same published at `journal`, for a recorder: give its subscription room, since a journal of which lines were
+    /// lost cannot be replayed beyond them.
+    pub fn publish_journal(&mut self) {
+        let system = Arc::clone(&self.system);
+        self.journal(move |entry| {
+            let stamp = Stamp { monotonic_time: entry.time, origin: Self::ORIGIN, ..Stamp::default() };
+            system.journal.publish(&stamp.message(JournalLine::from(&entry)));
+        });
     }
 
     /// Subscribes, with room for 1024 messages.
@@ -130,7 +142,7 @@ impl<R: Robot> Builder<R> {
 
     /// Dropping what has started stops it in order.
     fn assemble(self, clock: Clock, is_replay: bool) -> Result<Assembled<R>, StartError> {
-        let origin = Origin { robot: R::NAME, node: "local" };
+        let origin = Self::ORIGIN;
         let commands = R::commands(&self.options);
         let parameters = ParameterValues::new(self.parameters);
         let journal = self.journal.filter(|_| !is_replay);

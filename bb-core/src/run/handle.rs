@@ -6,6 +6,7 @@ use crate::control::{
     Command, CommandEvent, ParameterChange, ParameterType, SafetyError, SafetyTransition, StateTransition,
     SystemTopics,
 };
+use crate::journal::JournalLine;
 use crate::message::{Frame, Payload, Stamp, Stamped};
 use crate::node::{HealthTransition, Node};
 use crate::pubsub::Topic;
@@ -228,6 +229,8 @@ system_topic! {
     StateMachine at "state_machine" publishes StateTransition, state;
     /// Names the changes of the safety state.
     SafetyState at "safety" publishes SafetyTransition, safety;
+    /// Names the journal, if it is published.
+    JournalLines at "journal" publishes JournalLine, journal;
     /// Names what leads to the safety state `error`.
     SafetyErrors at "safety/error" publishes SafetyError, safety_error;
 }

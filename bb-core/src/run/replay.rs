@@ -15,6 +15,8 @@ use std::time::Duration;
 /// bit for bit.
 pub struct Replay<R: Robot> {
     live: Live<R>,
+    /// The number of the last line.
+    last: u64,
 }
 
 /// Why a journal cannot be replayed.
@@ -29,7 +31,7 @@ pub struct ReplayError {
 impl<R: Robot> Replay<R> {
     pub(super) fn new(machine: Machine<R>) -> Self {
         (0..R::ISLANDS.len()).filter_map(|number| machine.island(number)).for_each(|island| island.begin_replay());
-        Self { live: Live(Arc::new(machine)) }
+        Self { live: Live(Arc::new(machine)), last: 0 }
     }
 
     /// Replays lines, in the order of their numbers. A journal may be handed over in parts; a callback that took too long
@@ -51,6 +53,11 @@ impl<R: Robot> Replay<R> {
         for entry in entries {
             let slow = overruns.get(&entry.number).map_or(&[][..], Vec::as_slice);
             let line = entry.number;
+            if line != self.last + 1 {
+                let message = format!("it follows line {}; the lines between are missing", self.last);
+                return Err(ReplayError { line, message });
+            }
+            self.last = line;
             self.live.0.startup.control.replay_answer(answers.remove(&line));
             self.line(entry, slow).map_err(|message| ReplayError { line, message: message.to_owned() })?;
         }
