@@ -36,14 +36,17 @@ impl<R: Robot> Collector for Counts<R> {
 }
 
 fn inputs(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -> fmt::Result {
-    let inputs = || {
-        estimators.iter().flat_map(|estimator| estimator.inputs.iter().map(|input| (estimator.path, input)))
-    };
-    families.counter("estimator_messages_received", "Messages that arrived, the dropped ones included", |family| {
-        inputs().try_for_each(|(path, input)| {
-            family.count(&[("estimator", path), ("input", input.name)], input.received)
-        })
-    })?;
+    let inputs =
+        || estimators.iter().flat_map(|estimator| estimator.inputs.iter().map(|input| (estimator.path, input)));
+    families.counter(
+        "estimator_messages_received",
+        "Messages that arrived, the dropped ones included",
+        |family| {
+            inputs().try_for_each(|(path, input)| {
+                family.count(&[("estimator", path), ("input", input.name)], input.received)
+            })
+        },
+    )?;
     families.counter("estimator_messages_dropped", "Messages that were dropped", |family| {
         for (path, input) in inputs() {
             for &reason in DropReason::ALL {
@@ -89,9 +92,9 @@ fn estimators(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -
 
 fn latencies(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -> fmt::Result {
     families.counter("estimator_latencies", "Callbacks that were measured", |family| {
-        estimators.iter().try_for_each(|estimator| {
-            family.count(&[("estimator", estimator.path)], estimator.latency.count)
-        })
+        estimators
+            .iter()
+            .try_for_each(|estimator| family.count(&[("estimator", estimator.path)], estimator.latency.count))
     })?;
     let measured = || estimators.iter().filter(|estimator| estimator.latency.count > 0);
     families.gauge("estimator_latency", "Time in callbacks since the start", Some(Unit::Seconds), |family| {
@@ -145,9 +148,9 @@ fn commands(families: &mut Families<'_>, commands: &[CommandStatistics]) -> fmt:
 
 fn robot(families: &mut Families<'_>, report: &Report, declared_states: &[&str]) -> fmt::Result {
     families.gauge("safety_state", "1 for the safety state", None, |family| {
-        [Safety::Disarmed, Safety::Armed, Safety::Disarming, Safety::Error].into_iter().try_for_each(|state| {
-            family.gauge(&[("state", &state.to_string())], one_if(report.safety == state))
-        })
+        [Safety::Disarmed, Safety::Armed, Safety::Disarming, Safety::Error]
+            .into_iter()
+            .try_for_each(|state| family.gauge(&[("state", &state.to_string())], one_if(report.safety == state)))
     })?;
     families.gauge("operational_state", "1 for the operational state", None, |family| {
         BUILT_IN_STATES

@@ -181,7 +181,8 @@ fn commands_and_states() {
     assert_eq!(after["bb_command_refusals_total{command=\"wait\"}"], 1.0);
     assert_eq!(after["bb_command_ends_total{command=\"hasty\",outcome=\"timed_out\"}"], 1.0);
     assert_eq!(after["bb_safety_state{state=\"armed\"}"], 1.0);
-    let states: f64 = after.iter().filter(|(name, _)| name.starts_with("bb_operational_state")).map(|(_, is)| is).sum();
+    let states: f64 =
+        after.iter().filter(|(name, _)| name.starts_with("bb_operational_state")).map(|(_, is)| is).sum();
     assert_eq!(states, 1.0);
 }
 
