@@ -5,6 +5,7 @@ use bb_metrics::{Exporter, Server};
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
+use std::sync::{Mutex, PoisonError};
 
 /// Passes on what it gets; fails, or says that it has diverged, when told so.
 struct Judge;
@@ -221,4 +222,50 @@ fn it_stops_when_dropped_and_names_an_address_that_is_taken() {
     drop(server);
     assert!(TcpStream::connect(address).is_err());
     simulation.stop();
+}
+
+/// Whoever holds it keeps `Stuck` in its callback.
+static HELD: Mutex<()> = Mutex::new(());
+
+struct Stuck;
+
+impl Estimator for Stuck {
+    type Options = NoOptions;
+    type Input = Imu;
+    type Output = Imu;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+    fn handle_input(&mut self, _: &Stamped<Imu>) -> Result<Reply<Imu>, Fault> {
+        let _held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(Reply::none())
+    }
+}
+
+robot! {
+    robot Hung;
+    link base {
+        sensor imu: External<Imu>() { estimator stuck: Stuck(); }
+    }
+}
+
+#[test]
+fn an_estimator_that_hangs_does_not_hold_up_a_scrape() {
+    let running = Hung::builder().start().expect("it starts");
+    let server = Exporter::new(running.live()).serve("127.0.0.1:0").expect("a port is free");
+    let held = HELD.lock().expect("nobody has panicked");
+    let live = running.live();
+    let publisher =
+        std::thread::spawn(move || live.publish(hung::sensor::base::imu, live.clock().now(), sample(0.0)));
+    let has_arrived = || {
+        let (_, body) = ask(server.address(), b"GET /metrics HTTP/1.1\r\n\r\n");
+        body.contains("estimator=\"sensor/base/imu/stuck\",input=\"imu\"} 1\n")
+    };
+    while !has_arrived() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(!publisher.is_finished());
+    drop(held);
+    publisher.join().expect("it comes back");
 }
