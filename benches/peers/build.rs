@@ -1,4 +1,4 @@
-//! Copper's macro looks up where the strings of its log go. Nothing of ours is logged; it asks all the same.
+//! Copper's macro wants to know where to keep the strings of its log, also where nothing is logged.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
