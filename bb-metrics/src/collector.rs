@@ -1,0 +1,221 @@
+//! A report as metrics. One family after the other: the text format wants each in one piece.
+
+use bb_core::control::CommandStatistics;
+use bb_core::node::{DropReason, EstimatorStatistics};
+use bb_core::pubsub::TopicStatistics;
+use bb_core::{HealthState, Live, Report, Robot, Safety};
+use prometheus_client::collector::Collector;
+use prometheus_client::encoding::{DescriptorEncoder, MetricEncoder, NoLabelSet};
+use prometheus_client::metrics::MetricType;
+use prometheus_client::registry::Unit;
+use std::fmt;
+
+/// The states that every robot has.
+const BUILT_IN_STATES: [&str; 3] = ["disarmed", "idle", "executing"];
+
+/// Takes a report at each scrape.
+pub(crate) struct Counts<R: Robot>(pub(crate) Live<R>);
+
+impl<R: Robot> fmt::Debug for Counts<R> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Counts").field(&self.0).finish()
+    }
+}
+
+impl<R: Robot> Collector for Counts<R> {
+    fn encode(&self, encoder: DescriptorEncoder<'_>) -> fmt::Result {
+        let report = self.0.report();
+        let mut families = Families(encoder);
+        inputs(&mut families, &report.estimators)?;
+        estimators(&mut families, &report.estimators)?;
+        latencies(&mut families, &report.estimators)?;
+        topics(&mut families, &report.topics)?;
+        commands(&mut families, &report.commands)?;
+        robot(&mut families, &report, R::STATES)
+    }
+}
+
+fn inputs(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -> fmt::Result {
+    let inputs =
+        || estimators.iter().flat_map(|estimator| estimator.inputs.iter().map(|input| (estimator.path, input)));
+    families.counter(
+        "estimator_messages_received",
+        "Messages that arrived, the dropped ones included",
+        |family| {
+            inputs().try_for_each(|(path, input)| {
+                family.count(&[("estimator", path), ("input", input.name)], input.received)
+            })
+        },
+    )?;
+    families.counter("estimator_messages_dropped", "Messages that were dropped", |family| {
+        for (path, input) in inputs() {
+            for &reason in DropReason::ALL {
+                let labels = [("estimator", path), ("input", input.name), ("reason", reason_label(reason))];
+                family.count(&labels, input.dropped(reason))?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn estimators(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -> fmt::Result {
+    type Count = fn(&EstimatorStatistics) -> u64;
+    let counters: [(&str, &str, Count); 5] = [
+        ("estimator_dispatches", "Calls of the estimator", |estimator| estimator.dispatched),
+        ("estimator_emissions", "Calls in which it emitted", |estimator| estimator.emitted),
+        ("estimator_divergences", "Times it said that it has diverged", |estimator| estimator.diverged),
+        ("estimator_restarts", "Times it was made anew", |estimator| estimator.restarts),
+        ("estimator_health_transitions", "Changes of its health", |estimator| estimator.transitions),
+    ];
+    for (name, help, count) in counters {
+        families.counter(name, help, |family| {
+            estimators
+                .iter()
+                .try_for_each(|estimator| family.count(&[("estimator", estimator.path)], count(estimator)))
+        })?;
+    }
+    families.gauge("estimator_health", "1 for the state of its health", None, |family| {
+        for estimator in estimators {
+            for state in [HealthState::Healthy, HealthState::Degraded, HealthState::Lost] {
+                let labels = [("estimator", estimator.path), ("state", &state.to_string())];
+                family.gauge(&labels, one_if(estimator.health == state))?;
+            }
+        }
+        Ok(())
+    })?;
+    families.gauge("estimator_running", "0 if it has stopped or waits for its restart", None, |family| {
+        estimators.iter().try_for_each(|estimator| {
+            family.gauge(&[("estimator", estimator.path)], one_if(estimator.stopped.is_none()))
+        })
+    })
+}
+
+fn latencies(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -> fmt::Result {
+    families.counter("estimator_latencies", "Callbacks that were measured", |family| {
+        estimators
+            .iter()
+            .try_for_each(|estimator| family.count(&[("estimator", estimator.path)], estimator.latency.count))
+    })?;
+    let measured = || estimators.iter().filter(|estimator| estimator.latency.count > 0);
+    families.gauge("estimator_latency", "Time in callbacks since the start", Some(Unit::Seconds), |family| {
+        for estimator in measured() {
+            let latency = estimator.latency;
+            for (quantile, duration) in
+                [("0.5", latency.median), ("0.99", latency.p99), ("0.999", latency.p999), ("1", latency.longest)]
+            {
+                let labels = [("estimator", estimator.path), ("quantile", quantile)];
+                family.gauge(&labels, duration.as_secs_f64())?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn topics(families: &mut Families<'_>, topics: &[TopicStatistics]) -> fmt::Result {
+    let labels = |topic: &TopicStatistics| [("topic", topic.path), ("payload", topic.payload)];
+    families.counter("topic_messages_published", "Messages published", |family| {
+        topics.iter().try_for_each(|topic| family.count(&labels(topic), topic.published))
+    })?;
+    families.counter("topic_messages_lost", "Messages that slow subscribers lost", |family| {
+        topics.iter().try_for_each(|topic| family.count(&labels(topic), topic.lost))
+    })?;
+    families.gauge("topic_subscribers", "Subscriptions that listen now", None, |family| {
+        topics.iter().try_for_each(|topic| family.gauge(&labels(topic), topic.subscribers as f64))
+    })
+}
+
+fn commands(families: &mut Families<'_>, commands: &[CommandStatistics]) -> fmt::Result {
+    families.counter("command_starts", "Times the command was started", |family| {
+        commands.iter().try_for_each(|command| family.count(&[("command", command.name)], command.started))
+    })?;
+    families.counter("command_ends", "Times the command ended, and how", |family| {
+        for command in commands {
+            for (outcome, count) in [
+                ("succeeded", command.succeeded),
+                ("failed", command.failed),
+                ("timed_out", command.timed_out),
+                ("cancelled", command.cancelled),
+            ] {
+                family.count(&[("command", command.name), ("outcome", outcome)], count)?;
+            }
+        }
+        Ok(())
+    })?;
+    families.counter("command_refusals", "Times the command was refused", |family| {
+        commands.iter().try_for_each(|command| family.count(&[("command", command.name)], command.refused))
+    })
+}
+
+fn robot(families: &mut Families<'_>, report: &Report, declared_states: &[&str]) -> fmt::Result {
+    families.gauge("safety_state", "1 for the safety state", None, |family| {
+        [Safety::Disarmed, Safety::Armed, Safety::Disarming, Safety::Error]
+            .into_iter()
+            .try_for_each(|state| family.gauge(&[("state", &state.to_string())], one_if(report.safety == state)))
+    })?;
+    families.gauge("operational_state", "1 for the operational state", None, |family| {
+        BUILT_IN_STATES
+            .iter()
+            .chain(declared_states)
+            .try_for_each(|state| family.gauge(&[("state", state)], one_if(report.state == *state)))
+    })?;
+    families.counter("faults", "Faults of components", |family| family.count(&[], report.all_faults))
+}
+
+fn one_if(condition: bool) -> f64 {
+    f64::from(u8::from(condition))
+}
+
+/// A reason as a label reads: `inbox_full`.
+fn reason_label(reason: DropReason) -> &'static str {
+    match reason {
+        DropReason::SyncMiss => "sync_miss",
+        DropReason::OutOfOrder => "out_of_order",
+        DropReason::NonFinite => "non_finite",
+        DropReason::ClockSkew => "clock_skew",
+        DropReason::Stopped => "stopped",
+        DropReason::Overflow => "inbox_full",
+        // A reason that is newer than this crate.
+        _ => reason.name(),
+    }
+}
+
+type Label<'a> = (&'static str, &'a str);
+
+/// Writes families of metrics.
+struct Families<'a>(DescriptorEncoder<'a>);
+
+impl Families<'_> {
+    /// `name` without its prefix and without `_total`.
+    fn counter(
+        &mut self,
+        name: &str,
+        help: &str,
+        members: impl FnOnce(&mut Family<'_>) -> fmt::Result,
+    ) -> fmt::Result {
+        members(&mut Family(self.0.encode_descriptor(name, help, None, MetricType::Counter)?))
+    }
+
+    /// `name` without its prefix and without its unit.
+    fn gauge(
+        &mut self,
+        name: &str,
+        help: &str,
+        unit: Option<Unit>,
+        members: impl FnOnce(&mut Family<'_>) -> fmt::Result,
+    ) -> fmt::Result {
+        members(&mut Family(self.0.encode_descriptor(name, help, unit.as_ref(), MetricType::Gauge)?))
+    }
+}
+
+/// Writes the members of a family.
+struct Family<'a>(MetricEncoder<'a>);
+
+impl Family<'_> {
+    fn count(&mut self, labels: &[Label<'_>], value: u64) -> fmt::Result {
+        self.0.encode_family(&labels)?.encode_counter::<NoLabelSet, _, u64>(&value, None)
+    }
+
+    fn gauge(&mut self, labels: &[Label<'_>], value: f64) -> fmt::Result {
+        self.0.encode_family(&labels)?.encode_gauge(&value)
+    }
+}

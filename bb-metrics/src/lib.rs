@@ -1,0 +1,37 @@
+//! What a running robot counts, as Prometheus reads it.
+//!
+//! An [`Exporter`] takes the robot's report anew for each scrape: the robot itself does nothing more than without it.
+//! [`Exporter::render`] gives the text, [`Exporter::serve`] answers `GET /metrics`.
+//!
+//! | metric | labels beside `robot` | what |
+//! |---|---|---|
+//! | `bb_estimator_messages_received_total` | `estimator`, `input` | messages that arrived, the dropped ones included |
+//! | `bb_estimator_messages_dropped_total` | `estimator`, `input`, `reason` | those that were dropped |
+//! | `bb_estimator_dispatches_total` | `estimator` | calls |
+//! | `bb_estimator_emissions_total` | `estimator` | calls that emitted |
+//! | `bb_estimator_divergences_total` | `estimator` | times it said that it has diverged |
+//! | `bb_estimator_restarts_total` | `estimator` | times it was made anew |
+//! | `bb_estimator_health_transitions_total` | `estimator` | changes of its health |
+//! | `bb_estimator_health` | `estimator`, `state` | 1 for `healthy`, `degraded` or `lost`, 0 for the others |
+//! | `bb_estimator_running` | `estimator` | 0 if it has stopped or waits for its restart |
+//! | `bb_estimator_latencies_total` | `estimator` | callbacks that were measured |
+//! | `bb_estimator_latency_seconds` | `estimator`, `quantile` | since the start, within an eighth; where a `latency_budget` is declared; 1 is the longest |
+//! | `bb_topic_messages_published_total` | `topic`, `payload` | messages |
+//! | `bb_topic_messages_lost_total` | `topic`, `payload` | messages that slow subscribers lost |
+//! | `bb_topic_subscribers` | `topic`, `payload` | subscriptions that listen now |
+//! | `bb_command_starts_total` | `command` | starts |
+//! | `bb_command_ends_total` | `command`, `outcome` | `succeeded`, `failed`, `timed_out`, `cancelled` |
+//! | `bb_command_refusals_total` | `command` | refusals |
+//! | `bb_safety_state` | `state` | 1 for the one that it is in |
+//! | `bb_operational_state` | `state` | 1 for the one that it is in |
+//! | `bb_faults_total` | | faults of components |
+//!
+//! Counters stand at 0 from the first scrape on, so that the first increment is seen as one.
+
+mod collector;
+mod exporter;
+mod request;
+mod server;
+
+pub use exporter::Exporter;
+pub use server::{ServeError, Server};

@@ -1,0 +1,125 @@
+//! One request on one connection: the head is read within limits, and answered.
+
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// What a head may be long. Prometheus' is below 500 bytes.
+const LONGEST_HEAD: usize = 8 * 1024;
+const MOST_HEADERS: usize = 64;
+/// How long a client may take to send its head, and to take the answer.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What becomes of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    Metrics { with_body: bool },
+    NotFound,
+    NotAllowed,
+    Bad,
+    TooLong,
+    TooSlow,
+}
+
+/// Reads one request and answers it; the connection is closed behind it.
+///
+/// # Errors
+/// The client has gone, or does not take the answer.
+pub(crate) fn serve(mut stream: TcpStream, render: &dyn Fn() -> String) -> io::Result<()> {
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let answer = read(&mut stream)?;
+    write(&mut stream, answer, render)?;
+    stream.shutdown(std::net::Shutdown::Write)
+}
+
+fn read(stream: &mut TcpStream) -> io::Result<Answer> {
+    let deadline = Instant::now() + PATIENCE;
+    let mut head = [0; LONGEST_HEAD];
+    let mut length = 0;
+    loop {
+        let left = deadline.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(Answer::TooSlow);
+        }
+        stream.set_read_timeout(Some(left))?;
+        match stream.read(&mut head[length..]) {
+            Ok(0) => return Ok(Answer::Bad),
+            Ok(read) => length += read,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                return Ok(Answer::TooSlow);
+            }
+            Err(error) => return Err(error),
+        }
+        match answer(&head[..length]) {
+            Some(answer) => return Ok(answer),
+            None if length == LONGEST_HEAD => return Ok(Answer::TooLong),
+            None => {}
+        }
+    }
+}
+
+/// The answer to a head; none if it is not whole yet.
+fn answer(head: &[u8]) -> Option<Answer> {
+    let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
+    let mut request = httparse::Request::new(&mut headers);
+    match request.parse(head) {
+        Ok(httparse::Status::Partial) => return None,
+        Ok(httparse::Status::Complete(_)) => {}
+        Err(httparse::Error::TooManyHeaders) => return Some(Answer::TooLong),
+        Err(_) => return Some(Answer::Bad),
+    }
+    let path = request.path.unwrap_or("").split('?').next().unwrap_or("");
+    Some(match (path, request.method) {
+        ("/metrics", Some("GET")) => Answer::Metrics { with_body: true },
+        ("/metrics", Some("HEAD")) => Answer::Metrics { with_body: false },
+        ("/metrics", _) => Answer::NotAllowed,
+        _ => Answer::NotFound,
+    })
+}
+
+fn write(stream: &mut TcpStream, answer: Answer, render: &dyn Fn() -> String) -> io::Result<()> {
+    const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+    const PLAIN: &str = "text/plain; charset=utf-8";
+    let (status, kind, body) = match answer {
+        Answer::Metrics { .. } => ("200 OK", OPEN_METRICS, render()),
+        Answer::NotFound => ("404 Not Found", PLAIN, "the metrics are at /metrics\n".into()),
+        Answer::NotAllowed => ("405 Method Not Allowed\r\nAllow: GET, HEAD", PLAIN, "only GET and HEAD\n".into()),
+        Answer::Bad => ("400 Bad Request", PLAIN, "this is no HTTP request\n".into()),
+        Answer::TooLong => ("431 Request Header Fields Too Large", PLAIN, "the head is too long\n".into()),
+        Answer::TooSlow => ("408 Request Timeout", PLAIN, "the request took too long\n".into()),
+    };
+    let length = body.len();
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
+    );
+    stream.write_all(head.as_bytes())?;
+    if answer != (Answer::Metrics { with_body: false }) {
+        stream.write_all(body.as_bytes())?;
+    }
+    stream.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_head_has_its_answer() {
+        let rows: [(&str, Option<Answer>); 8] = [
+            ("GET /metrics HTTP/1.1\r\n\r\n", Some(Answer::Metrics { with_body: true })),
+            ("GET /metrics?name=a HTTP/1.0\r\nHost: a\r\n\r\n", Some(Answer::Metrics { with_body: true })),
+            ("HEAD /metrics HTTP/1.1\r\n\r\n", Some(Answer::Metrics { with_body: false })),
+            ("POST /metrics HTTP/1.1\r\n\r\n", Some(Answer::NotAllowed)),
+            ("GET / HTTP/1.1\r\n\r\n", Some(Answer::NotFound)),
+            ("GET /metrics HTTP/1.1\r\nHost", None),
+            ("\u{1}\u{2}\r\n\r\n", Some(Answer::Bad)),
+            ("GET /metrics FTP/1.1\r\n\r\n", Some(Answer::Bad)),
+        ];
+        for (head, expected) in rows {
+            assert_eq!(answer(head.as_bytes()), expected, "{head:?}");
+        }
+        let many = format!("GET /metrics HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(MOST_HEADERS + 1));
+        assert_eq!(answer(many.as_bytes()), Some(Answer::TooLong));
+    }
+}
