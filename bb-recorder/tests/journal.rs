@@ -24,7 +24,7 @@ impl Sensor for Numbers {
     fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
         self.0 += 1;
         let number = f64::from(self.0).sqrt();
-        Ok(Reading::now(Number(if self.0 % 50 == 0 { f64::NAN } else { number })))
+        Ok(Reading::now(Number(if self.0.is_multiple_of(50) { f64::NAN } else { number })))
     }
 }
 

@@ -16,7 +16,7 @@ use crate::model::{
 };
 use crate::names::module_name;
 use crate::parse::ServiceKind;
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::{Ident, Span, TokenStream};
 use quote::quote;
 use syn::Attribute;
 
@@ -35,6 +35,8 @@ struct Module {
     constants: Vec<(Ident, Handle)>,
     modules: Vec<(String, Module)>,
     docs: Vec<Attribute>,
+    /// Where its name was declared, if it was: an editor jumps there.
+    span: Option<Span>,
 }
 
 #[derive(Clone, Copy)]
@@ -88,14 +90,23 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
     for (id, parameter) in robot.parameters.iter().enumerate() {
         root.add(&parameter.path, &parameter.name, Handle::Parameter(id));
     }
-    for (path, attributes) in robot.places() {
+    for (path, place, attributes) in robot.places() {
         for root_name in ["sensor", "estimator", "actuator"] {
             let path: Vec<String> = std::iter::once(root_name.to_owned()).chain(path.iter().cloned()).collect();
-            root.describe(&path, attributes);
+            root.describe(&path, place, attributes);
         }
     }
     for group in &robot.parameter_groups {
-        root.describe(&group.path, &group.attributes);
+        root.describe(&group.path, &group.name, &group.attributes);
+    }
+    // Those of a sensor and of an estimator of several outputs are beside their handles.
+    for sensor in &robot.sensors {
+        if let Some(publisher) = robot.publishers.get(sensor.publisher) {
+            root.describe(&publisher.path, &sensor.name, &[]);
+        }
+    }
+    for estimator in &robot.estimators {
+        root.describe(&estimator.path, &estimator.name, &[]);
     }
     for (id, state) in robot.states.iter().enumerate() {
         root.add(&["state".to_owned(), crate::names::text(&state.name)], &state.name, Handle::State(id));
@@ -138,21 +149,25 @@ impl Module {
         }
     }
 
-    /// Has the module at a path carry doc comments; one without handles does not exist.
-    fn describe(&mut self, path: &[String], attributes: &[Attribute]) {
+    /// Has the module at a path carry a name's place and doc comments; one without handles does not exist.
+    fn describe(&mut self, path: &[String], name: &Ident, attributes: &[Attribute]) {
         let mut module = self;
         for segment in path {
             let Some((_, below)) = module.modules.iter_mut().find(|(name, _)| name == segment) else { return };
             module = below;
         }
         module.docs = docs(attributes).cloned().collect();
+        module.span = Some(name.span());
     }
 
     fn tokens(&self, robot: &Robot, name: &Ident, accessors: Accessors, depth: usize) -> TokenStream {
         let types = Types::new(robot, name, depth);
         let constants = self.constants.iter().map(|(name, handle)| handle.tokens(robot, &types, name, accessors));
         let modules = self.modules.iter().map(|(segment, module)| {
-            let (segment, content) = (ident(segment), module.tokens(robot, name, accessors, depth + 1));
+            let (mut segment, content) = (ident(segment), module.tokens(robot, name, accessors, depth + 1));
+            if let Some(span) = module.span {
+                segment.set_span(span.resolved_at(Span::call_site()));
+            }
             let docs = &module.docs;
             quote! {
                 #(#docs)*

@@ -3,6 +3,7 @@
 use super::{JointId, LinkId, Mount, Rigid, Robot};
 use crate::names::text;
 use crate::parse::JointKind;
+use proc_macro2::Ident;
 use syn::Attribute;
 
 /// The way from one frame to another through the tree.
@@ -54,13 +55,14 @@ impl Robot {
         self.joints.get(joint).is_some_and(|joint| joint.kind != JointKind::Fixed)
     }
 
-    /// Every link and joint: the names from the root down to it, and its docs.
-    pub(crate) fn places(&self) -> impl Iterator<Item = (Vec<String>, &[Attribute])> {
-        let links = self.links.iter().enumerate().map(|(id, link)| (self.place_of_link(id), &*link.attributes));
+    /// Every link and joint: the names from the root down to it, its own, and its docs.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (Vec<String>, &Ident, &[Attribute])> {
+        let links =
+            self.links.iter().enumerate().map(|(id, link)| (self.place_of_link(id), &link.name, &*link.attributes));
         let joints = self.joints.iter().map(|joint| {
             let mut place = self.place_of_link(joint.parent);
             place.push(text(&joint.name));
-            (place, &*joint.attributes)
+            (place, &joint.name, &*joint.attributes)
         });
         links.chain(joints)
     }
