@@ -13,6 +13,8 @@
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
+
 pub mod attitude;
 #[cfg(feature = "simulation")]
 pub mod simulation;

@@ -137,7 +137,7 @@ fn invalid_input_is_an_error() {
     }
     assert!(average_pair(&q, f64::NAN, &q, 1.0).is_err());
     assert_eq!(average_pair(&q, 0.0, &q, 0.0), Err(AverageError::NoWeight));
-    assert_eq!(average(&[]), Err(AverageError::NoWeight));
+    assert_eq!(average::<f64>(&[]), Err(AverageError::NoWeight));
     assert_eq!(average(&[(q, 0.0)]), Err(AverageError::NoWeight));
     assert_eq!(average_pair(&nan, 1.0, &q, 1.0), Err(AverageError::NonFinite { index: 0 }));
     assert_eq!(average(&[(q, 1.0), (nan, 1.0)]), Err(AverageError::NonFinite { index: 1 }));
