@@ -19,8 +19,8 @@ pub trait Real: RealField + Copy + Default + Sum + sealed::Sealed {
     const HALF: Self;
     /// The difference between 1 and the next number.
     const EPSILON: Self;
-    /// The squared norm, and the square of a noise, below which a vector of unknown unit is none: far enough from the
-    /// least number for its direction to be exact.
+    /// The squared norm below which a vector of unknown unit is none: far enough above the least number for its direction
+    /// to be exact.
     const LEAST_SQUARE: Self;
 
     /// The nearest to `value`.
@@ -31,6 +31,12 @@ pub trait Real: RealField + Copy + Default + Sum + sealed::Sealed {
 
     /// Nanoseconds in seconds.
     fn seconds(nanoseconds: i64) -> Self;
+
+    /// The nearest to `value`, but not below what a few roundings of numbers near 1 add up to.
+    #[inline(always)]
+    fn above_rounding(value: f64) -> Self {
+        Self::of(value).max(Self::of(4.0) * Self::EPSILON)
+    }
 }
 
 /// Writes the implementation for a scalar of the language.

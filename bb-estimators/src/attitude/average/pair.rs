@@ -48,7 +48,7 @@ pub fn average_pair<T: Real>(
 
     let across = (w1 - w2) * (T::TWO * sin * cos);
     let along = (w1 + w2) * (cos - sin) * (cos + sin);
-    if across.hypot(along) < T::of(AMBIGUOUS) * (w1 + w2) {
+    if across.hypot(along) < T::above_rounding(AMBIGUOUS) * (w1 + w2) {
         return Err(AverageError::Ambiguous);
     }
     let phi = T::HALF * across.atan2(along);

@@ -42,7 +42,7 @@ pub fn average<T: Real>(weighted: &[(UnitQuaternion<T>, T)]) -> Result<UnitQuate
         .filter(|&index| index != largest)
         .map(|index| eigen.eigenvalues[largest] - eigen.eigenvalues[index])
         .fold(T::of(f64::INFINITY), T::min);
-    if gap < T::of(AMBIGUOUS) * moments.trace() {
+    if gap < T::above_rounding(AMBIGUOUS) * moments.trace() {
         return Err(AverageError::Ambiguous);
     }
 

@@ -142,3 +142,17 @@ fn invalid_input_is_an_error() {
     assert_eq!(average_pair(&nan, 1.0, &q, 1.0), Err(AverageError::NonFinite { index: 0 }));
     assert_eq!(average(&[(q, 1.0), (nan, 1.0)]), Err(AverageError::NonFinite { index: 1 }));
 }
+
+#[test]
+fn single_precision_gives_the_same_and_knows_its_own_rounding() {
+    let single = |angle: f64| about_x(angle).cast::<f32>();
+    let pair = average_pair(&single(0.3), 1.0, &single(1.5), 3.0).unwrap();
+    let expected = average_pair(&about_x(0.3), 1.0, &about_x(1.5), 3.0).unwrap();
+    assert!(pair.cast::<f64>().angle_to(&expected) < 1e-6);
+    assert!(average(&[(single(0.3), 1.0), (single(1.5), 3.0)]).unwrap().angle_to(&pair) < 1e-6);
+    for angle in [0.3, 1.0, -2.0] {
+        let (q1, q2) = (single(angle), single(angle + core::f64::consts::PI));
+        assert_eq!(average_pair(&q1, 2.0, &q2, 2.0), Err(AverageError::Ambiguous));
+        assert_eq!(average(&[(q1, 2.0), (q2, 2.0)]), Err(AverageError::Ambiguous));
+    }
+}

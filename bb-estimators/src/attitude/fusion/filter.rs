@@ -21,8 +21,8 @@ const FULL_RANGE: f64 = 0.98;
 /// Beyond a right angle the correction is that of twice the greatest sine. Source: the library's.
 const FAR: f64 = 2.0;
 
-/// Below this squared norm an error has no direction.
-const NO_ERROR: f64 = 1e-24;
+/// Below this norm an error has no direction.
+const NO_ERROR: f64 = 1e-12;
 
 /// The revised AHRS algorithm of Madgwick's thesis.
 #[derive(Clone, Debug, PartialEq)]
@@ -200,6 +200,7 @@ fn deviation<T: Real>(
     if measured.dot(expected) >= T::ZERO {
         return Deviation { error, squared_sine };
     }
-    let axis = if squared_sine > T::of(NO_ERROR) { error * (T::ONE / squared_sine.sqrt()) } else { axis() };
+    let least = T::above_rounding(NO_ERROR);
+    let axis = if squared_sine > least * least { error * (T::ONE / squared_sine.sqrt()) } else { axis() };
     Deviation { error: axis * T::of(FAR), squared_sine: T::of(f64::INFINITY) }
 }

@@ -81,7 +81,8 @@ fn descent<T: Real>(
 ) -> Vector3<T> {
     let (error, world_up) = misalignment(world_from_body, up, field);
     let squared = error.norm_squared();
-    if squared > T::of(NO_GRADIENT * NO_GRADIENT) {
+    let least = T::above_rounding(NO_GRADIENT);
+    if squared > least * least {
         return error * (T::ONE / squared.sqrt());
     }
     if up.dot(&world_up) > T::ZERO {
