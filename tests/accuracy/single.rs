@@ -11,13 +11,15 @@ use bb_estimators::attitude::{
 use std::error::Error;
 
 /// The greatest error in `f32`, as a multiple of that in `f64`.
-const MOST: f64 = 1.01;
+const MOST: f64 = 1.001;
 
 /// A filter's name, and its errors on one recording in `f64` and in `f32`.
 struct Compared {
     name: &'static str,
-    run: fn(&Recording, &[ImuSample]) -> Result<[Degrees; 2], Box<dyn Error>>,
+    run: Run,
 }
+
+type Run = fn(&Recording, &[ImuSample]) -> Result<[Degrees; 2], Box<dyn Error>>;
 
 /// Writes the comparison of one filter: its type without the scalar, and its parameters.
 macro_rules! compared {
