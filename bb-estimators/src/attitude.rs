@@ -5,6 +5,8 @@
 //! * The world is ENU: x east, y north (magnetic north where a magnetometer gives it), z up.
 //! * An orientation is `world_from_body`: it takes coordinates in the sensor's frame to the world.
 //! * An accelerometer measures specific force: at rest it reads one g upwards.
+//! * Algorithms compute with a scalar [`Real`], `f64` where none is named: `MadgwickFilter` is `MadgwickFilter<f64>`, and
+//!   `MadgwickFilter<f32>` takes an `ImuSample<f32>`. Stamps are nanoseconds and parameters are `f64` with both.
 //!
 //! ```
 //! use bb_estimators::attitude::{AttitudeFilter, ImuSample, MadgwickFilter, MadgwickParams};
@@ -34,6 +36,7 @@ pub mod madgwick;
 pub mod mahony;
 pub mod mekf;
 mod params;
+mod real;
 mod rotation;
 mod sample;
 mod state;
@@ -58,6 +61,7 @@ pub use madgwick::{MadgwickFilter, MadgwickParams};
 pub use mahony::{MahonyFilter, MahonyParams};
 pub use mekf::{MekfFilter, MekfParams};
 pub use params::ParamsError;
+pub use real::Real;
 pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};
 pub use state::MAX_GAP_S;
 pub use tilt::{TiltFilter, TiltParams};

@@ -1,7 +1,7 @@
 //! Attitude filters and their fusion.
 //!
 //! Each algorithm is a plain value, values in, values out, with no runtime in sight: the modules below [`attitude`],
-//! which build without the feature `runtime`. The estimators at the top of this crate wrap them for `robot!`:
+//! which build without the feature `runtime`, in `f64` or `f32`, and without the standard library. The estimators at the top of this crate wrap them for `robot!`:
 //!
 //! | declared as | takes | emits |
 //! |---|---|---|
@@ -12,6 +12,8 @@
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
+
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 pub mod attitude;
 #[cfg(feature = "simulation")]

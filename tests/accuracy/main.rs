@@ -6,3 +6,4 @@
 mod attitude;
 mod command;
 mod recordings;
+mod single;

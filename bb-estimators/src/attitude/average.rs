@@ -17,6 +17,8 @@ use core::fmt;
 
 use nalgebra::UnitQuaternion;
 
+use crate::attitude::Real;
+
 #[cfg(feature = "runtime")]
 pub use estimator::{OrientationAverage, OrientationAverageOptions, OrientationPair};
 pub use pair::average_pair;
@@ -59,7 +61,7 @@ impl fmt::Display for AverageError {
 impl Error for AverageError {}
 
 /// Accepts one orientation and its weight.
-fn check(index: usize, orientation: &UnitQuaternion<f64>, weight: f64) -> Result<(), AverageError> {
+fn check<T: Real>(index: usize, orientation: &UnitQuaternion<T>, weight: f64) -> Result<(), AverageError> {
     if !(weight.is_finite() && weight >= 0.0) {
         return Err(AverageError::InvalidWeight { index, weight });
     }

@@ -2,6 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use super::Real;
+
 /// The small turn of the body, rad, body frame, that would bring the expected directions onto the measured ones,
 /// and the expected vertical in the body frame.
 ///
@@ -9,44 +11,44 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// the field's reference `b = (0, √(h_x² + h_y²), h_z)`, `h = R m`: the measured field itself, its horizontal part
 /// turned north. Source: section 3.4 of Madgwick's report for `b`; equation (32c) of Mahony, Hamel, Pflimlin for e.
 #[inline]
-pub(super) fn misalignment(
-    world_from_body: &UnitQuaternion<f64>,
-    up: &Vector3<f64>,
-    field: Option<&Vector3<f64>>,
-) -> (Vector3<f64>, Vector3<f64>) {
+pub(super) fn misalignment<T: Real>(
+    world_from_body: &UnitQuaternion<T>,
+    up: &Vector3<T>,
+    field: Option<&Vector3<T>>,
+) -> (Vector3<T>, Vector3<T>) {
     let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
     let (x2, y2, z2) = (x + x, y + y, z + z);
     let (wx, wy, xx, xz, yy, yz) = (w * x2, w * y2, x * x2, x * z2, y * y2, y * z2);
     // Rᵀẑ, the third row of R.
-    let world_up = Vector3::new(xz - wy, yz + wx, 1.0 - xx - yy);
+    let world_up = Vector3::new(xz - wy, yz + wx, T::ONE - xx - yy);
     let Some(field) = field else {
         return (up.cross(&world_up), world_up);
     };
     let (wz, xy, zz) = (w * z2, x * y2, z * z2);
-    let world_north = Vector3::new(xy + wz, 1.0 - xx - zz, yz - wx);
+    let world_north = Vector3::new(xy + wz, T::ONE - xx - zz, yz - wx);
     let vertical = world_up.dot(field);
     // Both are unit vectors but for rounding.
-    let squared = 1.0 - vertical * vertical;
-    let horizontal = if squared > 0.0 { squared.sqrt() } else { 0.0 };
+    let squared = T::ONE - vertical * vertical;
+    let horizontal = if squared > T::ZERO { squared.sqrt() } else { T::ZERO };
     // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
-    let error = (up + vertical * field).cross(&world_up) + horizontal * field.cross(&world_north);
+    let error = (up + field * vertical).cross(&world_up) + field.cross(&world_north) * horizontal;
     (error, world_up)
 }
 
 /// A unit vector, body frame, perpendicular to the expected vertical: about it a body that is exactly upside down,
 /// where the misalignment is zero, is turned upright.
 #[cold]
-pub(super) fn horizontal_axis(world_up: &Vector3<f64>) -> Vector3<f64> {
-    let axis = if world_up.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
+pub(super) fn horizontal_axis<T: Real>(world_up: &Vector3<T>) -> Vector3<T> {
+    let axis = if world_up.x.abs() < T::HALF { Vector3::x() } else { Vector3::y() };
     axis.cross(world_up).normalize()
 }
 
 /// East and up, as they are expected in the body frame: the first and third row of R.
 #[inline]
-pub(super) fn expected(world_from_body: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
+pub(super) fn expected<T: Real>(world_from_body: &UnitQuaternion<T>) -> [Vector3<T>; 2] {
     let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
     let (x2, y2, z2) = (x + x, y + y, z + z);
     let (xx, yy, zz, xy, xz, yz) = (x * x2, y * y2, z * z2, x * y2, x * z2, y * z2);
     let (wx, wy, wz) = (w * x2, w * y2, w * z2);
-    [Vector3::new(1.0 - yy - zz, xy - wz, xz + wy), Vector3::new(xz - wy, yz + wx, 1.0 - xx - yy)]
+    [Vector3::new(T::ONE - yy - zz, xy - wz, xz + wy), Vector3::new(xz - wy, yz + wx, T::ONE - xx - yy)]
 }

@@ -3,7 +3,9 @@
 //! The decomposition into heading and inclination is the one of D. Laidig, M. Caruso, A. Cereatti, T. Seel,
 //! "BROAD – A Benchmark for Robust Inertial Orientation Estimation", Data 6(7):72, 2021.
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{ComplexField, UnitQuaternion};
+
+use super::Real;
 
 /// The angles of the rotation `estimate ⊗ truth⁻¹`, which is in the world frame. All are in `0..=π` rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +23,7 @@ impl OrientationError {
     ///
     /// `None` if the truth is not finite, as where a tracking system lost its markers. An estimate that is
     /// not finite gives NaN, so that it is never mistaken for a missing truth.
-    pub fn between(estimate: &UnitQuaternion<f64>, truth: &UnitQuaternion<f64>) -> Option<Self> {
+    pub fn between<T: Real>(estimate: &UnitQuaternion<T>, truth: &UnitQuaternion<T>) -> Option<Self> {
         if !truth.coords.iter().all(|component| component.is_finite()) {
             return None;
         }
@@ -32,9 +34,9 @@ impl OrientationError {
         }
         // The arctangents are the same angles as the arccosines of the definition, and exact near 0.
         Some(Self {
-            total: 2.0 * x.hypot(y).hypot(z).atan2(w.abs()),
-            heading: 2.0 * z.abs().atan2(w.abs()),
-            inclination: 2.0 * x.hypot(y).atan2(w.hypot(z)),
+            total: 2.0 * x.hypot(y).hypot(z).atan2(w.abs()).as_f64(),
+            heading: 2.0 * z.abs().atan2(w.abs()).as_f64(),
+            inclination: 2.0 * x.hypot(y).atan2(w.hypot(z)).as_f64(),
         })
     }
 }
@@ -79,7 +81,7 @@ impl ErrorStatistics {
 
     /// The root mean square of each angle, rad. `None` if there is no error yet.
     pub fn rms(&self) -> Option<OrientationError> {
-        let rms = |sum: f64| (sum / self.count as f64).sqrt();
+        let rms = |sum: f64| ComplexField::sqrt(sum / self.count as f64);
         (self.count > 0).then(|| OrientationError {
             total: rms(self.total),
             heading: rms(self.heading),

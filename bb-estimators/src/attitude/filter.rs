@@ -4,7 +4,7 @@ use core::fmt::Debug;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::{ImuSample, ParamsError, SampleError};
+use super::{ImuSample, ParamsError, Real, SampleError};
 
 /// A filter that estimates `world_from_body` in ENU from inertial and, if it has them, magnetic samples.
 ///
@@ -21,7 +21,7 @@ use super::{ImuSample, ParamsError, SampleError};
 /// * A sample that is refused leaves the filter as it was.
 ///
 /// The orientation has unit norm for ever.
-pub trait AttitudeFilter: Sized {
+pub trait AttitudeFilter<T: Real = f64>: Sized {
     /// The tuning of the filter. `Default` is one set that works on ordinary sensors.
     type Params: Clone + Debug + Default + PartialEq;
 
@@ -41,7 +41,7 @@ pub trait AttitudeFilter: Sized {
     ///
     /// [`SampleError`] if a value is not finite or absurdly large, or if time stands still or runs back. The
     /// filter is then as it was before the call.
-    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError>;
+    fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError>;
 
     /// Starts from an orientation that is known, heading included, at `time_ns`, in place of one from the
     /// first sample.
@@ -49,21 +49,21 @@ pub trait AttitudeFilter: Sized {
     /// # Errors
     ///
     /// [`SampleError::NonFinite`] if the orientation is not a rotation. The filter is then as it was.
-    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError>;
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError>;
 
     /// The orientation after the last sample, or `None` before the filter has started.
-    fn world_from_body(&self) -> Option<UnitQuaternion<f64>>;
+    fn world_from_body(&self) -> Option<UnitQuaternion<T>>;
 
     /// The gyroscope's bias, rad/s in the body frame: what it reads more than the angular velocity. `None` if the
     /// filter does not estimate it; zero as long as it knows nothing of it.
-    fn gyroscope_bias(&self) -> Option<Vector3<f64>> {
+    fn gyroscope_bias(&self) -> Option<Vector3<T>> {
         None
     }
 
     /// Covariance of the orientation's error as a small rotation of the body, rad²:
     /// `true world_from_body = world_from_body ⊗ exp(½ error)`. `None` if the filter keeps none, or before it has
     /// started.
-    fn orientation_uncertainty(&self) -> Option<Matrix3<f64>> {
+    fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         None
     }
 

@@ -9,6 +9,7 @@ use core::fmt;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Quantity;
+use super::Real;
 use super::rotation::{turn_heading, turn_upright};
 
 /// Below this specific force, m/s², a sensor is in free fall and does not show where up is.
@@ -59,14 +60,14 @@ impl Error for InitialError {}
 /// # Errors
 ///
 /// [`InitialError`] if a value is not finite, in free fall, or if there is a field that shows no heading.
-pub fn initial_orientation(
-    specific_force: &Vector3<f64>,
-    magnetic_field: Option<&Vector3<f64>>,
-) -> Result<UnitQuaternion<f64>, InitialError> {
+pub fn initial_orientation<T: Real>(
+    specific_force: &Vector3<T>,
+    magnetic_field: Option<&Vector3<T>>,
+) -> Result<UnitQuaternion<T>, InitialError> {
     if !specific_force.iter().all(|component| component.is_finite()) {
         return Err(InitialError::NonFinite { quantity: Quantity::SpecificForce });
     }
-    let up = scaled_direction(specific_force, FREE_FALL).ok_or(InitialError::FreeFall)?;
+    let up = scaled_direction(specific_force, T::of(FREE_FALL)).ok_or(InitialError::FreeFall)?;
     let level = turn_upright(&UnitQuaternion::identity(), &up);
     let Some(field) = magnetic_field else {
         return Ok(level);
@@ -74,22 +75,22 @@ pub fn initial_orientation(
     if !field.iter().all(|component| component.is_finite()) {
         return Err(InitialError::NonFinite { quantity: Quantity::MagneticField });
     }
-    let field = scaled_direction(field, 0.0).ok_or(InitialError::NoHorizontalField)?;
+    let field = scaled_direction(field, T::ZERO).ok_or(InitialError::NoHorizontalField)?;
     let error = heading_error(&(level * field)).ok_or(InitialError::NoHorizontalField)?;
     Ok(turn_heading(&level, error))
 }
 
 /// The angle, rad, by which the world's vertical has to be turned about to bring the horizontal part of the
 /// unit vector `field`, in the world frame, to y. `None` if it has no horizontal part.
-pub(super) fn heading_error(field: &Vector3<f64>) -> Option<f64> {
+pub(super) fn heading_error<T: Real>(field: &Vector3<T>) -> Option<T> {
     let squared = field.x * field.x + field.y * field.y;
-    (squared > MIN_HORIZONTAL_FRACTION * MIN_HORIZONTAL_FRACTION).then(|| field.x.atan2(field.y))
+    (squared > T::of(MIN_HORIZONTAL_FRACTION * MIN_HORIZONTAL_FRACTION)).then(|| field.x.atan2(field.y))
 }
 
 /// The unit vector along a finite `vector` of any size, or `None` if its norm is at most `least`.
-fn scaled_direction(vector: &Vector3<f64>, least: f64) -> Option<Vector3<f64>> {
+fn scaled_direction<T: Real>(vector: &Vector3<T>, least: T) -> Option<Vector3<T>> {
     let largest = vector.amax();
-    if largest == 0.0 {
+    if largest == T::ZERO {
         return None;
     }
     // Twice, because the reciprocal of a subnormal is infinite and its quotient inexact.

@@ -5,28 +5,30 @@
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
+use super::Real;
+
 /// Below this squared angle, rad², sine and cosine of the half angle are series.
 const SERIES_SQUARED_ANGLE: f64 = 0.01;
 
 /// Cosine of half an angle, and the factor that makes the sine of half of it of the angle, for its square, rad².
 #[inline]
-pub(super) fn half_angle(squared_angle: f64) -> (f64, f64) {
-    if squared_angle < SERIES_SQUARED_ANGLE {
+pub(super) fn half_angle<T: Real>(squared_angle: T) -> (T, T) {
+    if squared_angle < T::of(SERIES_SQUARED_ANGLE) {
         // With h = (θ/2)² below 0.0025 the first terms left out are below 1e-15.
-        let h = 0.25 * squared_angle;
+        let h = T::of(0.25) * squared_angle;
         return (
-            1.0 - h * (1.0 / 2.0 - h * (1.0 / 24.0 - h * (1.0 / 720.0))),
-            0.5 - h * (1.0 / 12.0 - h * (1.0 / 240.0 - h * (1.0 / 10080.0))),
+            T::ONE - h * (T::HALF - h * (T::of(1.0 / 24.0) - h * (T::of(1.0 / 720.0)))),
+            T::HALF - h * (T::of(1.0 / 12.0) - h * (T::of(1.0 / 240.0) - h * (T::of(1.0 / 10080.0)))),
         );
     }
     let angle = squared_angle.sqrt();
-    let (sin, cos) = (0.5 * angle).sin_cos();
+    let (sin, cos) = (T::HALF * angle).sin_cos();
     (cos, sin / angle)
 }
 
 /// `world_from_body ⊗ exp(½ rotation)`: turns the body by a rotation vector given in the body frame, rad.
 #[inline]
-pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub(super) fn turn<T: Real>(world_from_body: &UnitQuaternion<T>, rotation: &Vector3<T>) -> UnitQuaternion<T> {
     let (cos, scale) = half_angle(rotation.norm_squared());
     let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
     let q = world_from_body;
@@ -41,7 +43,7 @@ pub(super) fn turn(world_from_body: &UnitQuaternion<f64>, rotation: &Vector3<f64
 /// `world_from_body ⊗ (1, tangent)`: turns the body about a vector given in the body frame, by twice the arc tangent of
 /// its length. Cheaper than [`turn`], and the same but for the third order. The result is longer than 1.
 #[inline]
-pub(super) fn turn_by_tangent(world_from_body: &UnitQuaternion<f64>, tangent: &Vector3<f64>) -> Quaternion<f64> {
+pub(super) fn turn_by_tangent<T: Real>(world_from_body: &UnitQuaternion<T>, tangent: &Vector3<T>) -> Quaternion<T> {
     let (q, x, y, z) = (world_from_body, tangent.x, tangent.y, tangent.z);
     Quaternion::new(
         q.w - q.i * x - q.j * y - q.k * z,
@@ -53,39 +55,39 @@ pub(super) fn turn_by_tangent(world_from_body: &UnitQuaternion<f64>, tangent: &V
 
 /// `quaternion` brought to unit norm; it is not zero.
 #[inline]
-pub(super) fn normalised(quaternion: &Quaternion<f64>) -> UnitQuaternion<f64> {
+pub(super) fn normalised<T: Real>(quaternion: &Quaternion<T>) -> UnitQuaternion<T> {
     let q = quaternion;
-    let scale = 1.0 / (q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k).sqrt();
+    let scale = T::ONE / (q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k).sqrt();
     unit(q.w * scale, q.i * scale, q.j * scale, q.k * scale)
 }
 
 /// Turns `world_from_body` about the world's vertical by `angle`, rad, counter-clockwise seen from above.
-pub(super) fn turn_heading(world_from_body: &UnitQuaternion<f64>, angle: f64) -> UnitQuaternion<f64> {
-    let (sin, cos) = (0.5 * angle).sin_cos();
+pub(super) fn turn_heading<T: Real>(world_from_body: &UnitQuaternion<T>, angle: T) -> UnitQuaternion<T> {
+    let (sin, cos) = (T::HALF * angle).sin_cos();
     turn_heading_by(world_from_body, [cos, sin])
 }
 
 /// Turns `world_from_body` about the world's vertical by an angle of whose half these are cosine and sine.
 #[inline]
-pub(super) fn turn_heading_by(world_from_body: &UnitQuaternion<f64>, [c, s]: [f64; 2]) -> UnitQuaternion<f64> {
+pub(super) fn turn_heading_by<T: Real>(world_from_body: &UnitQuaternion<T>, [c, s]: [T; 2]) -> UnitQuaternion<T> {
     let q = world_from_body;
     unit(c * q.w - s * q.k, c * q.i - s * q.j, c * q.j + s * q.i, c * q.k + s * q.w)
 }
 
 /// Turns `world_from_body` by the shortest rotation, about a horizontal axis, that takes the world vector `up`
 /// to the vertical. `up` may have any length but 0. If it points straight down, the axis is east.
-pub(super) fn turn_upright(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub(super) fn turn_upright<T: Real>(world_from_body: &UnitQuaternion<T>, up: &Vector3<T>) -> UnitQuaternion<T> {
     // Along (n + z, y, -x, 0) with n the norm of `up`. Next to straight down n + z cancels, and
     // (x² + y²) / (n - z) is the same number without that.
     let horizontal = up.x * up.x + up.y * up.y;
     let norm = (horizontal + up.z * up.z).sqrt();
-    let w = if up.z > 0.0 { norm + up.z } else { horizontal / (norm - up.z) };
+    let w = if up.z > T::ZERO { norm + up.z } else { horizontal / (norm - up.z) };
     let squared = w * w + horizontal;
-    let (w, x, y) = if squared > 0.0 {
-        let scale = 1.0 / squared.sqrt();
+    let (w, x, y) = if squared > T::ZERO {
+        let scale = T::ONE / squared.sqrt();
         (w * scale, up.y * scale, -up.x * scale)
     } else {
-        (0.0, 1.0, 0.0)
+        (T::ZERO, T::ONE, T::ZERO)
     };
     let q = world_from_body;
     unit(
@@ -97,14 +99,14 @@ pub(super) fn turn_upright(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f
 }
 
 /// `orientation` with its norm, which is 1 but for rounding, brought back to 1.
-pub(super) fn renormalised(orientation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+pub(super) fn renormalised<T: Real>(orientation: &UnitQuaternion<T>) -> UnitQuaternion<T> {
     let q = orientation;
     // One step of Newton's method for 1/√n at n = 1.
-    let scale = 1.5 - 0.5 * (q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k);
+    let scale = T::of(1.5) - T::HALF * (q.w * q.w + q.i * q.i + q.j * q.j + q.k * q.k);
     unit(q.w * scale, q.i * scale, q.j * scale, q.k * scale)
 }
 
-fn unit(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
+fn unit<T: Real>(w: T, x: T, y: T, z: T) -> UnitQuaternion<T> {
     Unit::new_unchecked(Quaternion::new(w, x, y, z))
 }
 
@@ -114,7 +116,7 @@ mod tests {
 
     #[test]
     fn agrees_with_the_exponential_at_every_angle() {
-        let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
+        let start = UnitQuaternion::<f64>::from_euler_angles(0.3, -1.1, 2.0);
         let axis = Vector3::new(0.48, -0.6, 0.64);
         for angle in [0.0, 1e-300, 1e-9, 1e-3, 0.05, 0.0999, 0.1001, 1.0, 3.1, 6.0, 500.0] {
             let rotation = axis * angle;
@@ -127,7 +129,7 @@ mod tests {
 
     #[test]
     fn world_rotations_are_products_from_the_left() {
-        let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
+        let start = UnitQuaternion::<f64>::from_euler_angles(0.3, -1.1, 2.0);
         let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.7) * start;
         assert!(turn_heading(&start, 0.7).angle_to(&heading) < 1e-15);
         for up in [Vector3::new(3.0, -4.0, 1.0), Vector3::new(1e-9, 0.0, -2.0), Vector3::new(-0.2, 0.1, -5.0)] {
@@ -141,7 +143,7 @@ mod tests {
 
     #[test]
     fn a_turn_by_a_tangent_is_by_twice_its_arc() {
-        let start = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
+        let start = UnitQuaternion::<f64>::from_euler_angles(0.3, -1.1, 2.0);
         let axis = Vector3::new(0.48, -0.6, 0.64);
         for tangent in [0.0, 1e-9, 0.01, 1.0, 50.0_f64] {
             let exact = start * UnitQuaternion::from_scaled_axis(axis * (2.0 * tangent.atan()));
@@ -152,7 +154,7 @@ mod tests {
 
     #[test]
     fn rounding_is_taken_away() {
-        let q = Quaternion::new(0.5, 0.5, -0.5, 0.5) * (1.0 + 1e-9);
+        let q = Quaternion::new(0.5, 0.5, -0.5, 0.5) * (1.0 + 1e-9_f64);
         assert!((renormalised(&Unit::new_unchecked(q)).norm() - 1.0).abs() < 1e-15);
     }
 }

@@ -5,6 +5,8 @@ use core::fmt;
 
 use nalgebra::Vector3;
 
+use super::Real;
+
 /// The greatest component of the angular velocity that a filter takes, rad/s. Gyroscopes end below 100 rad/s.
 pub const MAX_ANGULAR_VELOCITY: f64 = 1e3;
 
@@ -18,15 +20,15 @@ pub const MAX_MAGNETIC_FIELD: f64 = 1e15;
 ///
 /// All vectors are in the body frame, which is the sensor's.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImuSample {
+pub struct ImuSample<T = f64> {
     /// When it was measured, nanoseconds since any fixed moment.
     pub time_ns: i64,
     /// Angular velocity of the body relative to the world, rad/s.
-    pub angular_velocity: Vector3<f64>,
+    pub angular_velocity: Vector3<T>,
     /// Specific force, m/s²: at rest one g upwards.
-    pub specific_force: Vector3<f64>,
+    pub specific_force: Vector3<T>,
     /// Magnetic field, tesla. Only its direction is used, so any other unit does as well.
-    pub magnetic_field: Option<Vector3<f64>>,
+    pub magnetic_field: Option<Vector3<T>>,
 }
 
 /// A quantity that a filter is given.
@@ -96,21 +98,32 @@ impl fmt::Display for SampleError {
 impl Error for SampleError {}
 
 /// Squared norms of a sample that has been checked.
-pub(super) struct SquaredNorms {
+pub(super) struct SquaredNorms<T> {
     /// (m/s²)².
-    pub(super) specific_force: f64,
+    pub(super) specific_force: T,
     /// In the square of the field's unit; `None` if there is no field to use.
-    pub(super) magnetic_field: Option<f64>,
+    pub(super) magnetic_field: Option<T>,
 }
 
-impl ImuSample {
+impl<T: Real> ImuSample<T> {
+    /// The same in another scalar.
+    pub fn cast<U: Real>(&self) -> ImuSample<U> {
+        let cast = |vector: &Vector3<T>| vector.map(|component| U::of(component.as_f64()));
+        ImuSample {
+            time_ns: self.time_ns,
+            angular_velocity: cast(&self.angular_velocity),
+            specific_force: cast(&self.specific_force),
+            magnetic_field: self.magnetic_field.as_ref().map(cast),
+        }
+    }
+
     /// Whether every value is finite and one that a sensor can give.
     #[inline]
-    pub(super) fn check(&self, magnetometer: bool) -> Result<SquaredNorms, SampleError> {
-        check(Quantity::AngularVelocity, &self.angular_velocity, MAX_ANGULAR_VELOCITY)?;
-        let specific_force = check(Quantity::SpecificForce, &self.specific_force, MAX_SPECIFIC_FORCE)?;
+    pub(super) fn check(&self, magnetometer: bool) -> Result<SquaredNorms<T>, SampleError> {
+        check(Quantity::AngularVelocity, &self.angular_velocity, T::of(MAX_ANGULAR_VELOCITY))?;
+        let specific_force = check(Quantity::SpecificForce, &self.specific_force, T::of(MAX_SPECIFIC_FORCE))?;
         let magnetic_field = match &self.magnetic_field {
-            Some(field) if magnetometer => Some(check(Quantity::MagneticField, field, MAX_MAGNETIC_FIELD)?),
+            Some(field) if magnetometer => Some(check(Quantity::MagneticField, field, T::of(MAX_MAGNETIC_FIELD))?),
             _ => None,
         };
         Ok(SquaredNorms { specific_force, magnetic_field })
@@ -119,19 +132,19 @@ impl ImuSample {
 
 /// The squared norm, if every component is finite and within the limit.
 #[inline]
-fn check(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> Result<f64, SampleError> {
+fn check<T: Real>(quantity: Quantity, value: &Vector3<T>, limit: T) -> Result<T, SampleError> {
     // Most samples are within the sphere in the cube, of which the squared norm is needed anyway.
     let squared = value.norm_squared();
     if squared <= limit * limit { Ok(squared) } else { check_components(quantity, value, limit).map(|()| squared) }
 }
 
 #[cold]
-fn check_components(quantity: Quantity, value: &Vector3<f64>, limit: f64) -> Result<(), SampleError> {
+fn check_components<T: Real>(quantity: Quantity, value: &Vector3<T>, limit: T) -> Result<(), SampleError> {
     if !value.iter().all(|component| component.is_finite()) {
         return Err(SampleError::NonFinite { quantity });
     }
     if value.amax() > limit {
-        return Err(SampleError::OutOfRange { quantity, value: value.amax(), limit });
+        return Err(SampleError::OutOfRange { quantity, value: value.amax().as_f64(), limit: limit.as_f64() });
     }
     Ok(())
 }

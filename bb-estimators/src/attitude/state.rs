@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::initial::{FREE_FALL, heading_error};
 use super::rotation::{normalised, turn_heading, turn_upright};
-use super::{ImuSample, Quantity, SampleError};
+use super::{ImuSample, Quantity, Real, SampleError};
 
 /// The longest time between two samples that a filter integrates over, seconds.
 ///
@@ -14,31 +14,28 @@ pub const MAX_GAP_S: f64 = 1.0;
 
 const MAX_GAP_NS: i64 = (MAX_GAP_S * 1e9) as i64;
 
-/// Below this squared norm a magnetic field is none, whatever its unit.
-const NO_FIELD: f64 = 1e-60;
-
 /// The orientation with what is known about it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct AttitudeState {
+pub(super) struct AttitudeState<T: Real> {
     magnetometer: bool,
     previous_ns: Option<i64>,
-    world_from_body: Option<UnitQuaternion<f64>>,
+    world_from_body: Option<UnitQuaternion<T>>,
     heading_known: bool,
 }
 
 /// What there is to do for one sample once it has been accepted.
-pub(super) struct Step {
+pub(super) struct Step<T> {
     /// Time since the previous sample, in `0..=MAX_GAP_S`, seconds.
-    pub(super) dt_s: f64,
+    pub(super) dt_s: T,
     /// The orientation at the previous sample.
-    pub(super) world_from_body: UnitQuaternion<f64>,
+    pub(super) world_from_body: UnitQuaternion<T>,
     /// Direction of the specific force in the body frame; `None` in free fall.
-    pub(super) up: Option<Vector3<f64>>,
+    pub(super) up: Option<Vector3<T>>,
     /// Direction of the magnetic field in the body frame, if there is one to use.
-    pub(super) field: Option<Vector3<f64>>,
+    pub(super) field: Option<Vector3<T>>,
 }
 
-impl AttitudeState {
+impl<T: Real> AttitudeState<T> {
     /// A state that has seen no sample.
     pub(super) fn new(magnetometer: bool) -> Self {
         Self { magnetometer, previous_ns: None, world_from_body: None, heading_known: false }
@@ -46,7 +43,7 @@ impl AttitudeState {
 
     /// Checks a sample. `None` if the state has started or restarted with it and there is nothing to step.
     #[inline]
-    pub(super) fn admit(&mut self, sample: &ImuSample) -> Result<Option<Step>, SampleError> {
+    pub(super) fn admit(&mut self, sample: &ImuSample<T>) -> Result<Option<Step<T>>, SampleError> {
         let squared = sample.check(self.magnetometer)?;
         let time_ns = sample.time_ns;
         if let Some(previous_ns) = self.previous_ns
@@ -56,9 +53,9 @@ impl AttitudeState {
         }
 
         let previous_ns = self.previous_ns.replace(time_ns);
-        let up = direction(&sample.specific_force, squared.specific_force, FREE_FALL * FREE_FALL);
+        let up = direction(&sample.specific_force, squared.specific_force, T::of(FREE_FALL * FREE_FALL));
         let field = match (&sample.magnetic_field, squared.magnetic_field) {
-            (Some(field), Some(squared)) => direction(field, squared, NO_FIELD),
+            (Some(field), Some(squared)) => direction(field, squared, T::LEAST_SQUARE),
             _ => None,
         };
 
@@ -66,7 +63,7 @@ impl AttitudeState {
             // The difference of two stamps can be wider than their type.
             let dt_ns = time_ns.checked_sub(previous_ns).unwrap_or(i64::MAX);
             if dt_ns <= MAX_GAP_NS {
-                let dt_s = dt_ns as f64 * 1e-9;
+                let dt_s = T::seconds(dt_ns);
                 return Ok(Some(Step { dt_s, world_from_body, up, field }));
             }
         }
@@ -76,7 +73,7 @@ impl AttitudeState {
 
     /// Keeps the orientation that a step ended with, of any norm but 0. The first field sets its heading.
     #[inline]
-    pub(super) fn store(&mut self, world_from_body: &Quaternion<f64>, field: Option<Vector3<f64>>) {
+    pub(super) fn store(&mut self, world_from_body: &Quaternion<T>, field: Option<Vector3<T>>) {
         self.world_from_body = Some(normalised(world_from_body));
         if !self.heading_known
             && let Some(field) = field
@@ -86,7 +83,7 @@ impl AttitudeState {
     }
 
     #[cold]
-    fn face_north(&mut self, field: &Vector3<f64>) {
+    fn face_north(&mut self, field: &Vector3<T>) {
         if let Some(world_from_body) = self.world_from_body
             && let Some(error) = heading_error(&(world_from_body * field))
         {
@@ -96,13 +93,9 @@ impl AttitudeState {
     }
 
     /// Starts from a known orientation.
-    pub(super) fn start_at(
-        &mut self,
-        time_ns: i64,
-        world_from_body: UnitQuaternion<f64>,
-    ) -> Result<(), SampleError> {
+    pub(super) fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError> {
         let norm = world_from_body.norm();
-        if !(0.5..2.0).contains(&norm) {
+        if !(T::HALF..T::TWO).contains(&norm) {
             return Err(SampleError::NonFinite { quantity: Quantity::Orientation });
         }
         self.previous_ns = Some(time_ns);
@@ -112,7 +105,7 @@ impl AttitudeState {
     }
 
     /// The orientation, once there is one.
-    pub(super) fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+    pub(super) fn world_from_body(&self) -> Option<UnitQuaternion<T>> {
         self.world_from_body
     }
 
@@ -128,7 +121,7 @@ impl AttitudeState {
 
     /// Levels what orientation there is, or none, and lets the next field set the heading.
     #[cold]
-    fn restart(&mut self, up: Option<Vector3<f64>>, field: Option<Vector3<f64>>) {
+    fn restart(&mut self, up: Option<Vector3<T>>, field: Option<Vector3<T>>) {
         self.heading_known = false;
         let stale = self.world_from_body;
         let fresh = up.map(|up| {
@@ -143,6 +136,6 @@ impl AttitudeState {
 
 /// The unit vector along `vector`, or `None` if its squared norm is at most `least`.
 #[inline]
-fn direction(vector: &Vector3<f64>, squared: f64, least: f64) -> Option<Vector3<f64>> {
-    (squared > least).then(|| vector * (1.0 / squared.sqrt()))
+fn direction<T: Real>(vector: &Vector3<T>, squared: T, least: T) -> Option<Vector3<T>> {
+    (squared > least).then(|| vector * (T::ONE / squared.sqrt()))
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Unit, UnitQuaternion};
 
 use super::{AverageError, check};
+use crate::attitude::Real;
 
 /// Below this relative difference of M's two eigenvalues the average is not defined.
 const AMBIGUOUS: f64 = 1e-12;
@@ -26,32 +27,32 @@ const AMBIGUOUS: f64 = 1e-12;
 /// `[(w₁+w₂) cos²α, (w₁-w₂) sin α cos α; ·, (w₁+w₂) sin²α]`, whose dominant eigenvector is at φ with
 /// `tan 2φ = (w₁-w₂) sin 2α / ((w₁+w₂) cos 2α)`. The same vector, without the cancellation of the paper's
 /// `w₁ - w₂ + z`.
-pub fn average_pair(
-    first: &UnitQuaternion<f64>,
-    first_weight: f64,
-    second: &UnitQuaternion<f64>,
-    second_weight: f64,
-) -> Result<UnitQuaternion<f64>, AverageError> {
-    check(0, first, first_weight)?;
-    check(1, second, second_weight)?;
+pub fn average_pair<T: Real>(
+    first: &UnitQuaternion<T>,
+    first_weight: T,
+    second: &UnitQuaternion<T>,
+    second_weight: T,
+) -> Result<UnitQuaternion<T>, AverageError> {
+    check(0, first, first_weight.as_f64())?;
+    check(1, second, second_weight.as_f64())?;
     let greatest = first_weight.max(second_weight);
-    if greatest == 0.0 {
+    if greatest == T::ZERO {
         return Err(AverageError::NoWeight);
     }
     let (w1, w2) = (first_weight / greatest, second_weight / greatest);
 
     let q1 = first.into_inner();
-    let q2 = if first.coords.dot(&second.coords) < 0.0 { -second.into_inner() } else { second.into_inner() };
-    let (sum, difference) = ((q1 + q2) * 0.5, (q1 - q2) * 0.5);
+    let q2 = if first.coords.dot(&second.coords) < T::ZERO { -second.into_inner() } else { second.into_inner() };
+    let (sum, difference) = ((q1 + q2) * T::HALF, (q1 - q2) * T::HALF);
     let (cos, sin) = (sum.norm(), difference.norm());
 
-    let across = (w1 - w2) * (2.0 * sin * cos);
+    let across = (w1 - w2) * (T::TWO * sin * cos);
     let along = (w1 + w2) * (cos - sin) * (cos + sin);
-    if across.hypot(along) < AMBIGUOUS * (w1 + w2) {
+    if across.hypot(along) < T::above_rounding(AMBIGUOUS) * (w1 + w2) {
         return Err(AverageError::Ambiguous);
     }
-    let phi = 0.5 * across.atan2(along);
+    let phi = T::HALF * across.atan2(along);
     // sin φ / sin α, and its limit where the two orientations are one.
-    let ratio = if sin > 0.0 { phi.sin() / sin } else { 0.0 };
+    let ratio = if sin > T::ZERO { phi.sin() / sin } else { T::ZERO };
     Ok(Unit::new_normalize(sum * (phi.cos() / cos) + difference * ratio))
 }

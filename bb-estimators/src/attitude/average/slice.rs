@@ -1,8 +1,11 @@
 //! The average of any number of orientations.
 
+use core::cmp::Ordering;
+
 use nalgebra::{Matrix4, Quaternion, SymmetricEigen, Unit, UnitQuaternion};
 
 use super::{AverageError, check};
+use crate::attitude::Real;
 
 /// Below this relative difference of M's two greatest eigenvalues the average is not defined.
 const AMBIGUOUS: f64 = 1e-12;
@@ -21,29 +24,29 @@ const AMBIGUOUS: f64 = 1e-12;
 /// # Method
 ///
 /// The eigenvector of the greatest eigenvalue of `M = Σ wᵢ qᵢ qᵢᵀ`, by the symmetric QR algorithm.
-pub fn average(weighted: &[(UnitQuaternion<f64>, f64)]) -> Result<UnitQuaternion<f64>, AverageError> {
+pub fn average<T: Real>(weighted: &[(UnitQuaternion<T>, T)]) -> Result<UnitQuaternion<T>, AverageError> {
     for (index, (orientation, weight)) in weighted.iter().enumerate() {
-        check(index, orientation, *weight)?;
+        check(index, orientation, weight.as_f64())?;
     }
-    let by_weight = weighted.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let (heaviest, greatest) = by_weight.filter(|(_, weight)| *weight > 0.0).ok_or(AverageError::NoWeight)?;
+    let by_weight = weighted.iter().max_by(|a, b| a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal));
+    let (heaviest, greatest) = by_weight.filter(|(_, weight)| *weight > T::ZERO).ok_or(AverageError::NoWeight)?;
 
     let mut moments = Matrix4::zeros();
     for (orientation, weight) in weighted {
         let q = &orientation.coords;
-        moments += q * q.transpose() * (weight / greatest);
+        moments += q * q.transpose() * (*weight / *greatest);
     }
     let eigen = SymmetricEigen::new(moments);
     let largest = eigen.eigenvalues.imax();
     let gap = (0..4)
         .filter(|&index| index != largest)
         .map(|index| eigen.eigenvalues[largest] - eigen.eigenvalues[index])
-        .fold(f64::INFINITY, f64::min);
-    if gap < AMBIGUOUS * moments.trace() {
+        .fold(T::of(f64::INFINITY), T::min);
+    if gap < T::above_rounding(AMBIGUOUS) * moments.trace() {
         return Err(AverageError::Ambiguous);
     }
 
     let average = eigen.eigenvectors.column(largest).into_owned();
-    let sign = if average.dot(&heaviest.coords) < 0.0 { -1.0 } else { 1.0 };
+    let sign = if average.dot(&heaviest.coords) < T::ZERO { -T::ONE } else { T::ONE };
     Ok(Unit::new_normalize(Quaternion::from(average * sign)))
 }

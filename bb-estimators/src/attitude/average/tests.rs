@@ -137,8 +137,22 @@ fn invalid_input_is_an_error() {
     }
     assert!(average_pair(&q, f64::NAN, &q, 1.0).is_err());
     assert_eq!(average_pair(&q, 0.0, &q, 0.0), Err(AverageError::NoWeight));
-    assert_eq!(average(&[]), Err(AverageError::NoWeight));
+    assert_eq!(average::<f64>(&[]), Err(AverageError::NoWeight));
     assert_eq!(average(&[(q, 0.0)]), Err(AverageError::NoWeight));
     assert_eq!(average_pair(&nan, 1.0, &q, 1.0), Err(AverageError::NonFinite { index: 0 }));
     assert_eq!(average(&[(q, 1.0), (nan, 1.0)]), Err(AverageError::NonFinite { index: 1 }));
+}
+
+#[test]
+fn single_precision_gives_the_same_and_knows_its_own_rounding() {
+    let single = |angle: f64| about_x(angle).cast::<f32>();
+    let pair = average_pair(&single(0.3), 1.0, &single(1.5), 3.0).unwrap();
+    let expected = average_pair(&about_x(0.3), 1.0, &about_x(1.5), 3.0).unwrap();
+    assert!(pair.cast::<f64>().angle_to(&expected) < 1e-6);
+    assert!(average(&[(single(0.3), 1.0), (single(1.5), 3.0)]).unwrap().angle_to(&pair) < 1e-6);
+    for angle in [0.3, 1.0, -2.0] {
+        let (q1, q2) = (single(angle), single(angle + core::f64::consts::PI));
+        assert_eq!(average_pair(&q1, 2.0, &q2, 2.0), Err(AverageError::Ambiguous));
+        assert_eq!(average(&[(q1, 2.0), (q2, 2.0)]), Err(AverageError::Ambiguous));
+    }
 }

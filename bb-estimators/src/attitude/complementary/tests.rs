@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{ComplementaryFilter, ComplementaryParams};
 use crate::attitude::laws::{at_rest, attitude_laws};
-use crate::attitude::{AttitudeFilter, ImuSample, OrientationError};
+use crate::attitude::{AttitudeFilter, ImuSample, OrientationError, Real};
 
-fn filter(magnetometer: bool) -> ComplementaryFilter {
+fn filter<T: Real>(magnetometer: bool) -> ComplementaryFilter<T> {
     ComplementaryFilter::new(ComplementaryParams { magnetometer, ..Default::default() }).unwrap()
 }
 
@@ -86,8 +86,8 @@ fn parameters_out_of_range_are_named() {
     let good = ComplementaryParams::default();
     for value in [-1.0, f64::NAN, f64::INFINITY] {
         let tilt = ComplementaryParams { tilt_time_constant: value, ..good };
-        assert_eq!(ComplementaryFilter::new(tilt).unwrap_err().parameter, "tilt_time_constant");
+        assert_eq!(ComplementaryFilter::<f64>::new(tilt).unwrap_err().parameter, "tilt_time_constant");
         let heading = ComplementaryParams { heading_time_constant: value, ..good };
-        assert_eq!(ComplementaryFilter::new(heading).unwrap_err().parameter, "heading_time_constant");
+        assert_eq!(ComplementaryFilter::<f64>::new(heading).unwrap_err().parameter, "heading_time_constant");
     }
 }

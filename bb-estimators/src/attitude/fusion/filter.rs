@@ -9,7 +9,7 @@ use crate::attitude::directions::{expected, horizontal_axis};
 use crate::attitude::initial::MIN_HORIZONTAL_FRACTION;
 use crate::attitude::rotation::turn;
 use crate::attitude::state::AttitudeState;
-use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, SampleError};
+use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
 
 /// The gain at startup, 1/s, and how long it takes to go down to its value, s. Source: the library's.
 const STARTUP_GAIN: f64 = 10.0;
@@ -21,35 +21,35 @@ const FULL_RANGE: f64 = 0.98;
 /// Beyond a right angle the correction is that of twice the greatest sine. Source: the library's.
 const FAR: f64 = 2.0;
 
-/// Below this squared norm an error has no direction.
-const NO_ERROR: f64 = 1e-24;
+/// Below this norm an error has no direction.
+const NO_ERROR: f64 = 1e-12;
 
 /// The revised AHRS algorithm of Madgwick's thesis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FusionFilter {
+pub struct FusionFilter<T: Real = f64> {
     params: FusionParams,
-    state: AttitudeState,
-    offset: Offset,
+    state: AttitudeState<T>,
+    offset: Offset<T>,
     /// What is left of startup, s.
-    startup_s: f64,
-    acceleration: Rejection,
-    field: Rejection,
+    startup_s: T,
+    acceleration: Rejection<T>,
+    field: Rejection<T>,
     /// Squared sines of the greatest deviations that are not rejected.
-    near_acceleration: f64,
-    near_field: f64,
+    near_acceleration: T,
+    near_field: T,
     /// Time since the last field, at most [`MAX_GAP_S`].
-    since_field_s: f64,
+    since_field_s: T,
 }
 
 /// How far a measured direction is from the expected one.
-struct Deviation {
+struct Deviation<T> {
     /// Sine of the angle, times the axis to turn the body about; of length [`FAR`] beyond a right angle.
-    error: Vector3<f64>,
+    error: Vector3<T>,
     /// Squared sine; infinite beyond a right angle.
-    squared_sine: f64,
+    squared_sine: T,
 }
 
-impl AttitudeFilter for FusionFilter {
+impl<T: Real> AttitudeFilter<T> for FusionFilter<T> {
     type Params = FusionParams;
 
     fn new(params: FusionParams) -> Result<Self, ParamsError> {
@@ -58,12 +58,12 @@ impl AttitudeFilter for FusionFilter {
             params,
             state: AttitudeState::new(params.magnetometer),
             offset: Offset::new(),
-            startup_s: 0.0,
+            startup_s: T::ZERO,
             acceleration: Rejection::new(),
             field: Rejection::new(),
-            near_acceleration: squared_sine(params.acceleration_rejection),
-            near_field: squared_sine(params.magnetic_rejection),
-            since_field_s: 0.0,
+            near_acceleration: squared_sine(T::of(params.acceleration_rejection)),
+            near_field: squared_sine(T::of(params.magnetic_rejection)),
+            since_field_s: T::ZERO,
         })
     }
 
@@ -71,16 +71,16 @@ impl AttitudeFilter for FusionFilter {
         &self.params
     }
 
-    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError> {
+    fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         let Some(step) = self.state.admit(sample)? else {
-            self.begin(STARTUP_S);
+            self.begin(T::of(STARTUP_S));
             return Ok(());
         };
-        let range = self.params.gyroscope_range;
-        if range > 0.0 && sample.angular_velocity.amax() > FULL_RANGE * range {
-            self.begin(STARTUP_S);
+        let range = T::of(self.params.gyroscope_range);
+        if range > T::ZERO && sample.angular_velocity.amax() > T::of(FULL_RANGE) * range {
+            self.begin(T::of(STARTUP_S));
         }
-        self.startup_s = (self.startup_s - step.dt_s).max(0.0);
+        self.startup_s = (self.startup_s - step.dt_s).max(T::ZERO);
         let gain = self.gain();
         let rate = self.rate(step.dt_s, &sample.angular_velocity);
         let orientation = turn(&step.world_from_body, &(rate * step.dt_s));
@@ -90,19 +90,19 @@ impl AttitudeFilter for FusionFilter {
         if let Some(up) = &step.up {
             let deviation = deviation(up, &world_up, || horizontal_axis(&world_up));
             if self.takes_acceleration(step.dt_s, &deviation) {
-                correction += deviation.error * (gain * step.dt_s).min(1.0);
+                correction += deviation.error * (gain * step.dt_s).min(T::ONE);
             }
         }
-        self.since_field_s = (self.since_field_s + step.dt_s).min(MAX_GAP_S);
+        self.since_field_s = (self.since_field_s + step.dt_s).min(T::of(MAX_GAP_S));
         if let Some(field) = &step.field {
             let west = world_up.cross(field);
             let squared = west.norm_squared();
-            if squared > MIN_HORIZONTAL_FRACTION * MIN_HORIZONTAL_FRACTION {
-                let west = west * (1.0 / squared.sqrt());
+            if squared > T::of(MIN_HORIZONTAL_FRACTION * MIN_HORIZONTAL_FRACTION) {
+                let west = west * (T::ONE / squared.sqrt());
                 let deviation = deviation(&west, &-world_east, || world_up);
                 let dt_s = core::mem::take(&mut self.since_field_s);
                 if self.takes_field(dt_s, &deviation) {
-                    correction += deviation.error * (gain * dt_s).min(1.0);
+                    correction += deviation.error * (gain * dt_s).min(T::ONE);
                 }
             }
         }
@@ -110,28 +110,28 @@ impl AttitudeFilter for FusionFilter {
         Ok(())
     }
 
-    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError> {
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError> {
         self.state.start_at(time_ns, world_from_body)?;
-        self.begin(0.0);
+        self.begin(T::ZERO);
         Ok(())
     }
 
-    fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+    fn world_from_body(&self) -> Option<UnitQuaternion<T>> {
         self.state.world_from_body()
     }
 
-    fn gyroscope_bias(&self) -> Option<Vector3<f64>> {
+    fn gyroscope_bias(&self) -> Option<Vector3<T>> {
         self.params.offset_correction.then_some(self.offset.offset)
     }
 
     /// When the gyroscope's offset is being found.
     fn is_at_rest(&self) -> Option<bool> {
-        self.params.offset_correction.then(|| self.offset.is_still(self.params.rest_time))
+        self.params.offset_correction.then(|| self.offset.is_still(T::of(self.params.rest_time)))
     }
 
     /// When the last field was rejected.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
-        let watched = self.params.magnetometer && self.params.magnetic_rejection > 0.0;
+        let watched = self.params.magnetometer && T::of(self.params.magnetic_rejection) > T::ZERO;
         watched.then_some(self.field.is_ignored())
     }
 
@@ -142,60 +142,65 @@ impl AttitudeFilter for FusionFilter {
     }
 }
 
-impl FusionFilter {
+impl<T: Real> FusionFilter<T> {
     #[cold]
-    fn begin(&mut self, startup_s: f64) {
+    fn begin(&mut self, startup_s: T) {
         // Without feedback there is nothing to start up.
-        self.startup_s = if self.params.gain > 0.0 { startup_s } else { 0.0 };
+        self.startup_s = if T::of(self.params.gain) > T::ZERO { startup_s } else { T::ZERO };
         self.acceleration = Rejection::new();
         self.field = Rejection::new();
         self.offset.forget_motion();
-        self.since_field_s = 0.0;
+        self.since_field_s = T::ZERO;
     }
 
     /// The gain of now, 1/s.
-    pub(super) fn gain(&self) -> f64 {
-        let gain = self.params.gain;
-        if self.startup_s > 0.0 {
-            gain + (STARTUP_GAIN - gain).max(0.0) * (self.startup_s / STARTUP_S)
+    pub(super) fn gain(&self) -> T {
+        let gain = T::of(self.params.gain);
+        if self.startup_s > T::ZERO {
+            gain + (T::of(STARTUP_GAIN) - gain).max(T::ZERO) * (self.startup_s / T::of(STARTUP_S))
         } else {
             gain
         }
     }
 
     /// The angular velocity without the offset, rad/s.
-    fn rate(&mut self, dt_s: f64, measured: &Vector3<f64>) -> Vector3<f64> {
+    fn rate(&mut self, dt_s: T, measured: &Vector3<T>) -> Vector3<T> {
         if !self.params.offset_correction {
             return *measured;
         }
-        self.offset.correct(dt_s, measured, self.params.rest_angular_velocity, self.params.rest_time)
+        self.offset.correct(dt_s, measured, T::of(self.params.rest_angular_velocity), T::of(self.params.rest_time))
     }
 
-    fn takes_acceleration(&mut self, dt_s: f64, deviation: &Deviation) -> bool {
-        let near = self.startup_s > 0.0 || deviation.squared_sine <= self.near_acceleration;
-        self.acceleration.takes(dt_s, self.params.recovery_time, near)
+    fn takes_acceleration(&mut self, dt_s: T, deviation: &Deviation<T>) -> bool {
+        let near = self.startup_s > T::ZERO || deviation.squared_sine <= self.near_acceleration;
+        self.acceleration.takes(dt_s, T::of(self.params.recovery_time), near)
     }
 
-    fn takes_field(&mut self, dt_s: f64, deviation: &Deviation) -> bool {
-        let near = self.startup_s > 0.0 || deviation.squared_sine <= self.near_field;
-        self.field.takes(dt_s, self.params.recovery_time, near)
+    fn takes_field(&mut self, dt_s: T, deviation: &Deviation<T>) -> bool {
+        let near = self.startup_s > T::ZERO || deviation.squared_sine <= self.near_field;
+        self.field.takes(dt_s, T::of(self.params.recovery_time), near)
     }
 }
 
 /// Of a threshold, rad, of which 0 is none.
-fn squared_sine(threshold: f64) -> f64 {
+fn squared_sine<T: Real>(threshold: T) -> T {
     let sine = threshold.sin();
-    if threshold > 0.0 { sine * sine } else { f64::INFINITY }
+    if threshold > T::ZERO { sine * sine } else { T::of(f64::INFINITY) }
 }
 
 /// The deviation of two unit vectors; `axis` is what to turn about where they are opposite.
 #[inline]
-fn deviation(measured: &Vector3<f64>, expected: &Vector3<f64>, axis: impl FnOnce() -> Vector3<f64>) -> Deviation {
+fn deviation<T: Real>(
+    measured: &Vector3<T>,
+    expected: &Vector3<T>,
+    axis: impl FnOnce() -> Vector3<T>,
+) -> Deviation<T> {
     let error = measured.cross(expected);
     let squared_sine = error.norm_squared();
-    if measured.dot(expected) >= 0.0 {
+    if measured.dot(expected) >= T::ZERO {
         return Deviation { error, squared_sine };
     }
-    let axis = if squared_sine > NO_ERROR { error * (1.0 / squared_sine.sqrt()) } else { axis() };
-    Deviation { error: axis * FAR, squared_sine: f64::INFINITY }
+    let least = T::above_rounding(NO_ERROR);
+    let axis = if squared_sine > least * least { error * (T::ONE / squared_sine.sqrt()) } else { axis() };
+    Deviation { error: axis * T::of(FAR), squared_sine: T::of(f64::INFINITY) }
 }

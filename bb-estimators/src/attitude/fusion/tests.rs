@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{FusionFilter, FusionParams};
 use crate::attitude::laws::{at_rest, attitude_laws};
-use crate::attitude::{AttitudeFilter, ImuSample};
+use crate::attitude::{AttitudeFilter, ImuSample, Real};
 
-fn filter(magnetometer: bool) -> FusionFilter {
+fn filter<T: Real>(magnetometer: bool) -> FusionFilter<T> {
     FusionFilter::new(FusionParams { magnetometer, ..Default::default() }).unwrap()
 }
 
@@ -91,8 +91,8 @@ fn a_gyroscope_at_its_range_starts_up_anew() {
 fn parameters_out_of_range_are_named() {
     for value in [-1.0, f64::NAN, f64::INFINITY] {
         let params = FusionParams { gain: value, ..Default::default() };
-        assert_eq!(FusionFilter::new(params).unwrap_err().parameter, "gain");
+        assert_eq!(FusionFilter::<f64>::new(params).unwrap_err().parameter, "gain");
         let params = FusionParams { acceleration_rejection: value, ..Default::default() };
-        assert_eq!(FusionFilter::new(params).unwrap_err().parameter, "acceleration_rejection");
+        assert_eq!(FusionFilter::<f64>::new(params).unwrap_err().parameter, "acceleration_rejection");
     }
 }

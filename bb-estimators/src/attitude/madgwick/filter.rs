@@ -6,19 +6,19 @@ use super::MadgwickParams;
 use crate::attitude::directions::{horizontal_axis, misalignment};
 use crate::attitude::rotation::{turn, turn_by_tangent};
 use crate::attitude::state::AttitudeState;
-use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
+use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 
 /// Below this norm the gradient is rounding noise, which has no direction to descend in.
 const NO_GRADIENT: f64 = 1e-12;
 
 /// Madgwick's gradient-descent filter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MadgwickFilter {
+pub struct MadgwickFilter<T: Real = f64> {
     params: MadgwickParams,
-    state: AttitudeState,
+    state: AttitudeState<T>,
 }
 
-impl AttitudeFilter for MadgwickFilter {
+impl<T: Real> AttitudeFilter<T> for MadgwickFilter<T> {
     type Params = MadgwickParams;
 
     fn new(params: MadgwickParams) -> Result<Self, ParamsError> {
@@ -30,7 +30,7 @@ impl AttitudeFilter for MadgwickFilter {
         &self.params
     }
 
-    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError> {
+    fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         let Some(step) = self.state.admit(sample)? else {
             return Ok(());
         };
@@ -42,17 +42,17 @@ impl AttitudeFilter for MadgwickFilter {
         };
         let descent = descent(&predicted, &up, step.field.as_ref());
         // The tangent of half the angle, to the fourth order.
-        let half = self.params.beta * step.dt_s;
-        let tangent = half * (1.0 + half * half * (1.0 / 3.0));
+        let half = T::of(self.params.beta) * step.dt_s;
+        let tangent = half * (T::ONE + half * half * (T::of(1.0 / 3.0)));
         self.state.store(&turn_by_tangent(&predicted, &(descent * tangent)), step.field);
         Ok(())
     }
 
-    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError> {
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError> {
         self.state.start_at(time_ns, world_from_body)
     }
 
-    fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+    fn world_from_body(&self) -> Option<UnitQuaternion<T>> {
         self.state.world_from_body()
     }
 
@@ -74,13 +74,18 @@ impl AttitudeFilter for MadgwickFilter {
 /// Zero where there is nothing to gain, except at the top of F, upside down, which is left about the body's
 /// x or y axis.
 #[inline]
-fn descent(world_from_body: &UnitQuaternion<f64>, up: &Vector3<f64>, field: Option<&Vector3<f64>>) -> Vector3<f64> {
+fn descent<T: Real>(
+    world_from_body: &UnitQuaternion<T>,
+    up: &Vector3<T>,
+    field: Option<&Vector3<T>>,
+) -> Vector3<T> {
     let (error, world_up) = misalignment(world_from_body, up, field);
     let squared = error.norm_squared();
-    if squared > NO_GRADIENT * NO_GRADIENT {
-        return error * (1.0 / squared.sqrt());
+    let least = T::above_rounding(NO_GRADIENT);
+    if squared > least * least {
+        return error * (T::ONE / squared.sqrt());
     }
-    if up.dot(&world_up) > 0.0 {
+    if up.dot(&world_up) > T::ZERO {
         return Vector3::zeros();
     }
     horizontal_axis(&world_up)

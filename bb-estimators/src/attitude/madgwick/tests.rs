@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{MadgwickFilter, MadgwickParams};
 use crate::attitude::laws::{at_rest, attitude_laws};
-use crate::attitude::{AttitudeFilter, ImuSample};
+use crate::attitude::{AttitudeFilter, ImuSample, Real};
 
-fn filter(beta: f64, magnetometer: bool) -> MadgwickFilter {
+fn filter<T: Real>(beta: f64, magnetometer: bool) -> MadgwickFilter<T> {
     MadgwickFilter::new(MadgwickParams { beta, magnetometer }).unwrap()
 }
 
@@ -30,7 +30,7 @@ fn the_step_descends_on_the_papers_objective() {
         time_ns: 1_000_000,
         angular_velocity: Vector3::zeros(),
         specific_force: Vector3::new(1.0, -4.0, 8.0),
-        magnetic_field: Some(Vector3::new(0.3, 0.2, -0.6)),
+        magnetic_field: Some(Vector3::new(0.3, 0.2, -0.6_f64)),
     };
     let a = sample.specific_force.normalize();
     let m = sample.magnetic_field.unwrap().normalize();
@@ -72,9 +72,9 @@ fn beta_0_is_the_gyroscope_alone() {
 #[test]
 fn parameters_out_of_range_are_named() {
     for beta in [-0.1, f64::NAN, f64::INFINITY, 1001.0] {
-        let error = MadgwickFilter::new(MadgwickParams { beta, magnetometer: true }).unwrap_err();
+        let error = MadgwickFilter::<f64>::new(MadgwickParams { beta, magnetometer: true }).unwrap_err();
         assert_eq!(error.parameter, "beta");
     }
-    let error = MadgwickFilter::new(MadgwickParams { beta: -0.1, magnetometer: true }).unwrap_err();
+    let error = MadgwickFilter::<f64>::new(MadgwickParams { beta: -0.1, magnetometer: true }).unwrap_err();
     assert_eq!(error.to_string(), "`beta` is -0.1 rad/s: choose a value from 0 to 1000 rad/s");
 }

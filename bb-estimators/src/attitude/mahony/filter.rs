@@ -6,21 +6,21 @@ use super::MahonyParams;
 use crate::attitude::directions::{horizontal_axis, misalignment};
 use crate::attitude::rotation::{turn, turn_by_tangent};
 use crate::attitude::state::AttitudeState;
-use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
+use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 
 /// Below this norm an error upside down is none, which a lean to one side ends.
 const NO_ERROR: f64 = 1e-6;
 
 /// The explicit complementary filter with bias correction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MahonyFilter {
+pub struct MahonyFilter<T: Real = f64> {
     params: MahonyParams,
-    state: AttitudeState,
+    state: AttitudeState<T>,
     /// rad/s.
-    bias: Vector3<f64>,
+    bias: Vector3<T>,
 }
 
-impl AttitudeFilter for MahonyFilter {
+impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
     type Params = MahonyParams;
 
     fn new(params: MahonyParams) -> Result<Self, ParamsError> {
@@ -32,7 +32,7 @@ impl AttitudeFilter for MahonyFilter {
         &self.params
     }
 
-    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError> {
+    fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         let Some(step) = self.state.admit(sample)? else {
             return Ok(());
         };
@@ -43,25 +43,25 @@ impl AttitudeFilter for MahonyFilter {
             return Ok(());
         };
         let (mut error, world_up) = misalignment(&predicted, &up, step.field.as_ref());
-        if error.x.abs() < NO_ERROR && error.norm() < NO_ERROR && up.dot(&world_up) < 0.0 {
+        if error.x.abs() < T::of(NO_ERROR) && error.norm() < T::of(NO_ERROR) && up.dot(&world_up) < T::ZERO {
             error = horizontal_axis(&world_up);
         }
-        self.bias -= error * (self.params.integral_gain * step.dt_s);
-        let half = 0.5 * self.params.proportional_gain * step.dt_s;
-        let half = if half < 0.5 { half } else { 0.5 };
+        self.bias -= error * (T::of(self.params.integral_gain) * step.dt_s);
+        let half = T::HALF * T::of(self.params.proportional_gain) * step.dt_s;
+        let half = if half < T::HALF { half } else { T::HALF };
         self.state.store(&turn_by_tangent(&predicted, &(error * half)), step.field);
         Ok(())
     }
 
-    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError> {
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError> {
         self.state.start_at(time_ns, world_from_body)
     }
 
-    fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+    fn world_from_body(&self) -> Option<UnitQuaternion<T>> {
         self.state.world_from_body()
     }
 
-    fn gyroscope_bias(&self) -> Option<Vector3<f64>> {
+    fn gyroscope_bias(&self) -> Option<Vector3<T>> {
         Some(self.bias)
     }
 

@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{MahonyFilter, MahonyParams};
 use crate::attitude::laws::{at_rest, attitude_laws};
-use crate::attitude::{AttitudeFilter, ImuSample};
+use crate::attitude::{AttitudeFilter, ImuSample, Real};
 
-fn filter(proportional_gain: f64, integral_gain: f64, magnetometer: bool) -> MahonyFilter {
+fn filter<T: Real>(proportional_gain: f64, integral_gain: f64, magnetometer: bool) -> MahonyFilter<T> {
     MahonyFilter::new(MahonyParams { proportional_gain, integral_gain, magnetometer }).unwrap()
 }
 
@@ -43,8 +43,8 @@ fn parameters_out_of_range_are_named() {
     let good = MahonyParams::default();
     for value in [-0.1, f64::NAN, f64::INFINITY, 1001.0] {
         let proportional = MahonyParams { proportional_gain: value, ..good };
-        assert_eq!(MahonyFilter::new(proportional).unwrap_err().parameter, "proportional_gain");
+        assert_eq!(MahonyFilter::<f64>::new(proportional).unwrap_err().parameter, "proportional_gain");
         let integral = MahonyParams { integral_gain: value, ..good };
-        assert_eq!(MahonyFilter::new(integral).unwrap_err().parameter, "integral_gain");
+        assert_eq!(MahonyFilter::<f64>::new(integral).unwrap_err().parameter, "integral_gain");
     }
 }

@@ -1,8 +1,11 @@
 //! The error state: its mean, its covariance, and the two things a Kalman filter does with them.
 
+use core::cmp::Ordering;
+
 use nalgebra::Matrix3;
 
 use super::window::Window;
+use crate::attitude::Real;
 
 /// How many numbers the filter estimates.
 pub(super) const STATES: usize = 19;
@@ -28,57 +31,57 @@ const ROUNDING: f64 = 1e-6;
 
 /// Mean and covariance of the error state. The covariance is kept symmetric to the last bit.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Errors {
-    pub(super) mean: [f64; STATES],
-    covariance: [[f64; STATES]; STATES],
+pub(super) struct Errors<T> {
+    pub(super) mean: [T; STATES],
+    covariance: [[T; STATES]; STATES],
 }
 
 /// Variances that grow with time, per second or for one window.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ProcessNoise {
+pub(super) struct ProcessNoise<T> {
     /// rad².
-    pub(super) rotation: f64,
+    pub(super) rotation: T,
     /// (rad/s)².
-    pub(super) bias: f64,
+    pub(super) bias: T,
     /// (m/s)².
-    pub(super) velocity: f64,
+    pub(super) velocity: T,
 }
 
-impl Errors {
+impl<T: Real> Errors<T> {
     /// Nothing known, and so sure of it.
     pub(super) fn new() -> Self {
-        Self { mean: [0.0; STATES], covariance: [[0.0; STATES]; STATES] }
+        Self { mean: [T::ZERO; STATES], covariance: [[T::ZERO; STATES]; STATES] }
     }
 
     /// Forgets what is known of `COUNT` states from `first` on, and of their correlation with all others.
-    pub(super) fn forget<const COUNT: usize>(&mut self, first: usize, variance: f64) {
+    pub(super) fn forget<const COUNT: usize>(&mut self, first: usize, variance: T) {
         for i in first..first + COUNT {
             for j in 0..STATES {
-                self.covariance[i][j] = 0.0;
-                self.covariance[j][i] = 0.0;
+                self.covariance[i][j] = T::ZERO;
+                self.covariance[j][i] = T::ZERO;
             }
             self.covariance[i][i] = variance;
         }
     }
 
     /// Admits that a state may be wrong by more than was thought.
-    pub(super) fn doubt(&mut self, state: usize, variance: f64) {
+    pub(super) fn doubt(&mut self, state: usize, variance: T) {
         self.covariance[state][state] += variance;
     }
 
-    pub(super) fn variance(&self, state: usize) -> f64 {
+    pub(super) fn variance(&self, state: usize) -> T {
         self.covariance[state][state]
     }
 
     /// Covariance of the rotation error, world axes, rad².
-    pub(super) fn rotation(&self) -> Matrix3<f64> {
+    pub(super) fn rotation(&self) -> Matrix3<T> {
         Matrix3::from_fn(|i, k| self.covariance[ROTATION + i][ROTATION + k])
     }
 
     /// Whether every mean and variance is a number to compute with.
     pub(super) fn are_sane(&self) -> bool {
-        let variances = (0..STATES).all(|i| (0.0..1e12).contains(&self.covariance[i][i]));
-        variances && self.mean.iter().all(|mean| mean.abs() < 1e9)
+        let variances = (0..STATES).all(|i| (T::ZERO..T::of(1e12)).contains(&self.covariance[i][i]));
+        variances && self.mean.iter().all(|mean| mean.abs() < T::of(1e9))
     }
 
     /// Takes the errors over a window: `x ← Φ x`, `P ← Φ P Φᵀ + Q`.
@@ -88,9 +91,9 @@ impl Errors {
     ///
     /// * velocity: `v ← v + F + θ × F - τ F'`, horizontally, with F' the integral of rotation times ω × f,
     /// * rotation: `θ ← θ - R δb - W δE`.
-    pub(super) fn propagate(&mut self, window: &Window, noise: &ProcessNoise) {
+    pub(super) fn propagate(&mut self, window: &Window<T>, noise: &ProcessNoise<T>) {
         let force = &window.force;
-        let turned = [[0.0, force.z, -force.y], [-force.z, 0.0, force.x]];
+        let turned = [[T::ZERO, force.z, -force.y], [-force.z, T::ZERO, force.x]];
         let lagged = [[-window.force_rate.x], [-window.force_rate.y]];
         let integrated = window.gyroscope_integrals();
         self.mix::<2, 3>(VELOCITY, ROTATION, &turned);
@@ -112,14 +115,14 @@ impl Errors {
         &mut self,
         target: usize,
         source: usize,
-        factor: &[[f64; COLUMNS]; ROWS],
+        factor: &[[T; COLUMNS]; ROWS],
     ) {
         for (i, factor) in factor.iter().enumerate() {
             let mut row = self.covariance[target + i];
             for (k, factor) in factor.iter().enumerate() {
-                self.mean[target + i] += factor * self.mean[source + k];
+                self.mean[target + i] += *factor * self.mean[source + k];
                 for (sum, value) in row.iter_mut().zip(&self.covariance[source + k]) {
-                    *sum += factor * value;
+                    *sum += *factor * *value;
                 }
             }
             self.covariance[target + i] = row;
@@ -128,7 +131,7 @@ impl Errors {
         for i in 0..ROWS {
             let row = self.covariance[target + i];
             for (j, factor) in factor.iter().enumerate().skip(i) {
-                let sum: f64 = factor.iter().zip(&row[source..]).map(|(factor, value)| factor * value).sum();
+                let sum: T = factor.iter().zip(&row[source..]).map(|(factor, value)| *factor * *value).sum();
                 self.covariance[target + i][target + j] = row[target + j] + sum;
             }
         }
@@ -146,27 +149,28 @@ impl Errors {
     /// One scalar measurement: `measured` is the states times `observation`, up to `variance`.
     pub(super) fn update<const COUNT: usize>(
         &mut self,
-        observation: [(usize, f64); COUNT],
-        measured: f64,
-        variance: f64,
+        observation: [(usize, T); COUNT],
+        measured: T,
+        variance: T,
     ) {
-        let mut gain = [0.0; STATES];
-        let mut expected = 0.0;
+        let mut gain = [T::ZERO; STATES];
+        let mut expected = T::ZERO;
         for (state, factor) in observation {
             expected += factor * self.mean[state];
             for (gain, value) in gain.iter_mut().zip(&self.covariance[state]) {
-                *gain += factor * value;
+                *gain += factor * *value;
             }
         }
-        let total: f64 = variance + observation.iter().map(|(state, factor)| factor * gain[*state]).sum::<f64>();
-        if total.is_nan() || total <= 0.0 {
+        let total: T = variance + observation.iter().map(|(state, factor)| *factor * gain[*state]).sum::<T>();
+        // Nor if it is not a number.
+        if !matches!(total.partial_cmp(&T::ZERO), Some(Ordering::Greater)) {
             return;
         }
-        let scale = 1.0 / total;
+        let scale = T::ONE / total;
         let step = (measured - expected) * scale;
         for i in 0..STATES {
             self.mean[i] += gain[i] * step;
-            let least = self.covariance[i][i] * ROUNDING;
+            let least = self.covariance[i][i] * T::of(ROUNDING);
             for j in 0..STATES {
                 // In this order the two halves round alike.
                 self.covariance[i][j] -= (gain[i] * gain[j]) * scale;

@@ -4,6 +4,9 @@
 //! changes the dip. The third, which turns the heading, cannot be told from a wrong heading. But all three are
 //! of one size, so the two that show tell how wrong the heading may be.
 
+use crate::attitude::Real;
+use crate::attitude::initial::MIN_HORIZONTAL_FRACTION;
+
 /// Norm and dip count as unchanged up to this difference of the field in the vertical plane, as a fraction of its
 /// norm. Source: VQF's `magNormTh` of 0.1 and `magDipTh` of 10° in one.
 const SAME: f64 = 0.1;
@@ -37,127 +40,127 @@ const CONTRADICTION_S: f64 = 10.0;
 const LARGEST: f64 = 10.0;
 
 /// The field in the vertical plane: horizontal and vertical part.
-type Plane = [f64; 2];
+type Plane<T> = [T; 2];
 
 /// What a window's field means for the heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum Verdict<T> {
     /// To be believed but for a disturbance of this variance of each component, as fractions of the norm squared.
-    Disturbed(f64),
+    Disturbed(T),
     /// There is a new reference, or the heading must be wrong: it can be off by all that the field says.
     HeadingUnknown,
 }
 
 /// The reference, and the field that may become the next one.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct FieldReference {
-    reference: Plane,
+pub(super) struct FieldReference<T> {
+    reference: Plane<T>,
     /// How long the field has been like the reference, s.
-    seen_s: f64,
-    candidate: Plane,
-    candidate_s: f64,
+    seen_s: T,
+    candidate: Plane<T>,
+    candidate_s: T,
     /// Squared size of the disturbance: the greatest of late.
-    disturbance: f64,
-    contradicted_s: f64,
+    disturbance: T,
+    contradicted_s: T,
 }
 
-impl FieldReference {
+impl<T: Real> FieldReference<T> {
     /// Takes the first field as reference; it is not zero.
-    pub(super) fn new(field: Plane) -> Self {
+    pub(super) fn new(field: Plane<T>) -> Self {
         Self {
             reference: field,
-            seen_s: 0.0,
+            seen_s: T::ZERO,
             candidate: field,
-            candidate_s: 0.0,
-            disturbance: 0.0,
-            contradicted_s: 0.0,
+            candidate_s: T::ZERO,
+            disturbance: T::ZERO,
+            contradicted_s: T::ZERO,
         }
     }
 
-    fn norm(&self) -> f64 {
+    fn norm(&self) -> T {
         norm(self.reference)
     }
 
     /// Whether the greatest disturbance of late is beyond what counts as unchanged.
     pub(super) fn is_disturbed(&self) -> bool {
-        self.disturbance > SAME * SAME
+        self.disturbance > T::of(SAME * SAME)
     }
 
     /// In the field's own unit, squared.
-    pub(super) fn squared_norm(&self) -> f64 {
+    pub(super) fn squared_norm(&self) -> T {
         self.norm() * self.norm()
     }
 
     /// Horizontal part of the reference, as a fraction of its norm.
-    pub(super) fn horizontal(&self) -> f64 {
-        (self.reference[0] / self.norm()).max(crate::attitude::initial::MIN_HORIZONTAL_FRACTION)
+    pub(super) fn horizontal(&self) -> T {
+        (self.reference[0] / self.norm()).max(T::of(MIN_HORIZONTAL_FRACTION))
     }
 
     /// Vertical part, upwards, as a fraction.
-    pub(super) fn vertical(&self) -> f64 {
+    pub(super) fn vertical(&self) -> T {
         self.reference[1] / self.norm()
     }
 
     /// Takes the field of a window of `dt` seconds; `contradicts` if its heading is far from the one known.
-    pub(super) fn observe(&mut self, dt: f64, field: Plane, contradicts: bool) -> Verdict {
+    pub(super) fn observe(&mut self, dt: T, field: Plane<T>, contradicts: bool) -> Verdict<T> {
         let unit = self.norm();
-        let same = (SAME * unit) * (SAME * unit);
-        let field = shortened(field, LARGEST * unit);
+        let same = (T::of(SAME) * unit) * (T::of(SAME) * unit);
+        let field = shortened(field, T::of(LARGEST) * unit);
 
         if distance(field, self.candidate) < same {
             self.candidate_s += dt;
         } else {
-            self.candidate_s -= 3.0 * dt;
+            self.candidate_s -= T::of(3.0) * dt;
         }
-        if self.candidate_s <= 0.0 {
-            self.candidate_s = 0.0;
+        if self.candidate_s <= T::ZERO {
+            self.candidate_s = T::ZERO;
             self.candidate = field;
         }
-        approach(&mut self.candidate, field, (dt / CANDIDATE_TIME_CONSTANT_S).min(1.0));
+        approach(&mut self.candidate, field, (dt / T::of(CANDIDATE_TIME_CONSTANT_S)).min(T::ONE));
 
         let undisturbed = distance(field, self.reference) < same;
         if undisturbed {
-            self.seen_s = (self.seen_s + dt).min(MOST_EVIDENCE_S);
+            self.seen_s = (self.seen_s + dt).min(T::of(MOST_EVIDENCE_S));
         }
-        let needed = (LEAST_EVIDENCE_S + EVIDENCE_RATIO * self.seen_s).min(MOST_EVIDENCE_S);
+        let needed = (T::of(LEAST_EVIDENCE_S) + T::of(EVIDENCE_RATIO) * self.seen_s).min(T::of(MOST_EVIDENCE_S));
         if distance(self.candidate, self.reference) > same && self.candidate_s > needed {
             *self = Self { seen_s: self.candidate_s, ..Self::new(self.candidate) };
             return Verdict::HeadingUnknown;
         }
-        self.contradicted_s = if undisturbed && contradicts { self.contradicted_s + dt } else { 0.0 };
-        if self.contradicted_s > CONTRADICTION_S {
-            self.contradicted_s = 0.0;
+        self.contradicted_s = if undisturbed && contradicts { self.contradicted_s + dt } else { T::ZERO };
+        if self.contradicted_s > T::of(CONTRADICTION_S) {
+            self.contradicted_s = T::ZERO;
             return Verdict::HeadingUnknown;
         }
 
         let size = distance(field, self.reference) / (unit * unit);
-        let fade = (dt / DISTURBANCE_TIME_CONSTANT_S).min(1.0);
+        let fade = (dt / T::of(DISTURBANCE_TIME_CONSTANT_S)).min(T::ONE);
         self.disturbance = (self.disturbance + (size - self.disturbance) * fade).max(size);
-        let trust = self.seen_s / (self.seen_s + TRUST_TIME_CONSTANT_S);
+        let trust = self.seen_s / (self.seen_s + T::of(TRUST_TIME_CONSTANT_S));
         let verdict = Verdict::Disturbed(self.disturbance * trust);
         if undisturbed {
-            let gain = dt / self.seen_s.min(REFERENCE_TIME_CONSTANT_S).max(dt);
+            let gain = dt / self.seen_s.min(T::of(REFERENCE_TIME_CONSTANT_S)).max(dt);
             approach(&mut self.reference, field, gain);
         }
         verdict
     }
 }
 
-fn norm([horizontal, vertical]: Plane) -> f64 {
+fn norm<T: Real>([horizontal, vertical]: Plane<T>) -> T {
     (horizontal * horizontal + vertical * vertical).sqrt()
 }
 
-fn distance(a: Plane, b: Plane) -> f64 {
+fn distance<T: Real>(a: Plane<T>, b: Plane<T>) -> T {
     (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1])
 }
 
-fn approach(mean: &mut Plane, value: Plane, gain: f64) {
+fn approach<T: Real>(mean: &mut Plane<T>, value: Plane<T>, gain: T) {
     for (mean, value) in mean.iter_mut().zip(value) {
         *mean += (value - *mean) * gain;
     }
 }
 
-fn shortened(field: Plane, longest: f64) -> Plane {
+fn shortened<T: Real>(field: Plane<T>, longest: T) -> Plane<T> {
     let norm = norm(field);
     if norm > longest { field.map(|part| part * (longest / norm)) } else { field }
 }

@@ -12,7 +12,7 @@ use super::window::Window;
 use crate::attitude::initial::heading_error;
 use crate::attitude::rotation::{turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
-use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, SampleError};
+use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 
 /// Standard deviation of the tilt that one accelerometer sample shows in motion, rad. At rest it is forgotten
 /// within a second.
@@ -63,29 +63,29 @@ const CONTRADICTION_DEVIATIONS: f64 = 4.0;
 
 /// The self-calibrating error-state Kalman filter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MekfFilter {
+pub struct MekfFilter<T: Real = f64> {
     params: MekfParams,
-    state: AttitudeState,
+    state: AttitudeState<T>,
     heading_known: bool,
     /// rad/s.
-    bias: Vector3<f64>,
+    bias: Vector3<T>,
     /// What `angular_velocity` has to lose beyond the bias, as a fraction of itself.
-    calibration: Matrix3<f64>,
+    calibration: Matrix3<T>,
     /// `world_from_body` after the last sample.
-    rotation: Matrix3<f64>,
-    errors: Errors,
-    window: Window,
-    measurements: Measurements,
-    rest: Rest,
-    field: Option<FieldReference>,
-    last_field: Vector3<f64>,
-    squared_acceleration: f64,
+    rotation: Matrix3<T>,
+    errors: Errors<T>,
+    window: Window<T>,
+    measurements: Measurements<T>,
+    rest: Rest<T>,
+    field: Option<FieldReference<T>>,
+    last_field: Vector3<T>,
+    squared_acceleration: T,
     /// ∫ R f dt, m/s, since the mean began, and how long ago that is.
-    mean_force: Vector3<f64>,
-    mean_force_s: f64,
+    mean_force: Vector3<T>,
+    mean_force_s: T,
 }
 
-impl AttitudeFilter for MekfFilter {
+impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     type Params = MekfParams;
 
     fn new(params: MekfParams) -> Result<Self, ParamsError> {
@@ -103,9 +103,9 @@ impl AttitudeFilter for MekfFilter {
             rest: Rest::new(&Vector3::zeros(), &Vector3::zeros()),
             field: None,
             last_field: Vector3::zeros(),
-            squared_acceleration: 0.0,
+            squared_acceleration: T::ZERO,
             mean_force: Vector3::zeros(),
-            mean_force_s: 0.0,
+            mean_force_s: T::ZERO,
         };
         filter.forget_sensors();
         Ok(filter)
@@ -115,7 +115,7 @@ impl AttitudeFilter for MekfFilter {
         &self.params
     }
 
-    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError> {
+    fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         let Some(step) = self.state.admit(sample)? else {
             self.restart(sample);
             return Ok(());
@@ -124,10 +124,10 @@ impl AttitudeFilter for MekfFilter {
         let rate = measured - self.bias - self.calibration * measured;
         let mut orientation = turn(&step.world_from_body, &(rate * step.dt_s));
 
-        let bias_deviation = self.errors.variance(BIAS).max(0.0).sqrt();
+        let bias_deviation = self.errors.variance(BIAS).max(T::ZERO).sqrt();
         self.rest.add(step.dt_s, measured, &sample.specific_force, &self.bias, bias_deviation);
         let before = core::mem::replace(&mut self.rotation, *orientation.to_rotation_matrix().matrix());
-        let middle = (before + self.rotation) * 0.5;
+        let middle = (before + self.rotation) * T::HALF;
         self.window.add_rate(step.dt_s, &middle, measured);
         let rotation = if self.params.force_is_mean { &middle } else { &self.rotation };
         self.window.add_force(step.dt_s, rotation, &rate, &sample.specific_force);
@@ -150,33 +150,33 @@ impl AttitudeFilter for MekfFilter {
             && let Some(error) = heading_error(&(orientation * direction))
         {
             orientation = turn_heading(&orientation, error);
-            self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
+            self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
             self.heading_known = true;
         }
         self.state.store(&orientation, step.field);
         Ok(())
     }
 
-    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError> {
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError> {
         self.state.start_at(time_ns, world_from_body)?;
         self.heading_known = true;
         if let Some(orientation) = self.state.world_from_body() {
-            self.begin(&orientation, GIVEN, GIVEN);
+            self.begin(&orientation, T::of(GIVEN), T::of(GIVEN));
         }
         Ok(())
     }
 
-    fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+    fn world_from_body(&self) -> Option<UnitQuaternion<T>> {
         self.state.world_from_body()
     }
 
-    fn gyroscope_bias(&self) -> Option<Vector3<f64>> {
+    fn gyroscope_bias(&self) -> Option<Vector3<T>> {
         Some(self.bias)
     }
 
     /// As of the last window's end, at most 0.1 s ago. Without a magnetometer the heading's own variance is 0: it is
     /// right by definition at the start, and what it drifts by since is in here.
-    fn orientation_uncertainty(&self) -> Option<Matrix3<f64>> {
+    fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
         Some(self.rotation.transpose() * self.errors.rotation() * self.rotation)
     }
@@ -197,72 +197,72 @@ impl AttitudeFilter for MekfFilter {
     }
 }
 
-impl MekfFilter {
+impl<T: Real> MekfFilter<T> {
     /// The gyroscope's scale and misalignment errors: what it reads is `(1 + E)` times the angular velocity and
     /// the bias, for small E.
-    pub fn gyroscope_calibration(&self) -> Matrix3<f64> {
+    pub fn gyroscope_calibration(&self) -> Matrix3<T> {
         self.calibration
     }
 
     /// How much the magnetometer lags the gyroscope, s.
-    pub fn magnetometer_latency(&self) -> f64 {
+    pub fn magnetometer_latency(&self) -> T {
         self.errors.mean[LATENCY]
     }
 
     /// After a start from a sample, the first one or the one after a gap.
     #[cold]
-    fn restart(&mut self, sample: &ImuSample) {
+    fn restart(&mut self, sample: &ImuSample<T>) {
         let Some(orientation) = self.state.world_from_body() else {
             return;
         };
         let direction = sample.magnetic_field.filter(|_| self.params.magnetometer).map(|field| field.normalize());
         self.heading_known = direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
         self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
-        self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
+        self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
     }
 
     /// Starts the orientation's errors anew; what is known of the sensors stays.
-    fn begin(&mut self, orientation: &UnitQuaternion<f64>, tilt_deviation: f64, heading_deviation: f64) {
+    fn begin(&mut self, orientation: &UnitQuaternion<T>, tilt_deviation: T, heading_deviation: T) {
         // Without a magnetometer there is no heading to be wrong.
-        let heading_deviation = if self.params.magnetometer { heading_deviation } else { 0.0 };
+        let heading_deviation = if self.params.magnetometer { heading_deviation } else { T::ZERO };
         // All of a window or nothing: one horizontal axis alone would depend on where north is.
         while self.measurements.take(&mut self.errors) {}
         self.correct();
-        self.errors.mean[VELOCITY..VELOCITY + 2].fill(0.0);
+        self.errors.mean[VELOCITY..VELOCITY + 2].fill(T::ZERO);
         self.errors.forget::<2>(ROTATION, tilt_deviation * tilt_deviation);
         self.errors.forget::<1>(ROTATION + 2, heading_deviation * heading_deviation);
-        self.errors.forget::<2>(VELOCITY, INITIAL_VELOCITY * INITIAL_VELOCITY);
+        self.errors.forget::<2>(VELOCITY, T::of(INITIAL_VELOCITY * INITIAL_VELOCITY));
         self.rotation = *orientation.to_rotation_matrix().matrix();
         self.window = Window::new();
         self.measurements = Measurements::none();
         self.mean_force = Vector3::zeros();
-        self.mean_force_s = 0.0;
+        self.mean_force_s = T::ZERO;
     }
 
     /// Doubts what is known of the sensors as at the start.
     fn forget_sensors(&mut self) {
         let params = &self.params;
-        let latency = if params.magnetometer { params.magnetometer_latency } else { 0.0 };
-        self.errors.forget::<3>(BIAS, params.initial_bias * params.initial_bias);
-        self.errors.forget::<9>(CALIBRATION, params.calibration_error * params.calibration_error);
+        let latency = if params.magnetometer { T::of(params.magnetometer_latency) } else { T::ZERO };
+        self.errors.forget::<3>(BIAS, T::of(params.initial_bias * params.initial_bias));
+        self.errors.forget::<9>(CALIBRATION, T::of(params.calibration_error * params.calibration_error));
         self.errors.forget::<1>(LATENCY, latency * latency);
-        let latency = params.accelerometer_latency;
+        let latency = T::of(params.accelerometer_latency);
         self.errors.forget::<1>(FORCE_LATENCY, latency * latency);
     }
 
     /// Ends a window: takes the errors to now, corrects by them, and looks at what the window says.
-    fn close_window(&mut self, orientation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    fn close_window(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
         while self.measurements.take(&mut self.errors) {}
         let window = core::mem::replace(&mut self.window, Window::new());
         let (params, dt) = (&self.params, window.duration);
-        let rotation_noise = params.gyroscope_noise * params.gyroscope_noise * dt
-            + params.gyroscope_rate_noise * params.gyroscope_rate_noise * window.squared_rate;
+        let rotation_noise = T::of(params.gyroscope_noise * params.gyroscope_noise) * dt
+            + T::of(params.gyroscope_rate_noise * params.gyroscope_rate_noise) * window.squared_rate;
         self.errors.propagate(
             &window,
             &ProcessNoise {
                 rotation: rotation_noise,
-                bias: params.bias_drift * params.bias_drift * dt,
-                velocity: ACCELEROMETER_NOISE * ACCELEROMETER_NOISE * dt,
+                bias: T::of(params.bias_drift * params.bias_drift) * dt,
+                velocity: T::of(ACCELEROMETER_NOISE * ACCELEROMETER_NOISE) * dt,
             },
         );
         if !self.errors.are_sane() {
@@ -275,10 +275,12 @@ impl MekfFilter {
         let force = correction * window.force;
         self.mean_force = correction * self.mean_force + force;
         self.mean_force_s += dt;
-        if self.mean_force_s > FORCE_MEAN_S {
+        if self.mean_force_s > T::of(FORCE_MEAN_S) {
             let sum = core::mem::replace(&mut self.mean_force, Vector3::zeros());
-            self.mean_force_s = 0.0;
-            if sum.x.hypot(sum.y) > MAX_FORCE_SLOPE * sum.z && sum.norm() > 0.5 * GRAVITY * FORCE_MEAN_S {
+            self.mean_force_s = T::ZERO;
+            if sum.x.hypot(sum.y) > T::of(MAX_FORCE_SLOPE) * sum.z
+                && sum.norm() > T::HALF * T::of(GRAVITY) * T::of(FORCE_MEAN_S)
+            {
                 return self.level(orientation, &sum);
             }
         }
@@ -287,7 +289,7 @@ impl MekfFilter {
     }
 
     /// Moves the mean errors into what they are errors of; returns the rotation.
-    fn correct(&mut self) -> UnitQuaternion<f64> {
+    fn correct(&mut self) -> UnitQuaternion<T> {
         let mean = &mut self.errors.mean;
         let rotation = Vector3::new(mean[ROTATION], mean[ROTATION + 1], mean[ROTATION + 2]);
         for i in 0..3 {
@@ -296,23 +298,23 @@ impl MekfFilter {
                 self.calibration[(i, k)] += mean[CALIBRATION + 3 * i + k];
             }
         }
-        mean[..CALIBRATION + 9].fill(0.0);
+        mean[..CALIBRATION + 9].fill(T::ZERO);
         turn(&UnitQuaternion::identity(), &rotation)
     }
 
     /// Looks at what a window says, for the samples of the next one to take.
-    fn measure(&mut self, window: &Window, correction: &UnitQuaternion<f64>, force: &Vector3<f64>) {
+    fn measure(&mut self, window: &Window<T>, correction: &UnitQuaternion<T>, force: &Vector3<T>) {
         let dt = window.duration;
         let resting = self.rest.is_detected();
         let squared = (force.x * force.x + force.y * force.y) / (dt * dt);
-        let gain = (dt / ACCELERATION_TIME_CONSTANT_S).min(1.0);
+        let gain = (dt / T::of(ACCELERATION_TIME_CONSTANT_S)).min(T::ONE);
         self.squared_acceleration += (squared - self.squared_acceleration) * gain;
         let velocity_variance = if resting {
-            REST_VELOCITY * REST_VELOCITY / dt
+            T::of(REST_VELOCITY * REST_VELOCITY) / dt
         } else {
-            let growth = self.params.acceleration_time * self.params.acceleration_time;
-            let squared = self.params.velocity * self.params.velocity + growth * self.squared_acceleration;
-            squared * 2.0 * VELOCITY_TIME_S / dt
+            let growth = T::of(self.params.acceleration_time * self.params.acceleration_time);
+            let squared = T::of(self.params.velocity * self.params.velocity) + growth * self.squared_acceleration;
+            squared * T::TWO * T::of(VELOCITY_TIME_S) / dt
         };
         let bias = resting.then(|| self.rest_bias(dt));
         let heading = window.mean_field().and_then(|(field, rate)| {
@@ -323,51 +325,51 @@ impl MekfFilter {
     }
 
     /// What the gyroscope reads at rest is its bias.
-    fn rest_bias(&mut self, dt: f64) -> (Vector3<f64>, f64) {
+    fn rest_bias(&mut self, dt: T) -> (Vector3<T>, T) {
         let difference = self.rest.rate - self.bias;
         let squared = difference.norm_squared();
-        let expected = self.errors.variance(BIAS) + REST_BIAS * REST_BIAS;
-        if squared > BIAS_STEP * BIAS_STEP * expected {
+        let expected = self.errors.variance(BIAS) + T::of(REST_BIAS * REST_BIAS);
+        if squared > T::of(BIAS_STEP * BIAS_STEP) * expected {
             for axis in 0..3 {
                 self.errors.doubt(BIAS + axis, squared);
             }
         }
-        let most = (MAX_REST_BIAS * MAX_REST_BIAS / squared.max(1e-12)).min(1.0).sqrt();
-        (difference * most, REST_BIAS * REST_BIAS / dt)
+        let most = (T::of(MAX_REST_BIAS * MAX_REST_BIAS) / squared.max(T::of(1e-12))).min(T::ONE).sqrt();
+        (difference * most, T::of(REST_BIAS * REST_BIAS) / dt)
     }
 
     /// What the field says about the heading; `field` and what it changes by with the lag are in the world.
-    fn heading(&mut self, dt: f64, field: &Vector3<f64>, rate: &Vector3<f64>) -> Option<Heading> {
+    fn heading(&mut self, dt: T, field: &Vector3<T>, rate: &Vector3<T>) -> Option<Heading<T>> {
         let squared = field.x * field.x + field.y * field.y;
         let plane = [squared.sqrt(), field.z];
         let reference = self.field.get_or_insert_with(|| FieldReference::new(plane));
         let angle = field.x.atan2(field.y);
-        let deviation = self.errors.variance(ROTATION + 2).max(0.0).sqrt();
-        let contradicts = angle.abs() > CONTRADICTION.max(CONTRADICTION_DEVIATIONS * deviation);
+        let deviation = self.errors.variance(ROTATION + 2).max(T::ZERO).sqrt();
+        let contradicts = angle.abs() > T::of(CONTRADICTION).max(T::of(CONTRADICTION_DEVIATIONS) * deviation);
         let disturbance = match reference.observe(dt, plane, contradicts) {
             Verdict::Disturbed(variance) => variance,
             Verdict::HeadingUnknown => {
                 self.errors.doubt(ROTATION + 2, angle * angle);
-                0.0
+                T::ZERO
             }
         };
         let horizontal = reference.horizontal();
-        let usual = self.params.field_disturbance * self.params.field_disturbance;
-        let least = 0.25 * horizontal * horizontal * reference.squared_norm();
+        let usual = T::of(self.params.field_disturbance * self.params.field_disturbance);
+        let least = T::of(0.25) * horizontal * horizontal * reference.squared_norm();
         let rate = (rate.x * field.y - rate.y * field.x) / squared.max(least);
         Some(Heading {
             angle: angle + rate * self.errors.mean[LATENCY],
             slope: reference.vertical() / horizontal,
             rate,
-            variance: 2.0 * FIELD_TIME_S * (usual + disturbance) / (dt * horizontal * horizontal),
+            variance: T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance) / (dt * horizontal * horizontal),
         })
     }
 
     /// The tilt contradicts the mean specific force: starts it anew, and the heading with the next field.
     #[cold]
-    fn level(&mut self, orientation: UnitQuaternion<f64>, up: &Vector3<f64>) -> UnitQuaternion<f64> {
+    fn level(&mut self, orientation: UnitQuaternion<T>, up: &Vector3<T>) -> UnitQuaternion<T> {
         let orientation = turn_upright(&orientation, up);
-        self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
+        self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
         self.forget_sensors();
         self.heading_known = !self.params.magnetometer;
         self.field = None;
@@ -376,11 +378,11 @@ impl MekfFilter {
 
     /// Numbers beyond all reason came in, and no knowledge is left: starts anew from the orientation.
     #[cold]
-    fn recover(&mut self, orientation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    fn recover(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
         let (state, heading_known) = (self.state.clone(), self.heading_known);
         self.reset();
         (self.state, self.heading_known) = (state, heading_known);
-        self.begin(&orientation, INITIAL_TILT, INITIAL_HEADING);
+        self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
         orientation
     }
 }

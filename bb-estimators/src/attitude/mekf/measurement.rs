@@ -7,57 +7,58 @@
 use nalgebra::Vector3;
 
 use super::errors::{BIAS, Errors, LATENCY, ROTATION, VELOCITY};
+use crate::attitude::Real;
 
 /// Heading, seen by the magnetic field.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Heading {
+pub(super) struct Heading<T> {
     /// How far the field is from north, rad, as if the lag were zero to first order.
-    pub(super) angle: f64,
+    pub(super) angle: T,
     /// Vertical over horizontal part of the reference.
-    pub(super) slope: f64,
+    pub(super) slope: T,
     /// What the angle grows by with the lag, rad/s.
-    pub(super) rate: f64,
+    pub(super) rate: T,
     /// rad².
-    pub(super) variance: f64,
+    pub(super) variance: T,
 }
 
 /// The measurements of one window that are still to be taken.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Measurements {
+pub(super) struct Measurements<T> {
     next: u32,
-    velocity_variance: f64,
-    heading: Option<Heading>,
+    velocity_variance: T,
+    heading: Option<Heading<T>>,
     /// What the gyroscope reads at rest, less its known bias, and its variance.
-    bias: Option<(Vector3<f64>, f64)>,
+    bias: Option<(Vector3<T>, T)>,
 }
 
-impl Measurements {
+impl<T: Real> Measurements<T> {
     /// No measurement.
     pub(super) fn none() -> Self {
-        Self { next: u32::MAX, velocity_variance: 0.0, heading: None, bias: None }
+        Self { next: u32::MAX, velocity_variance: T::ZERO, heading: None, bias: None }
     }
 
     /// The velocity is zero up to `velocity_variance`, and more if there is more.
-    pub(super) fn new(velocity_variance: f64, heading: Option<Heading>, bias: Option<(Vector3<f64>, f64)>) -> Self {
+    pub(super) fn new(velocity_variance: T, heading: Option<Heading<T>>, bias: Option<(Vector3<T>, T)>) -> Self {
         Self { next: 0, velocity_variance, heading, bias }
     }
 
     /// Takes the next scalar; `false` if there is none left.
-    pub(super) fn take(&mut self, errors: &mut Errors) -> bool {
+    pub(super) fn take(&mut self, errors: &mut Errors<T>) -> bool {
         let taken = self.next;
         match taken {
-            0 | 1 => errors.update([(VELOCITY + taken as usize, 1.0)], 0.0, self.velocity_variance),
+            0 | 1 => errors.update([(VELOCITY + taken as usize, T::ONE)], T::ZERO, self.velocity_variance),
             2 => {
                 if let Some(heading) = self.heading {
                     let observation =
-                        [(ROTATION + 1, -heading.slope), (ROTATION + 2, 1.0), (LATENCY, heading.rate)];
+                        [(ROTATION + 1, -heading.slope), (ROTATION + 2, T::ONE), (LATENCY, heading.rate)];
                     errors.update(observation, heading.angle, heading.variance);
                 }
             }
             3..=5 => {
                 if let Some((bias, variance)) = self.bias {
                     let axis = taken as usize - 3;
-                    errors.update([(BIAS + axis, 1.0)], bias[axis], variance);
+                    errors.update([(BIAS + axis, T::ONE)], bias[axis], variance);
                 }
             }
             _ => return false,

@@ -1,5 +1,6 @@
 //! Whether the sensor lies still, and what the gyroscope reads then.
 
+use crate::attitude::Real;
 use nalgebra::Vector3;
 
 /// Time constant of the means, s. Source: VQF's `restFilterTau`.
@@ -22,40 +23,41 @@ const LEAST_S: f64 = 1.0;
 
 /// Recognises rest.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Rest {
+pub(super) struct Rest<T> {
     /// Mean angular velocity, rad/s.
-    pub(super) rate: Vector3<f64>,
-    force: Vector3<f64>,
-    still_s: f64,
+    pub(super) rate: Vector3<T>,
+    force: Vector3<T>,
+    still_s: T,
 }
 
-impl Rest {
-    pub(super) fn new(rate: &Vector3<f64>, force: &Vector3<f64>) -> Self {
-        Self { rate: *rate, force: *force, still_s: 0.0 }
+impl<T: Real> Rest<T> {
+    pub(super) fn new(rate: &Vector3<T>, force: &Vector3<T>) -> Self {
+        Self { rate: *rate, force: *force, still_s: T::ZERO }
     }
 
     /// Takes a sample; the bias is known up to `bias_deviation`, rad/s.
     pub(super) fn add(
         &mut self,
-        dt: f64,
-        rate: &Vector3<f64>,
-        force: &Vector3<f64>,
-        bias: &Vector3<f64>,
-        bias_deviation: f64,
+        dt: T,
+        rate: &Vector3<T>,
+        force: &Vector3<T>,
+        bias: &Vector3<T>,
+        bias_deviation: T,
     ) {
-        let gain = (dt / TIME_CONSTANT_S).min(1.0);
+        let gain = (dt / T::of(TIME_CONSTANT_S)).min(T::ONE);
         self.rate += (rate - self.rate) * gain;
         self.force += (force - self.force) * gain;
-        let rate_is_steady = (rate - self.rate).norm_squared() < MAX_RATE_DEVIATION * MAX_RATE_DEVIATION;
-        let force_is_steady = (force - self.force).norm_squared() < MAX_FORCE_DEVIATION * MAX_FORCE_DEVIATION;
-        let step = MAX_BIAS_STEP + 3.0 * bias_deviation;
+        let rate_is_steady = (rate - self.rate).norm_squared() < T::of(MAX_RATE_DEVIATION * MAX_RATE_DEVIATION);
+        let force_is_steady =
+            (force - self.force).norm_squared() < T::of(MAX_FORCE_DEVIATION * MAX_FORCE_DEVIATION);
+        let step = T::of(MAX_BIAS_STEP) + T::of(3.0) * bias_deviation;
         let rate_is_bias = (self.rate - bias).norm_squared() < step * step;
-        let force_is_gravity = (self.force.norm() - super::GRAVITY).abs() < MAX_GRAVITY_ERROR;
+        let force_is_gravity = (self.force.norm() - T::of(super::GRAVITY)).abs() < T::of(MAX_GRAVITY_ERROR);
         let still = rate_is_steady && force_is_steady && rate_is_bias && force_is_gravity;
-        self.still_s = if still { (self.still_s + dt).min(1e3) } else { 0.0 };
+        self.still_s = if still { (self.still_s + dt).min(T::of(1e3)) } else { T::ZERO };
     }
 
     pub(super) fn is_detected(&self) -> bool {
-        self.still_s > LEAST_S
+        self.still_s > T::of(LEAST_S)
     }
 }

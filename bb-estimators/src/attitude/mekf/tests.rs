@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::{MekfFilter, MekfParams};
 use crate::attitude::laws::{FIELD, UP, at_rest, attitude_laws};
-use crate::attitude::{AttitudeFilter, ImuSample, OrientationError, SampleError};
+use crate::attitude::{AttitudeFilter, ImuSample, OrientationError, Real, SampleError};
 
-fn filter(magnetometer: bool) -> MekfFilter {
+fn filter<T: Real>(magnetometer: bool) -> MekfFilter<T> {
     // The samples of these tests are of their instant.
     MekfFilter::new(MekfParams { magnetometer, force_is_mean: false, ..MekfParams::default() }).unwrap()
 }
@@ -237,8 +237,9 @@ fn still_time_is_refused_and_gravity_needs_no_turn() {
 
 #[test]
 fn parameters_out_of_range_are_named() {
-    let error = MekfFilter::new(MekfParams { velocity: 0.0, ..MekfParams::default() }).unwrap_err();
+    let error = MekfFilter::<f64>::new(MekfParams { velocity: 0.0, ..MekfParams::default() }).unwrap_err();
     assert_eq!(error.to_string(), "`velocity` is 0 m/s: choose a value from 0.001 to 1000 m/s");
-    let error = MekfFilter::new(MekfParams { field_disturbance: f64::NAN, ..MekfParams::default() }).unwrap_err();
+    let error =
+        MekfFilter::<f64>::new(MekfParams { field_disturbance: f64::NAN, ..MekfParams::default() }).unwrap_err();
     assert_eq!(error.parameter, "field_disturbance");
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::errors::{BIAS, CALIBRATION};
+use crate::attitude::Real;
 
 /// A window ends after this many samples: enough to do the filter's work in small pieces, one with each.
 const SAMPLES: u32 = 8;
@@ -12,37 +13,37 @@ const LONGEST_S: f64 = 0.1;
 
 /// Integrals over the samples of a window.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Window {
+pub(super) struct Window<T> {
     samples: u32,
     /// s.
-    pub(super) duration: f64,
+    pub(super) duration: T,
     /// ∫ R f dt, m/s.
-    pub(super) force: Vector3<f64>,
+    pub(super) force: Vector3<T>,
     /// ∫ R (ω × f) dt, m/s².
-    pub(super) force_rate: Vector3<f64>,
+    pub(super) force_rate: Vector3<T>,
     /// ∫ R dt, s.
-    rotation: Matrix3<f64>,
+    rotation: Matrix3<T>,
     /// ∫ R ⊗ ω dt, rad: row i, then the body axis that R takes to i, then the axis of ω.
-    rotation_rate: [[f64; 9]; 3],
+    rotation_rate: [[T; 9]; 3],
     /// ∫ |ω|² dt, rad²/s.
-    pub(super) squared_rate: f64,
+    pub(super) squared_rate: T,
     /// Σ R m.
-    field: Vector3<f64>,
+    field: Vector3<T>,
     /// Σ R (ω × m).
-    field_rate: Vector3<f64>,
+    field_rate: Vector3<T>,
     fields: u32,
 }
 
-impl Window {
+impl<T: Real> Window<T> {
     pub(super) fn new() -> Self {
         Self {
             samples: 0,
-            duration: 0.0,
+            duration: T::ZERO,
             force: Vector3::zeros(),
             force_rate: Vector3::zeros(),
             rotation: Matrix3::zeros(),
-            rotation_rate: [[0.0; 9]; 3],
-            squared_rate: 0.0,
+            rotation_rate: [[T::ZERO; 9]; 3],
+            squared_rate: T::ZERO,
             field: Vector3::zeros(),
             field_rate: Vector3::zeros(),
             fields: 0,
@@ -50,24 +51,18 @@ impl Window {
     }
 
     pub(super) fn is_full(&self) -> bool {
-        self.samples >= SAMPLES || self.duration >= LONGEST_S
+        self.samples >= SAMPLES || self.duration >= T::of(LONGEST_S)
     }
 
     /// Adds a specific force that was measured with the sensor at `rotation`, turning at `rate`.
-    pub(super) fn add_force(
-        &mut self,
-        dt: f64,
-        rotation: &Matrix3<f64>,
-        rate: &Vector3<f64>,
-        force: &Vector3<f64>,
-    ) {
+    pub(super) fn add_force(&mut self, dt: T, rotation: &Matrix3<T>, rate: &Vector3<T>, force: &Vector3<T>) {
         let force = force * dt;
         self.force += rotation * force;
         self.force_rate += rotation * rate.cross(&force);
     }
 
     /// Adds an angular velocity, the mean over `dt`, in the middle of which the rotation was `rotation`.
-    pub(super) fn add_rate(&mut self, dt: f64, rotation: &Matrix3<f64>, rate: &Vector3<f64>) {
+    pub(super) fn add_rate(&mut self, dt: T, rotation: &Matrix3<T>, rate: &Vector3<T>) {
         self.samples += 1;
         self.duration += dt;
         let rotation = rotation * dt;
@@ -83,28 +78,28 @@ impl Window {
     }
 
     /// Adds a magnetic field that was measured with the sensor at `rotation`, turning at `rate`.
-    pub(super) fn add_field(&mut self, rotation: &Matrix3<f64>, rate: &Vector3<f64>, field: &Vector3<f64>) {
+    pub(super) fn add_field(&mut self, rotation: &Matrix3<T>, rate: &Vector3<T>, field: &Vector3<T>) {
         self.field += rotation * field;
         self.field_rate += rotation * rate.cross(field);
         self.fields += 1;
     }
 
     /// Means of R m and R (ω × m), if there was a field.
-    pub(super) fn mean_field(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        let scale = 1.0 / f64::from(self.fields.max(1));
+    pub(super) fn mean_field(&self) -> Option<(Vector3<T>, Vector3<T>)> {
+        let scale = T::ONE / T::of(f64::from(self.fields.max(1)));
         (self.fields > 0).then(|| (self.field * scale, self.field_rate * scale))
     }
 
     /// How bias and calibration turn the world in this window, rad per rad/s and rad per fraction.
-    pub(super) fn gyroscope_integrals(&self) -> [[f64; 12]; 3] {
-        let mut integrals = [[0.0; 12]; 3];
+    pub(super) fn gyroscope_integrals(&self) -> [[T; 12]; 3] {
+        let mut integrals = [[T::ZERO; 12]; 3];
         for (i, row) in integrals.iter_mut().enumerate() {
             let (bias, calibration) = row.split_at_mut(CALIBRATION - BIAS);
             for (k, value) in bias.iter_mut().enumerate() {
                 *value = -self.rotation[(i, k)];
             }
             for (value, integral) in calibration.iter_mut().zip(&self.rotation_rate[i]) {
-                *value = -integral;
+                *value = -*integral;
             }
         }
         integrals

@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{TiltFilter, TiltParams};
 use crate::attitude::laws::{at_rest, attitude_laws_without_gyroscope};
-use crate::attitude::{AttitudeFilter, ImuSample};
+use crate::attitude::{AttitudeFilter, ImuSample, Real};
 
-fn filter(time_constant: f64, magnetometer: bool) -> TiltFilter {
+fn filter<T: Real>(time_constant: f64, magnetometer: bool) -> TiltFilter<T> {
     TiltFilter::new(TiltParams { time_constant, magnetometer }).unwrap()
 }
 
@@ -67,6 +67,6 @@ fn it_knows_nothing_but_the_orientation() {
 fn parameters_out_of_range_are_named() {
     for value in [-1.0, f64::NAN, f64::INFINITY] {
         let params = TiltParams { time_constant: value, ..Default::default() };
-        assert_eq!(TiltFilter::new(params).unwrap_err().parameter, "time_constant");
+        assert_eq!(TiltFilter::<f64>::new(params).unwrap_err().parameter, "time_constant");
     }
 }

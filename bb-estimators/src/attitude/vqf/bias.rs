@@ -5,23 +5,24 @@ use nalgebra::{Matrix3, Vector3};
 use super::VqfParams;
 use super::coefficients::InertialCoefficients;
 use super::low_pass::LowPass;
+use crate::attitude::Real;
 
 /// The gyroscope's bias and what is known of it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Bias {
+pub(super) struct Bias<T> {
     /// rad/s, body frame.
-    pub(super) bias: Vector3<f64>,
+    pub(super) bias: Vector3<T>,
     /// (rad/s)², body frame.
-    covariance: Matrix3<f64>,
+    covariance: Matrix3<T>,
     /// The rotation from body to the level frame, and the horizontal part of the bias in that, both low-passed as
     /// the specific force is: what the inclination has been corrected by stems from as long ago.
-    rotations: LowPass<9>,
-    biases: LowPass<2>,
+    rotations: LowPass<T, 9>,
+    biases: LowPass<T, 2>,
 }
 
-impl Bias {
+impl<T: Real> Bias<T> {
     pub(super) fn new(params: &VqfParams) -> Self {
-        let variance = params.initial_bias * params.initial_bias;
+        let variance = T::of(params.initial_bias * params.initial_bias);
         Self {
             bias: Vector3::zeros(),
             covariance: Matrix3::from_diagonal_element(variance),
@@ -38,15 +39,15 @@ impl Bias {
 
     /// What the gyroscope reads at rest is the bias: `rate` is low-passed, rad/s.
     #[inline]
-    pub(super) fn rest(&mut self, params: &VqfParams, coefficients: &InertialCoefficients, rate: &Vector3<f64>) {
+    pub(super) fn rest(&mut self, params: &VqfParams, coefficients: &InertialCoefficients<T>, rate: &Vector3<T>) {
         self.grow(coefficients);
-        let mut innovation = (rate - self.bias).cap_magnitude(params.largest_bias);
+        let mut innovation = (rate - self.bias).cap_magnitude(T::of(params.largest_bias));
         let mut change = Vector3::zeros();
         for axis in 0..3 {
             innovation[axis] -= change[axis];
             let variance = self.covariance[(axis, axis)] + coefficients.rest_variance;
-            let column: Vector3<f64> = self.covariance.column(axis).into();
-            let gain = column * (1.0 / variance);
+            let column: Vector3<T> = self.covariance.column(axis).into();
+            let gain = column * (T::ONE / variance);
             change += gain * innovation[axis];
             self.covariance -= gain * column.transpose();
         }
@@ -62,10 +63,10 @@ impl Bias {
     pub(super) fn motion(
         &mut self,
         params: &VqfParams,
-        dt_s: f64,
-        coefficients: &InertialCoefficients,
-        leaning: &Vector3<f64>,
-        level_from_body: &Matrix3<f64>,
+        dt_s: T,
+        coefficients: &InertialCoefficients<T>,
+        leaning: &Vector3<T>,
+        level_from_body: &Matrix3<T>,
     ) {
         let rotation = self.low_pass(dt_s, coefficients, level_from_body);
         self.grow(coefficients);
@@ -74,8 +75,8 @@ impl Bias {
             -leaning.y / dt_s + rotation.1[0] - expected.x,
             leaning.x / dt_s + rotation.1[1] - expected.y,
         )
-        .cap_magnitude(params.largest_bias);
-        let vertical = (-expected.z).clamp(-params.largest_bias, params.largest_bias);
+        .cap_magnitude(T::of(params.largest_bias));
+        let vertical = (-expected.z).clamp(-T::of(params.largest_bias), T::of(params.largest_bias));
         let measurements = [
             (horizontal.x, coefficients.motion_variance),
             (horizontal.y, coefficients.motion_variance),
@@ -84,9 +85,9 @@ impl Bias {
         // The noises are independent, so the three are taken one after the other and no matrix is inverted.
         let mut change = Vector3::zeros();
         for (row, (innovation, variance)) in measurements.into_iter().enumerate() {
-            let observation: Vector3<f64> = rotation.0.row(row).transpose();
+            let observation: Vector3<T> = rotation.0.row(row).transpose();
             let column = self.covariance * observation;
-            let gain = column * (1.0 / (observation.dot(&column) + variance));
+            let gain = column * (T::ONE / (observation.dot(&column) + variance));
             change += gain * (innovation - observation.dot(&change));
             self.covariance -= gain * column.transpose();
         }
@@ -97,10 +98,10 @@ impl Bias {
     #[inline]
     pub(super) fn low_pass(
         &mut self,
-        dt_s: f64,
-        coefficients: &InertialCoefficients,
-        level_from_body: &Matrix3<f64>,
-    ) -> (Matrix3<f64>, [f64; 2]) {
+        dt_s: T,
+        coefficients: &InertialCoefficients<T>,
+        level_from_body: &Matrix3<T>,
+    ) -> (Matrix3<T>, [T; 2]) {
         let bias = level_from_body * self.bias;
         let biases = self.biases.filter(&[bias.x, bias.y], dt_s, &coefficients.tilt);
         let elements = core::array::from_fn(|i| level_from_body.as_slice()[i]);
@@ -109,14 +110,14 @@ impl Bias {
     }
 
     /// What was known fades.
-    fn grow(&mut self, coefficients: &InertialCoefficients) {
+    fn grow(&mut self, coefficients: &InertialCoefficients<T>) {
         self.covariance *= coefficients.bias_kept;
         for axis in 0..3 {
             self.covariance[(axis, axis)] += coefficients.bias_growth;
         }
     }
 
-    fn correct(&mut self, params: &VqfParams, change: Vector3<f64>) {
-        self.bias = (self.bias + change).cap_magnitude(params.largest_bias);
+    fn correct(&mut self, params: &VqfParams, change: Vector3<T>) {
+        self.bias = (self.bias + change).cap_magnitude(T::of(params.largest_bias));
     }
 }

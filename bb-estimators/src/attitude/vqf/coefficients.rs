@@ -2,6 +2,7 @@
 
 use super::VqfParams;
 use super::low_pass::Coefficients;
+use crate::attitude::Real;
 use crate::attitude::low_pass::gain;
 
 /// Coefficients serve sample times that differ from theirs by up to this fraction.
@@ -15,45 +16,45 @@ pub(super) const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
 /// For what happens with every sample of gyroscope and accelerometer.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct InertialCoefficients {
-    dt_s: f64,
-    pub(super) tilt: Coefficients,
-    pub(super) rest: Coefficients,
+pub(super) struct InertialCoefficients<T> {
+    dt_s: T,
+    pub(super) tilt: Coefficients<T>,
+    pub(super) rest: Coefficients<T>,
     /// What is kept of the bias's covariance in a sample, as a factor, and what is added to its variances, (rad/s)².
-    pub(super) bias_kept: f64,
-    pub(super) bias_growth: f64,
+    pub(super) bias_kept: T,
+    pub(super) bias_growth: T,
     /// Variances of the bias's measurements, (rad/s)².
-    pub(super) rest_variance: f64,
-    pub(super) motion_variance: f64,
-    pub(super) vertical_variance: f64,
+    pub(super) rest_variance: T,
+    pub(super) motion_variance: T,
+    pub(super) vertical_variance: T,
 }
 
-impl InertialCoefficients {
-    pub(super) fn new(params: &VqfParams, dt_s: f64) -> Self {
-        let initial = params.initial_bias * params.initial_bias;
-        let growth = BIAS_WANDER * BIAS_WANDER / params.bias_forgetting_time * dt_s;
+impl<T: Real> InertialCoefficients<T> {
+    pub(super) fn new(params: &VqfParams, dt_s: T) -> Self {
+        let initial = T::of(params.initial_bias * params.initial_bias);
+        let growth = T::of(BIAS_WANDER * BIAS_WANDER) / T::of(params.bias_forgetting_time) * dt_s;
         // The variance of one measurement for which the filter's own goes to that of the deviation squared.
-        let measured = |deviation: f64| {
+        let measured = |deviation: T| {
             let squared = deviation * deviation;
             squared * squared / growth + squared
         };
-        let motion_variance = measured(params.motion_bias_deviation);
+        let motion_variance = measured(T::of(params.motion_bias_deviation));
         Self {
             dt_s,
-            tilt: Coefficients::new(params.tilt_time_constant, dt_s),
-            rest: Coefficients::new(params.rest_time_constant, dt_s),
-            bias_kept: if initial > growth { 1.0 - growth / initial } else { 0.0 },
+            tilt: Coefficients::new(T::of(params.tilt_time_constant), dt_s),
+            rest: Coefficients::new(T::of(params.rest_time_constant), dt_s),
+            bias_kept: if initial > growth { T::ONE - growth / initial } else { T::ZERO },
             bias_growth: growth.min(initial),
-            rest_variance: measured(params.rest_bias_deviation),
+            rest_variance: measured(T::of(params.rest_bias_deviation)),
             motion_variance,
-            vertical_variance: motion_variance / params.vertical_forgetting_factor.max(1e-10),
+            vertical_variance: motion_variance / T::of(params.vertical_forgetting_factor).max(T::of(1e-10)),
         }
     }
 
     /// Makes them anew if they are not for this sample time.
     #[inline]
-    pub(super) fn follow(&mut self, params: &VqfParams, dt_s: f64) {
-        if (dt_s - self.dt_s).abs() > TOLERANCE * self.dt_s {
+    pub(super) fn follow(&mut self, params: &VqfParams, dt_s: T) {
+        if (dt_s - self.dt_s).abs() > T::of(TOLERANCE) * self.dt_s {
             *self = Self::new(params, dt_s);
         }
     }
@@ -61,27 +62,27 @@ impl InertialCoefficients {
 
 /// For what happens with every sample of the magnetometer.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct FieldCoefficients {
-    dt_s: f64,
-    pub(super) field: Coefficients,
-    pub(super) heading_gain: f64,
-    pub(super) reference_gain: f64,
+pub(super) struct FieldCoefficients<T> {
+    dt_s: T,
+    pub(super) field: Coefficients<T>,
+    pub(super) heading_gain: T,
+    pub(super) reference_gain: T,
 }
 
-impl FieldCoefficients {
-    pub(super) fn new(params: &VqfParams, dt_s: f64) -> Self {
+impl<T: Real> FieldCoefficients<T> {
+    pub(super) fn new(params: &VqfParams, dt_s: T) -> Self {
         Self {
             dt_s,
-            field: Coefficients::new(params.field_time_constant, dt_s),
-            heading_gain: gain(dt_s, params.heading_time_constant),
-            reference_gain: gain(dt_s, params.reference_time_constant),
+            field: Coefficients::new(T::of(params.field_time_constant), dt_s),
+            heading_gain: gain(dt_s, T::of(params.heading_time_constant)),
+            reference_gain: gain(dt_s, T::of(params.reference_time_constant)),
         }
     }
 
     /// Makes them anew if they are not for this sample time.
     #[inline]
-    pub(super) fn follow(&mut self, params: &VqfParams, dt_s: f64) {
-        if (dt_s - self.dt_s).abs() > TOLERANCE * self.dt_s {
+    pub(super) fn follow(&mut self, params: &VqfParams, dt_s: T) {
+        if (dt_s - self.dt_s).abs() > T::of(TOLERANCE) * self.dt_s {
             *self = Self::new(params, dt_s);
         }
     }

@@ -5,23 +5,24 @@ use nalgebra::Vector3;
 use super::VqfParams;
 use super::coefficients::FieldCoefficients;
 use super::low_pass::LowPass;
+use crate::attitude::Real;
 
 /// What a rotation about the vertical leaves alone of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Field {
+struct Field<T> {
     /// In the field's own unit.
-    norm: f64,
+    norm: T,
     /// How far it points below the horizon, rad.
-    dip: f64,
+    dip: T,
 }
 
-impl Field {
+impl<T: Real> Field<T> {
     fn is_near(self, reference: Self, params: &VqfParams) -> bool {
-        (self.norm - reference.norm).abs() < params.field_norm_tolerance * reference.norm
-            && (self.dip - reference.dip).abs() < params.field_dip_tolerance
+        (self.norm - reference.norm).abs() < T::of(params.field_norm_tolerance) * reference.norm
+            && (self.dip - reference.dip).abs() < T::of(params.field_dip_tolerance)
     }
 
-    fn approach(&mut self, field: Self, gain: f64) {
+    fn approach(&mut self, field: Self, gain: T) {
         self.norm += gain * (field.norm - self.norm);
         self.dip += gain * (field.dip - self.dip);
     }
@@ -29,25 +30,25 @@ impl Field {
 
 /// The reference, and the field that may become the next one.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Disturbance {
-    fields: LowPass<2>,
-    reference: Option<Field>,
-    candidate: Option<Field>,
-    candidate_s: f64,
-    undisturbed_s: f64,
-    rejected_s: f64,
+pub(super) struct Disturbance<T> {
+    fields: LowPass<T, 2>,
+    reference: Option<Field<T>>,
+    candidate: Option<Field<T>>,
+    candidate_s: T,
+    undisturbed_s: T,
+    rejected_s: T,
     detected: bool,
 }
 
-impl Disturbance {
+impl<T: Real> Disturbance<T> {
     pub(super) fn new(params: &VqfParams) -> Self {
         Self {
             fields: LowPass::new(),
             reference: None,
             candidate: None,
-            candidate_s: 0.0,
-            undisturbed_s: 0.0,
-            rejected_s: params.rejection_time,
+            candidate_s: T::ZERO,
+            undisturbed_s: T::ZERO,
+            rejected_s: T::of(params.rejection_time),
             detected: true,
         }
     }
@@ -56,8 +57,8 @@ impl Disturbance {
     pub(super) fn forget_motion(&mut self) {
         self.fields = LowPass::new();
         self.candidate = None;
-        self.candidate_s = 0.0;
-        self.undisturbed_s = 0.0;
+        self.candidate_s = T::ZERO;
+        self.undisturbed_s = T::ZERO;
     }
 
     pub(super) fn is_detected(&self) -> bool {
@@ -70,13 +71,13 @@ impl Disturbance {
     pub(super) fn observe(
         &mut self,
         params: &VqfParams,
-        dt_s: f64,
-        coefficients: &FieldCoefficients,
-        norm: f64,
-        direction: &Vector3<f64>,
+        dt_s: T,
+        coefficients: &FieldCoefficients<T>,
+        norm: T,
+        direction: &Vector3<T>,
         turning: bool,
-    ) -> f64 {
-        let dip = (-direction.z).clamp(-1.0, 1.0).asin();
+    ) -> T {
+        let dip = (-direction.z).clamp(-T::ONE, T::ONE).asin();
         let [norm, dip] = self.fields.filter(&[norm, dip], dt_s, &coefficients.field);
         let field = Field { norm, dip };
         self.compare(params, dt_s, coefficients, field);
@@ -85,17 +86,17 @@ impl Disturbance {
     }
 
     /// Compares the field with the reference, which follows it while it is undisturbed.
-    fn compare(&mut self, params: &VqfParams, dt_s: f64, coefficients: &FieldCoefficients, field: Field) {
+    fn compare(&mut self, params: &VqfParams, dt_s: T, coefficients: &FieldCoefficients<T>, field: Field<T>) {
         match &mut self.reference {
             Some(reference) if field.is_near(*reference, params) => {
                 self.undisturbed_s += dt_s;
-                if self.undisturbed_s >= params.undisturbed_time {
+                if self.undisturbed_s >= T::of(params.undisturbed_time) {
                     self.detected = false;
                     reference.approach(field, coefficients.reference_gain);
                 }
             }
             _ => {
-                self.undisturbed_s = 0.0;
+                self.undisturbed_s = T::ZERO;
                 self.detected = true;
             }
         }
@@ -105,38 +106,39 @@ impl Disturbance {
     fn consider(
         &mut self,
         params: &VqfParams,
-        dt_s: f64,
-        coefficients: &FieldCoefficients,
-        field: Field,
+        dt_s: T,
+        coefficients: &FieldCoefficients<T>,
+        field: Field<T>,
         turning: bool,
     ) {
         let Some(candidate) = self.candidate.as_mut().filter(|candidate| field.is_near(**candidate, params)) else {
             self.candidate = Some(field);
-            self.candidate_s = 0.0;
+            self.candidate_s = T::ZERO;
             return;
         };
         if turning {
             self.candidate_s += dt_s;
         }
         candidate.approach(field, coefficients.reference_gain);
-        let needed_s = if self.reference.is_none() { params.first_field_time } else { params.new_field_time };
+        let needed_s =
+            if self.reference.is_none() { T::of(params.first_field_time) } else { T::of(params.new_field_time) };
         if self.detected && self.candidate_s >= needed_s {
             self.reference = Some(*candidate);
             self.detected = false;
-            self.undisturbed_s = params.undisturbed_time;
+            self.undisturbed_s = T::of(params.undisturbed_time);
         }
     }
 
     /// A disturbed field counts for nothing at first, and for less when it lasts.
-    fn trust(&mut self, params: &VqfParams, dt_s: f64) -> f64 {
+    fn trust(&mut self, params: &VqfParams, dt_s: T) -> T {
         if !self.detected {
-            self.rejected_s = (self.rejected_s - params.rejection_factor * dt_s).max(0.0);
-            return 1.0;
+            self.rejected_s = (self.rejected_s - T::of(params.rejection_factor) * dt_s).max(T::ZERO);
+            return T::ONE;
         }
-        if self.rejected_s > params.rejection_time {
-            return 1.0 / params.rejection_factor;
+        if self.rejected_s > T::of(params.rejection_time) {
+            return T::ONE / T::of(params.rejection_factor);
         }
         self.rejected_s += dt_s;
-        0.0
+        T::ZERO
     }
 }

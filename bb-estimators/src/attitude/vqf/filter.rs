@@ -11,7 +11,7 @@ use super::low_pass::LowPass;
 use super::rest::Rest;
 use crate::attitude::rotation::{renormalised, turn, turn_upright};
 use crate::attitude::state::AttitudeState;
-use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, SampleError};
+use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
 
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
@@ -24,24 +24,24 @@ const USUAL_DT_S: f64 = 0.01;
 
 /// The versatile quaternion-based filter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct VqfFilter {
+pub struct VqfFilter<T: Real = f64> {
     params: VqfParams,
-    state: AttitudeState,
-    inertial_from_body: UnitQuaternion<f64>,
-    level_from_inertial: UnitQuaternion<f64>,
-    heading: Heading,
+    state: AttitudeState<T>,
+    inertial_from_body: UnitQuaternion<T>,
+    level_from_inertial: UnitQuaternion<T>,
+    heading: Heading<T>,
     /// Specific force in the inertial frame, m/s².
-    forces: LowPass<3>,
-    rest: Rest,
-    bias: Bias,
-    disturbance: Disturbance,
+    forces: LowPass<T, 3>,
+    rest: Rest<T>,
+    bias: Bias<T>,
+    disturbance: Disturbance<T>,
     /// Time since the last field, at most [`MAX_GAP_S`].
-    since_field_s: f64,
-    coefficients: InertialCoefficients,
-    field_coefficients: FieldCoefficients,
+    since_field_s: T,
+    coefficients: InertialCoefficients<T>,
+    field_coefficients: FieldCoefficients<T>,
 }
 
-impl AttitudeFilter for VqfFilter {
+impl<T: Real> AttitudeFilter<T> for VqfFilter<T> {
     type Params = VqfParams;
 
     fn new(params: VqfParams) -> Result<Self, ParamsError> {
@@ -51,14 +51,14 @@ impl AttitudeFilter for VqfFilter {
             state: AttitudeState::new(params.magnetometer),
             inertial_from_body: UnitQuaternion::identity(),
             level_from_inertial: UnitQuaternion::identity(),
-            heading: Heading::new(1.0),
+            heading: Heading::new(T::ONE),
             forces: LowPass::new(),
             rest: Rest::new(),
             bias: Bias::new(&params),
             disturbance: Disturbance::new(&params),
-            since_field_s: 0.0,
-            coefficients: InertialCoefficients::new(&params, USUAL_DT_S),
-            field_coefficients: FieldCoefficients::new(&params, USUAL_DT_S),
+            since_field_s: T::ZERO,
+            coefficients: InertialCoefficients::new(&params, T::of(USUAL_DT_S)),
+            field_coefficients: FieldCoefficients::new(&params, T::of(USUAL_DT_S)),
         })
     }
 
@@ -66,9 +66,9 @@ impl AttitudeFilter for VqfFilter {
         &self.params
     }
 
-    fn update(&mut self, sample: &ImuSample) -> Result<(), SampleError> {
+    fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         let Some(step) = self.state.admit(sample)? else {
-            let mean_gain = if self.state.heading_is_known() { 0.5 } else { 1.0 };
+            let mean_gain = if self.state.heading_is_known() { T::HALF } else { T::ONE };
             self.begin(Heading::new(mean_gain), LowPass::new());
             self.average_first(sample);
             return Ok(());
@@ -80,7 +80,7 @@ impl AttitudeFilter for VqfFilter {
         } else {
             self.level_from_inertial * self.inertial_from_body
         };
-        self.since_field_s = (self.since_field_s + step.dt_s).min(MAX_GAP_S);
+        self.since_field_s = (self.since_field_s + step.dt_s).min(T::of(MAX_GAP_S));
         if let (Some(direction), Some(field)) = (&step.field, &sample.magnetic_field) {
             self.turn_north(field.dot(direction), &(level_from_body * direction));
         }
@@ -88,17 +88,17 @@ impl AttitudeFilter for VqfFilter {
         Ok(())
     }
 
-    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<f64>) -> Result<(), SampleError> {
+    fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError> {
         self.state.start_at(time_ns, world_from_body)?;
-        self.begin(Heading::new(0.0), LowPass::settled([0.0, 0.0, GRAVITY]));
+        self.begin(Heading::new(T::ZERO), LowPass::settled([T::ZERO, T::ZERO, T::of(GRAVITY)]));
         Ok(())
     }
 
-    fn world_from_body(&self) -> Option<UnitQuaternion<f64>> {
+    fn world_from_body(&self) -> Option<UnitQuaternion<T>> {
         self.state.world_from_body()
     }
 
-    fn gyroscope_bias(&self) -> Option<Vector3<f64>> {
+    fn gyroscope_bias(&self) -> Option<Vector3<T>> {
         (self.params.rest_bias || self.params.motion_bias).then_some(self.bias.bias)
     }
 
@@ -119,11 +119,11 @@ impl AttitudeFilter for VqfFilter {
     }
 }
 
-impl VqfFilter {
+impl<T: Real> VqfFilter<T> {
     /// Starts from the orientation that the state has, if it has one; what is known of the gyroscope and of the
     /// field stays.
     #[cold]
-    fn begin(&mut self, heading: Heading, forces: LowPass<3>) {
+    fn begin(&mut self, heading: Heading<T>, forces: LowPass<T, 3>) {
         if let Some(orientation) = self.state.world_from_body() {
             self.inertial_from_body = orientation;
         }
@@ -133,21 +133,21 @@ impl VqfFilter {
         self.rest = Rest::new();
         self.bias.forget_motion();
         self.disturbance.forget_motion();
-        self.since_field_s = 0.0;
+        self.since_field_s = T::ZERO;
     }
 
     /// Lets the means of the low-passes begin with the sample that started the filter.
     #[cold]
-    fn average_first(&mut self, sample: &ImuSample) {
+    fn average_first(&mut self, sample: &ImuSample<T>) {
         let (coefficients, level_from_body) = (&self.coefficients, &self.inertial_from_body);
         self.rest.average_first(coefficients, &sample.angular_velocity, &sample.specific_force);
-        self.forces.filter(&(level_from_body * sample.specific_force).into(), 0.0, &coefficients.tilt);
-        self.bias.low_pass(0.0, coefficients, level_from_body.to_rotation_matrix().matrix());
+        self.forces.filter(&(level_from_body * sample.specific_force).into(), T::ZERO, &coefficients.tilt);
+        self.bias.low_pass(T::ZERO, coefficients, level_from_body.to_rotation_matrix().matrix());
     }
 
     /// Integrates the gyroscope less its bias.
     #[inline]
-    fn strapdown(&mut self, dt_s: f64, measured: &Vector3<f64>) {
+    fn strapdown(&mut self, dt_s: T, measured: &Vector3<T>) {
         self.rest.add_rate(&self.params, dt_s, &self.coefficients, measured);
         let turned = turn(&self.inertial_from_body, &((measured - self.bias.bias) * dt_s));
         self.inertial_from_body = renormalised(&turned);
@@ -155,17 +155,17 @@ impl VqfFilter {
 
     /// Corrects the inclination by the specific force, and the bias by that; returns the orientation but for heading.
     #[inline]
-    fn incline(&mut self, dt_s: f64, force: &Vector3<f64>) -> UnitQuaternion<f64> {
+    fn incline(&mut self, dt_s: T, force: &Vector3<T>) -> UnitQuaternion<T> {
         let (params, coefficients) = (&self.params, &self.coefficients);
         self.rest.add_force(params, dt_s, coefficients, force);
         let inertial = self.inertial_from_body * force;
-        let mean: Vector3<f64> = self.forces.filter(&inertial.into(), dt_s, &coefficients.tilt).into();
+        let mean: Vector3<T> = self.forces.filter(&inertial.into(), dt_s, &coefficients.tilt).into();
         let leaning = self.level_from_inertial * mean;
         let squared = leaning.norm_squared();
-        if squared <= NO_FORCE {
+        if squared <= T::of(NO_FORCE) {
             return self.level_from_inertial * self.inertial_from_body;
         }
-        let leaning = leaning * (1.0 / squared.sqrt());
+        let leaning = leaning * (T::ONE / squared.sqrt());
         self.level_from_inertial = renormalised(&turn_upright(&self.level_from_inertial, &leaning));
 
         let level_from_body = self.level_from_inertial * self.inertial_from_body;
@@ -182,18 +182,18 @@ impl VqfFilter {
 
     /// Corrects the heading by a field of this norm and direction in the level frame.
     #[inline]
-    fn turn_north(&mut self, norm: f64, direction: &Vector3<f64>) {
+    fn turn_north(&mut self, norm: T, direction: &Vector3<T>) {
         let (params, dt_s) = (&self.params, self.since_field_s);
         self.field_coefficients.follow(params, dt_s);
-        self.since_field_s = 0.0;
+        self.since_field_s = T::ZERO;
         let coefficients = &self.field_coefficients;
         let trust = if params.disturbance_rejection {
-            let least = params.new_field_angular_velocity;
+            let least = T::of(params.new_field_angular_velocity);
             let turning = self.rest.rate.norm_squared() >= least * least;
             self.disturbance.observe(params, dt_s, coefficients, norm, direction, turning)
         } else {
-            1.0
+            T::ONE
         };
-        self.heading.correct(dt_s, params.heading_time_constant, coefficients, direction, trust);
+        self.heading.correct(dt_s, T::of(params.heading_time_constant), coefficients, direction, trust);
     }
 }

@@ -5,6 +5,7 @@
 //! whose states are the output and its derivative but for half a sample. At a constant input they are the input and
 //! zero, whatever the coefficients.
 
+use crate::attitude::Real;
 use core::f64::consts::SQRT_2;
 
 /// The greatest `dt / (√2 τ)`: beyond it the low-pass lets everything through in one sample, and the tangent ends.
@@ -12,17 +13,17 @@ const MAX_ANGLE: f64 = 1.5;
 
 /// What a low-pass of one time constant multiplies by, at one sample time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Coefficients {
-    time_constant_s: f64,
-    integrator: f64,
-    band_from_band: f64,
-    band_from_input: f64,
+pub(super) struct Coefficients<T> {
+    time_constant_s: T,
+    integrator: T,
+    band_from_band: T,
+    band_from_input: T,
 }
 
-impl Coefficients {
-    pub(super) fn new(time_constant_s: f64, dt_s: f64) -> Self {
-        let integrator = (dt_s / (SQRT_2 * time_constant_s)).min(MAX_ANGLE).tan();
-        let band_from_band = 1.0 / (1.0 + integrator * (integrator + SQRT_2));
+impl<T: Real> Coefficients<T> {
+    pub(super) fn new(time_constant_s: T, dt_s: T) -> Self {
+        let integrator = (dt_s / (T::of(SQRT_2) * time_constant_s)).min(T::of(MAX_ANGLE)).tan();
+        let band_from_band = T::ONE / (T::ONE + integrator * (integrator + T::of(SQRT_2)));
         Self { time_constant_s, integrator, band_from_band, band_from_input: integrator * band_from_band }
     }
 }
@@ -31,32 +32,32 @@ impl Coefficients {
 ///
 /// For the first time constant the output is the mean of all that came.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct LowPass<const N: usize> {
-    band: [f64; N],
-    low: [f64; N],
+pub(super) struct LowPass<T, const N: usize> {
+    band: [T; N],
+    low: [T; N],
     /// How many samples the mean has so far; `None` once it is over.
-    samples: Option<f64>,
-    elapsed_s: f64,
+    samples: Option<T>,
+    elapsed_s: T,
 }
 
-impl<const N: usize> LowPass<N> {
+impl<T: Real, const N: usize> LowPass<T, N> {
     /// One that begins with the mean of its first inputs.
     pub(super) fn new() -> Self {
-        Self { band: [0.0; N], low: [0.0; N], samples: Some(0.0), elapsed_s: 0.0 }
+        Self { band: [T::ZERO; N], low: [T::ZERO; N], samples: Some(T::ZERO), elapsed_s: T::ZERO }
     }
 
     /// One that has had this input for ever.
-    pub(super) fn settled(value: [f64; N]) -> Self {
-        Self { band: [0.0; N], low: value, samples: None, elapsed_s: 0.0 }
+    pub(super) fn settled(value: [T; N]) -> Self {
+        Self { band: [T::ZERO; N], low: value, samples: None, elapsed_s: T::ZERO }
     }
 
     /// Takes an input that came `dt_s` after the last one; returns the output.
     #[inline]
-    pub(super) fn filter(&mut self, input: &[f64; N], dt_s: f64, coefficients: &Coefficients) -> [f64; N] {
+    pub(super) fn filter(&mut self, input: &[T; N], dt_s: T, coefficients: &Coefficients<T>) -> [T; N] {
         if let Some(samples) = self.samples {
-            return self.mean(input, samples + 1.0, dt_s, coefficients.time_constant_s);
+            return self.mean(input, samples + T::ONE, dt_s, coefficients.time_constant_s);
         }
-        let mut output = [0.0; N];
+        let mut output = [T::ZERO; N];
         for i in 0..N {
             let difference = input[i] - self.low[i];
             let band = coefficients.band_from_band * self.band[i] + coefficients.band_from_input * difference;
@@ -69,9 +70,9 @@ impl<const N: usize> LowPass<N> {
     }
 
     #[cold]
-    fn mean(&mut self, input: &[f64; N], samples: f64, dt_s: f64, time_constant_s: f64) -> [f64; N] {
+    fn mean(&mut self, input: &[T; N], samples: T, dt_s: T, time_constant_s: T) -> [T; N] {
         for (mean, input) in self.low.iter_mut().zip(input) {
-            *mean += (input - *mean) / samples;
+            *mean += (*input - *mean) / samples;
         }
         self.elapsed_s += dt_s;
         // Of the first sample it is not known what time it stands for: the same as this one.

@@ -5,25 +5,26 @@ use nalgebra::Vector3;
 use super::VqfParams;
 use super::coefficients::InertialCoefficients;
 use super::low_pass::LowPass;
+use crate::attitude::Real;
 
 /// Recognises rest by how far gyroscope and accelerometer are from their low-passed values.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Rest {
-    rates: LowPass<3>,
-    forces: LowPass<3>,
+pub(super) struct Rest<T> {
+    rates: LowPass<T, 3>,
+    forces: LowPass<T, 3>,
     /// Low-passed angular velocity, rad/s.
-    pub(super) rate: Vector3<f64>,
-    still_s: f64,
+    pub(super) rate: Vector3<T>,
+    still_s: T,
     detected: bool,
 }
 
-impl Rest {
+impl<T: Real> Rest<T> {
     pub(super) fn new() -> Self {
         Self {
             rates: LowPass::new(),
             forces: LowPass::new(),
             rate: Vector3::zeros(),
-            still_s: 0.0,
+            still_s: T::ZERO,
             detected: false,
         }
     }
@@ -35,12 +36,12 @@ impl Rest {
     /// Lets the means begin with a sample.
     pub(super) fn average_first(
         &mut self,
-        coefficients: &InertialCoefficients,
-        rate: &Vector3<f64>,
-        force: &Vector3<f64>,
+        coefficients: &InertialCoefficients<T>,
+        rate: &Vector3<T>,
+        force: &Vector3<T>,
     ) {
-        self.rate = self.rates.filter(&(*rate).into(), 0.0, &coefficients.rest).into();
-        self.forces.filter(&(*force).into(), 0.0, &coefficients.rest);
+        self.rate = self.rates.filter(&(*rate).into(), T::ZERO, &coefficients.rest).into();
+        self.forces.filter(&(*force).into(), T::ZERO, &coefficients.rest);
     }
 
     /// Takes an angular velocity, rad/s, and ends rest if it differs too much or is too large for a bias.
@@ -48,14 +49,14 @@ impl Rest {
     pub(super) fn add_rate(
         &mut self,
         params: &VqfParams,
-        dt_s: f64,
-        coefficients: &InertialCoefficients,
-        rate: &Vector3<f64>,
+        dt_s: T,
+        coefficients: &InertialCoefficients<T>,
+        rate: &Vector3<T>,
     ) {
         self.rate = self.rates.filter(&(*rate).into(), dt_s, &coefficients.rest).into();
         let deviation = (rate - self.rate).norm_squared();
-        if deviation >= params.rest_angular_velocity * params.rest_angular_velocity
-            || self.rate.norm_squared() > params.largest_bias * params.largest_bias
+        if deviation >= T::of(params.rest_angular_velocity * params.rest_angular_velocity)
+            || self.rate.norm_squared() > T::of(params.largest_bias * params.largest_bias)
         {
             self.end();
         }
@@ -66,21 +67,21 @@ impl Rest {
     pub(super) fn add_force(
         &mut self,
         params: &VqfParams,
-        dt_s: f64,
-        coefficients: &InertialCoefficients,
-        force: &Vector3<f64>,
+        dt_s: T,
+        coefficients: &InertialCoefficients<T>,
+        force: &Vector3<T>,
     ) {
-        let mean: Vector3<f64> = self.forces.filter(&(*force).into(), dt_s, &coefficients.rest).into();
-        if (force - mean).norm_squared() >= params.rest_specific_force * params.rest_specific_force {
+        let mean: Vector3<T> = self.forces.filter(&(*force).into(), dt_s, &coefficients.rest).into();
+        if (force - mean).norm_squared() >= T::of(params.rest_specific_force * params.rest_specific_force) {
             self.end();
             return;
         }
         self.still_s += dt_s;
-        self.detected |= self.still_s >= params.rest_time;
+        self.detected |= self.still_s >= T::of(params.rest_time);
     }
 
     fn end(&mut self) {
-        self.still_s = 0.0;
+        self.still_s = T::ZERO;
         self.detected = false;
     }
 }

@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{VqfFilter, VqfParams};
 use crate::attitude::laws::{FIELD, UP, at_rest, attitude_laws};
-use crate::attitude::{AttitudeFilter, ImuSample, OrientationError};
+use crate::attitude::{AttitudeFilter, ImuSample, OrientationError, Real};
 
-fn filter(magnetometer: bool) -> VqfFilter {
+fn filter<T: Real>(magnetometer: bool) -> VqfFilter<T> {
     VqfFilter::new(VqfParams { magnetometer, ..Default::default() }).unwrap()
 }
 
@@ -106,8 +106,8 @@ fn a_rate_that_changes_does_no_harm() {
 fn parameters_out_of_range_are_named() {
     for value in [-1.0, f64::NAN, f64::INFINITY] {
         let params = VqfParams { largest_bias: value, ..Default::default() };
-        assert_eq!(VqfFilter::new(params).unwrap_err().parameter, "largest_bias");
+        assert_eq!(VqfFilter::<f64>::new(params).unwrap_err().parameter, "largest_bias");
         let params = VqfParams { rejection_factor: value, ..Default::default() };
-        assert_eq!(VqfFilter::new(params).unwrap_err().parameter, "rejection_factor");
+        assert_eq!(VqfFilter::<f64>::new(params).unwrap_err().parameter, "rejection_factor");
     }
 }

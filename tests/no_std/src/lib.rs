@@ -1,0 +1,49 @@
+//! Every algorithm in both scalars, in a library with a panic handler of its own: it does not build, with E0152, when one of
+//! its dependencies brings the standard library in.
+
+#![no_std]
+
+use bb_estimators::attitude::average::{average, average_pair};
+use bb_estimators::attitude::initial::initial_orientation;
+use bb_estimators::attitude::{
+    AttitudeFilter, ComplementaryFilter, FusionFilter, ImuSample, MadgwickFilter, MahonyFilter, MekfFilter,
+    OrientationError, Real, TiltFilter, VqfFilter,
+};
+use nalgebra::UnitQuaternion;
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    loop {}
+}
+
+/// The heading error of all filters together after one sample, rad, in `f64`.
+pub fn double(sample: &ImuSample) -> Option<f64> {
+    all(sample)
+}
+
+/// The same in `f32`.
+pub fn single(sample: &ImuSample<f32>) -> Option<f64> {
+    all(sample)
+}
+
+fn all<T: Real>(sample: &ImuSample<T>) -> Option<f64> {
+    let truth = initial_orientation(&sample.specific_force, sample.magnetic_field.as_ref()).ok()?;
+    let orientations = [
+        updated::<T, ComplementaryFilter<T>>(sample)?,
+        updated::<T, FusionFilter<T>>(sample)?,
+        updated::<T, MadgwickFilter<T>>(sample)?,
+        updated::<T, MahonyFilter<T>>(sample)?,
+        updated::<T, MekfFilter<T>>(sample)?,
+        updated::<T, TiltFilter<T>>(sample)?,
+        updated::<T, VqfFilter<T>>(sample)?,
+    ];
+    let mean = average(&orientations.map(|orientation| (orientation, T::ONE))).ok()?;
+    let mean = average_pair(&mean, T::ONE, &truth, T::HALF).ok()?;
+    Some(OrientationError::between(&mean, &truth)?.heading)
+}
+
+fn updated<T: Real, F: AttitudeFilter<T>>(sample: &ImuSample<T>) -> Option<UnitQuaternion<T>> {
+    let mut filter = F::new(F::Params::default()).ok()?;
+    filter.update(sample).ok()?;
+    filter.world_from_body()
+}
