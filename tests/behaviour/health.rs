@@ -151,6 +151,13 @@ fn an_overrun_of_the_latency_budget_degrades() -> Result<(), StartError> {
     let report = run.simulation.report();
     let latency = report.estimator(WATCH).expect("it is declared").latency;
     assert_eq!((latency.count, latency.longest), (3, Duration::from_millis(2)));
+    // A message that is old when it comes is older when its callback is over.
+    run.simulation.publish(watched::sensor::base::number, at(run.now), Number(1.0));
+    run.simulation.run_until(at(run.now + 5));
+    run.simulation.publish(watched::sensor::base::number, at(run.now), Number(1.0));
+    let report = run.simulation.report();
+    let age = report.estimator(WATCH).expect("it is declared").inputs[0].age;
+    assert_eq!((age.count, age.longest), (5, Duration::from_micros(5999)));
     Ok(())
 }
 

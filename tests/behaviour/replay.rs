@@ -195,6 +195,7 @@ fn counts(report: &Report) -> String {
         .map(|estimator| {
             let mut estimator = estimator.clone();
             estimator.latency = Default::default();
+            estimator.inputs.iter_mut().for_each(|input| input.age = Default::default());
             format!("{estimator:?}")
         })
         .collect();

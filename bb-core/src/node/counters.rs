@@ -70,6 +70,9 @@ pub(super) struct InputCounters {
     /// Messages that did not fit in the inbox. Those who published them count, whoever holds the estimator meanwhile; they
     /// are not among the other two.
     overflowed: AtomicU64,
+    /// How old messages were when the callback that they led to was over, in nanoseconds; of a driver, where a latency budget
+    /// is declared.
+    pub(super) age: Option<Latency>,
 }
 
 #[derive(Debug, Default)]
@@ -87,7 +90,12 @@ pub(super) struct Counters {
 
 impl Counters {
     pub(super) fn new(declaration: &EstimatorDeclaration) -> Self {
-        let inputs = declaration.inputs.iter().map(|_| InputCounters::default()).collect();
+        let is_measured = declaration.health.latency_budget_nanos.is_some();
+        let inputs = declaration.inputs.iter().map(|input| InputCounters {
+            age: (is_measured && input.driver).then(Latency::default),
+            ..InputCounters::default()
+        });
+        let inputs = inputs.collect();
         Self { inputs, ..Self::default() }
     }
 
@@ -120,7 +128,8 @@ impl Counters {
             let mut dropped = counters.dropped.each_ref().map(Count::get);
             dropped[DropReason::Overflow as usize] = overflowed;
             let received = counters.received.get() + overflowed;
-            InputStatistics { name: declared.name, source: declared.source, received, dropped }
+            let age = counters.age.as_ref().map(Latency::statistics).unwrap_or_default();
+            InputStatistics { name: declared.name, source: declared.source, received, dropped, age }
         });
         EstimatorStatistics {
             path: declaration.path,
@@ -176,6 +185,9 @@ pub struct InputStatistics {
     pub source: &'static str,
     /// Messages that arrived, the dropped ones included.
     pub received: u64,
+    /// How old its messages were, from their stamp to the end of the callback that they led to: of a driver, where a
+    /// `latency_budget` is declared.
+    pub age: LatencyStatistics,
     dropped: [u64; REASONS],
 }
 

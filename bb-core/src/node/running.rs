@@ -162,7 +162,13 @@ impl<E: Estimator> Node<E> {
             Ok(Handled::Ran(reply)) => {
                 self.arrived(declared, now);
                 let mut bad = match budget {
-                    Some(budget) => self.overrun(budget, start),
+                    Some(budget) => {
+                        let (bad, end) = self.overrun(budget, start);
+                        if let Some(age) = &self.shared.counters().inputs[input].age {
+                            age.add(end.nanos_since(message.monotonic_time).max(0) as u64);
+                        }
+                        bad
+                    }
                     None => None,
                 };
                 if let Some(limit) = declared.stale_after_nanos
@@ -274,7 +280,7 @@ impl<E: Estimator> Node<E> {
         match caught(|| callback(running)) {
             Ok(reply) => {
                 let bad = self.declaration.health.latency_budget_nanos;
-                let bad = bad.and_then(|budget| self.overrun(budget, start));
+                let bad = bad.and_then(|budget| self.overrun(budget, start).0);
                 let stamp = Stamp { monotonic_time: now, wall_time: self.clock.wall_at(now), ..self.template };
                 let path = self.declaration.path;
                 self.complete(reply, bad, path, stamp, now, emitted).map_or(Turn::Quiet, Turn::Emitted)
@@ -328,20 +334,21 @@ impl<E: Estimator> Node<E> {
         self.judge(bad.map_or(Event::Good, Event::Bad), source, now);
     }
 
-    /// Measures a callback that has a budget; the reason if it took longer.
-    fn overrun(&self, budget_nanos: i64, start: MonotonicTime) -> Option<HealthReason> {
-        let mut elapsed = self.clock.now().nanos_since(start);
+    /// Measures a callback that has a budget; the reason if it took longer, and when it was over.
+    fn overrun(&self, budget_nanos: i64, start: MonotonicTime) -> (Option<HealthReason>, MonotonicTime) {
+        let mut end = self.clock.now();
         if self.clock.is_virtual() {
-            elapsed = elapsed.saturating_add(self.shared.pretended_latency_nanos());
+            end = end.plus_nanos(self.shared.pretended_latency_nanos());
         }
+        let elapsed = end.nanos_since(start);
         self.shared.counters().latency.add(elapsed.max(0) as u64);
         if elapsed <= budget_nanos {
-            return None;
+            return (None, end);
         }
         if let Some(journal) = self.startup.journal() {
             journal.overrun(start, self.shared.number());
         }
-        Some(HealthReason::LatencyOverrun)
+        (Some(HealthReason::LatencyOverrun), end)
     }
 
     /// An input was let in.
