@@ -42,5 +42,5 @@ pub use simulation::Simulation;
 pub use source::{SensorDeclaration, Source};
 pub use startup::Startup;
 pub use stop::StopSignal;
-pub(crate) use supervision::Verdict;
+pub(crate) use supervision::Failures;
 pub use supervision::{Supervision, Supervisor};

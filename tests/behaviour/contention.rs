@@ -194,7 +194,7 @@ fn one_that_hangs_does_not_hold_up_those_who_publish() {
         for number in 0..1100 {
             running.publish(crowded::sensor::base::b, running.clock().now(), Number(f64::from(number)));
         }
-        assert!(start.elapsed() < Duration::from_secs(2), "it took {:?}", start.elapsed());
+        assert!(start.elapsed() < Duration::from_secs(5), "it took {:?}", start.elapsed());
         let full = running.report().estimator(ORDERED).map(|node| node.inputs[1].dropped(DropReason::Overflow));
         assert_eq!(full, Some(1100 - 1024));
         // Both that hang, `ordered` and `apart`, go on.
@@ -242,7 +242,14 @@ fn a_waker_may_publish_subscribe_and_stop_and_a_call_from_there_is_refused() {
             live.request_stop();
         });
         running.publish(crowded::sensor::base::a, running.clock().now(), Number(1.0));
-        let answers = answers.lock().expect("nobody else has it").clone();
+        // Whoever looks at the start what is due may deliver it in our place.
+        let answers = loop {
+            let answers = answers.lock().expect("nobody else has it").clone();
+            if !answers.is_empty() {
+                break answers;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        };
         let refused = "estimator/base/ordered cannot be asked by code that an estimator's message has woken, which \
                        would wait for itself: use `cast`, or another thread";
         assert_eq!(answers, [Err(refused.to_owned())]);

@@ -61,7 +61,7 @@ pub trait Shore: Sized + Send {
 }
 
 /// How long a publisher waits for room in a full inbox.
-const LONGEST_WAIT: Duration = Duration::from_millis(100);
+const LONGEST_WAIT: Duration = Duration::from_millis(500);
 
 /// An island behind its lock.
 pub struct Island<S: Shore> {
@@ -143,11 +143,15 @@ impl<S: Shore> Island<S> {
         if self.replayed.load(Ordering::Relaxed) {
             return inbox.push(now, message);
         }
-        if !inbox.has_room(S::CAPACITY) && !self.served.load(Ordering::Relaxed) {
+        while !inbox.has_room(S::CAPACITY) && !self.served.load(Ordering::Relaxed) {
             drop(inbox);
-            self.wait_for_room();
+            let has_waited = self.wait_for_room();
             self.attend(wiring);
             inbox = self.inbox();
+            // Else somebody else may have taken the room that there was.
+            if !has_waited {
+                break;
+            }
         }
         let dropped = if inbox.has_room(S::CAPACITY) { None } else { inbox.pop() };
         inbox.push(now, message);
@@ -164,10 +168,10 @@ impl<S: Shore> Island<S> {
     }
 
     /// Somebody runs the island and delivers as fast as he can: whoever floods it meanwhile waits for him, but not for one
-    /// that hangs, nor for himself.
-    fn wait_for_room(&self) {
+    /// that hangs, nor for himself. True once there may be room.
+    fn wait_for_room(&self) -> bool {
         if self.hangs.load(Ordering::Relaxed) || Inside::is_here() {
-            return;
+            return false;
         }
         self.waiting.fetch_add(1, Ordering::Relaxed);
         let has_room = || Pending(self.pending.load(Ordering::Relaxed)).has_room(S::CAPACITY);
@@ -177,6 +181,7 @@ impl<S: Shore> Island<S> {
         }
         // Before it attends to the inbox: see `drain`.
         self.waiting.fetch_sub(1, Ordering::Relaxed);
+        in_time
     }
 
     fn wake_up(&self, wiring: &S::Wiring, now: MonotonicTime) {

@@ -1,6 +1,6 @@
 //! A running actuator: whether it may move, and what becomes of it when it fails.
 
-use super::supervision::{Supervisor, Verdict};
+use super::supervision::{Failures, Supervisor};
 use super::{Failed, Startup, caught, retire};
 use crate::component::{Actuator, ActuatorContext, Then};
 use crate::control::{Binding, Safety};
@@ -42,8 +42,7 @@ struct State<A> {
     /// None while it does not run.
     actuator: Option<A>,
     restart_at: Option<MonotonicTime>,
-    attempt: u32,
-    failed_at: MonotonicTime,
+    failures: Failures,
 }
 
 /// Why an actuator has not done what it was told.
@@ -93,7 +92,7 @@ impl<A: Actuator> ActuatorNode<A> {
         } else {
             startup.make(declaration.path, options, binding, |options| A::init(options, &context))
         };
-        let state = State { actuator: made.ok(), restart_at: None, attempt: 0, failed_at: MonotonicTime::ZERO };
+        let state = State { actuator: made.ok(), restart_at: None, failures: Failures::default() };
         let inner = Arc::new(Inner {
             declaration,
             context,
@@ -209,14 +208,8 @@ impl<A: Actuator> Inner<A> {
         if fault.then != Then::Restart {
             return;
         }
-        let supervisors = self.startup.supervisors();
-        if now.duration_since(state.failed_at) > supervisors.calm() {
-            state.attempt = 0;
-        }
-        let verdict = supervisors.failed(self.declaration.supervisor, now);
-        state.restart_at = (verdict != Verdict::GiveUp).then(|| now + supervisors.backoff(state.attempt));
-        (state.attempt, state.failed_at) = (state.attempt.saturating_add(1), now);
-        self.startup.carry_out(verdict, self.declaration.path, now);
+        let ActuatorDeclaration { supervisor, path, .. } = *self.declaration;
+        state.restart_at = self.startup.failed(&mut state.failures, supervisor, path, now, true);
     }
 }
 

@@ -2,11 +2,10 @@
 //! of what it gives, and of itself when it fails.
 
 use super::periodic::Periodic;
-use super::supervision::{Supervisor, Verdict};
+use super::supervision::{Failures, Supervisor};
 use super::{Failed, Robot, Startup, caught, retire};
 use crate::component::{Fault, Next, Then};
 use crate::control::Binding;
-use crate::journal::Event;
 use crate::message::{Frame, Stamp, Stamped};
 use crate::time::MonotonicTime;
 use crate::topology::Transform;
@@ -62,9 +61,7 @@ struct Running<R: Robot, S: Periodic, P> {
     publish: P,
     due: Option<MonotonicTime>,
     at_one_instant: u32,
-    /// How often in a row it has failed, and when last.
-    attempt: u32,
-    failed_at: MonotonicTime,
+    failures: Failures,
     restart: Arc<AtomicBool>,
     options_changed: Arc<AtomicBool>,
 }
@@ -100,8 +97,7 @@ impl Startup {
             publish,
             due: None,
             at_one_instant: 0,
-            attempt: 0,
-            failed_at: MonotonicTime::ZERO,
+            failures: Failures::default(),
             restart: self.look_after(declaration.supervisor),
             options_changed,
         }));
@@ -180,18 +176,8 @@ where
             return;
         }
         let now = self.startup.clock.now();
-        let supervisors = self.startup.supervisors();
-        if now.duration_since(self.failed_at) > supervisors.calm() {
-            self.attempt = 0;
-        }
-        if let Some(journal) = self.startup.journal() {
-            let (supervisor, path) = (self.declaration.supervisor, self.declaration.path);
-            journal.write(now, Event::Failed { supervisor, path });
-        }
-        let verdict = supervisors.failed(self.declaration.supervisor, now);
-        self.due = (verdict != Verdict::GiveUp).then(|| now + supervisors.backoff(self.attempt));
-        (self.attempt, self.failed_at) = (self.attempt.saturating_add(1), now);
-        self.startup.carry_out(verdict, self.declaration.path, now);
+        let SensorDeclaration { supervisor, path, .. } = *self.declaration;
+        self.due = self.startup.failed(&mut self.failures, supervisor, path, now, true);
         // The verdict may have flagged this one as well, which starts anew already.
         self.restart.store(false, Ordering::Release);
     }

@@ -3,7 +3,7 @@
 use super::agenda::Agenda;
 use super::bus::{Bus, Directory};
 use super::error::Faults;
-use super::supervision::{Supervision, Supervisor, Supervisors, Verdict};
+use super::supervision::{Failures, Supervision, Supervisor, Supervisors, Verdict};
 use super::{Robot, StartError, StopSignal, caught};
 use crate::component::{Fault, Options, Then};
 use crate::control::{Binding, Control, ParameterValues};
@@ -128,6 +128,25 @@ impl Startup {
         let flag = Arc::new(AtomicBool::new(false));
         self.periodic().push((supervisor, Arc::clone(&flag)));
         flag
+    }
+
+    /// Takes the failure of a component: what its supervisor decides is carried out. When it is made anew, if it is.
+    /// `is_outside`: it is no estimator, so that a journal cannot know of it otherwise.
+    pub(crate) fn failed(
+        &self,
+        failures: &mut Failures,
+        supervisor: Supervisor,
+        path: &'static str,
+        now: MonotonicTime,
+        is_outside: bool,
+    ) -> Option<MonotonicTime> {
+        if let Some(journal) = self.journal.as_ref().filter(|_| is_outside) {
+            journal.write(now, Event::Failed { supervisor, path });
+        }
+        let at = self.supervisors.restart_at(failures, now);
+        let verdict = self.supervisors.failed(supervisor, now);
+        self.carry_out(verdict, path, now);
+        (verdict != Verdict::GiveUp).then_some(at)
     }
 
     /// Does what a supervisor has decided after a failure at `path`, beyond that component's own restart.

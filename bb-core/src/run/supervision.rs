@@ -38,6 +38,13 @@ impl Default for Supervision {
 /// The number of a supervisor: 0 for the robot, then the links, then the joints, in the order of the topology.
 pub type Supervisor = usize;
 
+/// How often in a row a component has failed, and when last.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Failures {
+    count: u32,
+    last: MonotonicTime,
+}
+
 /// What a supervisor decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
@@ -92,15 +99,21 @@ impl Supervisors {
             .any(|current| current == above)
     }
 
-    /// How long the restart number `attempt` in a row waits, from 0.
-    pub(crate) fn backoff(&self, attempt: u32) -> Duration {
-        let factor = 1_u32.checked_shl(attempt).unwrap_or(u32::MAX);
-        self.settings.first_backoff.saturating_mul(factor).min(self.settings.longest_backoff)
+    /// When a component that has failed now is to be made anew.
+    pub(crate) fn restart_at(&self, failures: &mut Failures, now: MonotonicTime) -> MonotonicTime {
+        // After so long without a failure the next one is the first again.
+        if now.duration_since(failures.last) > self.settings.within {
+            failures.count = 0;
+        }
+        let at = now + self.backoff(failures.count);
+        *failures = Failures { count: failures.count.saturating_add(1), last: now };
+        at
     }
 
-    /// After how long without a failure the next one counts as the first.
-    pub(crate) fn calm(&self) -> Duration {
-        self.settings.within
+    /// How long the restart number `attempt` in a row waits, from 0.
+    fn backoff(&self, attempt: u32) -> Duration {
+        let factor = 1_u32.checked_shl(attempt).unwrap_or(u32::MAX);
+        self.settings.first_backoff.saturating_mul(factor).min(self.settings.longest_backoff)
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::{Node, Recipe};
 use crate::component::{Context, Estimator, Then};
-use crate::node::HealthReason;
 use crate::node::health::Event;
 use crate::node::timers::Timers;
-use crate::run::{Failed, Verdict, caught, retire};
+use crate::node::{EstimatorDeclaration, HealthReason};
+use crate::run::{Failed, Failures, caught, retire};
 use crate::time::MonotonicTime;
 
 /// What is known of its failures.
@@ -13,9 +13,7 @@ use crate::time::MonotonicTime;
 pub(super) struct Restart {
     /// When it is made anew, if it is.
     pub(super) at: Option<MonotonicTime>,
-    /// How often in a row it has failed.
-    attempt: u32,
-    failed_at: MonotonicTime,
+    failures: Failures,
 }
 
 impl<E: Estimator> Node<E> {
@@ -35,18 +33,8 @@ impl<E: Estimator> Node<E> {
 
     /// Asks its supervisor.
     pub(super) fn plan_restart(&mut self, now: MonotonicTime) {
-        let supervisors = self.startup.supervisors();
-        if now.duration_since(self.restart.failed_at) > supervisors.calm() {
-            self.restart.attempt = 0;
-        }
-        let backoff = supervisors.backoff(self.restart.attempt);
-        let verdict = supervisors.failed(self.declaration.supervisor, now);
-        self.restart = Restart {
-            at: (verdict != Verdict::GiveUp).then(|| now + backoff),
-            attempt: self.restart.attempt.saturating_add(1),
-            failed_at: now,
-        };
-        self.startup.carry_out(verdict, self.declaration.path, now);
+        let EstimatorDeclaration { supervisor, path, .. } = *self.declaration;
+        self.restart.at = self.startup.failed(&mut self.restart.failures, supervisor, path, now, false);
         self.schedule();
     }
 
