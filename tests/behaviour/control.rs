@@ -33,6 +33,28 @@ impl Command for Move {
     }
 }
 
+/// Begins to wait where it is started, before it is gone on with.
+#[derive(Debug)]
+pub(crate) struct Eager;
+
+impl Command for Eager {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = MonotonicTime;
+
+    fn run(
+        _: NoOptions,
+        _: NoArguments,
+        context: CommandContext,
+    ) -> impl Future<Output = Result<Outcome<MonotonicTime>, Fault>> + Send {
+        let sleep = context.sleep(Duration::from_millis(50));
+        async move {
+            sleep.await;
+            Ok(Outcome::done(context.now()))
+        }
+    }
+}
+
 /// A servo; negative targets break it.
 #[derive(Debug)]
 pub(crate) struct Servo;
@@ -129,6 +151,7 @@ robot! {
         category motion { concurrency: 2; }
         arm: Arm;
         disarm: Disarm;
+        eager: Eager;
         go: Move { category: motion; timeout: 1 s; }
         turn: Move { category: motion; allowed_states: [idle, executing]; }
         look: Move { allowed_states: [idle, executing, parked]; }
@@ -187,6 +210,18 @@ fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Res
     );
     let safety: Vec<_> = safety.drain().map(|change| change.to).collect();
     assert_eq!(safety, [Safety::Armed]);
+    Ok(())
+}
+
+#[test]
+fn a_command_that_begins_where_it_is_started_has_the_time_of_its_start() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let mut simulation = Commanded::builder().simulate()?;
+    simulation.arm();
+    simulation.run_until(at(200));
+    let eager = simulation.command(commanded::command::eager, NoArguments)?;
+    simulation.run_until(at(300));
+    assert_eq!(eager.try_result(), Some(Ok(at(250))));
     Ok(())
 }
 

@@ -109,6 +109,7 @@ impl Control {
         drop(state);
         self.tell();
         // The user's code may run here already, and start other commands: no lock is held.
+        self.go_on_at(now);
         let parameters = self.parameters();
         let context = CommandContext { name: declared.name, health, control: self.clone() };
         let started = crate::run::caught(|| prepared.start(arguments, &parameters, context));
@@ -220,7 +221,7 @@ impl Control {
     /// Starts what `take` takes of what waits, and goes on once with every command that can.
     fn turn(&self, now: MonotonicTime, take: impl FnOnce(&mut VecDeque<Waiting>) -> Vec<Waiting>) {
         let _acting = self.act();
-        self.0.moment_nanos.store(now.as_nanos(), Ordering::Release);
+        self.go_on_at(now);
         self.0.sleeper.advance(now);
         let waiting = {
             let mut state = lock(&self.0.state);
@@ -255,6 +256,11 @@ impl Control {
                 self.finish(&task, result, now);
             }
         }
+    }
+
+    /// From now on it is `now` for all commands.
+    fn go_on_at(&self, now: MonotonicTime) {
+        self.0.moment_nanos.fetch_max(now.as_nanos(), Ordering::AcqRel);
     }
 
     /// Waits until there may be something to drive, `longest` at most.
