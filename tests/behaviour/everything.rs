@@ -113,25 +113,27 @@ fn every_run_of_everything_is_the_same() -> Result<(), Box<dyn std::error::Error
     Ok(())
 }
 
-/// The peak of this process's memory in bytes, if the system says so.
-fn peak() -> Option<u64> {
+/// This process's memory in bytes, if the system says so.
+fn memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
 }
 
 #[test]
-#[ignore = "takes a minute in a release build"]
+#[ignore = "takes minutes in a release build, where .ci/run has it run in a step of its own"]
 fn a_week_takes_no_more_memory_than_an_hour() -> Result<(), Box<dyn std::error::Error>> {
     let mut builder = Whole::builder();
     builder.supervision().max_restarts = usize::MAX;
     let mut simulation = builder.simulate()?;
     simulation.arm();
     simulation.run_until(at(3_600_000));
-    let after_an_hour = peak();
+    let after_an_hour = memory();
     simulation.run_until(at(7 * 24 * 3_600_000));
-    if let (Some(hour), Some(week)) = (after_an_hour, peak()) {
-        assert!(week < hour + 4_000_000, "{hour} bytes after an hour, {week} after a week");
-    }
+    let (Some(hour), Some(week)) = (after_an_hour, memory()) else {
+        println!("the system does not say how much memory this process has: nothing was measured");
+        return Ok(());
+    };
+    assert!(week < hour + 4_000_000, "{hour} bytes after an hour, {week} after a week");
     Ok(())
 }
