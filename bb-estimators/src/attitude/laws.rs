@@ -16,7 +16,7 @@ pub(super) use invariance::{field_unit, heading_reference, mounting};
 pub(super) use motion::{constant_rotation, free_fall};
 pub(super) use norm::{unit_norm, unit_norm_for_ever};
 pub(super) use refusal::{bad_samples, refused_changes_nothing};
-pub(super) use samples::{at_rest, orientation, samples, wild_samples};
+pub(super) use samples::{at_rest, cases, orientation, samples, wild_samples};
 pub(super) use scalar::InScalar;
 pub(super) use start::{first_field, first_sample, gap, reset};
 
@@ -95,7 +95,7 @@ macro_rules! laws_in {
             }
 
             proptest! {
-                #![proptest_config(ProptestConfig::with_cases(64))]
+                #![proptest_config(laws::cases::<$scalar>())]
 
                 #[test]
                 fn unit_norm_whatever_comes(samples in laws::wild_samples()) {

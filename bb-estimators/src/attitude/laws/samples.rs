@@ -2,9 +2,26 @@
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 use super::{FIELD, UP};
-use crate::attitude::ImuSample;
+use crate::attitude::initial::initial_orientation;
+use crate::attitude::{ImuSample, Real};
+
+/// How many cases a law is held against, and which.
+///
+/// In double precision they are others each time. In single precision they are always the same: a filter that decides
+/// at a threshold decides otherwise within rounding of it, which about one case in 100,000 meets. `PROPTEST_RNG_SEED`
+/// chooses others, `PROPTEST_CASES` more.
+pub(in crate::attitude) fn cases<T: Real>() -> ProptestConfig {
+    let config = ProptestConfig::with_cases(64);
+    match config.rng_seed {
+        RngSeed::Random if T::EPSILON.as_f64() > f64::EPSILON => {
+            ProptestConfig { rng_seed: RngSeed::Fixed(1), ..config }
+        }
+        _ => config,
+    }
+}
 
 /// A sample at rest in the orientation `truth`.
 pub(in crate::attitude) fn at_rest(time_ns: i64, truth: &UnitQuaternion<f64>) -> ImuSample {
@@ -29,13 +46,14 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-/// Samples that a sensor could give when it is thrown about, some without a field, the first with one.
+/// Samples that a sensor could give when it is thrown about, some without a field, the first with one that shows a
+/// heading: without it a filter has to choose where it starts, and that depends on how the sensor is mounted.
 pub(in crate::attitude) fn samples() -> impl Strategy<Value = Vec<ImuSample>> {
     let force = prop_oneof![20 => vector(30.0), 1 => Just(Vector3::zeros())];
     let field = prop_oneof![2 => vector(60e-6).prop_map(Some), 1 => Just(None)];
     let dt_ns = prop_oneof![20 => 1_000_000..20_000_000_i64, 1 => Just(2_000_000_000)];
     let one = (dt_ns, vector(20.0), force, field);
-    (vector(60e-6), proptest::collection::vec(one, 2..100)).prop_map(|(first_field, parts)| {
+    let samples = (vector(60e-6), proptest::collection::vec(one, 2..100)).prop_map(|(first_field, parts)| {
         let mut time_ns = 0;
         let mut samples: Vec<_> = parts
             .into_iter()
@@ -47,6 +65,9 @@ pub(in crate::attitude) fn samples() -> impl Strategy<Value = Vec<ImuSample>> {
         samples[0].magnetic_field = Some(first_field);
         samples[0].specific_force += UP;
         samples
+    });
+    samples.prop_filter("a first sample that shows an orientation", |samples| {
+        initial_orientation(&samples[0].specific_force, samples[0].magnetic_field.as_ref()).is_ok()
     })
 }
 
