@@ -121,7 +121,7 @@ fn memory() -> Option<u64> {
 }
 
 #[test]
-#[ignore = "takes minutes in a release build, where .ci/run has it run in a step of its own"]
+#[ignore = "measures the memory of its process: alone in a release build, as .ci/run has it"]
 fn a_week_takes_no_more_memory_than_an_hour() -> Result<(), Box<dyn std::error::Error>> {
     let mut builder = Whole::builder();
     builder.supervision().max_restarts = usize::MAX;
