@@ -31,16 +31,16 @@ pub(super) fn misalignment<T: Real>(
     let squared = T::ONE - vertical * vertical;
     let horizontal = if squared > T::ZERO { squared.sqrt() } else { T::ZERO };
     // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
-    let error = (up + field * vertical).cross(&world_up) + field.cross(&world_north) * horizontal;
+    let error = (up + field * vertical).cross(&world_up) + field.cross(&(world_north * horizontal));
     (error, world_up)
 }
 
 /// A unit vector, body frame, perpendicular to the expected vertical: about it a body that is exactly upside down,
 /// where the misalignment is zero, is turned upright.
 #[cold]
-pub(super) fn horizontal_axis<T: Real>(world_up: &Vector3<T>) -> Vector3<T> {
+pub(super) fn horizontal_axis<T: Real>(world_up: Vector3<T>) -> Vector3<T> {
     let axis = if world_up.x.abs() < T::HALF { Vector3::x() } else { Vector3::y() };
-    axis.cross(world_up).normalize()
+    axis.cross(&world_up).normalize()
 }
 
 /// East and up, as they are expected in the body frame: the first and third row of R.

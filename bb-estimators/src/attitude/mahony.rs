@@ -14,9 +14,8 @@
 //!   [`madgwick`](super::madgwick): its dip need not be known.
 //! * The weights `k_i` of the directions are all 1.
 //! * The error is taken where the gyroscope leads, not at the previous orientation: what was measured now is
-//!   compared with what is expected now.
-//! * A step turns by the angle whose half has the correction as its tangent, which spares an exponential and differs
-//!   in the third order of one sample's correction.
+//!   compared with what is expected now. It turns the orientation from there on, in one turn with the gyroscope's
+//!   next sample, as in the paper's differential equation; never beyond what was missed, however late that comes.
 //! * Exactly upside down the error is zero; the paper leaves this set of measure zero out, and here it is left
 //!   about a horizontal axis.
 

@@ -14,11 +14,13 @@ const SERIES_SQUARED_ANGLE: f64 = 0.01;
 #[inline]
 pub(super) fn half_angle<T: Real>(squared_angle: T) -> (T, T) {
     if squared_angle < T::of(SERIES_SQUARED_ANGLE) {
-        // With h = (θ/2)² below 0.0025 the first terms left out are below 1e-15.
+        // With h = (θ/2)² below 0.0025 the first terms left out are below 1e-19.
         let h = T::of(0.25) * squared_angle;
+        let (c6, s6) =
+            (T::of(1.0 / 720.0) - h * T::of(1.0 / 40320.0), T::of(1.0 / 10080.0) - h * T::of(1.0 / 725_760.0));
         return (
-            T::ONE - h * (T::HALF - h * (T::of(1.0 / 24.0) - h * (T::of(1.0 / 720.0)))),
-            T::HALF - h * (T::of(1.0 / 12.0) - h * (T::of(1.0 / 240.0) - h * (T::of(1.0 / 10080.0)))),
+            T::ONE - h * (T::HALF - h * (T::of(1.0 / 24.0) - h * c6)),
+            T::HALF - h * (T::of(1.0 / 12.0) - h * (T::of(1.0 / 240.0) - h * s6)),
         );
     }
     let angle = squared_angle.sqrt();
@@ -32,6 +34,22 @@ pub(super) fn turn<T: Real>(world_from_body: &UnitQuaternion<T>, rotation: &Vect
     let (cos, scale) = half_angle(rotation.norm_squared());
     let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
     let q = world_from_body;
+    unit(
+        cos * q.w - q.i * x - q.j * y - q.k * z,
+        cos * q.i + q.w * x + q.j * z - q.k * y,
+        cos * q.j + q.w * y + q.k * x - q.i * z,
+        cos * q.k + q.w * z + q.i * y - q.j * x,
+    )
+}
+
+/// [`turn`], which also brings the norm back to 1 from what rounding made of it before.
+#[inline]
+pub(super) fn turn_unit<T: Real>(world_from_body: &UnitQuaternion<T>, rotation: &Vector3<T>) -> UnitQuaternion<T> {
+    let q = world_from_body;
+    let norm = T::of(1.5) - T::HALF * ((q.i * q.i + q.k * q.k) + (q.j * q.j + q.w * q.w));
+    let (cos, scale) = half_angle(rotation.norm_squared());
+    let (cos, scale) = (cos * norm, scale * norm);
+    let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
     unit(
         cos * q.w - q.i * x - q.j * y - q.k * z,
         cos * q.i + q.w * x + q.j * z - q.k * y,

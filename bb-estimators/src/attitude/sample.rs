@@ -6,6 +6,7 @@ use core::fmt;
 use nalgebra::Vector3;
 
 use super::Real;
+use super::initial::FREE_FALL;
 
 /// The greatest component of the angular velocity that a filter takes, rad/s. Gyroscopes end below 100 rad/s.
 pub const MAX_ANGULAR_VELOCITY: f64 = 1e3;
@@ -97,12 +98,12 @@ impl fmt::Display for SampleError {
 
 impl Error for SampleError {}
 
-/// Squared norms of a sample that has been checked.
-pub(super) struct SquaredNorms<T> {
-    /// (m/s²)².
-    pub(super) specific_force: T,
-    /// In the square of the field's unit; `None` if there is no field to use.
-    pub(super) magnetic_field: Option<T>,
+/// What a sample shows of the world, unit vectors in the body frame.
+pub(super) struct Directions<T> {
+    /// Of the specific force; `None` in free fall.
+    pub(super) up: Option<Vector3<T>>,
+    /// Of the magnetic field, if there is one to use.
+    pub(super) field: Option<Vector3<T>>,
 }
 
 impl<T: Real> ImuSample<T> {
@@ -117,34 +118,55 @@ impl<T: Real> ImuSample<T> {
         }
     }
 
-    /// Whether every value is finite and one that a sensor can give.
+    /// The directions it shows, if every value that a filter uses is finite and one that a sensor can give.
     #[inline]
-    pub(super) fn check(&self, magnetometer: bool) -> Result<SquaredNorms<T>, SampleError> {
-        check(Quantity::AngularVelocity, &self.angular_velocity, T::of(MAX_ANGULAR_VELOCITY))?;
-        let specific_force = check(Quantity::SpecificForce, &self.specific_force, T::of(MAX_SPECIFIC_FORCE))?;
-        let magnetic_field = match &self.magnetic_field {
-            Some(field) if magnetometer => Some(check(Quantity::MagneticField, field, T::of(MAX_MAGNETIC_FIELD))?),
-            _ => None,
+    pub(super) fn directions(&self, magnetometer: bool) -> Result<Directions<T>, SampleError> {
+        // Most samples are within the spheres in the cubes, of which the squared norms are needed anyway.
+        let rate = self.angular_velocity.norm_squared();
+        let force = self.specific_force.norm_squared();
+        let field = match &self.magnetic_field {
+            Some(field) if magnetometer => field.norm_squared(),
+            _ => T::ZERO,
         };
-        Ok(SquaredNorms { specific_force, magnetic_field })
+        let usual = rate <= square(MAX_ANGULAR_VELOCITY)
+            && force <= square(MAX_SPECIFIC_FORCE)
+            && field <= square(MAX_MAGNETIC_FIELD);
+        if !usual {
+            self.check_components(magnetometer)?;
+        }
+        Ok(Directions {
+            up: direction(&self.specific_force, force, square(FREE_FALL)),
+            field: self.magnetic_field.as_ref().and_then(|vector| direction(vector, field, T::LEAST_SQUARE)),
+        })
+    }
+
+    #[cold]
+    fn check_components(&self, magnetometer: bool) -> Result<(), SampleError> {
+        check(Quantity::AngularVelocity, &self.angular_velocity, MAX_ANGULAR_VELOCITY)?;
+        check(Quantity::SpecificForce, &self.specific_force, MAX_SPECIFIC_FORCE)?;
+        match &self.magnetic_field {
+            Some(field) if magnetometer => check(Quantity::MagneticField, field, MAX_MAGNETIC_FIELD),
+            _ => Ok(()),
+        }
     }
 }
 
-/// The squared norm, if every component is finite and within the limit.
-#[inline]
-fn check<T: Real>(quantity: Quantity, value: &Vector3<T>, limit: T) -> Result<T, SampleError> {
-    // Most samples are within the sphere in the cube, of which the squared norm is needed anyway.
-    let squared = value.norm_squared();
-    if squared <= limit * limit { Ok(squared) } else { check_components(quantity, value, limit).map(|()| squared) }
-}
-
-#[cold]
-fn check_components<T: Real>(quantity: Quantity, value: &Vector3<T>, limit: T) -> Result<(), SampleError> {
+fn check<T: Real>(quantity: Quantity, value: &Vector3<T>, limit: f64) -> Result<(), SampleError> {
     if !value.iter().all(|component| component.is_finite()) {
         return Err(SampleError::NonFinite { quantity });
     }
-    if value.amax() > limit {
-        return Err(SampleError::OutOfRange { quantity, value: value.amax().as_f64(), limit: limit.as_f64() });
+    if value.amax() > T::of(limit) {
+        return Err(SampleError::OutOfRange { quantity, value: value.amax().as_f64(), limit });
     }
     Ok(())
+}
+
+fn square<T: Real>(limit: f64) -> T {
+    T::of(limit) * T::of(limit)
+}
+
+/// The unit vector along `vector`, or `None` if its squared norm is at most `least`.
+#[inline]
+fn direction<T: Real>(vector: &Vector3<T>, squared: T, least: T) -> Option<Vector3<T>> {
+    (squared > least).then(|| vector * (T::ONE / squared.sqrt()))
 }

@@ -2,8 +2,9 @@
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
-use super::initial::{FREE_FALL, heading_error};
-use super::rotation::{normalised, turn_heading, turn_upright};
+use super::initial::heading_error;
+use super::rotation::{normalised, turn, turn_heading, turn_upright};
+use super::sample::Directions;
 use super::{ImuSample, Quantity, Real, SampleError};
 
 /// The longest time between two samples that a filter integrates over, seconds.
@@ -44,7 +45,7 @@ impl<T: Real> AttitudeState<T> {
     /// Checks a sample. `None` if the state has started or restarted with it and there is nothing to step.
     #[inline]
     pub(super) fn admit(&mut self, sample: &ImuSample<T>) -> Result<Option<Step<T>>, SampleError> {
-        let squared = sample.check(self.magnetometer)?;
+        let Directions { up, field } = sample.directions(self.magnetometer)?;
         let time_ns = sample.time_ns;
         if let Some(previous_ns) = self.previous_ns
             && time_ns <= previous_ns
@@ -53,28 +54,36 @@ impl<T: Real> AttitudeState<T> {
         }
 
         let previous_ns = self.previous_ns.replace(time_ns);
-        let up = direction(&sample.specific_force, squared.specific_force, T::of(FREE_FALL * FREE_FALL));
-        let field = match (&sample.magnetic_field, squared.magnetic_field) {
-            (Some(field), Some(squared)) => direction(field, squared, T::LEAST_SQUARE),
-            _ => None,
-        };
-
         if let (Some(previous_ns), Some(world_from_body)) = (previous_ns, self.world_from_body) {
             // The difference of two stamps can be wider than their type.
             let dt_ns = time_ns.checked_sub(previous_ns).unwrap_or(i64::MAX);
             if dt_ns <= MAX_GAP_NS {
-                let dt_s = T::seconds(dt_ns);
-                return Ok(Some(Step { dt_s, world_from_body, up, field }));
+                return Ok(Some(Step { dt_s: T::seconds(dt_ns), world_from_body, up, field }));
             }
         }
-        self.restart(up, field);
+        self.restart(sample);
         Ok(None)
+    }
+
+    /// A step that turns the body by a rotation vector, rad, body frame, and by nothing else.
+    pub(super) fn turn(&mut self, rotation: &Vector3<T>, sample: &ImuSample<T>) {
+        if let (Some(world_from_body), Ok(directions)) =
+            (self.world_from_body, sample.directions(self.magnetometer))
+        {
+            self.store(&turn(&world_from_body, rotation), directions.field);
+        }
     }
 
     /// Keeps the orientation that a step ended with, of any norm but 0. The first field sets its heading.
     #[inline]
     pub(super) fn store(&mut self, world_from_body: &Quaternion<T>, field: Option<Vector3<T>>) {
-        self.world_from_body = Some(normalised(world_from_body));
+        self.keep(normalised(world_from_body), field);
+    }
+
+    /// Keeps the orientation that a step ended with. The first field sets its heading.
+    #[inline]
+    pub(super) fn keep(&mut self, world_from_body: UnitQuaternion<T>, field: Option<Vector3<T>>) {
+        self.world_from_body = Some(world_from_body);
         if !self.heading_known
             && let Some(field) = field
         {
@@ -121,7 +130,9 @@ impl<T: Real> AttitudeState<T> {
 
     /// Levels what orientation there is, or none, and lets the next field set the heading.
     #[cold]
-    fn restart(&mut self, up: Option<Vector3<T>>, field: Option<Vector3<T>>) {
+    fn restart(&mut self, sample: &ImuSample<T>) {
+        // Again, so that a step need not keep them for this; they have been checked.
+        let Ok(Directions { up, field }) = sample.directions(self.magnetometer) else { return };
         self.heading_known = false;
         let stale = self.world_from_body;
         let fresh = up.map(|up| {
@@ -132,10 +143,4 @@ impl<T: Real> AttitudeState<T> {
             self.store(&world_from_body, field);
         }
     }
-}
-
-/// The unit vector along `vector`, or `None` if its squared norm is at most `least`.
-#[inline]
-fn direction<T: Real>(vector: &Vector3<T>, squared: T, least: T) -> Option<Vector3<T>> {
-    (squared > least).then(|| vector * (T::ONE / squared.sqrt()))
 }

@@ -88,7 +88,7 @@ impl<T: Real> AttitudeFilter<T> for FusionFilter<T> {
         let [world_east, world_up] = expected(&orientation);
         let mut correction = Vector3::zeros();
         if let Some(up) = &step.up {
-            let deviation = deviation(up, &world_up, || horizontal_axis(&world_up));
+            let deviation = deviation(up, &world_up, || horizontal_axis(world_up));
             if self.takes_acceleration(step.dt_s, &deviation) {
                 correction += deviation.error * (gain * step.dt_s).min(T::ONE);
             }

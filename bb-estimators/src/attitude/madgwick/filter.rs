@@ -88,5 +88,5 @@ fn descent<T: Real>(
     if up.dot(&world_up) > T::ZERO {
         return Vector3::zeros();
     }
-    horizontal_axis(&world_up)
+    horizontal_axis(world_up)
 }
