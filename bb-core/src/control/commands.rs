@@ -3,6 +3,7 @@
 use super::command::{Command, CommandContext, Outcome, Role};
 use super::parameters::{Binding, ParameterValues};
 use super::tasks::{Running, Value, lock};
+use crate::Payload;
 use crate::component::Fault;
 use std::any::Any;
 use std::fmt;
@@ -47,7 +48,7 @@ impl Cancel {
 }
 
 /// A category of commands: how many of them may run at once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct CategoryDeclaration {
     /// Its name.
     pub name: &'static str,
@@ -69,7 +70,7 @@ impl CommandDeclaration {
 }
 
 /// Why a command was not started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 #[non_exhaustive]
 pub enum RefusalReason {
     /// Its `allowed_states` do not include this one.
@@ -83,7 +84,7 @@ pub enum RefusalReason {
 }
 
 /// A command that was not started.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub struct Refusal {
     /// Its name.
     pub command: &'static str,

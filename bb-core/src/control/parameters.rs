@@ -1,5 +1,6 @@
 //! Values that may be changed while the robot runs.
 
+use crate::Payload;
 use crate::component::{Options, Range};
 use std::fmt;
 use std::sync::Arc;
@@ -34,7 +35,7 @@ pub enum ParameterDefault {
 }
 
 /// The value of a parameter.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Payload)]
 pub enum ParameterValue {
     /// `bool`
     Bool(bool),

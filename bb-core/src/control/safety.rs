@@ -1,5 +1,6 @@
 //! Whether the robot may move.
 
+use crate::Payload;
 use crate::component::Fault;
 use crate::run::caught;
 use std::fmt;
@@ -7,7 +8,7 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 /// Whether the robot may move.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Payload)]
 pub enum Safety {
     /// It may not.
     #[default]
@@ -32,7 +33,7 @@ impl fmt::Display for Safety {
 }
 
 /// Why the safety state is `error`, at `safety/error`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub struct SafetyError {
     /// The component.
     pub path: &'static str,

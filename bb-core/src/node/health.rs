@@ -9,11 +9,12 @@
 //! | lost | first input | degraded, that completion counts if good | recovered | none |
 
 use super::HealthDeclaration;
+use crate::Payload;
 use crate::time::MonotonicTime;
 use std::fmt;
 
 /// How far an estimator's output can be relied on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 pub enum HealthState {
     /// Its last completions were good.
     #[default]
@@ -25,7 +26,7 @@ pub enum HealthState {
 }
 
 /// Why the health of an estimator has changed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 #[non_exhaustive]
 pub enum HealthReason {
     /// A callback took longer than `latency_budget`.
@@ -45,7 +46,7 @@ pub enum HealthReason {
 }
 
 /// A change of an estimator's health, as published and as commands get it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct HealthTransition {
     /// The path of the estimator.
     pub estimator: &'static str,
