@@ -103,15 +103,15 @@ pub mod __private {
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{
-        AnyIsland, EstimatorDeclaration, HealthDeclaration, InputDeclaration, Island, Key, Node, Shore, Turn,
-        WorkerDeclaration,
+        AnyIsland, EstimatorDeclaration, HealthDeclaration, Held, InputDeclaration, Island, IslandDeclaration, Key,
+        Node, Sea, Shore, Turn, WorkerDeclaration,
     };
     pub use crate::pubsub::{AnyTopic, DynamicMessage, Topic};
     pub use crate::run::{
         ActuatorDeclaration, ActuatorHandle, ActuatorNode, AnyActuator, AsBridge, AsController, AsSensor,
         BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle, FeedOf, IslandOf,
         OutputHandle, ParameterHandle, Periodic, Report, Robot, SensorDeclaration, SensorHandle, Source,
-        StartError, Startup,
+        StartError, Startup, Visit,
     };
     pub use crate::stub::{Known, NotProbed, Probe, Unknown, as_known, both_known, stub};
     pub use crate::time::MonotonicTime;

@@ -12,9 +12,11 @@ mod shared;
 mod timers;
 
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
-pub use declaration::{EstimatorDeclaration, HealthDeclaration, InputDeclaration, WorkerDeclaration};
+pub use declaration::{
+    EstimatorDeclaration, HealthDeclaration, InputDeclaration, IslandDeclaration, WorkerDeclaration,
+};
 pub use health::{HealthReason, HealthState, HealthTransition};
-pub use island::{AnyIsland, Island, Key, Shore};
+pub use island::{AnyIsland, Held, Island, Key, Sea, Shore};
 pub use latency::LatencyStatistics;
 pub use running::{Node, Turn};
 pub(crate) use shared::SharedNode;

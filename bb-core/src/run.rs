@@ -30,7 +30,7 @@ pub(crate) use error::{Failed, caught, retire, wake};
 pub use handle::{
     ActuatorHandle, BridgeHandle, CommandHandle, Configurable, ControllerHandle, EstimatorHandle,
     EstimatorOfSeveralHandle, Health, JournalLines, OutputHandle, ParameterHandle, Publisher, SafetyErrors,
-    SafetyState, SensorHandle, StateMachine, Visitable,
+    SafetyState, SensorHandle, StateMachine, Visit, Visitable,
 };
 pub use live::Live;
 pub use periodic::{AsBridge, AsController, AsSensor, Periodic};

@@ -73,6 +73,17 @@ impl Default for HealthDeclaration {
     }
 }
 
+/// An island of estimators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IslandDeclaration {
+    /// Its number.
+    pub number: usize,
+    /// The path of its first estimator.
+    pub name: &'static str,
+    /// How its own thread runs, if it has one.
+    pub worker: Option<WorkerDeclaration>,
+}
+
 /// `runs_on: worker`: how its thread runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorkerDeclaration {

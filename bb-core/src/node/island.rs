@@ -14,7 +14,7 @@ mod model;
 
 use self::inbox::{Inbox, Pending, Taken};
 use self::inside::{Inside, Within};
-use super::WorkerDeclaration;
+use super::{IslandDeclaration, WorkerDeclaration};
 use crate::journal::{Event, Journal};
 use crate::run::StopSignal;
 use crate::time::MonotonicTime;
@@ -33,27 +33,28 @@ use std::sync::{
 };
 use std::sync::{PoisonError, TryLockError};
 
-/// What `robot!` implements for each island.
-pub trait Shore: Sized + Send {
+/// What `robot!` implements for its wiring.
+pub trait Sea {
+    /// Where the robot's journal is written, if it is.
+    fn journal(&self) -> Option<&Journal>;
+}
+
+/// What `robot!` implements for each island. That all may go to other threads is asked of the whole wiring: of each it
+/// would be proven again wherever the island is named.
+pub trait Shore: Sized {
     /// The robot's wiring.
-    type Wiring;
+    type Wiring: Sea;
     /// What may be left in the inbox: a variant for each publisher outside that feeds it, and "something is due".
-    type Message: Send;
+    type Message;
     /// Messages that the inbox holds.
     const CAPACITY: usize = 1024;
-    /// Its number.
-    const NUMBER: usize;
-    /// The path of its first estimator.
-    const NAME: &'static str;
-    /// How its own thread runs, if it has one.
-    const WORKER: Option<WorkerDeclaration>;
+    /// It, as declared.
+    const DECLARATION: IslandDeclaration;
 
     /// Runs all that lies downstream of a message that arrived at `now`.
     fn deliver(&mut self, wiring: &Self::Wiring, message: &Self::Message, now: MonotonicTime);
     /// Runs whatever is due: timers, ticks, restarts, losses.
     fn wake(&mut self, wiring: &Self::Wiring, now: MonotonicTime);
-    /// Where the robot's journal is written, if it is.
-    fn journal(wiring: &Self::Wiring) -> Option<&Journal>;
     /// Counts a message that did not fit in the inbox, wherever it would have gone.
     fn dropped(wiring: &Self::Wiring, message: &Self::Message);
     /// Stops its estimators.
@@ -96,7 +97,8 @@ struct Keyed<M> {
     message: M,
 }
 
-type Held<'a, S> = Within<MutexGuard<'a, S>>;
+/// An island that the calling thread holds.
+pub type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S: Shore> Island<S> {
     /// An island that nobody runs yet.
@@ -158,9 +160,9 @@ impl<S: Shore> Island<S> {
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         drop(inbox);
         if let Some(dropped) = dropped {
-            if let Some(journal) = S::journal(wiring) {
+            if let Some(journal) = wiring.journal() {
                 let Key { entry, line } = dropped.key;
-                journal.write(now, Event::Drop { island: S::NUMBER, entry, message: line });
+                journal.write(now, Event::Drop { island: S::DECLARATION.number, entry, message: line });
             }
             S::dropped(wiring, &dropped.message);
         }
@@ -211,7 +213,7 @@ impl<S: Shore> Island<S> {
 
     /// Delivers what has come into the inbox meanwhile, and lets go.
     #[inline]
-    fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
+    pub fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
         drop(state);
         fence(Ordering::SeqCst);
         if self.pending.load(Ordering::Relaxed) != 0 {
@@ -254,8 +256,8 @@ impl<S: Shore> Island<S> {
                 state.deliver(wiring, &message, now);
             }
             Taken::Wake(now) => {
-                if let Some(journal) = S::journal(wiring) {
-                    journal.write(now, Event::Wake { island: S::NUMBER });
+                if let Some(journal) = wiring.journal() {
+                    journal.write(now, Event::Wake { island: S::DECLARATION.number });
                 }
                 state.wake(wiring, now);
             }
@@ -265,8 +267,9 @@ impl<S: Shore> Island<S> {
     /// Writes into the journal, if there is one, what is delivered now; the island is held.
     #[inline]
     fn write(wiring: &S::Wiring, now: MonotonicTime, key: Key) {
-        if let Some(journal) = S::journal(wiring) {
-            journal.write(now, Event::Deliver { island: S::NUMBER, entry: key.entry, message: key.line });
+        if let Some(journal) = wiring.journal() {
+            journal
+                .write(now, Event::Deliver { island: S::DECLARATION.number, entry: key.entry, message: key.line });
         }
     }
 
@@ -287,18 +290,23 @@ impl<S: Shore> Island<S> {
         call: impl FnOnce(&mut S) -> T,
     ) -> Option<T> {
         let mut state = match timeout {
-            None if Inside::is_here() => return None,
-            None => {
-                self.waiting.fetch_add(1, Ordering::Relaxed);
-                let state = Within::new(unpoisoned(self.state.lock()));
-                self.waiting.fetch_sub(1, Ordering::Relaxed);
-                state
-            }
+            None => self.hold()?,
             Some(timeout) => self.lock_within(timeout)?,
         };
         let result = call(&mut state);
         self.leave(wiring, state);
         Some(result)
+    }
+
+    /// Takes the island once it is free; `None` on a thread that is inside one. [`Self::leave`] gives it back.
+    pub fn hold(&self) -> Option<Held<'_, S>> {
+        if Inside::is_here() {
+            return None;
+        }
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        let state = Within::new(unpoisoned(self.state.lock()));
+        self.waiting.fetch_sub(1, Ordering::Relaxed);
+        Some(state)
     }
 
     fn lock_within(&self, timeout: Duration) -> Option<Held<'_, S>> {
@@ -334,7 +342,7 @@ impl<S: Shore> Island<S> {
 }
 
 /// What all islands of a robot with the wiring `W` have in common.
-pub trait AnyIsland<W>: Sync {
+pub trait AnyIsland<W> {
     /// The path of its first estimator.
     fn name(&self) -> &'static str;
     /// Something may be due.
@@ -360,7 +368,7 @@ pub trait AnyIsland<W>: Sync {
 #[cfg(not(loom))]
 impl<S: Shore> AnyIsland<S::Wiring> for Island<S> {
     fn name(&self) -> &'static str {
-        S::NAME
+        S::DECLARATION.name
     }
 
     fn wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
@@ -368,7 +376,7 @@ impl<S: Shore> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn worker(&self) -> Option<WorkerDeclaration> {
-        S::WORKER
+        S::DECLARATION.worker
     }
 
     fn give_to_thread(&self) {

@@ -277,8 +277,24 @@ impl<R: Robot, T: Payload> Publisher<R> for OutputHandle<R, T> {
     }
 }
 
-/// What is called with an estimator once that is free, and the slot for what it emits.
-type Visit<'a, E> = &'a mut dyn FnMut(&mut Node<E>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp>;
+/// What is called with an estimator, and the slot for what it emits.
+type Call<'a, E> = dyn FnMut(&mut Node<E>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + 'a;
+
+/// What is called with an estimator once that is free. A type of its own, which rustc checks once, not in every function
+/// that it is given to.
+#[allow(missing_debug_implementations)]
+pub struct Visit<'a, E: Estimator>(&'a mut Call<'a, E>);
+
+impl<'a, E: Estimator> Visit<'a, E> {
+    pub(super) fn new(call: &'a mut Call<'a, E>) -> Self {
+        Self(call)
+    }
+
+    /// The stamp of what it has emitted, if it has.
+    pub fn call(self, node: &mut Node<E>, emitted: &mut Option<E::Output>) -> Option<Stamp> {
+        (self.0)(node, emitted)
+    }
+}
 
 /// What answers requests: the handle of an estimator.
 pub trait Visitable<R: Robot>: Copy {

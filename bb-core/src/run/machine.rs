@@ -1,6 +1,6 @@
 //! What real and simulated runs share: the wiring, and what can be asked of it.
 
-use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher, Visitable};
+use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher, Visit, Visitable};
 use super::{ActuatorError, Report, Robot, SensorHandle, Startup};
 use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
 use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal};
@@ -53,11 +53,12 @@ impl<R: Robot> Machine<R> {
     {
         let (mut request, mut response) = (Some(request), None);
         let now = self.startup.clock.now();
-        estimator.visit(&self.wiring, now, &mut |node, emitted| {
+        let mut visit = |node: &mut Node<V::Estimator>, emitted: &mut Option<_>| {
             let (answer, stamp) = node.call(request.take()?, now, emitted);
             response = Some(answer);
             stamp
-        });
+        };
+        estimator.visit(&self.wiring, now, Visit::new(&mut visit));
         response.unwrap_or_else(|| {
             let path = self.startup.node(estimator.number()).declaration().path;
             Err(Fault::new(format!(

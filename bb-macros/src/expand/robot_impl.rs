@@ -174,7 +174,7 @@ fn source(
                 &options.#options,
                 #binding,
                 wiring,
-                |wiring: &__Wiring, message, now| wiring.#publish(message, now),
+                __Wiring::#publish,
                 sources,
             );
         }

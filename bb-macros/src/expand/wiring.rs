@@ -56,11 +56,15 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
     }
     let mut places = Vec::new();
     for number in 0..islands.all.len() {
-        let (name, function) = (island_struct(number), format_ident!("__new_island_{number}"));
+        let name = island_struct(number);
+        let nodes = islands.all.get(number).into_iter().flat_map(|island| &island.estimators).map(|id| {
+            let (node, start) = (node(*id), start_function(*id));
+            quote!(#node: #start(options, startup),)
+        });
         places.push(Field {
             name: island(number),
             kind: quote!(::bb_core::__private::Island<#name>),
-            value: quote!(::bb_core::__private::Island::new(#function(options, startup))),
+            value: quote!(::bb_core::__private::Island::new(#name { #(#nodes)* })),
         });
         shores.extend(shore(&types, islands, number, &consumers));
     }
@@ -92,6 +96,13 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
         #shores
         #feeds
         static __ISLANDS: [::bb_core::__private::IslandOf<__Wiring>; #count] = [#(#finders),*];
+
+        impl ::bb_core::__private::Sea for __Wiring {
+            #[inline]
+            fn journal(&self) -> ::core::option::Option<&::bb_core::__private::Journal> {
+                self.startup.journal()
+            }
+        }
 
         impl __Wiring { #functions }
     }
@@ -319,7 +330,7 @@ fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
     let number = islands.of.get(id).copied().unwrap_or(0);
     let (island, place) = (island_struct(number), group::path(number, &self::island(number)));
     let (node, emit, turn, visit) = (node(id), emit_function(id), turn_function(id), visit_function(id));
-    let (kind, output) = (types.estimator(id), types.estimator_output(id));
+    let kind = types.estimator(id);
     quote! {
         #[cold]
         fn #turn(&self, island: &mut #island, now: ::bb_core::__private::MonotonicTime) {
@@ -337,18 +348,16 @@ fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
         fn #visit(
             &self,
             now: ::bb_core::__private::MonotonicTime,
-            visit: &mut dyn ::core::ops::FnMut(
-                &mut ::bb_core::__private::Node<#kind>,
-                &mut ::core::option::Option<#output>,
-            ) -> ::core::option::Option<::bb_core::__private::Stamp>,
+            visit: ::bb_core::__private::Visit<'_, #kind>,
         ) {
-            self.islands.#place.with(self, ::core::option::Option::None, |island| {
+            if let ::core::option::Option::Some(mut island) = self.islands.#place.hold() {
                 let mut emitted = ::core::option::Option::None;
-                if let ::core::option::Option::Some(stamp) = visit(&mut island.#node, &mut emitted) {
-                    self.#emit(island, &mut emitted, stamp, now);
+                if let ::core::option::Option::Some(stamp) = visit.call(&mut island.#node, &mut emitted) {
+                    self.#emit(&mut island, &mut emitted, stamp, now);
                 }
-                self.#turn(island, now);
-            });
+                self.#turn(&mut island, now);
+                self.islands.#place.leave(self, island);
+            }
         }
     }
 }
@@ -357,14 +366,9 @@ fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
 fn shore(types: &Types<'_>, islands: &Islands, number: IslandId, consumers: &[Vec<Consumer>]) -> TokenStream {
     let Some(island) = islands.all.get(number) else { return TokenStream::new() };
     let (name, message) = (island_struct(number), message_enum(number));
-    let function = format_ident!("__new_island_{number}");
     let fields = island.estimators.iter().map(|id| {
         let (node, kind) = (node(*id), types.estimator(*id));
         quote!(#node: ::bb_core::__private::Node<#kind>,)
-    });
-    let values = island.estimators.iter().map(|id| {
-        let (node, start) = (node(*id), start_function(*id));
-        quote!(#node: #start(options, startup),)
     });
     let (mut variants, mut deliveries, mut drops) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
     for (publisher, consumers) in consumers.iter().enumerate() {
@@ -396,16 +400,11 @@ fn shore(types: &Types<'_>, islands: &Islands, number: IslandId, consumers: &[Ve
         #[allow(non_camel_case_types, clippy::large_enum_variant)]
         pub enum #message { #variants }
 
-        fn #function(options: &__Options, startup: &::bb_core::__private::Startup) -> #name {
-            #name { #(#values)* }
-        }
-
         impl ::bb_core::__private::Shore for #name {
             type Wiring = __Wiring;
             type Message = #message;
-            const NUMBER: usize = #number;
-            const NAME: &'static str = #path;
-            const WORKER: ::core::option::Option<::bb_core::__private::WorkerDeclaration> = #worker;
+            const DECLARATION: ::bb_core::__private::IslandDeclaration =
+                ::bb_core::__private::IslandDeclaration { number: #number, name: #path, worker: #worker };
 
             fn deliver(&mut self, wiring: &__Wiring, message: &#message, now: ::bb_core::__private::MonotonicTime) {
                 match message { #deliveries }
@@ -413,11 +412,6 @@ fn shore(types: &Types<'_>, islands: &Islands, number: IslandId, consumers: &[Ve
 
             fn wake(&mut self, wiring: &__Wiring, now: ::bb_core::__private::MonotonicTime) {
                 #(wiring.#turns(self, now);)*
-            }
-
-            #[inline]
-            fn journal(wiring: &__Wiring) -> ::core::option::Option<&::bb_core::__private::Journal> {
-                wiring.startup.journal()
             }
 
             fn dropped(wiring: &__Wiring, message: &#message) {

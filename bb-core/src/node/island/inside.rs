@@ -1,6 +1,7 @@
 //! Which threads are inside an island: code that they call there must not wait for one.
 
 use std::cell::Cell;
+use std::fmt;
 use std::ops::{Deref, DerefMut};
 use std::time::Duration;
 
@@ -36,9 +37,15 @@ impl Drop for Inside {
 }
 
 /// An island that the calling thread holds, by the guard `G`.
-pub(super) struct Within<G> {
+pub struct Within<G> {
     guard: G,
     _inside: Inside,
+}
+
+impl<G> fmt::Debug for Within<G> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Within")
+    }
 }
 
 impl<G> Within<G> {

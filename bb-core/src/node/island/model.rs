@@ -4,7 +4,7 @@
 //! the inbox: nobody misses to be told. That one thread at a time is inside is the lock's own type. (The checker's locks order
 //! more than real ones do: what the fences are for, they say where they stand.)
 
-use super::{Island, Key, Shore, WorkerDeclaration};
+use super::{Island, IslandDeclaration, Key, Sea, Shore};
 use crate::journal::Journal;
 use crate::time::MonotonicTime;
 use loom::sync::Arc;
@@ -33,14 +33,18 @@ impl<const CAPACITY: usize> Seen<CAPACITY> {
     }
 }
 
+impl Sea for AtomicUsize {
+    fn journal(&self) -> Option<&Journal> {
+        None
+    }
+}
+
 impl<const CAPACITY: usize> Shore for Seen<CAPACITY> {
     /// Counts what was dropped.
     type Wiring = AtomicUsize;
     type Message = Message;
     const CAPACITY: usize = CAPACITY;
-    const NUMBER: usize = 0;
-    const NAME: &'static str = "model";
-    const WORKER: Option<WorkerDeclaration> = None;
+    const DECLARATION: IslandDeclaration = IslandDeclaration { number: 0, name: "model", worker: None };
 
     fn deliver(&mut self, _: &AtomicUsize, message: &Message, _: MonotonicTime) {
         self.see(*message);
@@ -48,10 +52,6 @@ impl<const CAPACITY: usize> Shore for Seen<CAPACITY> {
 
     fn wake(&mut self, _: &AtomicUsize, _: MonotonicTime) {
         self.wakes += 1;
-    }
-
-    fn journal(_: &AtomicUsize) -> Option<&Journal> {
-        None
     }
 
     fn dropped(dropped: &AtomicUsize, _: &Message) {
