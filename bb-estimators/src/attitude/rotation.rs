@@ -8,24 +8,29 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use super::Real;
 
 /// Below this squared angle, rad², sine and cosine of the half angle are series.
-const SERIES_SQUARED_ANGLE: f64 = 0.01;
+pub(super) const SERIES_SQUARED_ANGLE: f64 = 0.01;
 
 /// Cosine of half an angle, and the factor that makes the sine of half of it of the angle, for its square, rad².
 #[inline]
 pub(super) fn half_angle<T: Real>(squared_angle: T) -> (T, T) {
     if squared_angle < T::of(SERIES_SQUARED_ANGLE) {
-        // With h = (θ/2)² below 0.0025 the first terms left out are below 1e-19.
-        let h = T::of(0.25) * squared_angle;
-        let (c6, s6) =
-            (T::of(1.0 / 720.0) - h * T::of(1.0 / 40320.0), T::of(1.0 / 10080.0) - h * T::of(1.0 / 725_760.0));
-        return (
-            T::ONE - h * (T::HALF - h * (T::of(1.0 / 24.0) - h * c6)),
-            T::HALF - h * (T::of(1.0 / 12.0) - h * (T::of(1.0 / 240.0) - h * s6)),
-        );
+        return series_of_half_angle(squared_angle);
     }
     let angle = squared_angle.sqrt();
     let (sin, cos) = (T::HALF * angle).sin_cos();
     (cos, sin / angle)
+}
+
+/// [`half_angle`] below [`SERIES_SQUARED_ANGLE`]: with h = (θ/2)² below 0.0025 the first terms left out are below 1e-19.
+#[inline]
+fn series_of_half_angle<T: Real>(squared_angle: T) -> (T, T) {
+    let h = T::of(0.25) * squared_angle;
+    let (c6, s6) =
+        (T::of(1.0 / 720.0) - h * T::of(1.0 / 40320.0), T::of(1.0 / 10080.0) - h * T::of(1.0 / 725_760.0));
+    (
+        T::ONE - h * (T::HALF - h * (T::of(1.0 / 24.0) - h * c6)),
+        T::HALF - h * (T::of(1.0 / 12.0) - h * (T::of(1.0 / 240.0) - h * s6)),
+    )
 }
 
 /// `world_from_body ⊗ exp(½ rotation)`: turns the body by a rotation vector given in the body frame, rad.
@@ -42,12 +47,17 @@ pub(super) fn turn<T: Real>(world_from_body: &UnitQuaternion<T>, rotation: &Vect
     )
 }
 
-/// [`turn`], which also brings the norm back to 1 from what rounding made of it before.
+/// [`turn`] by a rotation whose squared angle, `squared`, is below [`SERIES_SQUARED_ANGLE`]. It also brings the norm back to
+/// 1 from what rounding made of it before.
 #[inline]
-pub(super) fn turn_unit<T: Real>(world_from_body: &UnitQuaternion<T>, rotation: &Vector3<T>) -> UnitQuaternion<T> {
+pub(super) fn turn_little<T: Real>(
+    world_from_body: &UnitQuaternion<T>,
+    rotation: &Vector3<T>,
+    squared: T,
+) -> UnitQuaternion<T> {
     let q = world_from_body;
     let norm = T::of(1.5) - T::HALF * ((q.i * q.i + q.k * q.k) + (q.j * q.j + q.w * q.w));
-    let (cos, scale) = half_angle(rotation.norm_squared());
+    let (cos, scale) = series_of_half_angle(squared);
     let (cos, scale) = (cos * norm, scale * norm);
     let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
     unit(

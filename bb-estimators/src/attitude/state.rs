@@ -3,7 +3,7 @@
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::initial::heading_error;
-use super::rotation::{normalised, turn, turn_heading, turn_upright};
+use super::rotation::{normalised, turn_heading, turn_upright};
 use super::sample::Directions;
 use super::{ImuSample, Quantity, Real, SampleError};
 
@@ -63,15 +63,6 @@ impl<T: Real> AttitudeState<T> {
         }
         self.restart(sample);
         Ok(None)
-    }
-
-    /// A step that turns the body by a rotation vector, rad, body frame, and by nothing else.
-    pub(super) fn turn(&mut self, rotation: &Vector3<T>, sample: &ImuSample<T>) {
-        if let (Some(world_from_body), Ok(directions)) =
-            (self.world_from_body, sample.directions(self.magnetometer))
-        {
-            self.store(&turn(&world_from_body, rotation), directions.field);
-        }
     }
 
     /// Keeps the orientation that a step ended with, of any norm but 0. The first field sets its heading.

@@ -4,7 +4,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::MahonyParams;
 use crate::attitude::directions::{horizontal_axis, misalignment};
-use crate::attitude::rotation::turn_unit;
+use crate::attitude::rotation::{SERIES_SQUARED_ANGLE, renormalised, turn, turn_little};
+use crate::attitude::sample::Directions;
 use crate::attitude::state::{AttitudeState, Step};
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 
@@ -46,9 +47,9 @@ impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
         };
         // A path for each, so that neither carries what the other needs.
         match (&step.up, &step.field) {
-            (Some(up), Some(field)) => self.correct(&step, &sample.angular_velocity, up, Some(field)),
-            (Some(up), None) => self.correct(&step, &sample.angular_velocity, up, None),
-            (None, _) => self.coast(sample, step.dt_s),
+            (Some(up), Some(field)) => self.correct(&step, sample, up, Some(field)),
+            (Some(up), None) => self.correct(&step, sample, up, None),
+            (None, _) => self.turn_far(sample, step.dt_s),
         }
         Ok(())
     }
@@ -76,42 +77,56 @@ impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
 
 impl<T: Real> MahonyFilter<T> {
     #[inline(always)]
-    fn correct(
-        &mut self,
-        step: &Step<T>,
-        angular_velocity: &Vector3<T>,
-        up: &Vector3<T>,
-        field: Option<&Vector3<T>>,
-    ) {
-        let orientation = turn_unit(&step.world_from_body, &self.rotation(angular_velocity, step.dt_s));
+    fn correct(&mut self, step: &Step<T>, sample: &ImuSample<T>, up: &Vector3<T>, field: Option<&Vector3<T>>) {
+        // Ṙ = R [Ω - b + k_P ω_mes]×: first the correction, which is known in the body frame of the sample before, then
+        // the gyroscope; the two turns in one, to the third order of what is small (Baker, Campbell, Hausdorff).
+        let rotation = (sample.angular_velocity - self.bias) * step.dt_s;
+        let correction = self.error * self.gain(step.dt_s);
+        let both = rotation + correction + (correction * T::HALF).cross(&rotation);
+        let squared = both.norm_squared();
+        if squared < T::of(SERIES_SQUARED_ANGLE) {
+            self.compare(turn_little(&step.world_from_body, &both, squared), step.dt_s, up, field);
+        } else {
+            self.turn_far(sample, step.dt_s);
+        }
+    }
+
+    /// The same for a turn that is not small, or with nothing to correct by: one after the other, each exactly.
+    #[cold]
+    fn turn_far(&mut self, sample: &ImuSample<T>, dt_s: T) {
+        let (Some(before), Ok(Directions { up, field })) =
+            (self.state.world_from_body(), sample.directions(self.params.magnetometer))
+        else {
+            return;
+        };
+        let rotation = (sample.angular_velocity - self.bias) * dt_s;
+        let corrected = turn(&before, &(self.error * self.gain(dt_s)));
+        let turned = renormalised(&turn(&corrected, &rotation));
+        match up {
+            Some(up) => self.compare(turned, dt_s, &up, field.as_ref()),
+            None => {
+                self.error = Vector3::zeros();
+                self.state.keep(turned, field);
+            }
+        }
+    }
+
+    /// What part of an error is corrected in `dt_s`: not beyond it, however late the sample or large the gain.
+    #[inline(always)]
+    fn gain(&self, dt_s: T) -> T {
+        let gain = T::of(self.params.proportional_gain) * dt_s;
+        if gain < T::ONE { gain } else { T::ONE }
+    }
+
+    /// ḃ = -k_I ω_mes, and ω_mes for the next sample.
+    #[inline(always)]
+    fn compare(&mut self, orientation: UnitQuaternion<T>, dt_s: T, up: &Vector3<T>, field: Option<&Vector3<T>>) {
         let (mut error, world_up) = misalignment(&orientation, up, field);
         if error.x.abs() < T::of(NO_ERROR) && error.norm() < T::of(NO_ERROR) && up.dot(&world_up) < T::ZERO {
             error = horizontal_axis(world_up);
         }
-        self.bias -= error * (T::of(self.params.integral_gain) * step.dt_s);
+        self.bias -= error * (T::of(self.params.integral_gain) * dt_s);
         self.error = error;
         self.state.keep(orientation, field.copied());
-    }
-
-    /// A step by the gyroscope alone.
-    #[cold]
-    fn coast(&mut self, sample: &ImuSample<T>, dt_s: T) {
-        let rotation = self.rotation(&sample.angular_velocity, dt_s);
-        self.error = Vector3::zeros();
-        self.state.turn(&rotation, sample);
-    }
-
-    /// Ṙ = R [Ω - b + k_P ω_mes]×, ḃ = -k_I ω_mes: what the body turns by in `dt_s`, rad.
-    ///
-    /// First by the correction, which is known in the body frame of the sample before, and then by the gyroscope: of
-    /// the two turns in one the first three terms (Baker, Campbell, Hausdorff).
-    #[inline(always)]
-    fn rotation(&self, angular_velocity: &Vector3<T>, dt_s: T) -> Vector3<T> {
-        // Not beyond what was missed, however late the sample or large the gain.
-        let gain = T::of(self.params.proportional_gain) * dt_s;
-        let gain = if gain < T::ONE { gain } else { T::ONE };
-        let rotation = (angular_velocity - self.bias) * dt_s;
-        let correction = self.error * gain;
-        rotation + correction + (correction * T::HALF).cross(&rotation)
     }
 }

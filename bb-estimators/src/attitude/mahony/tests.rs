@@ -76,3 +76,19 @@ fn the_correction_turns_with_the_body() {
     // The correction of 0.05 rad begins a hundredth later; that it were left behind half a sample would cost a twentieth.
     assert!(end(10_000_000).angle_to(&end(100_000)) < 6e-4);
 }
+
+#[test]
+fn far_turns_are_made_one_after_the_other() {
+    let mut filter = filter(0.5, 0.0, false);
+    filter.start_at(0, UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.5)).unwrap();
+    filter.update(&at_rest(1_000_000, &UnitQuaternion::identity())).unwrap();
+    let far = ImuSample {
+        angular_velocity: Vector3::new(0.0, 0.0, 10.0),
+        ..at_rest(301_000_000, &UnitQuaternion::identity())
+    };
+    filter.update(&far).unwrap();
+    let corrected = 0.5 - 0.5 * 0.3 * 0.5_f64.sin();
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), corrected)
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 3.0);
+    assert!(filter.world_from_body().unwrap().angle_to(&turned) < 1e-12);
+}
