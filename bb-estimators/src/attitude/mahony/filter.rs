@@ -47,9 +47,11 @@ impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
         };
         // A path for each, so that neither carries what the other needs.
         match (&step.up, &step.field) {
-            (Some(up), Some(field)) => self.correct(&step, sample, up, Some(field)),
+            (Some(up), Some(field)) if self.state.heading_is_known() => {
+                self.correct(&step, sample, up, Some(field))
+            }
             (Some(up), None) => self.correct(&step, sample, up, None),
-            (None, _) => self.turn_far(sample, step.dt_s),
+            _ => self.turn_far(sample, step.dt_s),
         }
         Ok(())
     }
@@ -91,7 +93,8 @@ impl<T: Real> MahonyFilter<T> {
         }
     }
 
-    /// The same for a turn that is not small, or with nothing to correct by: one after the other, each exactly.
+    /// The same where it is rare: for a turn that is not small, in free fall, with the first field. One after the other, each
+    /// exactly.
     #[cold]
     fn turn_far(&mut self, sample: &ImuSample<T>, dt_s: T) {
         let (Some(before), Ok(Directions { up, field })) =
@@ -102,9 +105,11 @@ impl<T: Real> MahonyFilter<T> {
         let rotation = (sample.angular_velocity - self.bias) * dt_s;
         let corrected = turn(&before, &(self.error * self.gain(dt_s)));
         let turned = renormalised(&turn(&corrected, &rotation));
+        // What the first field turns at once is nothing to correct, and no bias.
+        let is_first_field = field.is_some() && !self.state.heading_is_known();
         match up {
-            Some(up) => self.compare(turned, dt_s, &up, field.as_ref()),
-            None => {
+            Some(up) if !is_first_field => self.compare(turned, dt_s, &up, field.as_ref()),
+            _ => {
                 self.error = Vector3::zeros();
                 self.state.keep(turned, field);
             }

@@ -92,3 +92,15 @@ fn far_turns_are_made_one_after_the_other() {
         * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 3.0);
     assert!(filter.world_from_body().unwrap().angle_to(&turned) < 1e-12);
 }
+
+#[test]
+fn the_first_field_leaves_no_correction_behind() {
+    let truth = UnitQuaternion::from_euler_angles(0.2, -0.1, 2.0);
+    let mut filter = filter(1.0, 0.1, true);
+    for i in 0..4 {
+        let field = at_rest(0, &truth).magnetic_field.filter(|_| i >= 2);
+        filter.update(&ImuSample { magnetic_field: field, ..at_rest(i * 10_000_000, &truth) }).unwrap();
+    }
+    assert!(filter.world_from_body().unwrap().angle_to(&truth) < 1e-9);
+    assert!(filter.gyroscope_bias().unwrap().norm() < 1e-9);
+}
