@@ -13,6 +13,11 @@
 //!
 //! Reading takes bytes from anywhere: it never panics, allocates no more than the bytes at hand justify, and names the
 //! field that is wrong.
+//!
+//! Why not a crate for CDR: those that there are go through serde, which knows the values of a type but not its shape, so
+//! that a definition for other programs would have to be written a second time and could differ; every payload and all that
+//! it holds would have to implement serde's traits; and none promises what the paragraph above does. Bags of other
+//! programs, whose types are known beforehand, `bb-bags` reads with such a crate.
 
 mod algebra;
 mod collections;
