@@ -1,7 +1,21 @@
-//! Real clocks, and what wall time does when the date is set.
+//! What every source of real time must hold, and what wall time does when the date is set.
 
 use super::*;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Condvar, Mutex};
 use std::time::Duration;
+
+/// The clock's time minus that of `Instant` since `zero`, in nanoseconds: from the try whose two reads of `Instant`, before
+/// and after that of the clock, are closest together.
+fn offset_to_instant(clock: &Clock, zero: Instant) -> i64 {
+    let tries = (0..1000).map(|_| {
+        let before = nanos_of(zero.elapsed());
+        let read = clock.now().as_nanos();
+        let after = nanos_of(zero.elapsed());
+        (after - before, read - before / 2 - after / 2)
+    });
+    tries.min().map_or(0, |(_, offset)| offset)
+}
 
 #[test]
 fn real_clocks_share_one_zero() {
@@ -9,6 +23,59 @@ fn real_clocks_share_one_zero() {
     let second = std::thread::spawn(|| Clock::real().now()).join().expect("it does not panic");
     assert!(second >= first);
     assert!(second.seconds_since(first) < 10.0);
+}
+
+#[test]
+fn a_read_is_never_before_one_that_happened_before_it() {
+    let clock = Clock::real();
+    let (last, is_over) = (AtomicI64::new(i64::MIN), AtomicBool::new(false));
+    let worst = std::thread::scope(|scope| {
+        let read = || {
+            let mut worst = 0;
+            while !is_over.load(Ordering::Relaxed) {
+                let before = last.load(Ordering::Acquire);
+                let now = clock.now().as_nanos();
+                worst = worst.max(before.saturating_sub(now));
+                last.fetch_max(now, Ordering::AcqRel);
+            }
+            worst
+        };
+        let threads = [(); 4].map(|()| scope.spawn(read));
+        std::thread::sleep(Duration::from_millis(500));
+        is_over.store(true, Ordering::Relaxed);
+        threads.into_iter().map(|thread| thread.join().expect("it does not panic")).max()
+    });
+    assert_eq!(worst, Some(0), "nanoseconds back");
+}
+
+#[test]
+fn time_does_not_drift_from_the_clock_that_threads_wait_on() {
+    let (clock, zero) = (Clock::real(), Instant::now());
+    let first = offset_to_instant(&clock, zero);
+    std::thread::sleep(Duration::from_secs(3));
+    // A processor's counter calibrated at the start was off by one part in a million: 3 microseconds.
+    let drift = offset_to_instant(&clock, zero) - first;
+    assert!(drift.abs() < 1_000, "{drift} ns in 3 s");
+}
+
+#[test]
+fn a_thread_that_waits_until_a_deadline_finds_that_it_has_come() {
+    let clock = Clock::real();
+    let (nothing, never) = (Mutex::new(()), Condvar::new());
+    for millis in [1, 10, 50] {
+        let deadline = clock.now() + Duration::from_millis(millis);
+        let mut held = nothing.lock().expect("nobody panics with it");
+        // Condition variables may wake early for no reason.
+        loop {
+            let (back, result) =
+                never.wait_timeout(held, deadline.duration_since(clock.now())).expect("nobody panics with it");
+            held = back;
+            if result.timed_out() {
+                break;
+            }
+        }
+        assert!(clock.now() >= deadline, "{millis} ms");
+    }
 }
 
 #[test]
