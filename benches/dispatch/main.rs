@@ -7,6 +7,7 @@
 
 mod chain;
 mod clock;
+mod hand_over;
 mod hang;
 mod publish;
 
@@ -16,9 +17,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Cargo itself adds `--bench`.
     let json = std::env::args().any(|argument| argument == "--json");
     let names: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
-    let measures: [(&str, Measure); 4] = [
+    let measures: [(&str, Measure); 5] = [
         ("clock", || Ok(clock::measure())),
         ("chain", || Ok(chain::measure()?)),
+        ("hand_over", hand_over::measure),
         ("publish", || Ok(publish::measure())),
         ("hang", || Ok(hang::measure()?)),
     ];
