@@ -9,6 +9,7 @@ mod chain;
 mod clock;
 mod hand_over;
 mod hang;
+mod journal;
 mod publish;
 
 use std::time::Instant;
@@ -17,11 +18,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Cargo itself adds `--bench`.
     let json = std::env::args().any(|argument| argument == "--json");
     let names: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
-    let measures: [(&str, Measure); 5] = [
+    let measures: [(&str, Measure); 6] = [
         ("clock", || Ok(clock::measure())),
         ("chain", || Ok(chain::measure()?)),
         ("hand_over", hand_over::measure),
         ("publish", || Ok(publish::measure())),
+        ("journal", || Ok(journal::measure()?)),
         ("hang", || Ok(hang::measure()?)),
     ];
     for (name, measure) in measures {
