@@ -1,8 +1,8 @@
-//! What the runtime costs: a hop from estimator to estimator, a publish, an allocation, and what an estimator that hangs on
-//! a worker does to a chain beside it.
+//! What the runtime costs: a hop from estimator to estimator, within an island, between two, and to a worker; a publish, an
+//! allocation, a journal; what an estimator that hangs on a worker does to a chain beside it; and how long `stop` takes.
 //!
 //! `cargo bench -p bb-benches --bench dispatch -- --json` prints one JSON object a line; without `--json`, a table. Names of
-//! files here (`chain`, `hang`) run those alone. Nanoseconds are the smallest of many batches, beside the same work without
+//! files here (`chain`, `stop`) run those alone. Nanoseconds are the smallest of many batches, beside the same work without
 //! the runtime, run in turn with it.
 
 mod chain;
@@ -11,6 +11,7 @@ mod hand_over;
 mod hang;
 mod journal;
 mod publish;
+mod stop;
 
 use std::time::Instant;
 
@@ -18,13 +19,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Cargo itself adds `--bench`.
     let json = std::env::args().any(|argument| argument == "--json");
     let names: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
-    let measures: [(&str, Measure); 6] = [
+    // The last one may leave threads that hang.
+    let measures: [(&str, Measure); 7] = [
         ("clock", || Ok(clock::measure())),
         ("chain", || Ok(chain::measure()?)),
         ("hand_over", hand_over::measure),
         ("publish", || Ok(publish::measure())),
         ("journal", || Ok(journal::measure()?)),
         ("hang", || Ok(hang::measure()?)),
+        ("stop", stop::measure),
     ];
     for (name, measure) in measures {
         if names.is_empty() || names.iter().any(|wanted| wanted == name) {
