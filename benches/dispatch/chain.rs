@@ -112,6 +112,6 @@ pub(super) fn measure() -> Result<Vec<Line>, StartError> {
         Line::Beside { name: "hop", ours_ns: (whole - none) / HOPS, beside_ns: (plain - nothing) / HOPS },
         Line::Beside { name: "chain_16", ours_ns: whole, beside_ns: plain },
         Line::Beside { name: "hop_with_latency_budget", ours_ns: one - none, beside_ns: (plain - nothing) / HOPS },
-        Line::Figure { name: "allocations", ours: allocations.count_total as f64 },
+        Line::Figure { name: "allocations", ours: allocations.count_total as f64, unit: "" },
     ])
 }

@@ -87,7 +87,11 @@ pub(super) fn measure() -> Result<Vec<Line>, StartError> {
     let hung = report.estimator("sensor/base/imu/hangs").expect("it is declared");
     assert!(hung.dispatched > 10, "it was there, and hung");
     Ok(vec![
-        Line::Figure { name: "hang_lost", ours: sent as f64 - delays_s.len() as f64 },
-        Line::Figure { name: "hang_p999_us", ours: delays_s.get(rank).map_or(f64::NAN, |delay| delay * 1e6) },
+        Line::Figure { name: "hang_lost", ours: sent as f64 - delays_s.len() as f64, unit: "messages" },
+        Line::Figure {
+            name: "hang_p999_us",
+            ours: delays_s.get(rank).map_or(f64::NAN, |delay| delay * 1e6),
+            unit: "us",
+        },
     ])
 }

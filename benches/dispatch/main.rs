@@ -1,33 +1,50 @@
-//! What the runtime costs: a hop from estimator to estimator, a publish, an allocation, and what an estimator that hangs on
-//! a worker does to a chain beside it.
+//! What the runtime costs: a hop from estimator to estimator, within an island, between two, and to a worker; a publish, an
+//! allocation, a journal; what an estimator that hangs on a worker does to a chain beside it; and how long `stop` takes.
 //!
-//! `cargo bench -p bb-benches --bench dispatch -- --json` prints one JSON object a line; without `--json`, a table. Each
-//! figure is the smallest of many batches, and stands beside the same work without the runtime, run in turn with it.
+//! `cargo bench -p bb-benches --bench dispatch -- --json` prints one JSON object a line; without `--json`, a table. Names of
+//! files here (`chain`, `stop`) run those alone. Nanoseconds are the smallest of many batches, beside the same work without
+//! the runtime, run in turn with it.
 
 mod chain;
+mod clock;
+mod hand_over;
 mod hang;
+mod journal;
 mod publish;
+mod stop;
 
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Cargo itself adds `--bench`.
     let json = std::env::args().any(|argument| argument == "--json");
-    let mut lines = chain::measure()?;
-    lines.extend(publish::measure());
-    lines.extend(hang::measure()?);
-    for line in lines {
-        line.print(json);
+    let names: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    // The last one may leave threads that hang.
+    let measures: [(&str, Measure); 7] = [
+        ("clock", || Ok(clock::measure())),
+        ("chain", || Ok(chain::measure()?)),
+        ("hand_over", hand_over::measure),
+        ("publish", || Ok(publish::measure())),
+        ("journal", || Ok(journal::measure()?)),
+        ("hang", || Ok(hang::measure()?)),
+        ("stop", stop::measure),
+    ];
+    for (name, measure) in measures {
+        if names.is_empty() || names.iter().any(|wanted| wanted == name) {
+            measure()?.iter().for_each(|line| line.print(json));
+        }
     }
     Ok(())
 }
+
+type Measure = fn() -> Result<Vec<Line>, Box<dyn std::error::Error>>;
 
 /// One measure.
 enum Line {
     /// Nanoseconds beside nanoseconds.
     Beside { name: &'static str, ours_ns: f64, beside_ns: f64 },
     /// A figure of its own.
-    Figure { name: &'static str, ours: f64 },
+    Figure { name: &'static str, ours: f64, unit: &'static str },
 }
 
 impl Line {
@@ -40,8 +57,8 @@ impl Line {
                 });
                 println!("{line}");
             }
-            Self::Figure { name, ours } if json => {
-                println!("{}", serde_json::json!({ "name": name, "ours": ours }))
+            Self::Figure { name, ours, unit } if json => {
+                println!("{}", serde_json::json!({ "name": name, "ours": ours, "unit": unit }))
             }
             Self::Beside { name, ours_ns, beside_ns } => {
                 println!(
@@ -49,7 +66,7 @@ impl Line {
                     ours_ns - beside_ns
                 );
             }
-            Self::Figure { name, ours } => println!("{name:>28} {ours:>10}"),
+            Self::Figure { name, ours, unit } => println!("{name:>28} {ours:>10.1} {unit}"),
         }
     }
 }
