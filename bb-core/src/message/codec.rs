@@ -6,7 +6,7 @@
 //! | plain CDR, little endian, as ROS 2 writes it | [`Writer`], [`Reader`] |
 //! | what the bytes mean | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
 //! | a message in the layout that ROS has for it | [`RosMessage`] |
-//! | a value to JSON and back | [`to_json`], [`from_json`] |
+//! | a value to JSON and back, and the JSON Schema of a type | [`to_json`], [`from_json`], [`json_schema`] |
 //!
 //! A message has an *exact* layout, [`Stamped`](crate::Stamped) with all it holds, and may have the layout of a ROS
 //! message beside, which viewers know and in which some values cannot be told apart.
@@ -39,7 +39,7 @@ mod writer;
 pub use derive::{FieldOf, NotField, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
-pub use json::{JsonError, bytes_to_json, from_json, json_to_bytes, to_json};
+pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
 pub use reader::Reader;
 pub use ros::{RosLayout, RosMessage};
 pub use schema::Schema;

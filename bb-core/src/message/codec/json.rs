@@ -15,6 +15,7 @@
 
 mod error;
 mod read;
+mod schema;
 #[cfg(test)]
 pub(super) mod tests;
 mod token;
@@ -23,6 +24,7 @@ mod write;
 
 pub use error::JsonError;
 pub use read::{from_json, json_to_bytes};
+pub use schema::json_schema;
 pub use write::{bytes_to_json, to_json};
 
 use super::shape::{FieldShape, NOTHING};

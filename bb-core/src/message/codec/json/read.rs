@@ -161,7 +161,7 @@ fn object(fields: &'static [FieldShape], value: &RawValue, writer: &mut Writer<'
 }
 
 /// An `Option`, also in a tuple struct of its own.
-fn is_optional(shape: Shape) -> bool {
+pub(super) fn is_optional(shape: Shape) -> bool {
     match shape {
         Shape::Option(_) => true,
         Shape::Struct(of) => match Form::of(of.fields) {

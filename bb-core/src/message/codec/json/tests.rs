@@ -1,4 +1,4 @@
-//! What is written is read back, and what is wrong is named.
+//! What is written is read back, what is wrong is named, and the schema takes what the reader takes.
 
 use super::*;
 use crate::Payload;
@@ -21,6 +21,9 @@ pub(in crate::message::codec) fn round_trip<T: Field>(value: &T) {
     assert_eq!(bytes_of(&again), bytes_of(&read));
     assert_eq!(bytes_to_json(&bytes_of(value), T::SHAPE).as_ref(), Ok(&json));
     assert_eq!(json_to_bytes(&json, T::SHAPE), Ok(bytes_of(&read)));
+    let schema: Value = serde_json::from_str(&json_schema(T::SHAPE)).expect("it is JSON");
+    let written: Value = serde_json::from_str(&json).expect("it is JSON");
+    assert!(accepts(&schema, &schema, &written), "{schema}\n{written}");
 }
 
 /// Arguments of a command.
@@ -250,6 +253,123 @@ fn bytes_that_are_none_of_an_enum_are_errors() {
     }
 }
 
+#[test]
+fn a_schema_says_what_is_read() {
+    let schema: Value = serde_json::from_str(&json_schema(Arguments::SHAPE)).expect("it is JSON");
+    let number = json!({"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]});
+    let expected = json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Arguments",
+        "type": "object",
+        "properties": {
+            "speed": number,
+            "gain": number,
+            "count": {"type": "integer", "minimum": 0, "maximum": 255},
+            "offset": {"type": "integer", "minimum": i64::MIN, "maximum": i64::MAX},
+            "label": {"type": "string"},
+            "letter": {"type": "string", "minLength": 1, "maxLength": 1},
+            "goal": {"anyOf": [{"$ref": "#/$defs/geometry_msgs.Vector3"}, {"type": "null"}]},
+            "corners": {
+                "type": "array",
+                "items": {"type": "integer", "minimum": -32768, "maximum": 32767},
+                "minItems": 2,
+                "maxItems": 2,
+            },
+            "mode": {"$ref": "#/$defs/Mode"},
+            "nothing": {"$ref": "#/$defs/Nothing"},
+        },
+        "required": ["speed", "gain", "count", "offset", "label", "letter", "corners", "mode", "nothing"],
+        "additionalProperties": false,
+        "$defs": {
+            "geometry_msgs.Vector3": {
+                "title": "geometry_msgs/Vector3",
+                "type": "object",
+                "properties": {"x": number, "y": number, "z": number},
+                "required": ["x", "y", "z"],
+                "additionalProperties": false,
+            },
+            "Mode": {"title": "Mode", "oneOf": [
+                {"enum": ["Fast"]},
+                {
+                    "type": "object",
+                    "properties": {"Slow": number},
+                    "required": ["Slow"],
+                    "additionalProperties": false,
+                },
+                {
+                    "type": "object",
+                    "properties": {"Along": {
+                        "type": "object",
+                        "properties": {"path": {
+                            "type": "array",
+                            "items": {"anyOf": [
+                                {"type": "integer", "minimum": 0, "maximum": 65535},
+                                {"type": "null"},
+                            ]},
+                        }},
+                        "required": ["path"],
+                        "additionalProperties": false,
+                    }},
+                    "required": ["Along"],
+                    "additionalProperties": false,
+                },
+            ]},
+            "Nothing": {"title": "Nothing", "type": ["object", "null"], "additionalProperties": false},
+        },
+    });
+    assert_eq!(schema, expected);
+    let text = json_schema(Arguments::SHAPE);
+    assert!(text.find("speed") < text.find("gain"), "fields keep their order: {text}");
+    let scalar = r#"{"$schema":"https://json-schema.org/draft/2020-12/schema","type":"boolean"}"#;
+    assert_eq!(json_schema(bool::SHAPE), scalar);
+}
+
+/// So much of JSON Schema as ours use.
+fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
+    let Some(keywords) = schema.as_object() else { return schema != &json!(false) };
+    let all = |list: &Value| list.as_array().cloned().unwrap_or_default();
+    let count = |limit: &Value| limit.as_u64().and_then(|limit| usize::try_from(limit).ok()).expect("a count");
+    keywords.iter().all(|(keyword, limit)| match keyword.as_str() {
+        "$schema" | "title" | "$defs" => true,
+        "$ref" => {
+            let name = limit.as_str().and_then(|name| name.strip_prefix("#/$defs/")).expect("a definition");
+            accepts(root, &root["$defs"][name], value)
+        }
+        "anyOf" => all(limit).iter().any(|choice| accepts(root, choice, value)),
+        "oneOf" => all(limit).iter().filter(|choice| accepts(root, choice, value)).count() == 1,
+        "not" => !accepts(root, limit, value),
+        "enum" => all(limit).contains(value),
+        "type" => {
+            let names = if limit.is_array() { all(limit) } else { vec![limit.clone()] };
+            names.iter().any(|name| match name.as_str().unwrap_or("") {
+                "boolean" => value.is_boolean(),
+                "null" => value.is_null(),
+                "string" => value.is_string(),
+                "array" => value.is_array(),
+                "object" => value.is_object(),
+                "number" => value.is_number(),
+                "integer" => value.as_f64().is_some_and(|number| number.fract() == 0.0),
+                other => panic!("no type {other}"),
+            })
+        }
+        "minimum" => value.as_f64() >= limit.as_f64(),
+        "maximum" => value.as_f64() <= limit.as_f64(),
+        "minLength" => value.as_str().is_some_and(|text| text.chars().count() >= count(limit)),
+        "maxLength" => value.as_str().is_some_and(|text| text.chars().count() <= count(limit)),
+        "minItems" => value.as_array().is_none_or(|items| items.len() >= count(limit)),
+        "maxItems" => value.as_array().is_none_or(|items| items.len() <= count(limit)),
+        "items" => all(value).iter().all(|item| accepts(root, limit, item)),
+        "properties" => value.as_object().is_none_or(|members| {
+            members.iter().all(|(name, member)| limit.get(name).is_none_or(|limit| accepts(root, limit, member)))
+        }),
+        "required" => all(limit).iter().all(|name| name.as_str().is_some_and(|name| value.get(name).is_some())),
+        "additionalProperties" => value.as_object().is_none_or(|members| {
+            members.keys().all(|name| schema.get("properties").is_some_and(|known| known.get(name).is_some()))
+        }),
+        other => panic!("no keyword {other}"),
+    })
+}
+
 /// Another value at one place of it.
 fn change(value: &mut Value, place: usize, other: Value, key: &str) {
     match value {
@@ -298,13 +418,16 @@ fn read_or_refuse<T: Field>(text: &str) {
 
 proptest! {
     #[test]
-    fn changed_json_is_read_or_refused(
+    fn the_schema_takes_what_the_reader_takes(
         value in everything(), changes in proptest::collection::vec((any::<usize>(), anything()), 1..4),
     ) {
         let mut json: Value = serde_json::from_str(&to_json(&value)).expect("it is JSON");
         for (place, other) in changes {
             change(&mut json, place, other, ["maybe", "list", "new"][place % 3]);
         }
+        let schema: Value = serde_json::from_str(&json_schema(Everything::SHAPE)).expect("it is JSON");
+        let read = json_to_bytes(&json.to_string(), Everything::SHAPE);
+        prop_assert_eq!(read.is_ok(), accepts(&schema, &schema, &json), "{:?}\n{}", read, json);
         read_or_refuse::<Everything>(&json.to_string());
     }
 

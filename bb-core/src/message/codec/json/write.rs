@@ -119,7 +119,7 @@ fn variant(of: &EnumShape, reader: &mut Reader<'_>, json: &mut String) -> Result
     Ok(())
 }
 
-fn number(value: impl Display, json: &mut String) {
+pub(super) fn number(value: impl Display, json: &mut String) {
     // Writing to a string cannot fail.
     let _ = write!(json, "{value}");
 }
