@@ -15,9 +15,74 @@
 //! message is told apart is asked by [`is_exact_as_ros`](super::is_exact_as_ros); one that is not needs the exact layout
 //! as well. What a body's pose is given in is the frame [`WORLD`], not the body's.
 
+/// Declares a ROS message with a header, and how a payload is written as one and read back.
+///
+/// The expressions of `write` see the `Stamped` payload by the name in parentheses; those of `read` see the message's
+/// fields by their names and may return a `DecodeError` with `?`. The header has the message's frame, or that of `in`.
+/// Without types the message is one that is declared already.
+///
+/// ```text
+/// ros_message! {
+///     FluidPressure => FluidPressureMessage "sensor_msgs/FluidPressure";
+///     write(pressure) {
+///         fluid_pressure: f64 = pressure.fluid_pressure,
+///         variance: f64 = pressure.variance.unwrap_or_default(),
+///     }
+///     read { Self { fluid_pressure, variance: unless_zero(variance) } }
+/// }
+/// ```
+macro_rules! ros_message {
+    (
+        $payload:ty => $name:ident $ros:literal $(in $frame:expr)?;
+        write($message:ident) { $($field:ident: $kind:ty = $value:expr,)* }
+        read $read:block
+    ) => {
+        #[doc = concat!("`", $ros, "`")]
+        #[derive(Clone, Debug, crate::Payload)]
+        #[payload(name = $ros)]
+        pub struct $name {
+            header: crate::message::codec::ros::Header,
+            $($field: $kind,)*
+        }
+
+        ros_message! {
+            $payload => $name $(in $frame)?;
+            write($message) { $($field = $value,)* }
+            read $read
+        }
+    };
+    (
+        $payload:ty => $name:ident $(in $frame:expr)?;
+        write($message:ident) { $($field:ident = $value:expr,)* }
+        read $read:block
+    ) => {
+        impl crate::message::RosMessage for $payload {
+            type Message = $name;
+
+            fn to_ros($message: &crate::message::Stamped<Self>) -> $name {
+                let frame = ros_message!(@frame $message $($frame)?);
+                $name { header: crate::message::codec::ros::Header::in_frame($message, frame), $($field: $value,)* }
+            }
+
+            fn from_ros(
+                message: $name,
+            ) -> Result<(Self, crate::time::WallTime), crate::message::DecodeError> {
+                let $name { header, $($field,)* } = message;
+                Ok(($read, header.stamp.wall_time()))
+            }
+        }
+    };
+    (@frame $message:ident) => {
+        $message.frame.name()
+    };
+    (@frame $message:ident $frame:expr) => {
+        $frame
+    };
+}
+
 mod covariance;
 mod geometry;
-mod odometry;
+mod nav;
 mod sensor;
 mod standard;
 

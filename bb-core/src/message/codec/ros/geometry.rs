@@ -1,34 +1,13 @@
 //! `geometry_msgs`
 
-use super::{Header, RosMessage, WORLD, covariance};
+use super::{WORLD, covariance};
 use crate::Payload;
 use crate::message::codec::{Field, FieldShape, Reader, Shape, StructShape, Writer};
-use crate::message::{DecodeError, Finite, Stamped};
+use crate::message::{DecodeError, Finite};
 use crate::payload::{Orientation, Pose, Twist};
-use crate::time::WallTime;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// `geometry_msgs/msg/QuaternionStamped`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "geometry_msgs/QuaternionStamped")]
-pub struct QuaternionStamped {
-    header: Header,
-    quaternion: UnitQuaternion<f64>,
-}
-
-impl RosMessage for Orientation {
-    type Message = QuaternionStamped;
-
-    fn to_ros(message: &Stamped<Self>) -> QuaternionStamped {
-        QuaternionStamped { header: Header::in_frame(message, WORLD), quaternion: message.world_from_body }
-    }
-
-    fn from_ros(message: QuaternionStamped) -> Result<(Self, WallTime), DecodeError> {
-        Ok((Self::new(message.quaternion), message.header.stamp.wall_time()))
-    }
-}
-
-/// `geometry_msgs/msg/Point`
+/// `geometry_msgs/Point`
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point(Vector3<f64>);
 
@@ -55,7 +34,7 @@ impl Field for Point {
     }
 }
 
-/// `geometry_msgs/msg/Pose`
+/// `geometry_msgs/Pose`
 #[derive(Clone, Debug, Payload)]
 #[payload(name = "geometry_msgs/Pose")]
 pub(super) struct PoseMessage {
@@ -73,43 +52,41 @@ impl PoseMessage {
     }
 }
 
-/// `geometry_msgs/msg/PoseStamped`
+/// `geometry_msgs/PoseWithCovariance`
 #[derive(Clone, Debug, Payload)]
-#[payload(name = "geometry_msgs/PoseStamped")]
-pub struct PoseStamped {
-    header: Header,
+#[payload(name = "geometry_msgs/PoseWithCovariance")]
+pub(super) struct PoseWithCovarianceMessage {
     pose: PoseMessage,
+    covariance: [f64; 36],
 }
 
-impl RosMessage for Pose {
-    type Message = PoseStamped;
-
-    fn to_ros(message: &Stamped<Self>) -> PoseStamped {
-        PoseStamped { header: Header::in_frame(message, WORLD), pose: PoseMessage::of(message) }
+impl PoseWithCovarianceMessage {
+    pub(super) fn of(pose: &Pose) -> Self {
+        Self { pose: PoseMessage::of(pose), covariance: covariance::to_ros(&pose.covariance) }
     }
 
-    fn from_ros(message: PoseStamped) -> Result<(Self, WallTime), DecodeError> {
-        Ok((message.pose.pose(), message.header.stamp.wall_time()))
+    pub(super) fn pose(&self) -> Pose {
+        Pose { covariance: covariance::from_ros(&self.covariance), ..self.pose.pose() }
     }
 }
 
-/// `geometry_msgs/msg/Twist`
+/// `geometry_msgs/Twist`
 #[derive(Clone, Debug, Payload)]
 #[payload(name = "geometry_msgs/Twist")]
-pub(super) struct TwistMessage {
+struct TwistMessage {
     linear: Vector3<f64>,
     angular: Vector3<f64>,
 }
 
-/// `geometry_msgs/msg/TwistWithCovariance`
+/// `geometry_msgs/TwistWithCovariance`
 #[derive(Clone, Debug, Payload)]
 #[payload(name = "geometry_msgs/TwistWithCovariance")]
-pub(super) struct TwistWithCovariance {
+pub(super) struct TwistWithCovarianceMessage {
     twist: TwistMessage,
     covariance: [f64; 36],
 }
 
-impl TwistWithCovariance {
+impl TwistWithCovarianceMessage {
     pub(super) fn of(twist: &Twist) -> Self {
         let Twist { linear, angular, covariance } = twist;
         let twist = TwistMessage { linear: *linear, angular: *angular };
@@ -122,22 +99,20 @@ impl TwistWithCovariance {
     }
 }
 
-/// `geometry_msgs/msg/TwistWithCovarianceStamped`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "geometry_msgs/TwistWithCovarianceStamped")]
-pub struct TwistStamped {
-    header: Header,
-    twist: TwistWithCovariance,
+ros_message! {
+    Orientation => QuaternionStamped "geometry_msgs/QuaternionStamped" in WORLD;
+    write(orientation) { quaternion: UnitQuaternion<f64> = orientation.world_from_body, }
+    read { Self::new(quaternion) }
 }
 
-impl RosMessage for Twist {
-    type Message = TwistStamped;
+ros_message! {
+    Pose => PoseStamped "geometry_msgs/PoseStamped" in WORLD;
+    write(it) { pose: PoseMessage = PoseMessage::of(it), }
+    read { pose.pose() }
+}
 
-    fn to_ros(message: &Stamped<Self>) -> TwistStamped {
-        TwistStamped { header: Header::of(message), twist: TwistWithCovariance::of(message) }
-    }
-
-    fn from_ros(message: TwistStamped) -> Result<(Self, WallTime), DecodeError> {
-        Ok((message.twist.twist(), message.header.stamp.wall_time()))
-    }
+ros_message! {
+    Twist => TwistStamped "geometry_msgs/TwistWithCovarianceStamped";
+    write(it) { twist: TwistWithCovarianceMessage = TwistWithCovarianceMessage::of(it), }
+    read { twist.twist() }
 }

@@ -1,124 +1,75 @@
 //! `sensor_msgs`
 
-use super::{Header, RosMessage, covariance};
-use crate::Payload;
-use crate::message::{DecodeError, Stamped};
+use super::covariance;
+use crate::message::DecodeError;
 use crate::payload::{Imu, JointState, MagneticField};
-use crate::time::WallTime;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-/// `sensor_msgs/msg/Imu`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "sensor_msgs/Imu")]
-pub struct ImuMessage {
-    header: Header,
+/// The covariance of an orientation that is not measured: −1 first.
+const NO_ORIENTATION: [f64; 9] = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+
+fn orientation_from_ros(
     orientation: UnitQuaternion<f64>,
-    orientation_covariance: [f64; 9],
-    angular_velocity: Vector3<f64>,
-    angular_velocity_covariance: [f64; 9],
-    linear_acceleration: Vector3<f64>,
-    linear_acceleration_covariance: [f64; 9],
+    covariance: &[f64; 9],
+) -> (Option<UnitQuaternion<f64>>, Option<Matrix3<f64>>) {
+    match covariance[0] == NO_ORIENTATION[0] {
+        true => (None, None),
+        false => (Some(orientation), covariance::from_ros(covariance)),
+    }
 }
 
-/// The first element of the covariance of an orientation that is not there.
-const ABSENT: f64 = -1.0;
-
-impl RosMessage for Imu {
-    type Message = ImuMessage;
-
-    fn to_ros(message: &Stamped<Self>) -> ImuMessage {
-        let mut orientation_covariance: [f64; 9] = covariance::to_ros(&message.orientation_covariance);
-        if message.orientation.is_none() {
-            orientation_covariance = [ABSENT, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        }
-        ImuMessage {
-            header: Header::of(message),
-            orientation: message.orientation.unwrap_or_else(UnitQuaternion::identity),
+ros_message! {
+    Imu => ImuMessage "sensor_msgs/Imu";
+    write(imu) {
+        orientation: UnitQuaternion<f64> = imu.orientation.unwrap_or_else(UnitQuaternion::identity),
+        orientation_covariance: [f64; 9] = match imu.orientation {
+            Some(_) => covariance::to_ros(&imu.orientation_covariance),
+            None => NO_ORIENTATION,
+        },
+        angular_velocity: Vector3<f64> = imu.angular_velocity,
+        angular_velocity_covariance: [f64; 9] = covariance::to_ros(&imu.angular_velocity_covariance),
+        linear_acceleration: Vector3<f64> = imu.linear_acceleration,
+        linear_acceleration_covariance: [f64; 9] = covariance::to_ros(&imu.linear_acceleration_covariance),
+    }
+    read {
+        let (orientation, orientation_covariance) = orientation_from_ros(orientation, &orientation_covariance);
+        Self {
+            angular_velocity,
+            linear_acceleration,
+            orientation,
             orientation_covariance,
-            angular_velocity: message.angular_velocity,
-            angular_velocity_covariance: covariance::to_ros(&message.angular_velocity_covariance),
-            linear_acceleration: message.linear_acceleration,
-            linear_acceleration_covariance: covariance::to_ros(&message.linear_acceleration_covariance),
+            angular_velocity_covariance: covariance::from_ros(&angular_velocity_covariance),
+            linear_acceleration_covariance: covariance::from_ros(&linear_acceleration_covariance),
         }
     }
-
-    fn from_ros(message: ImuMessage) -> Result<(Self, WallTime), DecodeError> {
-        let is_absent = message.orientation_covariance[0] == ABSENT;
-        let imu = Self {
-            angular_velocity: message.angular_velocity,
-            linear_acceleration: message.linear_acceleration,
-            orientation: (!is_absent).then_some(message.orientation),
-            orientation_covariance: match is_absent {
-                true => None,
-                false => covariance::from_ros(&message.orientation_covariance),
-            },
-            angular_velocity_covariance: covariance::from_ros(&message.angular_velocity_covariance),
-            linear_acceleration_covariance: covariance::from_ros(&message.linear_acceleration_covariance),
-        };
-        Ok((imu, message.header.stamp.wall_time()))
-    }
 }
 
-/// `sensor_msgs/msg/MagneticField`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "sensor_msgs/MagneticField")]
-pub struct MagneticFieldMessage {
-    header: Header,
-    magnetic_field: Vector3<f64>,
-    magnetic_field_covariance: [f64; 9],
+ros_message! {
+    MagneticField => MagneticFieldMessage "sensor_msgs/MagneticField";
+    write(field) {
+        magnetic_field: Vector3<f64> = field.magnetic_field,
+        magnetic_field_covariance: [f64; 9] = covariance::to_ros(&field.covariance),
+    }
+    read { Self { magnetic_field, covariance: covariance::from_ros(&magnetic_field_covariance) } }
 }
 
-impl RosMessage for MagneticField {
-    type Message = MagneticFieldMessage;
-
-    fn to_ros(message: &Stamped<Self>) -> MagneticFieldMessage {
-        MagneticFieldMessage {
-            header: Header::of(message),
-            magnetic_field: message.magnetic_field,
-            magnetic_field_covariance: covariance::to_ros(&message.covariance),
-        }
+// A list of one joint, which the frame names.
+ros_message! {
+    JointState => JointStateMessage "sensor_msgs/JointState";
+    write(joint) {
+        name: Vec<String> = vec![joint.frame.name().to_owned()],
+        position: Vec<f64> = vec![joint.position],
+        velocity: Vec<f64> = joint.velocity.into_iter().collect(),
+        effort: Vec<f64> = joint.effort.into_iter().collect(),
     }
-
-    fn from_ros(message: MagneticFieldMessage) -> Result<(Self, WallTime), DecodeError> {
-        let covariance = covariance::from_ros(&message.magnetic_field_covariance);
-        Ok((Self { magnetic_field: message.magnetic_field, covariance }, message.header.stamp.wall_time()))
-    }
-}
-
-/// `sensor_msgs/msg/JointState`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "sensor_msgs/JointState")]
-pub struct JointStateMessage {
-    header: Header,
-    name: Vec<String>,
-    position: Vec<f64>,
-    velocity: Vec<f64>,
-    effort: Vec<f64>,
-}
-
-/// A list of one joint, which the frame names.
-impl RosMessage for JointState {
-    type Message = JointStateMessage;
-
-    fn to_ros(message: &Stamped<Self>) -> JointStateMessage {
-        JointStateMessage {
-            header: Header::of(message),
-            name: vec![message.frame.name().to_owned()],
-            position: vec![message.position],
-            velocity: message.velocity.into_iter().collect(),
-            effort: message.effort.into_iter().collect(),
-        }
-    }
-
-    fn from_ros(message: JointStateMessage) -> Result<(Self, WallTime), DecodeError> {
-        let JointStateMessage { header, name, position, velocity, effort } = message;
+    read {
         match (name.as_slice(), position.as_slice(), velocity.as_slice(), effort.as_slice()) {
             ([_], [position], [] | [_], [] | [_]) => {
-                let (velocity, effort) = (velocity.first().copied(), effort.first().copied());
-                Ok((Self { position: *position, velocity, effort }, header.stamp.wall_time()))
+                Self { position: *position, velocity: velocity.first().copied(), effort: effort.first().copied() }
             }
             _ => {
-                Err(DecodeError::new(0, "the state of one joint", format!("that of {}", name.len())).within("name"))
+                let found = format!("that of {}", name.len());
+                return Err(DecodeError::new(0, "the state of one joint", found).within("name"));
             }
         }
     }
