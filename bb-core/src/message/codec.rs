@@ -36,7 +36,7 @@ mod tests;
 mod writer;
 
 #[doc(hidden)]
-pub use derive::{FieldOf, NotField, is_finite};
+pub use derive::{FieldOf, NotField, is_any, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
 pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
