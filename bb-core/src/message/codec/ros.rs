@@ -1,19 +1,32 @@
-//! Messages in the layout that ROS has for them, so that viewers and other tools know them.
+//! Messages in the layout that ROS has for them, so that viewers and other tools know them. The payloads are those of
+//! [`payload`](crate::payload).
 //!
-//! | payload | message | not told apart |
+//! | payload | message | what it does not keep |
 //! |---|---|---|
-//! | [`Imu`](crate::payload::Imu) | `sensor_msgs/msg/Imu` | an unknown covariance and one of zeros; a covariance of an orientation that is not there |
-//! | [`MagneticField`](crate::payload::MagneticField) | `sensor_msgs/msg/MagneticField` | an unknown covariance and one of zeros |
-//! | [`JointState`](crate::payload::JointState) | `sensor_msgs/msg/JointState` | – |
-//! | [`Orientation`](crate::payload::Orientation) | `geometry_msgs/msg/QuaternionStamped` | the covariance is left out |
-//! | [`Pose`](crate::payload::Pose) | `geometry_msgs/msg/PoseStamped` | the covariance is left out |
-//! | [`Twist`](crate::payload::Twist) | `geometry_msgs/msg/TwistWithCovarianceStamped` | an unknown covariance and one of zeros |
-//! | [`Odometry`](crate::payload::Odometry) | `nav_msgs/msg/Odometry` | an unknown covariance and one of zeros |
+//! | `Imu` | `sensor_msgs/msg/Imu` | a covariance of zeros, which reads as unknown; that of an orientation that is not there |
+//! | `MagneticField` | `sensor_msgs/msg/MagneticField` | a covariance of zeros, which reads as unknown |
+//! | `FluidPressure` | `sensor_msgs/msg/FluidPressure` | a variance of zero, which reads as unknown |
+//! | `Range` | `sensor_msgs/msg/Range` | a variance of zero, which reads as unknown |
+//! | `LaserScan` | `sensor_msgs/msg/LaserScan` | – |
+//! | `Image` | `sensor_msgs/msg/Image` | – |
+//! | `GnssFix` | `sensor_msgs/msg/NavSatFix` | the last bit of an angle, since ROS has degrees |
+//! | `BatteryState` | `sensor_msgs/msg/BatteryState` | digits beyond the seventh, since ROS has `float32` |
+//! | `JointState`, `JointStates`, `PositionCommand`, `VelocityCommand`, `EffortCommand` | `sensor_msgs/msg/JointState` | – |
+//! | `JointTrajectory` | `trajectory_msgs/msg/JointTrajectory` | times beyond 68 years |
+//! | `Orientation` | `geometry_msgs/msg/QuaternionStamped` | the covariance |
+//! | `Pose` | `geometry_msgs/msg/PoseStamped` | the covariance |
+//! | `PoseWithCovariance` | `geometry_msgs/msg/PoseWithCovarianceStamped` | – |
+//! | `Twist` | `geometry_msgs/msg/TwistWithCovarianceStamped` | a covariance of zeros, which reads as unknown |
+//! | `TwistWithCovariance` | `geometry_msgs/msg/TwistWithCovarianceStamped` | – |
+//! | `Accel` | `geometry_msgs/msg/AccelWithCovarianceStamped` | a covariance of zeros, which reads as unknown |
+//! | `Wrench` | `geometry_msgs/msg/WrenchStamped` | – |
+//! | `Odometry` | `nav_msgs/msg/Odometry` | a covariance of zeros, which reads as unknown |
+//! | `Path` | `nav_msgs/msg/Path` | – |
 //!
 //! As in ROS, an unknown covariance is all zeros, and an orientation that is not there has −1 as the first element of its
-//! covariance. A header's stamp has 32 bits for the seconds; times before 1901 and after 2038 do not fit. Whether a
-//! message is told apart is asked by [`is_exact_as_ros`](super::is_exact_as_ros); one that is not needs the exact layout
-//! as well. What a body's pose is given in is the frame [`WORLD`], not the body's.
+//! covariance. What a receiver or a battery does not measure is NaN. A header's stamp has 32 bits for the seconds; times
+//! before 1901 and after 2038 do not fit. [`is_exact_as_ros`](super::is_exact_as_ros) tells whether a message reads back
+//! the same; one that does not needs the exact layout as well. Poses are given in the frame [`WORLD`], not the body's.
 
 /// Declares a ROS message with a header, and how a payload is written as one and read back.
 ///
@@ -83,8 +96,12 @@ macro_rules! ros_message {
 mod covariance;
 mod geometry;
 mod nav;
+mod number;
 mod sensor;
 mod standard;
+#[cfg(test)]
+mod tests;
+mod trajectory;
 
 pub use standard::{Header, Text, Time, TransformStamped, TransformsMessage};
 

@@ -1,10 +1,10 @@
-//! `geometry_msgs`
+//! `geometry_msgs`; covariances are six by six, of the linear part, then of the angular one.
 
 use super::{WORLD, covariance};
 use crate::Payload;
 use crate::message::codec::{Field, FieldShape, Reader, Shape, StructShape, Writer};
 use crate::message::{DecodeError, Finite};
-use crate::payload::{Orientation, Pose, Twist};
+use crate::payload::{Accel, Orientation, Pose, PoseWithCovariance, Twist, TwistWithCovariance, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// `geometry_msgs/Point`
@@ -43,12 +43,20 @@ pub(super) struct PoseMessage {
 }
 
 impl PoseMessage {
-    pub(super) fn of(pose: &Pose) -> Self {
-        Self { position: Point(pose.position), orientation: pose.world_from_body }
+    pub(super) fn of(position: Vector3<f64>, orientation: UnitQuaternion<f64>) -> Self {
+        Self { position: Point(position), orientation }
     }
 
-    pub(super) fn pose(&self) -> Pose {
-        Pose { position: self.position.0, world_from_body: self.orientation, covariance: None }
+    pub(super) fn position(&self) -> Vector3<f64> {
+        self.position.0
+    }
+
+    pub(super) fn orientation(&self) -> UnitQuaternion<f64> {
+        self.orientation
+    }
+
+    fn pose(&self) -> Pose {
+        Pose { position: self.position(), world_from_body: self.orientation(), covariance: None }
     }
 }
 
@@ -62,7 +70,8 @@ pub(super) struct PoseWithCovarianceMessage {
 
 impl PoseWithCovarianceMessage {
     pub(super) fn of(pose: &Pose) -> Self {
-        Self { pose: PoseMessage::of(pose), covariance: covariance::to_ros(&pose.covariance) }
+        let message = PoseMessage::of(pose.position, pose.world_from_body);
+        Self { pose: message, covariance: covariance::to_ros(&pose.covariance) }
     }
 
     pub(super) fn pose(&self) -> Pose {
@@ -107,7 +116,7 @@ ros_message! {
 
 ros_message! {
     Pose => PoseStamped "geometry_msgs/PoseStamped" in WORLD;
-    write(it) { pose: PoseMessage = PoseMessage::of(it), }
+    write(it) { pose: PoseMessage = PoseMessage::of(it.position, it.world_from_body), }
     read { pose.pose() }
 }
 
@@ -115,4 +124,69 @@ ros_message! {
     Twist => TwistStamped "geometry_msgs/TwistWithCovarianceStamped";
     write(it) { twist: TwistWithCovarianceMessage = TwistWithCovarianceMessage::of(it), }
     read { twist.twist() }
+}
+
+ros_message! {
+    PoseWithCovariance => PoseWithCovarianceStamped "geometry_msgs/PoseWithCovarianceStamped" in WORLD;
+    write(it) { pose: PoseWithCovarianceMessage = PoseWithCovarianceMessage::of(&it.payload.into()), }
+    read {
+        Self {
+            position: pose.pose.position(),
+            world_from_body: pose.pose.orientation(),
+            covariance: covariance::matrix(&pose.covariance),
+        }
+    }
+}
+
+ros_message! {
+    TwistWithCovariance => TwistStamped;
+    write(it) { twist = TwistWithCovarianceMessage::of(&it.payload.into()), }
+    read {
+        let TwistMessage { linear, angular } = twist.twist;
+        Self { linear, angular, covariance: covariance::matrix(&twist.covariance) }
+    }
+}
+
+/// `geometry_msgs/Accel`
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "geometry_msgs/Accel")]
+struct AccelMessage {
+    linear: Vector3<f64>,
+    angular: Vector3<f64>,
+}
+
+/// `geometry_msgs/AccelWithCovariance`
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "geometry_msgs/AccelWithCovariance")]
+struct AccelWithCovariance {
+    accel: AccelMessage,
+    covariance: [f64; 36],
+}
+
+ros_message! {
+    Accel => AccelStamped "geometry_msgs/AccelWithCovarianceStamped";
+    write(it) {
+        accel: AccelWithCovariance = AccelWithCovariance {
+            accel: AccelMessage { linear: it.linear, angular: it.angular },
+            covariance: covariance::to_ros(&it.covariance),
+        },
+    }
+    read {
+        let AccelMessage { linear, angular } = accel.accel;
+        Self { linear, angular, covariance: covariance::from_ros(&accel.covariance) }
+    }
+}
+
+/// `geometry_msgs/Wrench`
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "geometry_msgs/Wrench")]
+struct WrenchMessage {
+    force: Vector3<f64>,
+    torque: Vector3<f64>,
+}
+
+ros_message! {
+    Wrench => WrenchStamped "geometry_msgs/WrenchStamped";
+    write(it) { wrench: WrenchMessage = WrenchMessage { force: it.force, torque: it.torque }, }
+    read { Self { force: wrench.force, torque: wrench.torque } }
 }
