@@ -5,6 +5,7 @@
 //! | what a field of a payload must be able to do | [`Field`]; `#[derive(Payload)]` writes it for structs and enums |
 //! | plain CDR, little endian, as ROS 2 writes it | [`Writer`], [`Reader`] |
 //! | what the bytes mean | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
+//! | the hash by which ROS 2 tells types apart | [`type_hash`] |
 //! | a message in the layout that ROS has for it | [`RosMessage`] |
 //! | a value to JSON and back, and the JSON Schema of a type | [`to_json`], [`from_json`], [`json_schema`] |
 //!
@@ -21,6 +22,7 @@
 
 mod algebra;
 mod collections;
+mod definitions;
 mod derive;
 mod error;
 mod intern;
@@ -29,10 +31,12 @@ mod plain;
 mod reader;
 pub mod ros;
 mod schema;
+mod sha256;
 mod shape;
 mod stamped;
 #[cfg(test)]
 mod tests;
+mod type_description;
 mod writer;
 
 #[doc(hidden)]
@@ -45,6 +49,7 @@ pub use ros::{RosLayout, RosMessage};
 pub use schema::Schema;
 pub use shape::{EnumShape, FieldShape, Shape, StructShape};
 pub use stamped::{decode_as_ros, encode_as_ros, is_exact_as_ros};
+pub use type_description::{type_description, type_hash};
 pub use writer::Writer;
 
 use super::Finite;

@@ -1,7 +1,9 @@
 //! Whole messages: the exact layout, and that of ROS.
 
 use super::ros::Header;
-use super::{DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, decode_with, encode_with};
+use super::{
+    DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, decode_with, encode_with, type_hash,
+};
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
 
@@ -15,6 +17,14 @@ impl<T: Payload> Stamped<T> {
     pub fn ros_schema() -> Option<Schema> {
         T::ROS.and_then(|layout| match layout.shape {
             Shape::Struct(shape) => Some(Schema::new(shape.name, layout.shape)),
+            _ => None,
+        })
+    }
+
+    /// The [`type_hash`] of ROS's message, if ROS has one for the payload.
+    pub fn ros_type_hash() -> Option<String> {
+        T::ROS.and_then(|layout| match layout.shape {
+            Shape::Struct(shape) => Some(type_hash(shape.name, layout.shape)),
             _ => None,
         })
     }

@@ -1,101 +1,17 @@
 //! Every shared payload: as bytes, as JSON and as ROS has it.
 
+mod random;
+
 use super::super::tests::{bytes_of, ros_round_trip, round_trip, stamp};
-use super::super::{Field, Shape, Writer, decode, is_exact_as_ros};
-use crate::message::{Finite, Frame, Payload, RosMessage, Stamp};
+use super::super::{decode, is_exact_as_ros};
+use crate::message::{Finite, Frame, Payload, RosMessage, Stamp, Stamped};
 use crate::payload::*;
 use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use random::Random;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// SplitMix64: values of any shape from one seed.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        usize::try_from(self.next() % end as u64).expect("it is below a usize")
-    }
-
-    /// Any bits, and often the numbers that ROS gives a meaning.
-    fn float(&mut self) -> f64 {
-        match self.below(6) {
-            0 => f64::from_bits(self.next()),
-            1 => [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY][self.below(6)],
-            _ => self.next() as i64 as f64 * 1e-18,
-        }
-    }
-
-    fn write(&mut self, name: &str, shape: Shape, writer: &mut Writer<'_>) {
-        match shape {
-            Shape::Bool => (self.below(2) == 1).write(writer),
-            Shape::Char => 'x'.write(writer),
-            Shape::U8 | Shape::I8 => (self.next() as u8).write(writer),
-            Shape::U16 | Shape::I16 => (self.next() as u16).write(writer),
-            // A second has no more.
-            Shape::U32 if name == "nanosec" => ((self.next() % 1_000_000_000) as u32).write(writer),
-            Shape::U32 | Shape::I32 => (self.next() as u32).write(writer),
-            // Small enough for ROS, at times.
-            Shape::U64 | Shape::I64 => {
-                let shift = self.below(48);
-                (self.next() >> shift).write(writer);
-            }
-            Shape::F32 => (self.float() as f32).write(writer),
-            Shape::F64 => self.float().write(writer),
-            Shape::Text => writer.text(["", "base_link", "é", "left wheel"][self.below(4)]),
-            Shape::Option(of) => {
-                let length = self.below(2);
-                writer.length(length);
-                self.some(length, *of, writer);
-            }
-            Shape::List(of) => {
-                let length = self.below(4);
-                writer.length(length);
-                self.some(length, *of, writer);
-            }
-            // An unknown covariance of ROS.
-            Shape::Array(Shape::F64, length) if self.below(4) == 0 => {
-                vec![0.0; length].iter().for_each(|zero: &f64| zero.write(writer))
-            }
-            Shape::Array(of, length) => self.some(length, *of, writer),
-            Shape::Struct(of) => of.fields.iter().for_each(|field| self.write(field.name, field.shape, writer)),
-            Shape::Enum(of) => {
-                let number = self.below(of.variants.len());
-                writer.variant(u32::try_from(number).expect("there are few"), 0);
-                for (index, variant) in
-                    of.variants.iter().enumerate().filter(|(_, variant)| !variant.fields.is_empty())
-                {
-                    writer.length(usize::from(index == number));
-                    if index == number {
-                        variant.fields.iter().for_each(|field| self.write(field.name, field.shape, writer));
-                    }
-                }
-            }
-        }
-    }
-
-    fn some(&mut self, length: usize, of: Shape, writer: &mut Writer<'_>) {
-        for _ in 0..length {
-            self.write("", of, writer);
-        }
-    }
-
-    fn value<T: Field>(&mut self) -> T {
-        let mut bytes = vec![0, 1, 0, 0];
-        let mut body = Vec::new();
-        self.write("", T::SHAPE, &mut Writer::new(&mut body));
-        bytes.extend(body);
-        decode(&bytes).expect("it has the shape")
-    }
-}
 
 /// What is written is read back, and `is_exact_as_ros` tells what ROS's message does not keep.
 fn holds<T: Payload + RosMessage>(random: &mut Random, stamp: Stamp) {
@@ -111,6 +27,24 @@ fn holds<T: Payload + RosMessage>(random: &mut Random, stamp: Stamp) {
     }
 }
 
+/// Calls a function for each payload that ROS has a message for.
+macro_rules! of_each_ros_payload {
+    ($call:ident($($argument:expr),*)) => {
+        of_each_ros_payload! {
+            $call($($argument),*):
+            Imu MagneticField FluidPressure Range LaserScan Image GnssFix BatteryState JointState JointStates
+            PositionCommand VelocityCommand EffortCommand JointTrajectory Orientation Pose PoseWithCovariance Twist
+            TwistWithCovariance Accel Wrench Odometry Path
+        }
+    };
+    ($call:ident $arguments:tt: $($payload:ident)*) => {
+        $( of_each_ros_payload!(@call $call $payload $arguments); )*
+    };
+    (@call $call:ident $payload:ident ($($argument:expr),*)) => {
+        $call::<$payload>($($argument),*)
+    };
+}
+
 proptest! {
     // Of every payload each.
     #![proptest_config(ProptestConfig::with_cases(64))]
@@ -118,35 +52,57 @@ proptest! {
     #[test]
     fn shared_payloads_are_read_back(seed in any::<u64>(), stamp in stamp()) {
         let random = &mut Random(seed);
-        holds::<Imu>(random, stamp);
-        holds::<MagneticField>(random, stamp);
-        holds::<FluidPressure>(random, stamp);
-        holds::<Range>(random, stamp);
-        holds::<LaserScan>(random, stamp);
-        holds::<Image>(random, stamp);
-        holds::<GnssFix>(random, stamp);
-        holds::<BatteryState>(random, stamp);
-        holds::<JointState>(random, stamp);
-        holds::<JointStates>(random, stamp);
-        holds::<PositionCommand>(random, stamp);
-        holds::<VelocityCommand>(random, stamp);
-        holds::<EffortCommand>(random, stamp);
-        holds::<JointTrajectory>(random, stamp);
-        holds::<Orientation>(random, stamp);
-        holds::<Pose>(random, stamp);
-        holds::<PoseWithCovariance>(random, stamp);
-        holds::<Twist>(random, stamp);
-        holds::<TwistWithCovariance>(random, stamp);
-        holds::<Accel>(random, stamp);
-        holds::<Wrench>(random, stamp);
-        holds::<Odometry>(random, stamp);
-        holds::<Path>(random, stamp);
+        of_each_ros_payload!(holds(random, stamp));
         round_trip(&random.value::<Marg>());
         round_trip(&random.value::<PowerState>());
         round_trip(&random.value::<RelativePose>());
         round_trip(&random.value::<BeginMotion>());
         round_trip(&random.value::<EndMotion>());
     }
+}
+
+/// As ROS 2 Kilted has them in its packages' `msg/*.json`.
+#[test]
+fn type_hashes_are_those_of_ros() {
+    fn named<T: Payload>(hashes: &mut Vec<(String, String)>) {
+        let name = Stamped::<T>::ros_schema().map(|schema| schema.name);
+        hashes.push((name.expect("ROS has it"), Stamped::<T>::ros_type_hash().expect("ROS has it")));
+    }
+    let mut hashes = Vec::new();
+    of_each_ros_payload!(named(&mut hashes));
+    hashes.dedup();
+    let expected = [
+        ("sensor_msgs/msg/Imu", "7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"),
+        ("sensor_msgs/msg/MagneticField", "e80f32f56a20486c9923008fc1a1db07bbb273cbbf6a5b3bfa00835ee00e4dff"),
+        ("sensor_msgs/msg/FluidPressure", "22dfb2b145a0bd5a31a1ac3882a1b32148b51d9b2f3bab250290d66f3595bc32"),
+        ("sensor_msgs/msg/Range", "b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a"),
+        ("sensor_msgs/msg/LaserScan", "64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828"),
+        ("sensor_msgs/msg/Image", "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"),
+        ("sensor_msgs/msg/NavSatFix", "62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"),
+        ("sensor_msgs/msg/BatteryState", "4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741"),
+        ("sensor_msgs/msg/JointState", "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"),
+        ("trajectory_msgs/msg/JointTrajectory", "179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e"),
+        ("geometry_msgs/msg/QuaternionStamped", "381add86c6c3160644d228ca342182c7fd6c7fab11c7a85ad817a9cc22dbac6e"),
+        ("geometry_msgs/msg/PoseStamped", "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8"),
+        (
+            "geometry_msgs/msg/PoseWithCovarianceStamped",
+            "26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e",
+        ),
+        (
+            "geometry_msgs/msg/TwistWithCovarianceStamped",
+            "77b67434531e6529b7a0091357b186b6ebdb17fd9ffd3e0c7ce9d3fb11a44563",
+        ),
+        (
+            "geometry_msgs/msg/AccelWithCovarianceStamped",
+            "61c9ad8928e71dd95ce791b2f02809ee2a0bbcc42cd0e4047fd00a822a08e444",
+        ),
+        ("geometry_msgs/msg/WrenchStamped", "8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77"),
+        ("nav_msgs/msg/Odometry", "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"),
+        ("nav_msgs/msg/Path", "1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b"),
+    ];
+    let expected: Vec<_> =
+        expected.iter().map(|(name, hash)| ((*name).to_owned(), format!("RIHS01_{hash}"))).collect();
+    assert_eq!(hashes, expected);
 }
 
 /// What sensors usually say is held by ROS's message, so that it is recorded once.
