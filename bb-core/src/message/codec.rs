@@ -126,17 +126,22 @@ fn decode_with<T>(
     bytes: &[u8],
     read: impl FnOnce(&mut Reader<'_>) -> Result<T, DecodeError>,
 ) -> Result<T, DecodeError> {
-    let Some((header, body)) = bytes.split_first_chunk::<4>() else {
+    let mut reader = data(bytes)?;
+    let value = read(&mut reader)?;
+    match reader.left() {
+        0..=PADDING => Ok(value),
+        left => Err(reader.error("the end", format!("{left} more bytes"))),
+    }
+}
+
+/// What follows the four bytes that name the encoding.
+fn data(bytes: &[u8]) -> Result<Reader<'_>, DecodeError> {
+    let Some((header, data)) = bytes.split_first_chunk::<4>() else {
         return Err(DecodeError::new(0, "the four bytes that name the encoding", format!("{} bytes", bytes.len())));
     };
     if header[..2] != HEADER[..2] {
         let found = format!("{:#04x}{:02x}", header[0], header[1]);
         return Err(DecodeError::new(0, "the encoding 0x0001, plain CDR in little endian", found));
     }
-    let mut reader = Reader::new(body);
-    let value = read(&mut reader)?;
-    match reader.left() {
-        0..=PADDING => Ok(value),
-        left => Err(reader.error("the end", format!("{left} more bytes"))),
-    }
+    Ok(Reader::new(data))
 }

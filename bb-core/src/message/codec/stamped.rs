@@ -2,7 +2,7 @@
 
 use super::ros::Header;
 use super::{
-    DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, decode_with, encode_with, type_hash,
+    DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, data, encode_with, type_hash,
 };
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
@@ -84,7 +84,9 @@ pub fn encode_as_ros<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> b
 /// ROS has no layout for the payload, or the bytes are wrong.
 pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeError> {
     match T::ROS {
-        Some(layout) => decode_with(bytes, layout.read),
+        // Bytes after the message are ignored: ROS counts padding for empty lists that it does not write, so some of its own
+        // messages end with bytes that mean nothing.
+        Some(layout) => (layout.read)(&mut data(bytes)?),
         None => Err(DecodeError::new(0, "a payload that ROS has a message for", T::NAME)),
     }
 }

@@ -3,7 +3,7 @@
 mod random;
 
 use super::super::tests::{bytes_of, ros_round_trip, round_trip, stamp};
-use super::super::{decode, is_exact_as_ros};
+use super::super::{decode, decode_as_ros, is_exact_as_ros};
 use crate::message::{Finite, Frame, Payload, RosMessage, Stamp, Stamped};
 use crate::payload::*;
 use crate::time::{MonotonicTime, WallTime};
@@ -262,6 +262,19 @@ fn messages_that_a_payload_cannot_be_are_refused_by_field() {
         error::<JointTrajectory>(decode(&bytes).expect("any number has the shape")),
         "`points[0].time_from_start.sec`: expected a duration that is not negative at byte 0, found -3"
     );
+}
+
+/// As rclpy writes a `JointState` whose lists are empty.
+#[test]
+fn what_ros_appends_is_ignored() {
+    let mut bytes = vec![0; 36];
+    bytes[1] = 1;
+    // An empty frame is the zero that ends it.
+    bytes[12] = 1;
+    bytes.extend(*b"astrtps_");
+    let (states, _) = decode_as_ros::<JointStates>(&bytes).expect("it is whole");
+    assert_eq!(states, JointStates::default());
+    assert!(decode_as_ros::<JointStates>(&bytes[..32]).is_err());
 }
 
 #[test]
