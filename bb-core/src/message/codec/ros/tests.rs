@@ -1,5 +1,6 @@
 //! Every shared payload: as bytes, as JSON and as ROS has it.
 
+mod exchange;
 mod random;
 
 use super::super::tests::{bytes_of, ros_round_trip, round_trip, stamp};
@@ -44,6 +45,7 @@ macro_rules! of_each_ros_payload {
         $call::<$payload>($($argument),*)
     };
 }
+use of_each_ros_payload;
 
 proptest! {
     // Of every payload each.
@@ -61,7 +63,7 @@ proptest! {
     }
 }
 
-/// As ROS 2 Kilted has them in its packages' `msg/*.json`.
+/// As ROS 2 Kilted has them in its packages' `msg/*.json`; `tests/ros2/check` compares with what is installed.
 #[test]
 fn type_hashes_are_those_of_ros() {
     fn named<T: Payload>(hashes: &mut Vec<(String, String)>) {
@@ -105,7 +107,7 @@ fn type_hashes_are_those_of_ros() {
     assert_eq!(hashes, expected);
 }
 
-/// What sensors usually say is held by ROS's message, so that it is recorded once.
+/// ROS's message holds what sensors usually measure, so it is recorded once.
 #[test]
 fn usual_values_are_exact_as_ros() {
     fn is_exact<T: Payload>(payload: T) -> bool {
