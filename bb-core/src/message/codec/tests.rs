@@ -286,6 +286,18 @@ fn a_length_is_believed_as_far_as_the_bytes_reach() {
     assert!(decode::<[Matrix6<f64>; 1 << 8]>(&bytes).is_err());
 }
 
+/// Each row would take its time, and no row takes a byte.
+#[test]
+fn rows_without_columns_cost_nothing() {
+    for (rows, columns) in [(u32::MAX, 0), (0, u32::MAX), (3, 0), (0, 0)] {
+        let mut bytes = vec![0, 1, 0, 0];
+        bytes.extend([rows, columns, 0].map(u32::to_le_bytes).as_flattened());
+        let matrix: DMatrix<f64> = decode(&bytes).expect("it is whole");
+        assert_eq!((matrix.nrows(), matrix.ncols()), (rows as usize, columns as usize));
+        round_trip(&matrix);
+    }
+}
+
 #[test]
 fn the_same_name_is_kept_once() {
     let bytes = bytes_of(&"a name that occurs once");
