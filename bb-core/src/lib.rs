@@ -99,7 +99,7 @@ pub mod __private {
     pub use crate::journal::Journal;
     pub use crate::message::codec::{
         DecodeError, EnumShape, FieldOf, FieldShape, NotField, Reader, RosLayout, Shape, StructShape, Writer,
-        is_finite,
+        is_any, is_finite,
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{

@@ -23,6 +23,26 @@ pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 /// assert!(!bb_core::Finite::is_finite(&WindingTemperature { temperature_k: f64::NAN }));
 /// ```
 ///
+/// A message with a NaN or an infinity is dropped before an estimator sees it. A field that holds those on purpose, such
+/// as the range of a beam that hit nothing, says so:
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// /// One beam.
+/// #[derive(Clone, Debug, Payload)]
+/// pub struct Beam {
+///     /// Direction, rad.
+///     pub angle: f64,
+///     /// Distance, m; infinite if nothing was hit.
+///     #[payload(non_finite)]
+///     pub range: f64,
+/// }
+///
+/// assert!(bb_core::Finite::is_finite(&Beam { angle: 0.0, range: f64::INFINITY }));
+/// assert!(!bb_core::Finite::is_finite(&Beam { angle: f64::NAN, range: 1.0 }));
+/// ```
+///
 /// Payloads are handed on by reference; a clone is made only for a subscriber and for the cache of an input that is
 /// not the driver, so large data belongs behind an `Arc`.
 ///

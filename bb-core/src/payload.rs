@@ -1,11 +1,40 @@
 //! The payloads that robots share; they mirror ROS where ROS has one. All SI.
+//!
+//! | what | payloads |
+//! |---|---|
+//! | inertial and magnetic sensors, pressure | [`Imu`], [`MagneticField`], [`Marg`], [`FluidPressure`] |
+//! | distance | [`Range`], [`LaserScan`] |
+//! | navigation satellites | [`GnssFix`] |
+//! | images | [`Image`] |
+//! | power | [`BatteryState`], [`PowerState`] |
+//! | position and orientation | [`Orientation`], [`Pose`], [`PoseWithCovariance`], [`RelativePose`], [`Path`] |
+//! | motion and forces | [`Twist`], [`TwistWithCovariance`], [`Accel`], [`Wrench`] |
+//! | pose with motion | [`Odometry`] |
+//! | joints | [`JointState`], [`JointStates`] |
+//! | commands to actuators, and their reports | [`PositionCommand`], [`VelocityCommand`], [`EffortCommand`], [`JointTrajectory`], [`BeginMotion`], [`EndMotion`] |
 
+mod actuator;
 mod attitude;
+mod geometry;
+mod gnss;
+mod image;
 mod joint;
 mod odometry;
+mod path;
+mod power;
+mod range;
 mod sensor;
+mod trajectory;
 
+pub use actuator::{BeginMotion, EffortCommand, EndMotion, MotionEnd, PositionCommand, VelocityCommand};
 pub use attitude::{Orientation, Pose};
-pub use joint::JointState;
+pub use geometry::{Accel, PoseWithCovariance, TwistWithCovariance, Wrench};
+pub use gnss::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
+pub use image::Image;
+pub use joint::{JointState, JointStates};
 pub use odometry::{Odometry, Twist};
-pub use sensor::{Imu, MagneticField, Marg};
+pub use path::{Path, PathPose, RelativePose};
+pub use power::{BatteryHealth, BatteryState, BatteryStatus, BatteryTechnology, PowerState};
+pub use range::{LaserScan, Radiation, Range};
+pub use sensor::{FluidPressure, Imu, MagneticField, Marg};
+pub use trajectory::{JointTrajectory, TrajectoryPoint};

@@ -5,8 +5,9 @@
 //! | what a field of a payload must be able to do | [`Field`]; `#[derive(Payload)]` writes it for structs and enums |
 //! | plain CDR, little endian, as ROS 2 writes it | [`Writer`], [`Reader`] |
 //! | what the bytes mean | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
+//! | the hash by which ROS 2 tells types apart | [`type_hash`] |
 //! | a message in the layout that ROS has for it | [`RosMessage`] |
-//! | a message as JSON | [`to_json`] |
+//! | a value to JSON and back, and the JSON Schema of a type | [`to_json`], [`from_json`], [`json_schema`] |
 //!
 //! A message has an *exact* layout, [`Stamped`](crate::Stamped) with all it holds, and may have the layout of a ROS
 //! message beside, which viewers know and in which some values cannot be told apart.
@@ -21,6 +22,7 @@
 
 mod algebra;
 mod collections;
+mod definitions;
 mod derive;
 mod error;
 mod intern;
@@ -29,22 +31,25 @@ mod plain;
 mod reader;
 pub mod ros;
 mod schema;
+mod sha256;
 mod shape;
 mod stamped;
 #[cfg(test)]
 mod tests;
+mod type_description;
 mod writer;
 
 #[doc(hidden)]
-pub use derive::{FieldOf, NotField, is_finite};
+pub use derive::{FieldOf, NotField, is_any, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
-pub use json::to_json;
+pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
 pub use reader::Reader;
 pub use ros::{RosLayout, RosMessage};
 pub use schema::Schema;
 pub use shape::{EnumShape, FieldShape, Shape, StructShape};
 pub use stamped::{decode_as_ros, encode_as_ros, is_exact_as_ros};
+pub use type_description::{type_description, type_hash};
 pub use writer::Writer;
 
 use super::Finite;
@@ -112,26 +117,31 @@ pub fn decode<T: Field>(bytes: &[u8]) -> Result<T, DecodeError> {
     decode_with(bytes, T::read)
 }
 
-fn encode_with(bytes: &mut Vec<u8>, write: impl FnOnce(&mut Writer<'_>)) {
+fn encode_with<T>(bytes: &mut Vec<u8>, write: impl FnOnce(&mut Writer<'_>) -> T) -> T {
     bytes.extend(HEADER);
-    write(&mut Writer::new(bytes));
+    write(&mut Writer::new(bytes))
 }
 
 fn decode_with<T>(
     bytes: &[u8],
     read: impl FnOnce(&mut Reader<'_>) -> Result<T, DecodeError>,
 ) -> Result<T, DecodeError> {
-    let Some((header, body)) = bytes.split_first_chunk::<4>() else {
+    let mut reader = data(bytes)?;
+    let value = read(&mut reader)?;
+    match reader.left() {
+        0..=PADDING => Ok(value),
+        left => Err(reader.error("the end", format!("{left} more bytes"))),
+    }
+}
+
+/// What follows the four bytes that name the encoding.
+fn data(bytes: &[u8]) -> Result<Reader<'_>, DecodeError> {
+    let Some((header, data)) = bytes.split_first_chunk::<4>() else {
         return Err(DecodeError::new(0, "the four bytes that name the encoding", format!("{} bytes", bytes.len())));
     };
     if header[..2] != HEADER[..2] {
         let found = format!("{:#04x}{:02x}", header[0], header[1]);
         return Err(DecodeError::new(0, "the encoding 0x0001, plain CDR in little endian", found));
     }
-    let mut reader = Reader::new(body);
-    let value = read(&mut reader)?;
-    match reader.left() {
-        0..=PADDING => Ok(value),
-        left => Err(reader.error("the end", format!("{left} more bytes"))),
-    }
+    Ok(Reader::new(data))
 }

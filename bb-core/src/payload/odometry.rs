@@ -16,7 +16,8 @@ pub struct Twist {
     pub covariance: Option<Matrix6<f64>>,
 }
 
-/// Where a body is and how it moves (`nav_msgs/Odometry`).
+/// Where a body is and how it moves, of an estimator or counted from wheels (`nav_msgs/Odometry`). Either covariance may be
+/// unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Odometry {

@@ -1,4 +1,4 @@
-//! What inertial and magnetic sensors measure.
+//! What inertial, magnetic and pressure sensors measure.
 
 use crate::Payload;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -60,4 +60,14 @@ pub struct Marg {
     pub imu: Imu,
     /// The magnetic field, where there is a reading that belongs to this sample.
     pub magnetic_field: Option<MagneticField>,
+}
+
+/// The pressure of a gas or a liquid around a sensor: of a barometer, or under water (`sensor_msgs/FluidPressure`).
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
+pub struct FluidPressure {
+    /// Absolute pressure, Pa.
+    pub fluid_pressure: f64,
+    /// Its variance, Pa².
+    pub variance: Option<f64>,
 }

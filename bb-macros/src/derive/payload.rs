@@ -6,7 +6,7 @@ use crate::diagnostics::Diagnostics;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{Data, DeriveInput, Fields, LitStr};
+use syn::{Data, DeriveInput, Field, Fields, LitStr};
 
 /// What `#[payload(…)]` says.
 #[derive(Default)]
@@ -23,14 +23,14 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     let text = crate::names::text(name);
     let (generics, arguments, bounds) = item.generics.split_for_impl();
     let finite = match &item.data {
-        Data::Struct(data) => arm(&quote!(Self), &data.fields),
+        Data::Struct(data) => arm(&quote!(Self), &data.fields, diagnostics),
         Data::Enum(data) if data.variants.is_empty() => quote!(_ => true,),
         Data::Enum(data) => data
             .variants
             .iter()
             .map(|variant| {
                 let variant_name = &variant.ident;
-                arm(&quote!(Self::#variant_name), &variant.fields)
+                arm(&quote!(Self::#variant_name), &variant.fields, diagnostics)
             })
             .collect(),
         Data::Union(_) => {
@@ -83,16 +83,38 @@ fn attributes(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Attributes {
 }
 
 /// `Self { a: f0, b: f1 } => f0 is finite && f1 is finite,`
-fn arm(head: &TokenStream, fields: &Fields) -> TokenStream {
+fn arm(head: &TokenStream, fields: &Fields, diagnostics: &mut Diagnostics) -> TokenStream {
     let patterns = patterns(fields);
     let mut checks = quote!(true);
     for (index, field) in fields.iter().enumerate() {
         let bound = format_ident!("f{index}");
         let kind = &field.ty;
+        let check = match may_be_non_finite(field, diagnostics) {
+            true => quote!(is_any),
+            false => quote!(is_finite),
+        };
         // The only place that requires the type to be a field, so that one that is not is reported once.
-        checks.extend(quote_spanned!(kind.span()=> && ::bb_core::__private::is_finite::<#kind>(#bound)));
+        checks.extend(quote_spanned!(kind.span()=> && ::bb_core::__private::#check::<#kind>(#bound)));
     }
     quote!(#head { #patterns } => #checks,)
+}
+
+/// Whether `#[payload(non_finite)]` is on a field.
+fn may_be_non_finite(field: &Field, diagnostics: &mut Diagnostics) -> bool {
+    let mut may_be = false;
+    for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("payload")) {
+        let parsed = attribute.parse_nested_meta(|meta| match meta.path.is_ident("non_finite") {
+            true => {
+                may_be = true;
+                Ok(())
+            }
+            false => Err(meta.error("expected `non_finite`")),
+        });
+        if let Err(error) = parsed {
+            diagnostics.syntax(&error);
+        }
+    }
+    may_be
 }
 
 /// `a: f0, b: f1,`

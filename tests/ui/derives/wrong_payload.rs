@@ -1,4 +1,4 @@
-//! A field that cannot be recorded, and a misspelt attribute; a payload that is right beside them is not reported.
+//! A field that cannot be recorded, and misspelt attributes; a payload that is right beside them is not reported.
 
 use bb_core::prelude::*;
 
@@ -14,6 +14,7 @@ pub struct Frame {
 #[derive(Clone, Debug, Payload)]
 #[payload(rose)]
 pub struct Sample {
+    #[payload(infinite)]
     pub frame: Frame,
 }
 

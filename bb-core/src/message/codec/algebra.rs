@@ -56,6 +56,10 @@ where
     C: nalgebra::Dim,
     S: RawStorage<T, R, C>,
 {
+    if matrix.is_empty() {
+        // Thousands of millions of rows without columns take no bytes, so they may come from anywhere.
+        return;
+    }
     for row in 0..matrix.nrows() {
         for column in 0..matrix.ncols() {
             if let Some(element) = matrix.get((row, column)) {
@@ -98,7 +102,11 @@ impl<T: Field + Scalar> Field for DMatrix<T> {
             let found = format!("{} for {rows} rows and {columns} columns", data.len());
             return Err(reader.error("as many elements as rows and columns make", found).within("data"));
         }
-        Ok(Self::from_row_iterator(rows as usize, columns as usize, data))
+        match data.is_empty() {
+            // As for writing: nalgebra would go through the rows.
+            true => Ok(Self::from_vec(rows as usize, columns as usize, data)),
+            false => Ok(Self::from_row_iterator(rows as usize, columns as usize, data)),
+        }
     }
 }
 

@@ -3,9 +3,14 @@
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::marker::PhantomData;
 
-/// Whether a field is finite. Of all that the derive generates, this alone requires a [`Field`].
+/// Whether a field is finite. Of all that the derive generates, this and [`is_any`] alone require a [`Field`].
 pub fn is_finite<T: Field>(value: &T) -> bool {
     value.is_finite()
+}
+
+/// Always true, for a field that may hold NaN and infinities.
+pub fn is_any<T: Field>(_: &T) -> bool {
+    true
 }
 
 /// What `T` does as a field, if it is one; else what [`NotField`] does, since own functions go first.

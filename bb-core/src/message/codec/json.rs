@@ -1,133 +1,55 @@
-//! Bytes and their shape as JSON, for dashboards.
+//! Payloads as JSON, by their shape: for dashboards, bridges and command lines.
+//!
+//! | value | JSON |
+//! |---|---|
+//! | integer | a number, exact, also beyond what JavaScript holds |
+//! | float | a number that reads back the same, or `"NaN"`, `"Infinity"`, `"-Infinity"` |
+//! | `char`, text | a string |
+//! | `Option` | `null` or the value |
+//! | list, array, matrix | an array; a matrix row by row |
+//! | vector of three, quaternion | an object with `x`, `y`, `z` and `w` |
+//! | struct | an object; one without fields is `{}`; a tuple struct of one field is that field |
+//! | enum | the name of the variant, or an object of that name with the variant's fields |
+//!
+//! Two things are lost: the bits of a NaN, and `Some(None)` of an `Option<Option<T>>`, which reads back as `None`.
 
-use super::shape::NOTHING;
-use super::{DecodeError, Field, FieldShape, Reader, Shape, Writer};
-use std::fmt::{Display, Write};
+mod error;
+mod read;
+mod schema;
+#[cfg(test)]
+pub(super) mod tests;
+mod token;
+mod wording;
+mod write;
 
-/// A value as JSON. Floats are written so that they are read back the same; what JSON has no number for is the text
-/// `"NaN"`, `"Infinity"` or `"-Infinity"`. Options are `null` or the value; an enum is the name of its variant, or an object of
-/// that name with the variant's fields; integers are exact, also beyond what JavaScript holds.
-pub fn to_json<T: Field>(value: &T) -> String {
-    let mut bytes = Vec::new();
-    value.write(&mut Writer::new(&mut bytes));
-    let mut json = String::new();
-    // What was written just now can be read.
-    let _ = write(T::SHAPE, &mut Reader::new(&bytes), &mut json);
-    json
+pub use error::JsonError;
+pub use read::{from_json, json_to_bytes};
+pub use schema::json_schema;
+pub use write::{bytes_to_json, to_json};
+
+use super::shape::{FieldShape, NOTHING};
+
+/// The floats that JSON has no number for.
+const NAN: &str = "NaN";
+const INFINITY: &str = "Infinity";
+const NEGATIVE_INFINITY: &str = "-Infinity";
+
+/// How the fields of a struct or a variant are written.
+enum Form {
+    /// No fields: `{}`.
+    Empty,
+    /// One field without a name: that field.
+    Transparent(super::Shape),
+    /// An object.
+    Object(&'static [FieldShape]),
 }
 
-fn write(shape: Shape, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
-    match shape {
-        Shape::Bool => number(bool::read(reader)?, json),
-        Shape::Char => text(char::read(reader)?.encode_utf8(&mut [0; 4]), json),
-        Shape::I8 => number(i8::read(reader)?, json),
-        Shape::I16 => number(i16::read(reader)?, json),
-        Shape::I32 => number(i32::read(reader)?, json),
-        Shape::I64 => number(i64::read(reader)?, json),
-        Shape::U8 => number(u8::read(reader)?, json),
-        Shape::U16 => number(u16::read(reader)?, json),
-        Shape::U32 => number(u32::read(reader)?, json),
-        Shape::U64 => number(u64::read(reader)?, json),
-        Shape::F32 => {
-            let value = f32::read(reader)?;
-            float(format!("{value:?}"), value.into(), json);
-        }
-        Shape::F64 => {
-            let value = f64::read(reader)?;
-            float(format!("{value:?}"), value, json);
-        }
-        Shape::Text => text(reader.text()?, json),
-        Shape::Option(of) => match reader.is_present()? {
-            true => write(*of, reader, json)?,
-            false => json.push_str("null"),
-        },
-        Shape::List(of) => {
-            let length = reader.length()?;
-            list(*of, length, reader, json)?;
-        }
-        Shape::Array(of, length) => list(*of, length, reader, json)?,
-        Shape::Struct(of) => object(of.fields, reader, json)?,
-        Shape::Enum(of) => {
-            let number = reader.variant()?;
-            for (index, variant) in of.variants.iter().enumerate() {
-                let is_this = usize::try_from(number) == Ok(index);
-                let has_fields = !variant.fields.is_empty() && reader.is_present()?;
-                match (is_this, has_fields) {
-                    (true, true) => {
-                        json.push('{');
-                        text(variant.name, json);
-                        json.push(':');
-                        object(variant.fields, reader, json)?;
-                        json.push('}');
-                    }
-                    (true, false) => text(variant.name, json),
-                    (false, _) => {}
-                }
-            }
+impl Form {
+    fn of(fields: &'static [FieldShape]) -> Self {
+        match fields {
+            [] | [FieldShape { name: NOTHING, .. }] => Self::Empty,
+            [FieldShape { name: "0", shape }] => Self::Transparent(*shape),
+            fields => Self::Object(fields),
         }
     }
-    Ok(())
-}
-
-fn list(of: Shape, length: usize, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
-    json.push('[');
-    for index in 0..length {
-        if index > 0 {
-            json.push(',');
-        }
-        write(of, reader, json)?;
-    }
-    json.push(']');
-    Ok(())
-}
-
-fn object(fields: &[FieldShape], reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
-    // A struct of one field without a name is that field.
-    if let [FieldShape { name: "0", shape }] = fields {
-        return write(*shape, reader, json);
-    }
-    json.push('{');
-    for (index, field) in fields.iter().enumerate() {
-        if field.name == NOTHING {
-            reader.nothing()?;
-            continue;
-        }
-        if index > 0 {
-            json.push(',');
-        }
-        text(field.name, json);
-        json.push(':');
-        write(field.shape, reader, json)?;
-    }
-    json.push('}');
-    Ok(())
-}
-
-fn number(value: impl Display, json: &mut String) {
-    // Writing to a string cannot fail.
-    let _ = write!(json, "{value}");
-}
-
-fn float(shortest: String, value: f64, json: &mut String) {
-    match value {
-        _ if value.is_finite() => json.push_str(&shortest),
-        _ if value.is_nan() => json.push_str("\"NaN\""),
-        _ => json.push_str(if value > 0.0 { "\"Infinity\"" } else { "\"-Infinity\"" }),
-    }
-}
-
-fn text(text: &str, json: &mut String) {
-    json.push('"');
-    for letter in text.chars() {
-        match letter {
-            '"' => json.push_str("\\\""),
-            '\\' => json.push_str("\\\\"),
-            '\n' => json.push_str("\\n"),
-            control if control < ' ' => {
-                let _ = write!(json, "\\u{:04x}", u32::from(control));
-            }
-            other => json.push(other),
-        }
-    }
-    json.push('"');
 }

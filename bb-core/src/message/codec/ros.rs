@@ -1,25 +1,107 @@
-//! Messages in the layout that ROS has for them, so that viewers and other tools know them.
+//! Messages in the layout that ROS has for them, so that viewers and other tools know them. The payloads are those of
+//! [`payload`](crate::payload).
 //!
-//! | payload | message | not told apart |
+//! | payload | message | what it does not keep |
 //! |---|---|---|
-//! | [`Imu`](crate::payload::Imu) | `sensor_msgs/msg/Imu` | an unknown covariance and one of zeros; a covariance of an orientation that is not there |
-//! | [`MagneticField`](crate::payload::MagneticField) | `sensor_msgs/msg/MagneticField` | an unknown covariance and one of zeros |
-//! | [`JointState`](crate::payload::JointState) | `sensor_msgs/msg/JointState` | – |
-//! | [`Orientation`](crate::payload::Orientation) | `geometry_msgs/msg/QuaternionStamped` | the covariance is left out |
-//! | [`Pose`](crate::payload::Pose) | `geometry_msgs/msg/PoseStamped` | the covariance is left out |
-//! | [`Twist`](crate::payload::Twist) | `geometry_msgs/msg/TwistWithCovarianceStamped` | an unknown covariance and one of zeros |
-//! | [`Odometry`](crate::payload::Odometry) | `nav_msgs/msg/Odometry` | an unknown covariance and one of zeros |
+//! | `Imu` | `sensor_msgs/msg/Imu` | a covariance of zeros, which reads as unknown; that of an orientation that is not there |
+//! | `MagneticField` | `sensor_msgs/msg/MagneticField` | a covariance of zeros, which reads as unknown |
+//! | `FluidPressure` | `sensor_msgs/msg/FluidPressure` | a variance of zero, which reads as unknown |
+//! | `Range` | `sensor_msgs/msg/Range` | a variance of zero, which reads as unknown |
+//! | `LaserScan` | `sensor_msgs/msg/LaserScan` | – |
+//! | `Image` | `sensor_msgs/msg/Image` | – |
+//! | `GnssFix` | `sensor_msgs/msg/NavSatFix` | the last bit of an angle, since ROS has degrees |
+//! | `BatteryState` | `sensor_msgs/msg/BatteryState` | digits beyond the seventh, since ROS has `float32` |
+//! | `JointState`, `JointStates`, `PositionCommand`, `VelocityCommand`, `EffortCommand` | `sensor_msgs/msg/JointState` | – |
+//! | `JointTrajectory` | `trajectory_msgs/msg/JointTrajectory` | times beyond 68 years |
+//! | `Orientation` | `geometry_msgs/msg/QuaternionStamped` | the covariance |
+//! | `Pose` | `geometry_msgs/msg/PoseStamped` | the covariance |
+//! | `PoseWithCovariance` | `geometry_msgs/msg/PoseWithCovarianceStamped` | – |
+//! | `Twist` | `geometry_msgs/msg/TwistWithCovarianceStamped` | a covariance of zeros, which reads as unknown |
+//! | `TwistWithCovariance` | `geometry_msgs/msg/TwistWithCovarianceStamped` | – |
+//! | `Accel` | `geometry_msgs/msg/AccelWithCovarianceStamped` | a covariance of zeros, which reads as unknown |
+//! | `Wrench` | `geometry_msgs/msg/WrenchStamped` | – |
+//! | `Odometry` | `nav_msgs/msg/Odometry` | a covariance of zeros, which reads as unknown |
+//! | `Path` | `nav_msgs/msg/Path` | – |
 //!
 //! As in ROS, an unknown covariance is all zeros, and an orientation that is not there has −1 as the first element of its
-//! covariance. A header's stamp has 32 bits for the seconds; times before 1901 and after 2038 do not fit. Whether a
-//! message is told apart is asked by [`is_exact_as_ros`](super::is_exact_as_ros); one that is not needs the exact layout
-//! as well. What a body's pose is given in is the frame [`WORLD`], not the body's.
+//! covariance. What a receiver or a battery does not measure is NaN. A header's stamp has 32 bits for the seconds; times
+//! before 1901 and after 2038 do not fit. [`is_exact_as_ros`](super::is_exact_as_ros) tells whether a message reads back
+//! the same; one that does not needs the exact layout as well. Poses are given in the frame [`WORLD`], not the body's.
+
+/// Declares a ROS message with a header, and how a payload is written as one and read back.
+///
+/// The expressions of `write` see the `Stamped` payload by the name in parentheses; those of `read` see the message's
+/// fields by their names and may return a `DecodeError` with `?`. The header has the message's frame, or that of `in`.
+/// Without types the message is one that is declared already.
+///
+/// ```text
+/// ros_message! {
+///     FluidPressure => FluidPressureMessage "sensor_msgs/FluidPressure";
+///     write(pressure) {
+///         fluid_pressure: f64 = pressure.fluid_pressure,
+///         variance: f64 = pressure.variance.unwrap_or_default(),
+///     }
+///     read { Self { fluid_pressure, variance: unless_zero(variance) } }
+/// }
+/// ```
+macro_rules! ros_message {
+    (
+        $payload:ty => $name:ident $ros:literal $(in $frame:expr)?;
+        write($message:ident) { $($field:ident: $kind:ty = $value:expr,)* }
+        read $read:block
+    ) => {
+        #[doc = concat!("`", $ros, "`")]
+        #[derive(Clone, Debug, crate::Payload)]
+        #[payload(name = $ros)]
+        pub struct $name {
+            header: crate::message::codec::ros::Header,
+            $($field: $kind,)*
+        }
+
+        ros_message! {
+            $payload => $name $(in $frame)?;
+            write($message) { $($field = $value,)* }
+            read $read
+        }
+    };
+    (
+        $payload:ty => $name:ident $(in $frame:expr)?;
+        write($message:ident) { $($field:ident = $value:expr,)* }
+        read $read:block
+    ) => {
+        impl crate::message::RosMessage for $payload {
+            type Message = $name;
+
+            fn to_ros($message: &crate::message::Stamped<Self>) -> $name {
+                let frame = ros_message!(@frame $message $($frame)?);
+                $name { header: crate::message::codec::ros::Header::in_frame($message, frame), $($field: $value,)* }
+            }
+
+            fn from_ros(
+                message: $name,
+            ) -> Result<(Self, crate::time::WallTime), crate::message::DecodeError> {
+                let $name { header, $($field,)* } = message;
+                Ok(($read, header.stamp.wall_time()))
+            }
+        }
+    };
+    (@frame $message:ident) => {
+        $message.frame.name()
+    };
+    (@frame $message:ident $frame:expr) => {
+        $frame
+    };
+}
 
 mod covariance;
 mod geometry;
-mod odometry;
+mod nav;
+mod number;
 mod sensor;
 mod standard;
+#[cfg(test)]
+mod tests;
+mod trajectory;
 
 pub use standard::{Header, Text, Time, TransformStamped, TransformsMessage};
 

@@ -1,7 +1,9 @@
 //! Whole messages: the exact layout, and that of ROS.
 
 use super::ros::Header;
-use super::{DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, decode_with, encode_with};
+use super::{
+    DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, data, encode_with, type_hash,
+};
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
 
@@ -15,6 +17,14 @@ impl<T: Payload> Stamped<T> {
     pub fn ros_schema() -> Option<Schema> {
         T::ROS.and_then(|layout| match layout.shape {
             Shape::Struct(shape) => Some(Schema::new(shape.name, layout.shape)),
+            _ => None,
+        })
+    }
+
+    /// The [`type_hash`] of ROS's message, if ROS has one for the payload.
+    pub fn ros_type_hash() -> Option<String> {
+        T::ROS.and_then(|layout| match layout.shape {
+            Shape::Struct(shape) => Some(type_hash(shape.name, layout.shape)),
             _ => None,
         })
     }
@@ -74,7 +84,9 @@ pub fn encode_as_ros<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> b
 /// ROS has no layout for the payload, or the bytes are wrong.
 pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeError> {
     match T::ROS {
-        Some(layout) => decode_with(bytes, layout.read),
+        // Bytes after the message are ignored: ROS counts padding for empty lists that it does not write, so some of its own
+        // messages end with bytes that mean nothing.
+        Some(layout) => (layout.read)(&mut data(bytes)?),
         None => Err(DecodeError::new(0, "a payload that ROS has a message for", T::NAME)),
     }
 }

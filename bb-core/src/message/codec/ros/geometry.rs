@@ -1,34 +1,13 @@
-//! `geometry_msgs`
+//! `geometry_msgs`; covariances are six by six, of the linear part, then of the angular one.
 
-use super::{Header, RosMessage, WORLD, covariance};
+use super::{WORLD, covariance};
 use crate::Payload;
 use crate::message::codec::{Field, FieldShape, Reader, Shape, StructShape, Writer};
-use crate::message::{DecodeError, Finite, Stamped};
-use crate::payload::{Orientation, Pose, Twist};
-use crate::time::WallTime;
+use crate::message::{DecodeError, Finite};
+use crate::payload::{Accel, Orientation, Pose, PoseWithCovariance, Twist, TwistWithCovariance, Wrench};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// `geometry_msgs/msg/QuaternionStamped`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "geometry_msgs/QuaternionStamped")]
-pub struct QuaternionStamped {
-    header: Header,
-    quaternion: UnitQuaternion<f64>,
-}
-
-impl RosMessage for Orientation {
-    type Message = QuaternionStamped;
-
-    fn to_ros(message: &Stamped<Self>) -> QuaternionStamped {
-        QuaternionStamped { header: Header::in_frame(message, WORLD), quaternion: message.world_from_body }
-    }
-
-    fn from_ros(message: QuaternionStamped) -> Result<(Self, WallTime), DecodeError> {
-        Ok((Self::new(message.quaternion), message.header.stamp.wall_time()))
-    }
-}
-
-/// `geometry_msgs/msg/Point`
+/// `geometry_msgs/Point`
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point(Vector3<f64>);
 
@@ -55,7 +34,7 @@ impl Field for Point {
     }
 }
 
-/// `geometry_msgs/msg/Pose`
+/// `geometry_msgs/Pose`
 #[derive(Clone, Debug, Payload)]
 #[payload(name = "geometry_msgs/Pose")]
 pub(super) struct PoseMessage {
@@ -64,52 +43,59 @@ pub(super) struct PoseMessage {
 }
 
 impl PoseMessage {
+    pub(super) fn of(position: Vector3<f64>, orientation: UnitQuaternion<f64>) -> Self {
+        Self { position: Point(position), orientation }
+    }
+
+    pub(super) fn position(&self) -> Vector3<f64> {
+        self.position.0
+    }
+
+    pub(super) fn orientation(&self) -> UnitQuaternion<f64> {
+        self.orientation
+    }
+
+    fn pose(&self) -> Pose {
+        Pose { position: self.position(), world_from_body: self.orientation(), covariance: None }
+    }
+}
+
+/// `geometry_msgs/PoseWithCovariance`
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "geometry_msgs/PoseWithCovariance")]
+pub(super) struct PoseWithCovarianceMessage {
+    pose: PoseMessage,
+    covariance: [f64; 36],
+}
+
+impl PoseWithCovarianceMessage {
     pub(super) fn of(pose: &Pose) -> Self {
-        Self { position: Point(pose.position), orientation: pose.world_from_body }
+        let message = PoseMessage::of(pose.position, pose.world_from_body);
+        Self { pose: message, covariance: covariance::to_ros(&pose.covariance) }
     }
 
     pub(super) fn pose(&self) -> Pose {
-        Pose { position: self.position.0, world_from_body: self.orientation, covariance: None }
+        Pose { covariance: covariance::from_ros(&self.covariance), ..self.pose.pose() }
     }
 }
 
-/// `geometry_msgs/msg/PoseStamped`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "geometry_msgs/PoseStamped")]
-pub struct PoseStamped {
-    header: Header,
-    pose: PoseMessage,
-}
-
-impl RosMessage for Pose {
-    type Message = PoseStamped;
-
-    fn to_ros(message: &Stamped<Self>) -> PoseStamped {
-        PoseStamped { header: Header::in_frame(message, WORLD), pose: PoseMessage::of(message) }
-    }
-
-    fn from_ros(message: PoseStamped) -> Result<(Self, WallTime), DecodeError> {
-        Ok((message.pose.pose(), message.header.stamp.wall_time()))
-    }
-}
-
-/// `geometry_msgs/msg/Twist`
+/// `geometry_msgs/Twist`
 #[derive(Clone, Debug, Payload)]
 #[payload(name = "geometry_msgs/Twist")]
-pub(super) struct TwistMessage {
+struct TwistMessage {
     linear: Vector3<f64>,
     angular: Vector3<f64>,
 }
 
-/// `geometry_msgs/msg/TwistWithCovariance`
+/// `geometry_msgs/TwistWithCovariance`
 #[derive(Clone, Debug, Payload)]
 #[payload(name = "geometry_msgs/TwistWithCovariance")]
-pub(super) struct TwistWithCovariance {
+pub(super) struct TwistWithCovarianceMessage {
     twist: TwistMessage,
     covariance: [f64; 36],
 }
 
-impl TwistWithCovariance {
+impl TwistWithCovarianceMessage {
     pub(super) fn of(twist: &Twist) -> Self {
         let Twist { linear, angular, covariance } = twist;
         let twist = TwistMessage { linear: *linear, angular: *angular };
@@ -122,22 +108,85 @@ impl TwistWithCovariance {
     }
 }
 
-/// `geometry_msgs/msg/TwistWithCovarianceStamped`
-#[derive(Clone, Debug, Payload)]
-#[payload(name = "geometry_msgs/TwistWithCovarianceStamped")]
-pub struct TwistStamped {
-    header: Header,
-    twist: TwistWithCovariance,
+ros_message! {
+    Orientation => QuaternionStamped "geometry_msgs/QuaternionStamped" in WORLD;
+    write(orientation) { quaternion: UnitQuaternion<f64> = orientation.world_from_body, }
+    read { Self::new(quaternion) }
 }
 
-impl RosMessage for Twist {
-    type Message = TwistStamped;
+ros_message! {
+    Pose => PoseStamped "geometry_msgs/PoseStamped" in WORLD;
+    write(it) { pose: PoseMessage = PoseMessage::of(it.position, it.world_from_body), }
+    read { pose.pose() }
+}
 
-    fn to_ros(message: &Stamped<Self>) -> TwistStamped {
-        TwistStamped { header: Header::of(message), twist: TwistWithCovariance::of(message) }
-    }
+ros_message! {
+    Twist => TwistStamped "geometry_msgs/TwistWithCovarianceStamped";
+    write(it) { twist: TwistWithCovarianceMessage = TwistWithCovarianceMessage::of(it), }
+    read { twist.twist() }
+}
 
-    fn from_ros(message: TwistStamped) -> Result<(Self, WallTime), DecodeError> {
-        Ok((message.twist.twist(), message.header.stamp.wall_time()))
+ros_message! {
+    PoseWithCovariance => PoseWithCovarianceStamped "geometry_msgs/PoseWithCovarianceStamped" in WORLD;
+    write(it) { pose: PoseWithCovarianceMessage = PoseWithCovarianceMessage::of(&it.payload.into()), }
+    read {
+        Self {
+            position: pose.pose.position(),
+            world_from_body: pose.pose.orientation(),
+            covariance: covariance::matrix(&pose.covariance),
+        }
     }
+}
+
+ros_message! {
+    TwistWithCovariance => TwistStamped;
+    write(it) { twist = TwistWithCovarianceMessage::of(&it.payload.into()), }
+    read {
+        let TwistMessage { linear, angular } = twist.twist;
+        Self { linear, angular, covariance: covariance::matrix(&twist.covariance) }
+    }
+}
+
+/// `geometry_msgs/Accel`
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "geometry_msgs/Accel")]
+struct AccelMessage {
+    linear: Vector3<f64>,
+    angular: Vector3<f64>,
+}
+
+/// `geometry_msgs/AccelWithCovariance`
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "geometry_msgs/AccelWithCovariance")]
+struct AccelWithCovariance {
+    accel: AccelMessage,
+    covariance: [f64; 36],
+}
+
+ros_message! {
+    Accel => AccelStamped "geometry_msgs/AccelWithCovarianceStamped";
+    write(it) {
+        accel: AccelWithCovariance = AccelWithCovariance {
+            accel: AccelMessage { linear: it.linear, angular: it.angular },
+            covariance: covariance::to_ros(&it.covariance),
+        },
+    }
+    read {
+        let AccelMessage { linear, angular } = accel.accel;
+        Self { linear, angular, covariance: covariance::from_ros(&accel.covariance) }
+    }
+}
+
+/// `geometry_msgs/Wrench`
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "geometry_msgs/Wrench")]
+struct WrenchMessage {
+    force: Vector3<f64>,
+    torque: Vector3<f64>,
+}
+
+ros_message! {
+    Wrench => WrenchStamped "geometry_msgs/WrenchStamped";
+    write(it) { wrench: WrenchMessage = WrenchMessage { force: it.force, torque: it.torque }, }
+    read { Self { force: wrench.force, torque: wrench.torque } }
 }

@@ -7,6 +7,7 @@ use crate::message::{Finite, Stamped};
 use crate::time::WallTime;
 use crate::topology::{JointKind, Topology};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use std::time::Duration;
 
 const NANOS_PER_SECOND: i64 = 1_000_000_000;
 
@@ -35,6 +36,35 @@ impl Time {
     /// The same as nanoseconds.
     pub fn wall_time(self) -> WallTime {
         WallTime::from_unix_nanos(i64::from(self.sec) * NANOS_PER_SECOND + i64::from(self.nanosec))
+    }
+}
+
+/// `builtin_interfaces/msg/Duration`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+#[payload(name = "builtin_interfaces/Duration")]
+pub(super) struct DurationMessage {
+    sec: i32,
+    nanosec: u32,
+}
+
+impl DurationMessage {
+    /// The duration, or the longest that 31 bits of seconds hold.
+    pub(super) fn of(duration: Duration) -> Self {
+        match i32::try_from(duration.as_secs()) {
+            Ok(sec) => Self { sec, nanosec: duration.subsec_nanos() },
+            Err(_) => Self { sec: i32::MAX, nanosec: 999_999_999 },
+        }
+    }
+
+    /// The duration.
+    ///
+    /// # Errors
+    /// It is negative.
+    pub(super) fn duration(self) -> Result<Duration, DecodeError> {
+        let seconds = u64::try_from(self.sec).map_err(|_| {
+            DecodeError::new(0, "a duration that is not negative", self.sec.to_string()).within("sec")
+        })?;
+        Ok(Duration::from_secs(seconds) + Duration::from_nanos(self.nanosec.into()))
     }
 }
 

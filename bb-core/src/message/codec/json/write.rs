@@ -1,0 +1,150 @@
+//! Bytes and their shape to JSON.
+
+use super::{Form, INFINITY, NAN, NEGATIVE_INFINITY};
+use crate::message::codec::{DecodeError, EnumShape, Field, FieldShape, Reader, Shape, Writer, decode_with};
+use std::fmt::{Display, Write};
+
+/// A value as JSON. [`from_json`](super::from_json) reads it back.
+pub fn to_json<T: Field>(value: &T) -> String {
+    let mut bytes = Vec::new();
+    value.write(&mut Writer::new(&mut bytes));
+    let mut json = String::new();
+    // What was written just now can be read.
+    let _ = write(T::SHAPE, &mut Reader::new(&bytes), &mut json);
+    json
+}
+
+/// The bytes that [`encode`](super::super::encode) wrote for a value of this shape, as JSON.
+///
+/// # Errors
+/// The bytes do not have this shape.
+pub fn bytes_to_json(bytes: &[u8], shape: Shape) -> Result<String, DecodeError> {
+    decode_with(bytes, |reader| {
+        let mut json = String::new();
+        write(shape, reader, &mut json)?;
+        Ok(json)
+    })
+}
+
+fn write(shape: Shape, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
+    match shape {
+        Shape::Bool => number(bool::read(reader)?, json),
+        Shape::Char => text(char::read(reader)?.encode_utf8(&mut [0; 4]), json),
+        Shape::I8 => number(i8::read(reader)?, json),
+        Shape::I16 => number(i16::read(reader)?, json),
+        Shape::I32 => number(i32::read(reader)?, json),
+        Shape::I64 => number(i64::read(reader)?, json),
+        Shape::U8 => number(u8::read(reader)?, json),
+        Shape::U16 => number(u16::read(reader)?, json),
+        Shape::U32 => number(u32::read(reader)?, json),
+        Shape::U64 => number(u64::read(reader)?, json),
+        Shape::F32 => {
+            let value = f32::read(reader)?;
+            float(format!("{value:?}"), value.into(), json);
+        }
+        Shape::F64 => {
+            let value = f64::read(reader)?;
+            float(format!("{value:?}"), value, json);
+        }
+        Shape::Text => text(reader.text()?, json),
+        Shape::Option(of) => match reader.is_present()? {
+            true => write(*of, reader, json)?,
+            false => json.push_str("null"),
+        },
+        Shape::List(of) => {
+            let length = reader.length()?;
+            list(*of, length, reader, json)?;
+        }
+        Shape::Array(of, length) => list(*of, length, reader, json)?,
+        Shape::Struct(of) => object(of.fields, reader, json)?,
+        Shape::Enum(of) => variant(of, reader, json)?,
+    }
+    Ok(())
+}
+
+fn list(of: Shape, length: usize, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
+    json.push('[');
+    for index in 0..length {
+        if index > 0 {
+            json.push(',');
+        }
+        write(of, reader, json)?;
+    }
+    json.push(']');
+    Ok(())
+}
+
+fn object(fields: &'static [FieldShape], reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
+    match Form::of(fields) {
+        Form::Transparent(shape) => return write(shape, reader, json),
+        Form::Empty => {
+            reader.nothing()?;
+            json.push_str("{}");
+        }
+        Form::Object(fields) => {
+            for (index, field) in fields.iter().enumerate() {
+                json.push(if index > 0 { ',' } else { '{' });
+                text(field.name, json);
+                json.push(':');
+                write(field.shape, reader, json)?;
+            }
+            json.push('}');
+        }
+    }
+    Ok(())
+}
+
+fn variant(of: &EnumShape, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
+    let number = reader.variant()?;
+    if usize::try_from(number).map_or(true, |number| number >= of.variants.len()) {
+        return reader.no_variant(number);
+    }
+    for (index, variant) in of.variants.iter().enumerate() {
+        let is_this = usize::try_from(number) == Ok(index);
+        let has_fields = !variant.fields.is_empty() && reader.is_present()?;
+        match (is_this, has_fields) {
+            (true, true) => {
+                json.push('{');
+                text(variant.name, json);
+                json.push(':');
+                object(variant.fields, reader, json)?;
+                json.push('}');
+            }
+            (true, false) if variant.fields.is_empty() => text(variant.name, json),
+            (true, false) => return Err(reader.error("the fields of the variant", "none")),
+            (false, true) => return Err(reader.error("no fields of another variant", "some")),
+            (false, false) => {}
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn number(value: impl Display, json: &mut String) {
+    // Writing to a string cannot fail.
+    let _ = write!(json, "{value}");
+}
+
+fn float(shortest: String, value: f64, json: &mut String) {
+    match value {
+        _ if value.is_finite() => json.push_str(&shortest),
+        _ if value.is_nan() => text(NAN, json),
+        _ if value > 0.0 => text(INFINITY, json),
+        _ => text(NEGATIVE_INFINITY, json),
+    }
+}
+
+pub(super) fn text(text: &str, json: &mut String) {
+    json.push('"');
+    for letter in text.chars() {
+        match letter {
+            '"' => json.push_str("\\\""),
+            '\\' => json.push_str("\\\\"),
+            '\n' => json.push_str("\\n"),
+            control if control < ' ' => {
+                let _ = write!(json, "\\u{:04x}", u32::from(control));
+            }
+            other => json.push(other),
+        }
+    }
+    json.push('"');
+}

@@ -1,0 +1,73 @@
+//! A shape as a type description of ROS 2, and the hash by which ROS 2 distinguishes types of the same name (REP 2016).
+
+use super::Shape;
+use super::definitions::{Count, Definition, Element, MessageField, definitions};
+use super::sha256::sha256;
+use std::fmt::Write;
+
+/// The hash of a type with the given name and shape: `RIHS01_` and 64 hexadecimal digits. For a ROS message it is the
+/// hash that ROS 2 has used since Iron.
+///
+/// ```
+/// use bb_core::message::codec::{ros::Time, type_hash};
+/// use bb_core::Field;
+///
+/// assert_eq!(
+///     type_hash("builtin_interfaces/Time", Time::SHAPE),
+///     "RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"
+/// );
+/// ```
+pub fn type_hash(name: &str, shape: Shape) -> String {
+    let mut hash = "RIHS01_".to_owned();
+    for byte in sha256(type_description(name, shape).as_bytes()) {
+        // Writing to a string cannot fail.
+        let _ = write!(hash, "{byte:02x}");
+    }
+    hash
+}
+
+/// The `type_description_interfaces/msg/TypeDescription` of a type, as the JSON that [`type_hash`] hashes: without the
+/// default values of the fields, and with the spaces that REP 2016 requires.
+pub fn type_description(name: &str, shape: Shape) -> String {
+    let mut definitions = definitions(name, shape).into_iter();
+    let main = definitions.next().map_or(String::new(), |main| individual(&main));
+    let mut referenced: Vec<_> = definitions.map(|definition| (type_name(&definition.name), definition)).collect();
+    referenced.sort_by(|(a, _), (b, _)| a.cmp(b));
+    let referenced: Vec<String> = referenced.iter().map(|(_, definition)| individual(definition)).collect();
+    let referenced = referenced.join(", ");
+    format!(r#"{{"type_description": {main}, "referenced_type_descriptions": [{referenced}]}}"#)
+}
+
+/// `sensor_msgs/Imu` to `sensor_msgs/msg/Imu`.
+pub(super) fn type_name(name: &str) -> String {
+    match name.split_once('/') {
+        Some((package, kind)) => format!("{package}/msg/{kind}"),
+        None => name.to_owned(),
+    }
+}
+
+// All names consist of letters, digits, underscores and slashes, so nothing needs an escape.
+
+fn individual(definition: &Definition) -> String {
+    let fields: Vec<String> = definition.fields.iter().map(field).collect();
+    format!(r#"{{"type_name": "{}", "fields": [{}]}}"#, type_name(&definition.name), fields.join(", "))
+}
+
+fn field(field: &MessageField) -> String {
+    let (id, nested) = match &field.element {
+        Element::Primitive(primitive) => (primitive.id, String::new()),
+        Element::Message(name) => (1, type_name(name)),
+    };
+    // `FIELD_TYPE_…_ARRAY`, `…_BOUNDED_SEQUENCE` and `…_UNBOUNDED_SEQUENCE` follow in blocks of 48.
+    let (block, capacity) = match field.count {
+        Count::One => (0, 0),
+        Count::Exactly(length) => (1, length),
+        Count::AtMostOne => (2, 1),
+        Count::Any => (3, 0),
+    };
+    format!(
+        r#"{{"name": "{}", "type": {{"type_id": {}, "capacity": {capacity}, "string_capacity": 0, "nested_type_name": "{nested}"}}}}"#,
+        field.name,
+        id + 48 * block,
+    )
+}

@@ -1,0 +1,41 @@
+//! Poses along a path, and relative poses.
+
+use crate::Payload;
+use crate::time::{MonotonicTime, WallTime};
+use nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use std::sync::Arc;
+
+/// Poses in their order, in the world: where a body was, or where it is to go (`nav_msgs/Path`).
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+#[payload(ros)]
+pub struct Path {
+    /// From the start.
+    pub poses: Arc<[PathPose]>,
+}
+
+/// A pose on a path.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct PathPose {
+    /// When the body is there; the Unix epoch where a path has no times.
+    pub time: WallTime,
+    /// The body's origin in the world, m.
+    pub position: Vector3<f64>,
+    /// Takes vectors of the body to the world.
+    pub world_from_body: UnitQuaternion<f64>,
+}
+
+/// How a body moved between two times, from wheels, scans or pictures. It does not say where it was.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct RelativePose {
+    /// The earlier time.
+    pub start: MonotonicTime,
+    /// The later time.
+    pub end: MonotonicTime,
+    /// The body's origin at the end, in its frame at the start, m.
+    pub position: Vector3<f64>,
+    /// Takes vectors of the body's frame at the end to its frame at the start.
+    pub start_from_end: UnitQuaternion<f64>,
+    /// Covariance: position in the frame at the start (m²), then orientation as a small rotation of the body at the end
+    /// (rad²).
+    pub covariance: Option<Matrix6<f64>>,
+}

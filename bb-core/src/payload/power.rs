@@ -1,0 +1,120 @@
+//! Batteries and supplies.
+
+use crate::Payload;
+
+/// The state of a battery (`sensor_msgs/BatteryState`).
+///
+/// ROS has degrees Celsius and ampere hours in numbers of four bytes where this has kelvin and coulomb.
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+#[payload(ros)]
+pub struct BatteryState {
+    /// V
+    pub voltage: f64,
+    /// K
+    pub temperature: Option<f64>,
+    /// A; negative while discharging.
+    pub current: Option<f64>,
+    /// Remaining charge, coulomb.
+    pub charge: Option<f64>,
+    /// Its charge when it was last full, coulomb.
+    pub capacity: Option<f64>,
+    /// Its charge when full, as designed, coulomb.
+    pub design_capacity: Option<f64>,
+    /// Remaining charge as a fraction of the capacity, from 0 to 1.
+    pub percentage: Option<f64>,
+    /// Whether it is being charged.
+    pub status: BatteryStatus,
+    /// Its condition.
+    pub health: BatteryHealth,
+    /// Its chemistry.
+    pub technology: BatteryTechnology,
+    /// Whether there is one in its place.
+    pub is_present: bool,
+    /// V, by cell; empty where the number of cells is not known.
+    pub cell_voltages: Vec<Option<f64>>,
+    /// K, by cell; empty where the number of cells is not known.
+    pub cell_temperatures: Vec<Option<f64>>,
+    /// The place it is in.
+    pub location: String,
+    /// Its serial number.
+    pub serial_number: String,
+}
+
+/// Whether a battery is being charged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub enum BatteryStatus {
+    /// It does not say.
+    #[default]
+    Unknown,
+    /// It is being charged.
+    Charging,
+    /// It supplies the robot.
+    Discharging,
+    /// Neither.
+    NotCharging,
+    /// It is full.
+    Full,
+}
+
+/// The condition of a battery.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub enum BatteryHealth {
+    /// It does not say.
+    #[default]
+    Unknown,
+    /// No fault.
+    Good,
+    /// Too hot.
+    Overheat,
+    /// It holds no charge.
+    Dead,
+    /// Too high a voltage.
+    Overvoltage,
+    /// Another fault.
+    UnspecifiedFailure,
+    /// Too cold.
+    Cold,
+    /// Its watchdog expired.
+    WatchdogTimerExpired,
+    /// It was charged for too long.
+    SafetyTimerExpired,
+}
+
+/// The chemistry of a battery.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub enum BatteryTechnology {
+    /// It does not say.
+    #[default]
+    Unknown,
+    /// Nickel–metal hydride.
+    NickelMetalHydride,
+    /// Lithium ion.
+    LithiumIon,
+    /// Lithium polymer.
+    LithiumPolymer,
+    /// Lithium iron phosphate.
+    LithiumIronPhosphate,
+    /// Nickel–cadmium.
+    NickelCadmium,
+    /// Lithium manganese dioxide.
+    LithiumManganeseDioxide,
+    /// Ternary lithium.
+    TernaryLithium,
+    /// Lead–acid, valve-regulated.
+    LeadAcid,
+}
+
+/// The state of a supply or of a rail that it feeds. ROS has no message for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
+pub struct PowerState {
+    /// Whether it is switched on.
+    pub is_on: bool,
+    /// V
+    pub voltage: Option<f64>,
+    /// A; positive to the load.
+    pub current: Option<f64>,
+    /// W; positive to the load.
+    pub power: Option<f64>,
+    /// J to the load since it was switched on.
+    pub energy: Option<f64>,
+}

@@ -1,0 +1,31 @@
+//! How joints are to move.
+
+use crate::Payload;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How several joints are to move together (`trajectory_msgs/JointTrajectory`). It starts at the message's time.
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+#[payload(ros)]
+pub struct JointTrajectory {
+    /// The joints.
+    pub joint_names: Arc<[String]>,
+    /// In the order of their times.
+    pub points: Arc<[TrajectoryPoint]>,
+}
+
+/// Where the joints of a trajectory are at one time. Each list is as long as the names of the joints, or empty where its
+/// quantity is free.
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+pub struct TrajectoryPoint {
+    /// rad or m
+    pub positions: Vec<f64>,
+    /// rad/s or m/s
+    pub velocities: Vec<f64>,
+    /// rad/s² or m/s²
+    pub accelerations: Vec<f64>,
+    /// N·m or N
+    pub efforts: Vec<f64>,
+    /// From the start of the trajectory.
+    pub time_from_start: Duration,
+}

@@ -1,0 +1,143 @@
+"""Compares messages of bb-core with how ROS 2's own Python packages, rosbags and jsonschema understand them.
+
+`check` writes the messages and runs this; each line of them has the name, definition and hash of a type, and a value as
+CDR and as JSON.
+"""
+
+import importlib
+import importlib.util
+import json
+import math
+import pathlib
+import struct
+import sys
+
+
+def has(module):
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+CHECKS = {"rclpy": has("rclpy") and has("sensor_msgs"), "rosbags": has("rosbags"), "jsonschema": has("jsonschema")}
+
+
+class Mismatch(Exception):
+    pass
+
+
+def same_number(ours, theirs):
+    """Whether a float of theirs is a number of ours, or the `float32` nearest to it."""
+    ours = float(ours)
+    if math.isnan(ours) or math.isnan(theirs):
+        return math.isnan(ours) and math.isnan(theirs)
+    if ours == theirs:
+        return math.copysign(1, ours) == math.copysign(1, theirs)
+    try:
+        return struct.unpack("f", struct.pack("f", ours))[0] == theirs
+    except OverflowError:
+        return False
+
+
+def compare(path, ours, theirs):
+    """Field by field; `ours` is JSON."""
+    if isinstance(ours, dict):
+        for name, value in ours.items():
+            compare(f"{path}.{name}", value, getattr(theirs, name))
+    elif isinstance(ours, list):
+        if len(ours) != len(theirs):
+            raise Mismatch(f"{path}: {len(ours)} elements, {len(theirs)} there")
+        for index, (a, b) in enumerate(zip(ours, theirs)):
+            compare(f"{path}[{index}]", a, b)
+    elif isinstance(theirs, (str, bool)):
+        if ours != theirs:
+            raise Mismatch(f"{path}: {ours!r}, {theirs!r} there")
+    elif isinstance(ours, str) or "float" in type(theirs).__name__:
+        if not same_number(ours, float(theirs)):
+            raise Mismatch(f"{path}: {ours!r}, {theirs!r} there")
+    elif ours != int(theirs):
+        raise Mismatch(f"{path}: {ours!r}, {theirs!r} there")
+
+
+def fields(message):
+    """The names of a message's fields, for the classes of rclpy and of rosbags."""
+    return getattr(message, "__dataclass_fields__", None) or message.get_fields_and_field_types()
+
+
+def check_rclpy(folder, lines):
+    from rclpy.serialization import deserialize_message, serialize_message
+
+    back = []
+    for line in lines:
+        package, kind = line["name"].split("/msg/")
+        message_class = getattr(importlib.import_module(f"{package}.msg"), kind)
+        message = deserialize_message(bytes.fromhex(line["cdr"]), message_class)
+        if set(fields(message)) - {"SLOT_TYPES"} != set(line["json"]):
+            raise Mismatch(f"{line['name']}: fields {sorted(line['json'])}")
+        compare(line["name"], line["json"], message)
+        cdr = serialize_message(message).hex()
+        back.append(json.dumps({"name": line["name"], "cdr": cdr, "expected": line["cdr"]}))
+        description = pathlib.Path(sys.prefix, "share", package, "msg", f"{kind}.json")
+        hashes = json.loads(description.read_text())["type_hashes"]
+        expected = next(entry["hash_string"] for entry in hashes if entry["type_name"] == line["name"])
+        if line["hash"] != expected:
+            raise Mismatch(f"{line['name']}: hash {line['hash']}, {expected} there")
+    pathlib.Path(folder, "back.jsonl").write_text("\n".join(back))
+    return len(lines)
+
+
+def check_rosbags(lines, are_ros):
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    for line in lines:
+        # What rosbags knows of ROS 2, and the definition that our recordings have.
+        ours = get_typestore(Stores.EMPTY)
+        ours.register(get_types_from_msg(line["definition"], line["name"]))
+        stores = [ours, get_typestore(Stores.LATEST)] if are_ros else [ours]
+        for store in stores:
+            message = store.deserialize_cdr(bytes.fromhex(line["cdr"]), line["name"])
+            if are_ros:
+                compare(line["name"], line["json"], message)
+            found = store.hash_rihs01(line["name"])
+            if found != line["hash"]:
+                raise Mismatch(f"{line['name']}: hash {line['hash']}, {found} there")
+    return len(lines)
+
+
+def check_jsonschema(lines):
+    from jsonschema import Draft202012Validator
+
+    for line in lines:
+        Draft202012Validator.check_schema(line["schema"])
+        Draft202012Validator(line["schema"]).validate(line["json"])
+    return len(lines)
+
+
+def main():
+    if sys.argv[1] == "available":
+        missing = [name for name, is_there in CHECKS.items() if not is_there]
+        for name in missing:
+            print(f"ros2: skipped: Python has no {name}")
+        return 1 if len(missing) == len(CHECKS) else 0
+    folder = sys.argv[2]
+    ros, exact = (
+        [json.loads(line) for line in pathlib.Path(folder, f"{name}.jsonl").read_text().splitlines()]
+        for name in ("ros", "exact")
+    )
+    if CHECKS["rclpy"]:
+        print(f"ros2: rclpy reads {check_rclpy(folder, ros)} messages field by field, with the same type hashes")
+    if CHECKS["rosbags"]:
+        count = check_rosbags(ros, True) + check_rosbags(exact, False)
+        print(f"ros2: rosbags reads {count} messages by our definitions, with the same type hashes")
+    if CHECKS["jsonschema"]:
+        print(f"ros2: jsonschema accepts {check_jsonschema(ros + exact)} values and their schemas")
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except Mismatch as mismatch:
+        print(f"ros2: {mismatch}")
+        sys.exit(2)
