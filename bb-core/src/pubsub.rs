@@ -3,7 +3,10 @@
 mod dynamic;
 mod queue;
 mod subscription;
+#[cfg(test)]
+mod tests;
 mod topic;
+mod wakers;
 
 pub use dynamic::{DynamicMessage, DynamicSubscription, Select};
 pub use queue::Overflow;

@@ -1,7 +1,9 @@
 //! The bounded queue between a topic and one subscriber.
 
 use super::SubscriberStatistics;
+use super::wakers::{Wakers, discard, wake};
 use std::collections::VecDeque;
+use std::mem::needs_drop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
@@ -37,6 +39,7 @@ impl Overflow {
     }
 }
 
+/// No user's code runs under its lock: messages are dropped, and wakers cloned, woken and dropped, without it.
 #[derive(Debug)]
 pub(super) struct Queue<M> {
     state: Mutex<State<M>>,
@@ -52,8 +55,37 @@ struct State<M> {
     lagged: u64,
     closed: bool,
     waker: Option<Waker>,
-    /// Threads that wait: telling nobody would cost a system call.
+    /// Threads that wait: notifying nobody would cost a system call.
     waiting: usize,
+}
+
+impl<M: Send + 'static> Queue<M> {
+    /// Adds a message; how many of the oldest had to make room for it. What is to be woken and dropped goes to `wakers`.
+    pub(super) fn push(&self, message: M, wakers: &mut Wakers) -> u64 {
+        let mut state = self.lock();
+        // Under the lock, so that what `abandon` takes out is all there is.
+        if self.is_abandoned() {
+            drop(state);
+            wakers.discard(message);
+            return 0;
+        }
+        let evicted = if state.messages.len() == self.capacity { state.messages.pop_front() } else { None };
+        let lost = u64::from(evicted.is_some());
+        state.lagged += lost;
+        state.messages.push_back(message);
+        let (waker, is_awaited) = (state.waker.take(), state.waiting > 0);
+        drop(state);
+        if is_awaited {
+            self.arrived.notify_one();
+        }
+        if let Some(waker) = waker {
+            wakers.wake(waker);
+        }
+        if let Some(evicted) = evicted {
+            wakers.discard(evicted);
+        }
+        lost
+    }
 }
 
 impl<M> Queue<M> {
@@ -70,19 +102,7 @@ impl<M> Queue<M> {
         Self { state: Mutex::new(state), arrived: Condvar::new(), capacity, abandoned: AtomicBool::new(false) }
     }
 
-    /// Adds a message; true if the oldest had to make room for it.
-    pub(super) fn push(&self, message: M) -> bool {
-        let mut state = self.lock();
-        let is_full = state.messages.len() == self.capacity;
-        if is_full {
-            state.messages.pop_front();
-            state.lagged += 1;
-        }
-        state.messages.push_back(message);
-        self.wake(state);
-        is_full
-    }
-
+    /// Tells the reader that no more will come.
     pub(super) fn close(&self) {
         let mut state = self.lock();
         state.closed = true;
@@ -91,15 +111,22 @@ impl<M> Queue<M> {
         // Several threads may wait for the same subscription, and none of them will get a message any more.
         self.arrived.notify_all();
         if let Some(waker) = waker {
-            crate::run::wake(waker);
+            wake(waker);
         }
     }
 
-    /// Says that nobody reads it any more; what waits is dropped.
+    /// Says that nobody reads it any more. What waits is dropped here, and nothing is added from now on: whoever drops the
+    /// queue itself, under whatever lock, runs no user's code.
     pub(super) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Release);
-        let messages = std::mem::take(&mut self.lock().messages);
-        drop(messages);
+        let mut state = self.lock();
+        let messages = std::mem::take(&mut state.messages);
+        let waker = state.waker.take();
+        drop(state);
+        if needs_drop::<M>() {
+            messages.into_iter().for_each(discard);
+        }
+        waker.into_iter().for_each(discard);
     }
 
     pub(super) fn is_abandoned(&self) -> bool {
@@ -128,16 +155,13 @@ impl<M> Queue<M> {
         self.lock().lagged
     }
 
-    /// Waits for a message until `timeout` (none: for ever); none after the time, or once closed and empty.
+    /// Waits for a message until `timeout` (`None`: without end); `None` after that, or once closed and empty.
     pub(super) fn wait(&self, timeout: Option<Duration>) -> Option<M> {
         let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
         let mut state = self.lock();
         loop {
-            if let Some(message) = state.messages.pop_front() {
-                return Some(message);
-            }
-            if state.closed {
-                return None;
+            if let Some(next) = state.ready() {
+                return next;
             }
             state.waiting += 1;
             state = match deadline {
@@ -157,31 +181,38 @@ impl<M> Queue<M> {
 
     pub(super) fn poll(&self, context: &mut Context<'_>) -> Poll<Option<M>> {
         let mut state = self.lock();
-        if let Some(message) = state.messages.pop_front() {
-            return Poll::Ready(Some(message));
+        if let Some(ready) = state.ready() {
+            return Poll::Ready(ready);
         }
-        if state.closed {
-            return Poll::Ready(None);
+        if state.waker.as_ref().is_some_and(|waker| waker.will_wake(context.waker())) {
+            return Poll::Pending;
         }
-        match &mut state.waker {
-            Some(waker) => waker.clone_from(context.waker()),
-            none => *none = Some(context.waker().clone()),
-        }
-        Poll::Pending
-    }
-
-    fn wake(&self, mut state: MutexGuard<'_, State<M>>) {
-        let (waker, is_awaited) = (state.waker.take(), state.waiting > 0);
         drop(state);
-        if is_awaited {
-            self.arrived.notify_one();
+        let waker = context.waker().clone();
+        let mut state = self.lock();
+        // A message may have arrived meanwhile, and woken the waker of before.
+        if let Some(ready) = state.ready() {
+            drop(state);
+            discard(waker);
+            return Poll::Ready(ready);
         }
-        if let Some(waker) = waker {
-            crate::run::wake(waker);
-        }
+        let before = state.waker.replace(waker);
+        drop(state);
+        before.into_iter().for_each(discard);
+        Poll::Pending
     }
 
     fn lock(&self) -> MutexGuard<'_, State<M>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<M> State<M> {
+    /// The next message, or `Some(None)` if no more will come.
+    fn ready(&mut self) -> Option<Option<M>> {
+        match self.messages.pop_front() {
+            None if !self.closed => None,
+            next => Some(next),
+        }
     }
 }

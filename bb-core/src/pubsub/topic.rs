@@ -2,6 +2,7 @@
 
 use super::dynamic::Tap;
 use super::queue::Queue;
+use super::wakers::Wakers;
 use super::{DynamicMessage, Overflow, Subscription};
 use crate::Payload;
 use crate::message::{DecodeError, Stamped};
@@ -22,8 +23,9 @@ pub struct Topic<T> {
 }
 
 pub(super) struct Subscribers<T> {
-    /// Replaced as a whole, so that a publisher takes it along and holds no lock while it wakes subscribers: whatever
-    /// they do on that thread may subscribe and unsubscribe.
+    /// Replaced as a whole, so that a publisher takes a list along and holds no lock while it wakes subscribers, who may
+    /// subscribe and unsubscribe on that thread. A queue that is dropped with its list is abandoned, and so runs no
+    /// user's code.
     queues: Arc<[Arc<Queue<Stamped<T>>>]>,
     /// Those who do not know the payload.
     taps: Arc<[Arc<Queue<DynamicMessage>>]>,
@@ -54,6 +56,7 @@ impl<T> Topic<T> {
         let queue = Arc::new(Queue::new(overflow));
         let mut subscribers = lock(&self.subscribers);
         if subscribers.closed {
+            drop(subscribers);
             queue.close();
         } else {
             subscribers.queues = subscribers.queues.iter().chain([&queue]).map(Arc::clone).collect();
@@ -94,12 +97,18 @@ impl<T: Payload> Topic<T> {
     #[inline]
     fn hand_out(&self, message: &Stamped<T>) {
         if self.listening.load(Ordering::Acquire) > 0 {
-            self.deliver(message);
+            self.deliver_and_wake(message);
         }
     }
 
     #[cold]
-    fn deliver(&self, message: &Stamped<T>) {
+    fn deliver_and_wake(&self, message: &Stamped<T>) {
+        let mut wakers = Wakers::dropping_at_once();
+        self.deliver(message, &mut wakers);
+        wakers.run();
+    }
+
+    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         let (queues, taps) = {
             let mut subscribers = lock(&self.subscribers);
             if subscribers.taps.iter().any(|tap| tap.is_abandoned()) {
@@ -110,10 +119,16 @@ impl<T: Payload> Topic<T> {
             self.listening.store(subscribers.count(), Ordering::Release);
             (Arc::clone(&subscribers.queues), Arc::clone(&subscribers.taps))
         };
-        let mut lost: u64 = queues.iter().map(|queue| u64::from(queue.push(message.clone()))).sum();
-        if !taps.is_empty() {
+        let mut lost = 0;
+        for queue in queues.iter() {
+            lost += queue.push(message.clone(), wakers);
+        }
+        if let Some((last, others)) = taps.split_last() {
             let message = DynamicMessage::new(self.path, message);
-            lost += taps.iter().map(|tap| u64::from(tap.push(message.clone()))).sum::<u64>();
+            for tap in others {
+                lost += tap.push(message.clone(), wakers);
+            }
+            lost += last.push(message, wakers);
         }
         if lost > 0 {
             self.lost.fetch_add(lost, Ordering::Relaxed);

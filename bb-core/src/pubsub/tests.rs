@@ -1,0 +1,3 @@
+//! What subscribers' own code may do, and what concurrency may not break.
+
+mod reentrant;
