@@ -12,3 +12,5 @@ pub use dynamic::{DynamicMessage, DynamicSubscription, Select};
 pub use queue::Overflow;
 pub use subscription::{RecvAsync, Subscription};
 pub use topic::{AnyTopic, SubscriberStatistics, Topic, TopicStatistics};
+#[allow(unused_imports, reason = "for publishers that hold a lock of the robot")]
+pub(crate) use wakers::Wakers;

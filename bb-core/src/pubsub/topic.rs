@@ -94,6 +94,17 @@ impl<T: Payload> Topic<T> {
         self.hand_out(message);
     }
 
+    /// Only enqueues `message`: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's
+    /// code runs here but the payload's `clone`, and that only if somebody listens.
+    #[inline]
+    #[allow(dead_code, reason = "for publishers that hold a lock of the robot")]
+    pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers) {
+        self.published.fetch_add(1, Ordering::Relaxed);
+        if self.listening.load(Ordering::Acquire) > 0 {
+            self.deliver(message, wakers);
+        }
+    }
+
     #[inline]
     fn hand_out(&self, message: &Stamped<T>) {
         if self.listening.load(Ordering::Acquire) > 0 {
@@ -108,6 +119,7 @@ impl<T: Payload> Topic<T> {
         wakers.run();
     }
 
+    #[cold]
     fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         let (queues, taps) = {
             let mut subscribers = lock(&self.subscribers);
@@ -175,6 +187,8 @@ pub trait AnyTopic {
     /// A message from its bytes, as [`DynamicMessage::encode`] has made them.
     #[doc(hidden)]
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
+    /// Publishes a message if its payload is this topic's; else does nothing and returns `false`.
+    fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
     /// Itself, for whoever knows the payload.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
@@ -213,6 +227,11 @@ impl<T: Payload> AnyTopic for Topic<T> {
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError> {
         let message: Stamped<T> = crate::message::codec::decode(bytes)?;
         Ok(DynamicMessage::new(self.path, &message))
+    }
+
+    fn publish_dynamic(&self, message: &DynamicMessage) -> bool {
+        let message = message.downcast();
+        message.inspect(|message| self.publish(message)).is_some()
     }
 
     fn as_any(&self) -> &dyn Any {

@@ -42,6 +42,13 @@ impl Wakers {
         }
     }
 
+    /// Whether there is nothing to do.
+    #[allow(dead_code, reason = "for publishers that hold a lock of the robot")]
+    pub(crate) fn is_empty(&self) -> bool {
+        // The slots are filled in order.
+        self.first[0].is_none() && self.evicted.is_empty()
+    }
+
     /// Wakes the tasks in the order in which their messages were enqueued, then drops the messages.
     pub(crate) fn run(self) {
         drop(self);
@@ -119,10 +126,12 @@ mod tests {
     fn a_panic_keeps_no_other_from_being_woken_or_dropped() {
         let (woken, dropped) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
         let mut wakers = Wakers::default();
+        assert!(wakers.is_empty());
         for _ in 0..7 {
             wakers.wake(Arc::new(Faulty(Arc::clone(&woken))).into());
             wakers.discard(Evicted(Arc::clone(&dropped)));
         }
+        assert!(!wakers.is_empty());
         assert_eq!((woken.load(Ordering::SeqCst), dropped.load(Ordering::SeqCst)), (0, 0));
         wakers.run();
         assert_eq!((woken.load(Ordering::SeqCst), dropped.load(Ordering::SeqCst)), (7, 7));
