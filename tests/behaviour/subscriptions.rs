@@ -111,3 +111,34 @@ fn an_absurd_capacity_is_bounded() {
     let all = Overflow::DropOldest { capacity: usize::MAX };
     drop(Talker::builder().subscribe_with(talker::sensor::numbers, all));
 }
+
+/// A payload of which a few fill a memory.
+#[derive(Clone, Debug, Payload)]
+pub(crate) struct Picture {
+    pixels: Vec<u8>,
+}
+
+robot! {
+    robot Watching;
+    link base;
+    sensors { sensor camera: External<Picture>(); }
+}
+
+#[test]
+fn idle_subscribers_of_large_messages_are_bounded_in_bytes() -> Result<(), StartError> {
+    const MIB: usize = 1 << 20;
+    let mut simulation = Watching::builder().simulate()?;
+    let idle = simulation.subscribe(watching::sensor::camera);
+    let small = Overflow::DropOldestWithin { capacity: 1000, bytes: 5 * MIB };
+    let any = simulation.subscribe_any(Select::All, None, small);
+    for _ in 0..70 {
+        let picture = Picture { pixels: vec![0; MIB] };
+        simulation.publish(watching::sensor::camera, MonotonicTime::ZERO, picture);
+    }
+    let kept = simulation.bus().subscribers("sensor/camera");
+    let kept: Vec<_> = kept.iter().map(|one| (one.waiting, one.bytes, one.lost)).collect();
+    assert_eq!(kept, [(64, 64 * MIB, 6), (5, 5 * MIB, 65)]);
+    assert_eq!((idle.lagged(), any.lagged()), (6, 65));
+    assert_eq!(simulation.report().topic("sensor/camera").map(|topic| topic.lost), Some(71));
+    Ok(())
+}

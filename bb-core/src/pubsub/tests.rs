@@ -1,4 +1,5 @@
 //! What subscribers' own code may do, and what concurrency may not break.
 
+mod bounds;
 mod deferred;
 mod reentrant;

@@ -1,7 +1,7 @@
 //! One publisher's end: who listens to it.
 
 use super::dynamic::Tap;
-use super::queue::Queue;
+use super::queue::{Queue, counted_bytes};
 use super::wakers::Wakers;
 use super::{DynamicMessage, Overflow, Subscription};
 use crate::Payload;
@@ -131,16 +131,17 @@ impl<T: Payload> Topic<T> {
             self.listening.store(subscribers.count(), Ordering::Release);
             (Arc::clone(&subscribers.queues), Arc::clone(&subscribers.taps))
         };
+        let bytes = counted_bytes(message);
         let mut lost = 0;
         for queue in queues.iter() {
-            lost += queue.push(message.clone(), wakers);
+            lost += queue.push(message.clone(), bytes, wakers);
         }
         if let Some((last, others)) = taps.split_last() {
             let message = DynamicMessage::new(self.path, message);
             for tap in others {
-                lost += tap.push(message.clone(), wakers);
+                lost += tap.push(message.clone(), bytes, wakers);
             }
-            lost += last.push(message, wakers);
+            lost += last.push(message, bytes, wakers);
         }
         if lost > 0 {
             self.lost.fetch_add(lost, Ordering::Relaxed);
@@ -263,6 +264,8 @@ pub struct SubscriberStatistics {
     pub waiting: usize,
     /// How many may wait.
     pub capacity: usize,
+    /// Bytes of the messages that wait, as far as they count towards the bound: see [`Overflow`].
+    pub bytes: usize,
     /// Messages it has lost because it was slow.
     pub lost: u64,
 }
