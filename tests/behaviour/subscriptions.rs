@@ -1,6 +1,7 @@
 //! Subscriptions to typed handles.
 
 use crate::components::{Counter, Number, Scale};
+use bb_core::DynamicSubscription;
 use bb_core::prelude::*;
 
 robot! {
@@ -140,5 +141,39 @@ fn idle_subscribers_of_large_messages_are_bounded_in_bytes() -> Result<(), Start
     assert_eq!(kept, [(64, 64 * MIB, 6), (5, 5 * MIB, 65)]);
     assert_eq!((idle.lagged(), any.lagged()), (6, 65));
     assert_eq!(simulation.report().topic("sensor/camera").map(|topic| topic.lost), Some(71));
+    Ok(())
+}
+
+robot! {
+    robot Diverse;
+    link base {
+        sensor imu: External<Imu>();
+        sensor field: External<MagneticField>();
+        sensor encoder: External<JointState>();
+    }
+}
+
+#[test]
+fn a_filter_takes_several_payload_types() -> Result<(), StartError> {
+    let builder = Diverse::builder();
+    let names: Vec<&str> = vec!["Imu", "MagneticField"];
+    let early = builder.subscribe_any(Select::All, ["JointState", "Imu"], Overflow::default());
+    let mut simulation = builder.simulate()?;
+    let one = simulation.subscribe_any(Select::Below("sensor"), Some("Imu"), Overflow::default());
+    let two = simulation.subscribe_any(Select::Below("sensor"), &*names, Overflow::default());
+    let all = simulation.bus().subscribe_any(Select::Below("sensor"), None, Overflow::default());
+
+    simulation.publish(diverse::sensor::base::imu, MonotonicTime::ZERO, Imu::new([0.0; 3].into(), [0.0; 3].into()));
+    simulation.publish(diverse::sensor::base::field, MonotonicTime::ZERO, MagneticField::new([0.0; 3].into()));
+    let state = JointState { position: 0.0, velocity: None, effort: None };
+    simulation.publish(diverse::sensor::base::encoder, MonotonicTime::ZERO, state);
+
+    let names = |subscription: &DynamicSubscription| {
+        subscription.drain().map(|message| message.payload_name()).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&early), ["Imu", "JointState"]);
+    assert_eq!(names(&one), ["Imu"]);
+    assert_eq!(names(&two), ["Imu", "MagneticField"]);
+    assert_eq!(names(&all), ["Imu", "MagneticField", "JointState"]);
     Ok(())
 }

@@ -5,7 +5,9 @@ use super::actuator::{Accepts, ActuatorError, AnyActuator};
 use crate::component::Fault;
 use crate::control::{Control, ParameterError, ParameterValue};
 use crate::message::Payload;
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, SubscriberStatistics, Subscription, Topic};
+use crate::pubsub::{
+    AnyTopic, DynamicSubscription, Overflow, Payloads, Select, SubscriberStatistics, Subscription, Topic,
+};
 use crate::time::Clock;
 use std::fmt;
 use std::sync::{Arc, Weak};
@@ -68,14 +70,17 @@ impl Bus {
         })
     }
 
-    /// Subscribes to messages of any payload; with the name of a payload's type, to those only.
-    pub fn subscribe_any(
+    /// Subscribes to messages of any payload; with names of payload types, to those only.
+    pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
-        payload: Option<&str>,
+        payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
-        self.with_topics(|topics| DynamicSubscription::new(topics.iter().copied(), select, payload, overflow))
+        let payloads = payloads.into();
+        self.with_topics(|topics| {
+            DynamicSubscription::new(topics.iter().copied(), select, payloads.clone(), overflow)
+        })
     }
 
     /// All paths that are published at.
@@ -98,7 +103,9 @@ impl Bus {
         let mut found = Err(Fault::new(format!("no actuator is at `{path}`")));
         if let Some(directory) = self.control.directory() {
             directory.with_actuators(&mut |actuators| {
-                let Some(actuator) = actuators.iter().find(|actuator| actuator.path() == path) else { return };
+                let Some(actuator) = actuators.iter().find(|actuator| actuator.path() == path) else {
+                    return;
+                };
                 found = match actuator.accepts().downcast::<Arc<dyn Accepts<T>>>() {
                     Ok(link) => Ok(ActuatorLink(*link)),
                     Err(_) => {

@@ -6,7 +6,7 @@ use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
 use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal};
 use crate::message::Stamp;
 use crate::node::{AnyIsland, Node};
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -21,13 +21,13 @@ impl<R: Robot> Machine<R> {
         publisher.topic(R::wired_topics(&self.wiring), self.startup.control.topics()).subscribe(overflow)
     }
 
-    pub(super) fn subscribe_any(
+    pub(super) fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
-        payload: Option<&str>,
+        payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
-        DynamicSubscription::new(self.topics(), select, payload, overflow)
+        DynamicSubscription::new(self.topics(), select, payloads, overflow)
     }
 
     fn topics(&self) -> Vec<&dyn AnyTopic> {
