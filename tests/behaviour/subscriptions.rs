@@ -1,8 +1,8 @@
 //! Subscriptions to typed handles.
 
 use crate::components::{Counter, Number, Scale};
-use bb_core::DynamicSubscription;
 use bb_core::prelude::*;
+use bb_core::{DynamicSubscription, Unmatched};
 
 robot! {
     robot Talker;
@@ -175,5 +175,41 @@ fn a_filter_takes_several_payload_types() -> Result<(), StartError> {
     assert_eq!(names(&one), ["Imu"]);
     assert_eq!(names(&two), ["Imu", "MagneticField"]);
     assert_eq!(names(&all), ["Imu", "MagneticField", "JointState"]);
+    Ok(())
+}
+
+#[test]
+fn a_selection_that_matches_nothing_names_the_nearest() -> Result<(), StartError> {
+    let builder = Diverse::builder();
+    let typo = builder.subscribe_any(Select::Path("sensor/base/imuu"), None, Overflow::default());
+    let told: Vec<_> = typo.unmatched().iter().map(Unmatched::to_string).collect();
+    assert_eq!(told, ["nothing publishes at `sensor/base/imuu`; did you mean `sensor/base/imu`?"]);
+    assert_eq!(typo.unmatched()[0].nearest(), Some("sensor/base/imu"));
+
+    let simulation = builder.simulate()?;
+    let select = Select::AnyOf(&[Select::Below("sensors"), Select::Path("health"), Select::Path("saftey")]);
+    let typos = simulation.subscribe_any(select, ["HealthTransition", "Imo"], Overflow::default());
+    let told: Vec<_> = typos.unmatched().iter().map(Unmatched::to_string).collect();
+    assert_eq!(
+        told,
+        [
+            "nothing publishes at or below `sensors`; did you mean `sensor`?",
+            "nothing publishes at `saftey`; did you mean `safety`?",
+            "nothing that is selected publishes `Imo`",
+        ]
+    );
+    let right = simulation.subscribe_any(Select::Below("sensor"), Some("Imu"), Overflow::default());
+    assert_eq!(right.unmatched(), []);
+
+    let error =
+        |path| simulation.bus().subscribe::<Imu>(path, Overflow::default()).map_err(|error| error.to_string());
+    assert_eq!(
+        error("sensor/base/imuu").err().as_deref(),
+        Some("nothing publishes at `sensor/base/imuu`; did you mean `sensor/base/imu`?")
+    );
+    assert_eq!(
+        error("sensor/base/field").err().as_deref(),
+        Some("`sensor/base/field` publishes `MagneticField`, not `Imu`")
+    );
     Ok(())
 }

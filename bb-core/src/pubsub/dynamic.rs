@@ -1,6 +1,7 @@
 //! Messages of any payload, by path: for loggers, dashboards, recorders.
 
 use super::queue::Queue;
+use super::unmatched::{Unmatched, unmatched};
 use super::{AnyTopic, Overflow, Payloads, Select};
 use crate::message::codec::{encode, encode_as_ros, is_exact_as_ros, to_json};
 use crate::message::{Payload, Schema, Stamp, Stamped};
@@ -137,17 +138,30 @@ pub struct Tap(pub(super) Arc<Queue<DynamicMessage>>);
 pub struct DynamicSubscription {
     queue: Arc<Queue<DynamicMessage>>,
     paths: Vec<&'static str>,
+    unmatched: Vec<Unmatched>,
 }
 
 impl DynamicSubscription {
-    /// Subscribes to those `topics` that are selected and whose payload is one of `payloads`.
+    /// Subscribes to those `topics` that are selected and whose payload is one of `payloads`. What matches none of them is
+    /// logged as a warning, and kept in [`unmatched`](Self::unmatched).
     pub fn new<'a, 'b>(
         topics: impl IntoIterator<Item = &'a dyn AnyTopic>,
         select: Select<'_>,
         payloads: impl Into<Payloads<'b>>,
         overflow: Overflow,
     ) -> Self {
-        let payloads = payloads.into();
+        let topics: Vec<_> = topics.into_iter().collect();
+        Self::among(&topics, &[], select, &payloads.into(), overflow)
+    }
+
+    /// The same, where the paths `declared` have a publisher while the robot runs.
+    pub(super) fn among(
+        topics: &[&dyn AnyTopic],
+        declared: &[&'static str],
+        select: Select<'_>,
+        payloads: &Payloads<'_>,
+        overflow: Overflow,
+    ) -> Self {
         let queue = Arc::new(Queue::new(overflow));
         let mut paths = Vec::new();
         for topic in topics {
@@ -156,12 +170,21 @@ impl DynamicSubscription {
                 paths.push(topic.path());
             }
         }
-        Self { queue, paths }
+        let unmatched = unmatched(topics, declared, select, payloads);
+        for unmatched in &unmatched {
+            tracing::warn!("{unmatched}");
+        }
+        Self { queue, paths, unmatched }
     }
 
     /// The paths it listens to.
     pub fn paths(&self) -> &[&'static str] {
         &self.paths
+    }
+
+    /// What it asked for and matched nothing when it was made, with the nearest name for each.
+    pub fn unmatched(&self) -> &[Unmatched] {
+        &self.unmatched
     }
 
     /// The oldest message that waits, if any.

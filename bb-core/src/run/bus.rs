@@ -7,6 +7,7 @@ use crate::control::{Control, ParameterError, ParameterValue};
 use crate::message::Payload;
 use crate::pubsub::{
     AnyTopic, DynamicSubscription, Overflow, Payloads, Select, SubscriberStatistics, Subscription, Topic,
+    nearest_path, unmatched_at,
 };
 use crate::time::Clock;
 use std::fmt;
@@ -57,11 +58,11 @@ impl Bus {
     /// Subscribes to what is published at `path`.
     ///
     /// # Errors
-    /// Nothing is published there, or another payload.
+    /// Nothing is published there, or another payload; the nearest path is named.
     pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
         self.with_topics(|topics| {
             let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
-                return Err(Fault::new(format!("nothing publishes at `{path}`")));
+                return Err(Fault::new(unmatched_at(path, topics, &[]).to_string()));
             };
             let typed = topic.as_any().downcast_ref::<Topic<T>>().ok_or_else(|| {
                 Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))
@@ -104,6 +105,9 @@ impl Bus {
         if let Some(directory) = self.control.directory() {
             directory.with_actuators(&mut |actuators| {
                 let Some(actuator) = actuators.iter().find(|actuator| actuator.path() == path) else {
+                    if let Some(near) = nearest_path(path, actuators.iter().map(|actuator| actuator.path())) {
+                        found = Err(Fault::new(format!("no actuator is at `{path}`; did you mean `{near}`?")));
+                    }
                     return;
                 };
                 found = match actuator.accepts().downcast::<Arc<dyn Accepts<T>>>() {
