@@ -2,7 +2,9 @@
 
 mod dynamic;
 mod nearest;
+mod publisher;
 mod queue;
+mod registry;
 mod select;
 mod subscription;
 #[cfg(test)]
@@ -13,7 +15,9 @@ mod wakers;
 
 pub use dynamic::{DynamicMessage, DynamicSubscription};
 pub(crate) use nearest::nearest_path;
+pub use publisher::Publisher;
 pub use queue::Overflow;
+pub(crate) use registry::Registry;
 pub use select::{Payloads, Select};
 pub use subscription::{RecvAsync, Subscription};
 pub use topic::{AnyTopic, SubscriberStatistics, Topic, TopicStatistics};

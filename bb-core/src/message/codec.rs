@@ -39,6 +39,7 @@ mod writer;
 pub use derive::{FieldOf, NotField, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
+pub(crate) use intern::intern;
 pub use json::to_json;
 pub use reader::Reader;
 pub use ros::{RosLayout, RosMessage};

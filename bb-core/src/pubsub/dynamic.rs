@@ -133,7 +133,8 @@ impl fmt::Debug for DynamicMessage {
 #[derive(Clone, Debug)]
 pub struct Tap(pub(super) Arc<Queue<DynamicMessage>>);
 
-/// The messages of all selected publishers, in the order in which they were published. Dropping it unsubscribes.
+/// The messages of all selected publishers, in the order in which they were published: also of those that begin to publish
+/// later, at paths made at run time. Dropping it unsubscribes.
 #[derive(Debug)]
 pub struct DynamicSubscription {
     queue: Arc<Queue<DynamicMessage>>,
@@ -151,10 +152,12 @@ impl DynamicSubscription {
         overflow: Overflow,
     ) -> Self {
         let topics: Vec<_> = topics.into_iter().collect();
-        Self::among(&topics, &[], select, &payloads.into(), overflow)
+        let subscription = Self::among(&topics, &[], select, &payloads.into(), overflow);
+        subscription.warn();
+        subscription
     }
 
-    /// The same, where the paths `declared` have a publisher while the robot runs.
+    /// The same without a warning, where the paths `declared` have a publisher while the robot runs.
     pub(super) fn among(
         topics: &[&dyn AnyTopic],
         declared: &[&'static str],
@@ -171,13 +174,21 @@ impl DynamicSubscription {
             }
         }
         let unmatched = unmatched(topics, declared, select, payloads);
-        for unmatched in &unmatched {
-            tracing::warn!("{unmatched}");
-        }
         Self { queue, paths, unmatched }
     }
 
-    /// The paths it listens to.
+    /// Logs what is unmatched. No lock may be held: it runs the user's `tracing` subscriber.
+    pub(super) fn warn(&self) {
+        for unmatched in &self.unmatched {
+            tracing::warn!("{unmatched}");
+        }
+    }
+
+    pub(super) fn tap(&self) -> Tap {
+        Tap(Arc::clone(&self.queue))
+    }
+
+    /// The paths it listened to when it was made. Of those made later at run time, it also listens to the selected ones.
     pub fn paths(&self) -> &[&'static str] {
         &self.paths
     }

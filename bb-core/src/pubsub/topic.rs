@@ -175,7 +175,7 @@ impl<T> fmt::Debug for Topic<T> {
 }
 
 /// What all topics have in common.
-pub trait AnyTopic {
+pub trait AnyTopic: Any + Send + Sync {
     /// Its path.
     fn path(&self) -> &'static str;
     /// The name of its payload's type.
