@@ -34,6 +34,7 @@ impl Wakers {
 
     /// Adds a message to drop; one that runs no code when it is dropped is dropped at once. No lock of this module may be
     /// held.
+    #[inline]
     pub(super) fn discard<M: Send + 'static>(&mut self, message: M) {
         if self.drops_at_once || !needs_drop::<M>() {
             discard(message);
@@ -43,7 +44,7 @@ impl Wakers {
     }
 
     /// Whether there is nothing to do.
-    #[allow(dead_code, reason = "for publishers that hold a lock of the robot")]
+    #[inline]
     pub(crate) fn is_empty(&self) -> bool {
         // The slots are filled in order.
         self.first[0].is_none() && self.evicted.is_empty()
@@ -53,12 +54,19 @@ impl Wakers {
     pub(crate) fn run(self) {
         drop(self);
     }
+
+    fn run_all(&mut self) {
+        self.first.iter_mut().filter_map(Option::take).chain(self.more.drain(..)).for_each(wake);
+        self.evicted.drain(..).for_each(discard);
+    }
 }
 
 impl Drop for Wakers {
+    #[inline]
     fn drop(&mut self) {
-        self.first.iter_mut().filter_map(Option::take).chain(self.more.drain(..)).for_each(wake);
-        self.evicted.drain(..).for_each(discard);
+        if !self.is_empty() {
+            self.run_all();
+        }
     }
 }
 
@@ -68,6 +76,7 @@ pub(super) fn wake(waker: Waker) {
 }
 
 /// Drops a message or a waker. A panic in its `Drop` is logged.
+#[inline]
 pub(super) fn discard<M>(value: M) {
     if needs_drop::<M>() {
         contain("a message's or a waker's `Drop`", || drop(value));
@@ -75,8 +84,15 @@ pub(super) fn discard<M>(value: M) {
 }
 
 /// Runs a user's code that must not end the thread which happens to run it.
+#[inline]
 fn contain(what: &'static str, call: impl FnOnce()) {
-    let Err(panic) = catch_unwind(AssertUnwindSafe(call)) else { return };
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(call)) {
+        log(what, panic);
+    }
+}
+
+#[cold]
+fn log(what: &'static str, panic: Box<dyn Any + Send>) {
     let message = panic.downcast_ref::<&str>().copied();
     let message = message.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     tracing::error!(panic = message.unwrap_or("no message"), "{what} panicked");
