@@ -2,8 +2,12 @@
 //! it replaces the allocator by one that counts.
 
 use bb_core::prelude::*;
+use bb_core::pubsub::Topic;
 use bb_estimators::attitude::ImuAndMagnetometer;
 use bb_estimators::{Madgwick, OrientationAverage};
+use std::future::Future;
+use std::pin::pin;
+use std::task::{Context as TaskContext, Waker};
 
 robot! {
     robot TwoImus;
@@ -47,4 +51,30 @@ fn nothing_is_allocated_from_publish_to_output() -> Result<(), StartError> {
     assert_eq!(attitude.drain().count(), 1000);
     assert_eq!(allocations.count_total, 0);
     Ok(())
+}
+
+/// A payload whose clone allocates nothing, although it holds the heap.
+#[derive(Clone, Debug, Payload)]
+struct Shared {
+    pixels: std::sync::Arc<[u8]>,
+}
+
+#[test]
+fn nothing_is_allocated_for_subscribers_that_are_full_or_awaited() {
+    let topic = Topic::<Shared>::new("sensor/base/camera");
+    let by_number = topic.subscribe(Overflow::DropOldest { capacity: 4 });
+    let by_bytes = topic.subscribe(Overflow::DropOldestWithin { capacity: 1 << 17, bytes: 10_000 });
+    let latest = topic.subscribe(Overflow::KeepLatest);
+    let mut awaited = topic.subscribe(Overflow::default());
+    let message = Stamped::new(MonotonicTime::ZERO, Shared { pixels: [0; 1000].into() });
+    let mut publish = || {
+        let next = pin!(awaited.recv_async());
+        assert!(next.poll(&mut TaskContext::from_waker(Waker::noop())).is_pending());
+        topic.publish(&message);
+        assert!(awaited.try_recv().is_some());
+    };
+    publish();
+    let allocations = allocation_counter::measure(|| (0..1000).for_each(|_| publish()));
+    assert_eq!(allocations.count_total, 0);
+    assert_eq!((by_number.lagged(), by_bytes.lagged(), latest.lagged()), (997, 991, 1000));
 }

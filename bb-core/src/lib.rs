@@ -46,7 +46,9 @@ pub use control::{
 };
 pub use message::{Field, Finite, Frame, Origin, Payload, Stamped};
 pub use node::{HealthReason, HealthState, HealthTransition};
-pub use pubsub::{DynamicMessage, DynamicSubscription, Overflow, Select, Subscription};
+pub use pubsub::{
+    DynamicMessage, DynamicSubscription, Overflow, Payloads, Publisher, Select, Subscription, Unmatched,
+};
 pub use run::{
     ActuatorHandle, Builder, Bus, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Live, OutputHandle,
     ParameterHandle, Replay, ReplayError, Report, Robot, Running, SensorHandle, Simulation, StartError,

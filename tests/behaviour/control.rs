@@ -387,7 +387,10 @@ fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Box<
     assert_eq!(counts.drain().map(|number| number.0).collect::<Vec<_>>(), [1.0, 10.0, 10.0, 10.0]);
     let mut builder = Commanded::builder();
     for (path, message) in [
-        ("sensor/base/pan/encodre", "nothing publishes at `sensor/base/pan/encodre`"),
+        (
+            "sensor/base/pan/encodre",
+            "nothing publishes at `sensor/base/pan/encodre`; did you mean `sensor/base/pan/encoder`?",
+        ),
         ("state_machine", "`state_machine` publishes `StateTransition`, not `Number`"),
     ] {
         builder.options(commanded::bridge::dashboard).path = path.into();

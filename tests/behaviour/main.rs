@@ -14,6 +14,7 @@ mod frames;
 mod health;
 mod hygiene;
 mod outputs;
+mod own_paths;
 mod parameters;
 mod real_time;
 mod replay;

@@ -2,6 +2,7 @@
 
 use crate::components::{Counter, Number, Scale};
 use bb_core::prelude::*;
+use bb_core::{DynamicSubscription, Unmatched};
 
 robot! {
     robot Talker;
@@ -110,4 +111,105 @@ fn a_waker_may_drop_its_subscription_and_ask_for_a_report() -> Result<(), StartE
 fn an_absurd_capacity_is_bounded() {
     let all = Overflow::DropOldest { capacity: usize::MAX };
     drop(Talker::builder().subscribe_with(talker::sensor::numbers, all));
+}
+
+/// A payload of which a few fill a memory.
+#[derive(Clone, Debug, Payload)]
+pub(crate) struct Picture {
+    pixels: Vec<u8>,
+}
+
+robot! {
+    robot Watching;
+    link base;
+    sensors { sensor camera: External<Picture>(); }
+}
+
+#[test]
+fn idle_subscribers_of_large_messages_are_bounded_in_bytes() -> Result<(), StartError> {
+    const MIB: usize = 1 << 20;
+    let mut simulation = Watching::builder().simulate()?;
+    let idle = simulation.subscribe(watching::sensor::camera);
+    let small = Overflow::DropOldestWithin { capacity: 1000, bytes: 5 * MIB };
+    let any = simulation.subscribe_any(Select::All, None, small);
+    for _ in 0..70 {
+        let picture = Picture { pixels: vec![0; MIB] };
+        simulation.publish(watching::sensor::camera, MonotonicTime::ZERO, picture);
+    }
+    let kept = simulation.bus().subscribers("sensor/camera");
+    let kept: Vec<_> = kept.iter().map(|one| (one.waiting, one.bytes, one.lost)).collect();
+    assert_eq!(kept, [(64, 64 * MIB, 6), (5, 5 * MIB, 65)]);
+    assert_eq!((idle.lagged(), any.lagged()), (6, 65));
+    assert_eq!(simulation.report().topic("sensor/camera").map(|topic| topic.lost), Some(71));
+    Ok(())
+}
+
+robot! {
+    robot Diverse;
+    link base {
+        sensor imu: External<Imu>();
+        sensor field: External<MagneticField>();
+        sensor encoder: External<JointState>();
+    }
+}
+
+#[test]
+fn a_filter_takes_several_payload_types() -> Result<(), StartError> {
+    let builder = Diverse::builder();
+    let names: Vec<&str> = vec!["Imu", "MagneticField"];
+    let early = builder.subscribe_any(Select::All, ["JointState", "Imu"], Overflow::default());
+    let mut simulation = builder.simulate()?;
+    let one = simulation.subscribe_any(Select::Below("sensor"), Some("Imu"), Overflow::default());
+    let two = simulation.subscribe_any(Select::Below("sensor"), &*names, Overflow::default());
+    let all = simulation.bus().subscribe_any(Select::Below("sensor"), None, Overflow::default());
+
+    simulation.publish(diverse::sensor::base::imu, MonotonicTime::ZERO, Imu::new([0.0; 3].into(), [0.0; 3].into()));
+    simulation.publish(diverse::sensor::base::field, MonotonicTime::ZERO, MagneticField::new([0.0; 3].into()));
+    let state = JointState { position: 0.0, velocity: None, effort: None };
+    simulation.publish(diverse::sensor::base::encoder, MonotonicTime::ZERO, state);
+
+    let names = |subscription: &DynamicSubscription| {
+        subscription.drain().map(|message| message.payload_name()).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&early), ["Imu", "JointState"]);
+    assert_eq!(names(&one), ["Imu"]);
+    assert_eq!(names(&two), ["Imu", "MagneticField"]);
+    assert_eq!(names(&all), ["Imu", "MagneticField", "JointState"]);
+    Ok(())
+}
+
+#[test]
+fn a_selection_that_matches_nothing_names_the_nearest() -> Result<(), StartError> {
+    let builder = Diverse::builder();
+    let typo = builder.subscribe_any(Select::Path("sensor/base/imuu"), None, Overflow::default());
+    let told: Vec<_> = typo.unmatched().iter().map(Unmatched::to_string).collect();
+    assert_eq!(told, ["nothing publishes at `sensor/base/imuu`; did you mean `sensor/base/imu`?"]);
+    assert_eq!(typo.unmatched()[0].nearest(), Some("sensor/base/imu"));
+
+    let simulation = builder.simulate()?;
+    let select = Select::AnyOf(&[Select::Below("sensors"), Select::Path("health"), Select::Path("saftey")]);
+    let typos = simulation.subscribe_any(select, ["HealthTransition", "Imo"], Overflow::default());
+    let told: Vec<_> = typos.unmatched().iter().map(Unmatched::to_string).collect();
+    assert_eq!(
+        told,
+        [
+            "nothing publishes at or below `sensors`; did you mean `sensor`?",
+            "nothing publishes at `saftey`; did you mean `safety`?",
+            "nothing that is selected publishes `Imo`",
+        ]
+    );
+    let right = simulation.subscribe_any(Select::Below("sensor"), Some("Imu"), Overflow::default());
+    assert_eq!(right.unmatched(), []);
+
+    let error =
+        |path| simulation.bus().subscribe::<Imu>(path, Overflow::default()).map_err(|error| error.to_string());
+    assert_eq!(
+        error("sensor/base/imuu").err().as_deref(),
+        Some("nothing publishes at `sensor/base/imuu`; did you mean `sensor/base/imu`?")
+    );
+    assert_eq!(
+        error("sensor/base/field").err().as_deref(),
+        Some("`sensor/base/field` publishes `MagneticField`, not `Imu`")
+    );
+    Ok(())
 }

@@ -18,9 +18,9 @@ use super::state::Machine;
 use super::tasks::{Bell, Sleeper, Task, lock};
 use super::{CategoryDeclaration, CommandDeclaration, Prepared};
 use crate::journal::{Event, Journal, JournalLine};
-use crate::message::Origin;
+use crate::message::{Origin, Stamp};
 use crate::node::HealthTransition;
-use crate::pubsub::{AnyTopic, Topic};
+use crate::pubsub::{AnyTopic, Registry, Topic};
 use crate::run::Directory;
 use crate::time::{Clock, MonotonicTime};
 use std::cell::Cell;
@@ -49,6 +49,8 @@ pub struct SystemTopics {
     pub(crate) journal: Topic<JournalLine>,
     pub(crate) commands: Box<[Topic<CommandEvent>]>,
     pub(crate) parameters: Box<[Topic<ParameterChange>]>,
+    /// Topics made at run time.
+    pub(crate) registry: Registry,
 }
 
 impl SystemTopics {
@@ -61,6 +63,7 @@ impl SystemTopics {
             journal: Topic::new("journal"),
             commands: declared.commands.iter().map(|command| Topic::new(command.path)).collect(),
             parameters: declared.parameters.iter().map(|parameter| Topic::new(parameter.path)).collect(),
+            registry: Registry::default(),
         }
     }
 
@@ -255,6 +258,13 @@ impl Control {
     /// When commands go on.
     pub(super) fn moment(&self) -> MonotonicTime {
         MonotonicTime::from_nanos(self.0.moment_nanos.load(Ordering::Acquire))
+    }
+
+    /// The stamp of what is published now; at the time of the commands, if one of them publishes it.
+    pub(crate) fn stamp(&self) -> Stamp {
+        let monotonic_time = if GOES_ON.get() { self.moment() } else { self.0.clock.now() };
+        let wall_time = self.0.clock.wall_at(monotonic_time);
+        Stamp { monotonic_time, wall_time, origin: self.0.origin, ..Stamp::default() }
     }
 
     pub(crate) fn set_directory(&self, directory: Arc<dyn Directory>) {

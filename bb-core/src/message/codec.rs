@@ -43,7 +43,8 @@ mod writer;
 pub use derive::{FieldOf, NotField, is_any, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
-pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
+pub(crate) use intern::intern;
+pub use json::to_json;
 pub use reader::Reader;
 pub use ros::{RosLayout, RosMessage};
 pub use schema::Schema;
@@ -68,6 +69,16 @@ use super::Finite;
 pub trait Field: Finite + Sized {
     /// What its bytes mean.
     const SHAPE: Shape;
+
+    /// Whether no value holds anything on the heap, so that [`heap_bytes`](Self::heap_bytes) need not be called.
+    const IS_INLINE: bool = false;
+
+    /// Bytes that it holds on the heap, beside its own `size_of`. What an `Arc` shares counts in full. Subscriptions are
+    /// bounded by it, see [`Overflow`](crate::Overflow); the derive adds up that of the fields, and a type with an
+    /// implementation of its own should say it too.
+    fn heap_bytes(&self) -> usize {
+        0
+    }
 
     /// Appends it.
     fn write(&self, writer: &mut Writer<'_>);

@@ -1,7 +1,8 @@
 //! Messages of any payload, by path: for loggers, dashboards, recorders.
 
 use super::queue::Queue;
-use super::{AnyTopic, Overflow};
+use super::unmatched::{Unmatched, unmatched};
+use super::{AnyTopic, Overflow, Payloads, Select};
 use crate::message::codec::{encode, encode_as_ros, is_exact_as_ros, to_json};
 use crate::message::{Payload, Schema, Stamp, Stamped};
 use std::any::Any;
@@ -132,62 +133,69 @@ impl fmt::Debug for DynamicMessage {
 #[derive(Clone, Debug)]
 pub struct Tap(pub(super) Arc<Queue<DynamicMessage>>);
 
-/// Which paths to subscribe to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Select<'a> {
-    /// All of them.
-    All,
-    /// One.
-    Path(&'a str),
-    /// One, and all below it: `sensor/base_link`.
-    Below(&'a str),
-    /// What any of these includes.
-    AnyOf(&'a [Select<'a>]),
-}
-
-impl Select<'_> {
-    /// Whether it includes `path`.
-    pub fn includes(self, path: &str) -> bool {
-        match self {
-            Self::All => true,
-            Self::Path(selected) => path == selected,
-            Self::Below(above) => {
-                path.strip_prefix(above).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-            }
-            Self::AnyOf(several) => several.iter().any(|select| select.includes(path)),
-        }
-    }
-}
-
-/// The messages of all selected publishers, in the order in which they were published. Dropping it unsubscribes.
+/// The messages of all selected publishers, in the order in which they were published: also of those that begin to publish
+/// later, at paths made at run time. Dropping it unsubscribes.
 #[derive(Debug)]
 pub struct DynamicSubscription {
     queue: Arc<Queue<DynamicMessage>>,
     paths: Vec<&'static str>,
+    unmatched: Vec<Unmatched>,
 }
 
 impl DynamicSubscription {
-    /// Subscribes to those `topics` that are selected and whose payload's type has the name `payload`, if one is given.
-    pub fn new<'a>(
+    /// Subscribes to those `topics` that are selected and whose payload is one of `payloads`. What matches none of them is
+    /// logged as a warning, and kept in [`unmatched`](Self::unmatched).
+    pub fn new<'a, 'b>(
         topics: impl IntoIterator<Item = &'a dyn AnyTopic>,
         select: Select<'_>,
-        payload: Option<&str>,
+        payloads: impl Into<Payloads<'b>>,
+        overflow: Overflow,
+    ) -> Self {
+        let topics: Vec<_> = topics.into_iter().collect();
+        let subscription = Self::among(&topics, &[], select, &payloads.into(), overflow);
+        subscription.warn();
+        subscription
+    }
+
+    /// The same without a warning, where the paths `declared` have a publisher while the robot runs.
+    pub(super) fn among(
+        topics: &[&dyn AnyTopic],
+        declared: &[&'static str],
+        select: Select<'_>,
+        payloads: &Payloads<'_>,
         overflow: Overflow,
     ) -> Self {
         let queue = Arc::new(Queue::new(overflow));
         let mut paths = Vec::new();
         for topic in topics {
-            if select.includes(topic.path()) && payload.is_none_or(|name| name == topic.payload_name()) {
+            if select.includes(topic.path()) && payloads.includes(topic.payload_name()) {
                 topic.tap(&Tap(Arc::clone(&queue)));
                 paths.push(topic.path());
             }
         }
-        Self { queue, paths }
+        let unmatched = unmatched(topics, declared, select, payloads);
+        Self { queue, paths, unmatched }
     }
 
-    /// The paths it listens to.
+    /// Logs what is unmatched. No lock may be held: it runs the user's `tracing` subscriber.
+    pub(super) fn warn(&self) {
+        for unmatched in &self.unmatched {
+            tracing::warn!("{unmatched}");
+        }
+    }
+
+    pub(super) fn tap(&self) -> Tap {
+        Tap(Arc::clone(&self.queue))
+    }
+
+    /// The paths it listened to when it was made. Of those made later at run time, it also listens to the selected ones.
     pub fn paths(&self) -> &[&'static str] {
         &self.paths
+    }
+
+    /// What it asked for and matched nothing when it was made, with the nearest name for each.
+    pub fn unmatched(&self) -> &[Unmatched] {
+        &self.unmatched
     }
 
     /// The oldest message that waits, if any.
@@ -236,20 +244,5 @@ mod tests {
         let left: Vec<_> = (0..100).map(|_| Arc::downgrade(&listen().queue)).collect();
         let _last = listen();
         assert_eq!(left.iter().filter(|queue| queue.strong_count() > 0).count(), 0);
-    }
-
-    #[test]
-    fn a_subtree_ends_at_whole_names() {
-        let below = Select::Below("sensor/base");
-        assert!(below.includes("sensor/base") && below.includes("sensor/base/imu"));
-        assert!(!below.includes("sensor/base_link/imu") && !below.includes("estimator/sensor/base"));
-        assert!(Select::All.includes("anything") && !Select::Path("a").includes("a/b"));
-    }
-
-    #[test]
-    fn several_are_selected_at_once() {
-        let several = Select::AnyOf(&[Select::Path("health"), Select::Below("command")]);
-        assert!(several.includes("health") && several.includes("command/stop"));
-        assert!(!several.includes("sensor/base/imu") && !Select::AnyOf(&[]).includes("health"));
     }
 }

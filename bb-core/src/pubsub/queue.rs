@@ -1,21 +1,36 @@
 //! The bounded queue between a topic and one subscriber.
 
 use super::SubscriberStatistics;
+use super::wakers::{Wakers, discard, wake};
+use crate::message::{Payload, Stamped};
 use std::collections::VecDeque;
+use std::mem::needs_drop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
 /// What happens to a subscriber that is slower than its publisher.
+///
+/// A subscription is bounded in messages and in bytes. The bytes of a message are what its payload holds on the heap
+/// ([`Field::heap_bytes`](crate::Field::heap_bytes)), and the message itself where that is larger than 1 KiB; smaller ones are
+/// bounded by their number alone. One message is always kept, however large it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overflow {
-    /// Keeps so many messages; then the oldest makes room, and the loss is counted.
+    /// Keeps so many messages, and no more than [`Overflow::DEFAULT_BYTES`]; then the oldest makes room, and the loss is
+    /// counted.
     DropOldest {
-        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`]. The room is made at once.
+        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
         capacity: usize,
     },
-    /// Keeps the newest alone; the loss of the others is counted.
+    /// The same with a bound in bytes of its own.
+    DropOldestWithin {
+        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
+        capacity: usize,
+        /// Bytes that they may have together; `usize::MAX` for no bound.
+        bytes: usize,
+    },
+    /// Keeps only the newest; the loss of the others is counted.
     KeepLatest,
 }
 
@@ -26,63 +41,137 @@ impl Default for Overflow {
 }
 
 impl Overflow {
-    /// The largest capacity of a subscription.
+    /// The largest capacity of a subscription, in messages.
     pub const MAX_CAPACITY: usize = 1 << 20;
 
-    fn capacity(self) -> usize {
-        match self {
-            Self::DropOldest { capacity } => capacity.clamp(1, Self::MAX_CAPACITY),
-            Self::KeepLatest => 1,
-        }
+    /// Bytes that the messages of a subscription may have together, if it does not say otherwise: 64 MiB.
+    pub const DEFAULT_BYTES: usize = 64 << 20;
+
+    fn bound(self) -> Bound {
+        let (capacity, bytes) = match self {
+            Self::DropOldest { capacity } => (capacity, Self::DEFAULT_BYTES),
+            Self::DropOldestWithin { capacity, bytes } => (capacity, bytes),
+            Self::KeepLatest => (1, usize::MAX),
+        };
+        Bound { capacity: capacity.clamp(1, Self::MAX_CAPACITY), bytes }
     }
 }
 
+/// How much may wait.
+#[derive(Clone, Copy, Debug)]
+struct Bound {
+    capacity: usize,
+    bytes: usize,
+}
+
+/// Room that a queue makes in advance, in bytes; beyond it, room is made when messages first need it.
+const ROOM_IN_ADVANCE: usize = 1 << 20;
+
+/// A message's own size that does not count towards the bytes of its subscription.
+const UNCOUNTED_BYTES: usize = 1 << 10;
+
+/// The bytes of a message that count towards the bound of a subscription.
+pub(super) fn counted_bytes<T: Payload>(message: &Stamped<T>) -> usize {
+    let own = const { if size_of::<Stamped<T>>() > UNCOUNTED_BYTES { size_of::<Stamped<T>>() } else { 0 } };
+    if T::IS_INLINE { own } else { own.saturating_add(message.payload.heap_bytes()) }
+}
+
+/// No user's code runs under its lock: messages are dropped, and wakers cloned, woken and dropped, without it.
 #[derive(Debug)]
 pub(super) struct Queue<M> {
     state: Mutex<State<M>>,
     arrived: Condvar,
-    capacity: usize,
+    bound: Bound,
     /// Nobody reads it any more.
     abandoned: AtomicBool,
 }
 
 #[derive(Debug)]
 struct State<M> {
-    messages: VecDeque<M>,
+    messages: VecDeque<Entry<M>>,
+    /// The sum of what they count.
+    bytes: usize,
     lagged: u64,
     closed: bool,
     waker: Option<Waker>,
-    /// Threads that wait: telling nobody would cost a system call.
+    /// Threads that wait: notifying nobody would cost a system call.
     waiting: usize,
 }
 
+#[derive(Debug)]
+struct Entry<M> {
+    message: M,
+    bytes: usize,
+}
+
+impl<M: Send + 'static> Queue<M> {
+    /// Adds a message of so many counted bytes; how many of the oldest had to make room for it. What is to be woken and
+    /// dropped goes to `wakers`.
+    pub(super) fn push(&self, message: M, bytes: usize, wakers: &mut Wakers) -> u64 {
+        let mut lost = 0;
+        let (state, evicted) = loop {
+            let mut state = self.lock();
+            let mut evicted = None;
+            if !self.has_room(&state, bytes) {
+                evicted = state.pop();
+                state.lagged += 1;
+                lost += 1;
+            }
+            if self.has_room(&state, bytes) {
+                break (state, evicted);
+            }
+            // A message that needs the room of several evicts them one at a time: each is dropped without the lock.
+            drop(state);
+            evicted.into_iter().for_each(|evicted| wakers.discard(evicted));
+        };
+        self.enqueue(state, Entry { message, bytes }, wakers);
+        evicted.into_iter().for_each(|evicted| wakers.discard(evicted));
+        lost
+    }
+
+    fn has_room(&self, state: &State<M>, bytes: usize) -> bool {
+        let has_bytes = || state.bytes.checked_add(bytes).is_some_and(|sum| sum <= self.bound.bytes);
+        state.messages.is_empty() || state.messages.len() < self.bound.capacity && has_bytes()
+    }
+
+    fn enqueue(&self, mut state: MutexGuard<'_, State<M>>, entry: Entry<M>, wakers: &mut Wakers) {
+        // Under the lock, so that what `abandon` takes out is all there is.
+        if self.is_abandoned() {
+            drop(state);
+            wakers.discard(entry.message);
+            return;
+        }
+        state.bytes += entry.bytes;
+        state.messages.push_back(entry);
+        let waker = state.waker.take();
+        let is_awaited = state.waiting > 0;
+        drop(state);
+        if is_awaited {
+            self.arrived.notify_one();
+        }
+        if let Some(waker) = waker {
+            wakers.wake(waker);
+        }
+    }
+}
+
 impl<M> Queue<M> {
-    /// All its room is made here, so that publishing allocates nothing.
+    /// Room for the usual number of messages is made here, so that publishing allocates nothing.
     pub(super) fn new(overflow: Overflow) -> Self {
-        let capacity = overflow.capacity();
+        let bound = overflow.bound();
+        let in_advance = bound.capacity.min(ROOM_IN_ADVANCE / size_of::<Entry<M>>());
         let state = State {
-            messages: VecDeque::with_capacity(capacity),
+            messages: VecDeque::with_capacity(in_advance),
+            bytes: 0,
             lagged: 0,
             closed: false,
             waker: None,
             waiting: 0,
         };
-        Self { state: Mutex::new(state), arrived: Condvar::new(), capacity, abandoned: AtomicBool::new(false) }
+        Self { state: Mutex::new(state), arrived: Condvar::new(), bound, abandoned: AtomicBool::new(false) }
     }
 
-    /// Adds a message; true if the oldest had to make room for it.
-    pub(super) fn push(&self, message: M) -> bool {
-        let mut state = self.lock();
-        let is_full = state.messages.len() == self.capacity;
-        if is_full {
-            state.messages.pop_front();
-            state.lagged += 1;
-        }
-        state.messages.push_back(message);
-        self.wake(state);
-        is_full
-    }
-
+    /// Tells the reader that no more will come.
     pub(super) fn close(&self) {
         let mut state = self.lock();
         state.closed = true;
@@ -91,15 +180,23 @@ impl<M> Queue<M> {
         // Several threads may wait for the same subscription, and none of them will get a message any more.
         self.arrived.notify_all();
         if let Some(waker) = waker {
-            crate::run::wake(waker);
+            wake(waker);
         }
     }
 
-    /// Says that nobody reads it any more; what waits is dropped.
+    /// Says that nobody reads it any more. What waits is dropped here, and nothing is added from now on: whoever drops the
+    /// queue itself, under whatever lock, runs no user's code.
     pub(super) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Release);
-        let messages = std::mem::take(&mut self.lock().messages);
-        drop(messages);
+        let mut state = self.lock();
+        let messages = std::mem::take(&mut state.messages);
+        state.bytes = 0;
+        let waker = state.waker.take();
+        drop(state);
+        if needs_drop::<M>() {
+            messages.into_iter().for_each(|entry| discard(entry.message));
+        }
+        waker.into_iter().for_each(discard);
     }
 
     pub(super) fn is_abandoned(&self) -> bool {
@@ -111,13 +208,14 @@ impl<M> Queue<M> {
         SubscriberStatistics {
             is_typed,
             waiting: state.messages.len(),
-            capacity: self.capacity,
+            capacity: self.bound.capacity,
+            bytes: state.bytes,
             lost: state.lagged,
         }
     }
 
     pub(super) fn pop(&self) -> Option<M> {
-        self.lock().messages.pop_front()
+        self.lock().pop()
     }
 
     pub(super) fn len(&self) -> usize {
@@ -128,16 +226,13 @@ impl<M> Queue<M> {
         self.lock().lagged
     }
 
-    /// Waits for a message until `timeout` (none: for ever); none after the time, or once closed and empty.
+    /// Waits for a message until `timeout` (`None`: without end); `None` after that, or once closed and empty.
     pub(super) fn wait(&self, timeout: Option<Duration>) -> Option<M> {
         let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
         let mut state = self.lock();
         loop {
-            if let Some(message) = state.messages.pop_front() {
-                return Some(message);
-            }
-            if state.closed {
-                return None;
+            if let Some(next) = state.ready() {
+                return next;
             }
             state.waiting += 1;
             state = match deadline {
@@ -157,31 +252,44 @@ impl<M> Queue<M> {
 
     pub(super) fn poll(&self, context: &mut Context<'_>) -> Poll<Option<M>> {
         let mut state = self.lock();
-        if let Some(message) = state.messages.pop_front() {
-            return Poll::Ready(Some(message));
+        if let Some(ready) = state.ready() {
+            return Poll::Ready(ready);
         }
-        if state.closed {
-            return Poll::Ready(None);
+        if state.waker.as_ref().is_some_and(|waker| waker.will_wake(context.waker())) {
+            return Poll::Pending;
         }
-        match &mut state.waker {
-            Some(waker) => waker.clone_from(context.waker()),
-            none => *none = Some(context.waker().clone()),
-        }
-        Poll::Pending
-    }
-
-    fn wake(&self, mut state: MutexGuard<'_, State<M>>) {
-        let (waker, is_awaited) = (state.waker.take(), state.waiting > 0);
         drop(state);
-        if is_awaited {
-            self.arrived.notify_one();
+        let waker = context.waker().clone();
+        let mut state = self.lock();
+        // A message may have arrived meanwhile, and woken the waker of before.
+        if let Some(ready) = state.ready() {
+            drop(state);
+            discard(waker);
+            return Poll::Ready(ready);
         }
-        if let Some(waker) = waker {
-            crate::run::wake(waker);
-        }
+        let before = state.waker.replace(waker);
+        drop(state);
+        before.into_iter().for_each(discard);
+        Poll::Pending
     }
 
     fn lock(&self) -> MutexGuard<'_, State<M>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<M> State<M> {
+    fn pop(&mut self) -> Option<M> {
+        let Entry { message, bytes } = self.messages.pop_front()?;
+        self.bytes -= bytes;
+        Some(message)
+    }
+
+    /// The next message, or `Some(None)` if no more will come.
+    fn ready(&mut self) -> Option<Option<M>> {
+        match self.pop() {
+            None if !self.closed => None,
+            next => Some(next),
+        }
     }
 }

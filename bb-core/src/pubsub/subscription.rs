@@ -66,6 +66,8 @@ impl<T> Subscription<T> {
 impl<T> Drop for Subscription<T> {
     fn drop(&mut self) {
         leave(&self.topic, &self.queue);
+        // A publisher may still hold the list with this queue.
+        self.queue.abandon();
     }
 }
 

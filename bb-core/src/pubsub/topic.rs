@@ -1,7 +1,8 @@
 //! One publisher's end: who listens to it.
 
 use super::dynamic::Tap;
-use super::queue::Queue;
+use super::queue::{Queue, counted_bytes};
+use super::wakers::Wakers;
 use super::{DynamicMessage, Overflow, Subscription};
 use crate::Payload;
 use crate::message::{DecodeError, Stamped};
@@ -22,8 +23,9 @@ pub struct Topic<T> {
 }
 
 pub(super) struct Subscribers<T> {
-    /// Replaced as a whole, so that a publisher takes it along and holds no lock while it wakes subscribers: whatever
-    /// they do on that thread may subscribe and unsubscribe.
+    /// Replaced as a whole, so that a publisher takes a list along and holds no lock while it wakes subscribers, who may
+    /// subscribe and unsubscribe on that thread. A queue that is dropped with its list is abandoned, and so runs no
+    /// user's code.
     queues: Arc<[Arc<Queue<Stamped<T>>>]>,
     /// Those who do not know the payload.
     taps: Arc<[Arc<Queue<DynamicMessage>>]>,
@@ -54,6 +56,7 @@ impl<T> Topic<T> {
         let queue = Arc::new(Queue::new(overflow));
         let mut subscribers = lock(&self.subscribers);
         if subscribers.closed {
+            drop(subscribers);
             queue.close();
         } else {
             subscribers.queues = subscribers.queues.iter().chain([&queue]).map(Arc::clone).collect();
@@ -91,15 +94,33 @@ impl<T: Payload> Topic<T> {
         self.hand_out(message);
     }
 
+    /// Only enqueues `message`: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's
+    /// code runs here but the payload's `clone`, and that only if somebody listens.
+    #[inline]
+    #[allow(dead_code, reason = "for publishers that hold a lock of the robot")]
+    pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers) {
+        self.published.fetch_add(1, Ordering::Relaxed);
+        if self.listening.load(Ordering::Acquire) > 0 {
+            self.deliver(message, wakers);
+        }
+    }
+
     #[inline]
     fn hand_out(&self, message: &Stamped<T>) {
         if self.listening.load(Ordering::Acquire) > 0 {
-            self.deliver(message);
+            self.deliver_and_wake(message);
         }
     }
 
     #[cold]
-    fn deliver(&self, message: &Stamped<T>) {
+    fn deliver_and_wake(&self, message: &Stamped<T>) {
+        let mut wakers = Wakers::dropping_at_once();
+        self.deliver(message, &mut wakers);
+        wakers.run();
+    }
+
+    #[cold]
+    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         let (queues, taps) = {
             let mut subscribers = lock(&self.subscribers);
             if subscribers.taps.iter().any(|tap| tap.is_abandoned()) {
@@ -110,10 +131,17 @@ impl<T: Payload> Topic<T> {
             self.listening.store(subscribers.count(), Ordering::Release);
             (Arc::clone(&subscribers.queues), Arc::clone(&subscribers.taps))
         };
-        let mut lost: u64 = queues.iter().map(|queue| u64::from(queue.push(message.clone()))).sum();
-        if !taps.is_empty() {
+        let bytes = counted_bytes(message);
+        let mut lost = 0;
+        for queue in queues.iter() {
+            lost += queue.push(message.clone(), bytes, wakers);
+        }
+        if let Some((last, others)) = taps.split_last() {
             let message = DynamicMessage::new(self.path, message);
-            lost += taps.iter().map(|tap| u64::from(tap.push(message.clone()))).sum::<u64>();
+            for tap in others {
+                lost += tap.push(message.clone(), bytes, wakers);
+            }
+            lost += last.push(message, bytes, wakers);
         }
         if lost > 0 {
             self.lost.fetch_add(lost, Ordering::Relaxed);
@@ -147,7 +175,7 @@ impl<T> fmt::Debug for Topic<T> {
 }
 
 /// What all topics have in common.
-pub trait AnyTopic {
+pub trait AnyTopic: Any + Send + Sync {
     /// Its path.
     fn path(&self) -> &'static str;
     /// The name of its payload's type.
@@ -160,6 +188,8 @@ pub trait AnyTopic {
     /// A message from its bytes, as [`DynamicMessage::encode`] has made them.
     #[doc(hidden)]
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
+    /// Publishes a message if its payload is this topic's; else does nothing and returns `false`.
+    fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
     /// Itself, for whoever knows the payload.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
@@ -200,6 +230,11 @@ impl<T: Payload> AnyTopic for Topic<T> {
         Ok(DynamicMessage::new(self.path, &message))
     }
 
+    fn publish_dynamic(&self, message: &DynamicMessage) -> bool {
+        let message = message.downcast();
+        message.inspect(|message| self.publish(message)).is_some()
+    }
+
     fn as_any(&self) -> &dyn Any {
         self
     }
@@ -229,6 +264,8 @@ pub struct SubscriberStatistics {
     pub waiting: usize,
     /// How many may wait.
     pub capacity: usize,
+    /// Bytes of the messages that wait, as far as they count towards the bound: see [`Overflow`].
+    pub bytes: usize,
     /// Messages it has lost because it was slow.
     pub lost: u64,
 }

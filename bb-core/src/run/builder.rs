@@ -10,7 +10,7 @@ use crate::control::{
 };
 use crate::journal::{Entry, Journal, JournalLine};
 use crate::message::{Origin, Stamp};
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::Arc;
@@ -33,10 +33,15 @@ impl<R: Robot> Builder<R> {
     const ORIGIN: Origin = Origin { robot: R::NAME, node: "local" };
 
     pub(super) fn new() -> Self {
+        let topics = R::topics();
+        let mut system = SystemTopics::new(declared::<R>());
+        let declared = R::all_topics(&topics).into_iter().chain(system.all()).map(|topic| topic.path());
+        let declared = declared.chain(R::ACTUATORS.iter().map(|actuator| actuator.path));
+        system.registry = Registry::new(declared);
         Self {
             options: R::options(),
-            topics: R::topics(),
-            system: Arc::new(SystemTopics::new(declared::<R>())),
+            topics,
+            system: Arc::new(system),
             parameters: R::PARAMETERS.iter().map(|parameter| parameter.default.into()).collect(),
             supervision: Supervision::default(),
             journal: None,
@@ -99,16 +104,16 @@ impl<R: Robot> Builder<R> {
         publisher.topic(&self.topics, &self.system).subscribe(overflow)
     }
 
-    /// Subscribes to messages of any payload, by path; with the name of a payload's type, to those only. (Commands to
+    /// Subscribes to messages of any payload, by path; with names of payload types, to those only. (Commands to
     /// actuators can be subscribed to once the robot runs.)
-    pub fn subscribe_any(
+    pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
-        payload: Option<&str>,
+        payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
         let topics: Vec<&dyn AnyTopic> = R::all_topics(&self.topics).into_iter().chain(self.system.all()).collect();
-        DynamicSubscription::new(topics, select, payload, overflow)
+        self.system.registry.subscribe(&topics, select, &payloads.into(), overflow)
     }
 
     /// Starts the robot in real time: each sensor on a thread of its own.

@@ -5,7 +5,10 @@ use super::actuator::{Accepts, ActuatorError, AnyActuator};
 use crate::component::Fault;
 use crate::control::{Control, ParameterError, ParameterValue};
 use crate::message::Payload;
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, SubscriberStatistics, Subscription, Topic};
+use crate::pubsub::{
+    AnyTopic, DynamicSubscription, Overflow, Payloads, Publisher, Registry, Select, SubscriberStatistics,
+    Subscription, Topic, nearest_path, unmatched_at,
+};
 use crate::time::Clock;
 use std::fmt;
 use std::sync::{Arc, Weak};
@@ -55,11 +58,11 @@ impl Bus {
     /// Subscribes to what is published at `path`.
     ///
     /// # Errors
-    /// Nothing is published there, or another payload.
+    /// Nothing is published there, or another payload; the nearest path is named.
     pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
         self.with_topics(|topics| {
             let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
-                return Err(Fault::new(format!("nothing publishes at `{path}`")));
+                return Err(unmatched_at(path, topics, self.registry().declared()).into());
             };
             let typed = topic.as_any().downcast_ref::<Topic<T>>().ok_or_else(|| {
                 Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))
@@ -68,14 +71,30 @@ impl Bus {
         })
     }
 
-    /// Subscribes to messages of any payload; with the name of a payload's type, to those only.
-    pub fn subscribe_any(
+    /// Subscribes to messages of any payload; with names of payload types, to those only.
+    pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
-        payload: Option<&str>,
+        payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
-        self.with_topics(|topics| DynamicSubscription::new(topics.iter().copied(), select, payload, overflow))
+        let payloads = payloads.into();
+        self.with_declared_topics(|topics| self.registry().subscribe(topics, select, &payloads, overflow))
+    }
+
+    /// A publisher at a path of the caller's own, such as `mission/progress`: names of letters, digits, `_`, `-` and `.` with
+    /// `/` between them. Those who subscribed to everything, or to a subtree with this path, receive what it publishes
+    /// without doing anything. A second publisher at the same path shares it.
+    ///
+    /// Paths are for names that recur: a robot has at most 1024 of them, of which those that nobody uses any more make room.
+    ///
+    /// # Errors
+    /// The path is that of a declared publisher or of a topic that every robot has, it has another payload already, it is
+    /// malformed, too many are in use, or the robot has stopped.
+    pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
+        let topic = self.registry().topic(path)?;
+        let control = self.control.clone();
+        Ok(Publisher::new(topic, move || control.stamp()))
     }
 
     /// All paths that are published at.
@@ -98,7 +117,12 @@ impl Bus {
         let mut found = Err(Fault::new(format!("no actuator is at `{path}`")));
         if let Some(directory) = self.control.directory() {
             directory.with_actuators(&mut |actuators| {
-                let Some(actuator) = actuators.iter().find(|actuator| actuator.path() == path) else { return };
+                let Some(actuator) = actuators.iter().find(|actuator| actuator.path() == path) else {
+                    if let Some(near) = nearest_path(path, actuators.iter().map(|actuator| actuator.path())) {
+                        found = Err(Fault::new(format!("no actuator is at `{path}`; did you mean `{near}`?")));
+                    }
+                    return;
+                };
                 found = match actuator.accepts().downcast::<Arc<dyn Accepts<T>>>() {
                     Ok(link) => Ok(ActuatorLink(*link)),
                     Err(_) => {
@@ -134,7 +158,21 @@ impl Bus {
         self.control.clock()
     }
 
+    fn registry(&self) -> &Registry {
+        &self.control.topics().registry
+    }
+
     fn with_topics<T>(&self, call: impl Fn(&[&dyn AnyTopic]) -> T) -> T {
+        let made = self.registry().topics();
+        self.with_declared_topics(|topics| {
+            let mut all: Vec<&dyn AnyTopic> = topics.to_vec();
+            all.extend(made.iter().map(|topic| &**topic));
+            call(&all)
+        })
+    }
+
+    /// Without those made at run time.
+    fn with_declared_topics<T>(&self, call: impl Fn(&[&dyn AnyTopic]) -> T) -> T {
         let system = self.control.topics().all();
         let mut result = None;
         if let Some(directory) = self.control.directory() {

@@ -5,7 +5,7 @@ use super::machine::Machine;
 use super::{ActuatorError, Bus, Report, Robot, SensorHandle};
 use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
 use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal, Safety};
-use crate::pubsub::{DynamicSubscription, Overflow, Select, Subscription};
+use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::Arc;
@@ -36,14 +36,14 @@ impl<R: Robot> Live<R> {
         self.0.subscribe(publisher, overflow)
     }
 
-    /// Subscribes from now on to messages of any payload, by path; with the name of a payload's type, to those only.
-    pub fn subscribe_any(
+    /// Subscribes from now on to messages of any payload, by path; with names of payload types, to those only.
+    pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
-        payload: Option<&str>,
+        payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
-        self.0.subscribe_any(select, payload, overflow)
+        self.0.subscribe_any(select, payloads, overflow)
     }
 
     /// Topics, actuators, parameters and states, by path: for code that does not know this robot's type.

@@ -6,7 +6,7 @@ use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
 use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal};
 use crate::message::Stamp;
 use crate::node::{AnyIsland, Node};
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -21,15 +21,20 @@ impl<R: Robot> Machine<R> {
         publisher.topic(R::wired_topics(&self.wiring), self.startup.control.topics()).subscribe(overflow)
     }
 
-    pub(super) fn subscribe_any(
+    pub(super) fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
-        payload: Option<&str>,
+        payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
-        DynamicSubscription::new(self.topics(), select, payload, overflow)
+        self.registry().subscribe(&self.topics(), select, &payloads.into(), overflow)
     }
 
+    fn registry(&self) -> &Registry {
+        &self.startup.control.topics().registry
+    }
+
+    /// All but those made at run time.
     fn topics(&self) -> Vec<&dyn AnyTopic> {
         let actuators = R::all_actuators(&self.wiring).into_iter().map(|actuator| actuator.any_topic());
         let robot = R::all_topics(R::wired_topics(&self.wiring)).into_iter().chain(actuators);
@@ -121,11 +126,12 @@ impl<R: Robot> Machine<R> {
     }
 
     pub(super) fn report(&self) -> Report {
-        let topics = self.topics();
+        let mut topics: Vec<_> = self.topics().iter().map(|topic| topic.statistics()).collect();
+        topics.extend(self.registry().topics().iter().map(|topic| topic.statistics()));
         let estimators: Vec<_> = self.startup.nodes().iter().map(|node| node.statistics()).collect();
         let (faults, all_faults) = self.startup.faults.all();
         Report {
-            topics: topics.iter().map(|topic| topic.statistics()).collect(),
+            topics,
             estimators,
             commands: self.startup.control.statistics(),
             state: self.startup.control.state(),
@@ -146,6 +152,7 @@ impl<R: Robot> Machine<R> {
         for topic in self.topics() {
             topic.close();
         }
+        self.registry().close();
         for island in (0..R::ISLANDS.len()).filter_map(|number| self.island(number)) {
             if !island.terminate(&self.wiring, left()) {
                 self.fault(island.name(), "did not come back from its input in time");

@@ -34,6 +34,7 @@ impl Finite for Unknown {
 #[diagnostic::do_not_recommend]
 impl Field for Unknown {
     const SHAPE: Shape = <()>::SHAPE;
+    const IS_INLINE: bool = true;
 
     fn write(&self, _: &mut Writer<'_>) {}
 

@@ -1,5 +1,6 @@
 //! nalgebra's types. Matrices are written row by row, as ROS has them; quaternions x, y, z, w.
 
+use super::collections::heap_bytes_of;
 use super::{DecodeError, Field, FieldShape, Reader, Shape, StructShape, Writer};
 use crate::message::Finite;
 use nalgebra::{
@@ -34,6 +35,10 @@ impl<T: Field + Scalar, const R: usize, const C: usize> Field for SMatrix<T, R, 
         3 if C == 1 => Shape::Struct(&Named::<T>::VECTOR),
         elements => Shape::Array(&T::SHAPE, elements),
     };
+    const IS_INLINE: bool = T::IS_INLINE;
+    fn heap_bytes(&self) -> usize {
+        heap_bytes_of(self)
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         if R * C == 0 {
             writer.length(0);
@@ -71,6 +76,9 @@ where
 
 impl<T: Field + Scalar> Field for DVector<T> {
     const SHAPE: Shape = Shape::List(&T::SHAPE);
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.as_slice()) + heap_bytes_of(self)
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         writer.length(self.nrows());
         write_rows(self, writer);
@@ -89,6 +97,9 @@ impl<T: Field + Scalar> Field for DMatrix<T> {
             FieldShape::new("data", Shape::List(&T::SHAPE)),
         ],
     });
+    fn heap_bytes(&self) -> usize {
+        size_of_val(self.as_slice()) + heap_bytes_of(self)
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         writer.length(self.nrows());
         writer.length(self.ncols());
@@ -112,6 +123,10 @@ impl<T: Field + Scalar> Field for DMatrix<T> {
 
 impl<T: Field + Scalar> Field for Quaternion<T> {
     const SHAPE: Shape = Shape::Struct(&Named::<T>::QUATERNION);
+    const IS_INLINE: bool = T::IS_INLINE;
+    fn heap_bytes(&self) -> usize {
+        self.coords.heap_bytes()
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         self.coords.write(writer);
     }
@@ -126,6 +141,10 @@ where
     Unit<T>: Finite,
 {
     const SHAPE: Shape = T::SHAPE;
+    const IS_INLINE: bool = T::IS_INLINE;
+    fn heap_bytes(&self) -> usize {
+        self.as_ref().heap_bytes()
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         self.as_ref().write(writer);
     }
@@ -142,6 +161,7 @@ impl Field for Isometry3<f64> {
             FieldShape::new("rotation", UnitQuaternion::<f64>::SHAPE),
         ],
     });
+    const IS_INLINE: bool = true;
     fn write(&self, writer: &mut Writer<'_>) {
         self.translation.vector.write(writer);
         self.rotation.write(writer);

@@ -3,8 +3,17 @@
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::sync::Arc;
 
+/// Bytes that the values hold on the heap, beside their own `size_of`.
+pub(super) fn heap_bytes_of<'a, T: Field + 'a>(values: impl IntoIterator<Item = &'a T>) -> usize {
+    if T::IS_INLINE { 0 } else { values.into_iter().map(T::heap_bytes).sum() }
+}
+
 impl<T: Field> Field for Option<T> {
     const SHAPE: Shape = Shape::Option(&T::SHAPE);
+    const IS_INLINE: bool = T::IS_INLINE;
+    fn heap_bytes(&self) -> usize {
+        heap_bytes_of(self)
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         writer.length(usize::from(self.is_some()));
         if let Some(value) = self {
@@ -18,6 +27,9 @@ impl<T: Field> Field for Option<T> {
 
 impl<T: Field> Field for Vec<T> {
     const SHAPE: Shape = Shape::List(&T::SHAPE);
+    fn heap_bytes(&self) -> usize {
+        self.capacity() * size_of::<T>() + heap_bytes_of(self)
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         writer.length(self.len());
         T::write_all(self, writer);
@@ -31,6 +43,10 @@ impl<T: Field> Field for Vec<T> {
 /// An array without elements has no counterpart in ROS and is written as a list that is always empty.
 impl<T: Field, const N: usize> Field for [T; N] {
     const SHAPE: Shape = if N == 0 { Shape::Option(&T::SHAPE) } else { Shape::Array(&T::SHAPE, N) };
+    const IS_INLINE: bool = T::IS_INLINE;
+    fn heap_bytes(&self) -> usize {
+        heap_bytes_of(self)
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         if N == 0 {
             writer.length(0);
@@ -48,6 +64,9 @@ impl<T: Field, const N: usize> Field for [T; N] {
 
 impl<T: Field> Field for Arc<T> {
     const SHAPE: Shape = T::SHAPE;
+    fn heap_bytes(&self) -> usize {
+        size_of::<T>() + T::heap_bytes(self)
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         T::write(self, writer);
     }
@@ -58,6 +77,9 @@ impl<T: Field> Field for Arc<T> {
 
 impl<T: Field> Field for Arc<[T]> {
     const SHAPE: Shape = Shape::List(&T::SHAPE);
+    fn heap_bytes(&self) -> usize {
+        size_of_val::<[T]>(self) + heap_bytes_of(self.iter())
+    }
     fn write(&self, writer: &mut Writer<'_>) {
         writer.length(self.len());
         T::write_all(self, writer);

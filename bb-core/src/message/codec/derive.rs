@@ -21,6 +21,15 @@ impl<T: Field> FieldOf<T> {
     /// What its bytes mean.
     pub const SHAPE: Shape = T::SHAPE;
 
+    /// Whether no value holds anything on the heap.
+    pub const IS_INLINE: bool = T::IS_INLINE;
+
+    /// Bytes that it holds on the heap.
+    #[inline]
+    pub fn heap_bytes(value: &T) -> usize {
+        if T::IS_INLINE { 0 } else { value.heap_bytes() }
+    }
+
     /// Appends it.
     #[inline]
     pub fn write(value: &T, writer: &mut Writer<'_>) {
@@ -41,6 +50,14 @@ impl<T: Field> FieldOf<T> {
 pub trait NotField<T> {
     /// Any.
     const SHAPE: Shape = Shape::Bool;
+
+    /// Any.
+    const IS_INLINE: bool = true;
+
+    /// None.
+    fn heap_bytes(_: &T) -> usize {
+        0
+    }
 
     /// Does nothing.
     fn write(_: &T, _: &mut Writer<'_>) {}

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
 
-/// How many bytes all distinct texts that are read as `&'static str` may have together, in one process. They are names
-/// of robots, links, components and states; recordings of a fleet stay far below it.
+/// How many bytes all distinct texts that are read as `&'static str`, and all paths made at run time, may have together, in
+/// one process. They are names of robots, links, components and states; recordings of a fleet stay far below it.
 pub const MAX_NAME_BYTES: usize = 1 << 20;
 
 struct Names {
@@ -15,7 +15,7 @@ struct Names {
 static NAMES: Mutex<Option<Names>> = Mutex::new(None);
 
 /// The same text, kept; none if there are too many.
-pub(super) fn intern(text: &str) -> Option<&'static str> {
+pub(crate) fn intern(text: &str) -> Option<&'static str> {
     if text.is_empty() {
         return Some("");
     }

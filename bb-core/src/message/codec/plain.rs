@@ -8,6 +8,7 @@ use std::time::Duration;
 macro_rules! numbers {
     ($($kind:ty, $shape:ident, $expected:literal;)*) => { $(
         impl Field for $kind {
+            const IS_INLINE: bool = true;
             const SHAPE: Shape = Shape::$shape;
             fn write(&self, writer: &mut Writer<'_>) {
                 writer.number(self.to_le_bytes());
@@ -32,6 +33,7 @@ numbers! {
 }
 
 impl Field for u8 {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::U8;
     fn write(&self, writer: &mut Writer<'_>) {
         writer.raw(&[*self]);
@@ -51,6 +53,7 @@ impl Field for u8 {
 macro_rules! as_other {
     ($($kind:ty, $other:ty, $expected:literal;)*) => { $(
         impl Field for $kind {
+            const IS_INLINE: bool = true;
             const SHAPE: Shape = <$other>::SHAPE;
             fn write(&self, writer: &mut Writer<'_>) {
                 (*self as $other).write(writer);
@@ -72,6 +75,7 @@ as_other! {
 macro_rules! wide {
     ($($kind:ty),*) => { $(
         impl Field for $kind {
+            const IS_INLINE: bool = true;
             const SHAPE: Shape = Shape::Array(&Shape::U64, 2);
             fn write(&self, writer: &mut Writer<'_>) {
                 (*self as u64).write(writer);
@@ -88,6 +92,7 @@ macro_rules! wide {
 wide!(u128, i128);
 
 impl Field for bool {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::Bool;
     fn write(&self, writer: &mut Writer<'_>) {
         writer.raw(&[u8::from(*self)]);
@@ -102,6 +107,7 @@ impl Field for bool {
 }
 
 impl Field for char {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::Char;
     fn write(&self, writer: &mut Writer<'_>) {
         u32::from(*self).write(writer);
@@ -113,6 +119,7 @@ impl Field for char {
 }
 
 impl Field for () {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::Struct(&StructShape { name: "Nothing", fields: &[FieldShape::NOTHING] });
     fn write(&self, writer: &mut Writer<'_>) {
         writer.nothing();
@@ -130,10 +137,14 @@ impl Field for String {
     fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
         reader.text().map(str::to_owned)
     }
+    fn heap_bytes(&self) -> usize {
+        self.capacity()
+    }
 }
 
 /// Each distinct text that is read stays in memory; when they are [`MAX_NAME_BYTES`] together, no further one is read.
 impl Field for &'static str {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::Text;
     fn write(&self, writer: &mut Writer<'_>) {
         writer.text(self);
@@ -148,6 +159,7 @@ impl Field for &'static str {
 }
 
 impl Field for Duration {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::Struct(&StructShape {
         name: "Duration",
         fields: &[FieldShape::new("sec", Shape::U64), FieldShape::new("nanosec", Shape::U32)],
@@ -166,6 +178,7 @@ impl Field for Duration {
 }
 
 impl Field for MonotonicTime {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::I64;
     fn write(&self, writer: &mut Writer<'_>) {
         self.as_nanos().write(writer);
@@ -176,6 +189,7 @@ impl Field for MonotonicTime {
 }
 
 impl Field for WallTime {
+    const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::I64;
     fn write(&self, writer: &mut Writer<'_>) {
         self.as_unix_nanos().write(writer);

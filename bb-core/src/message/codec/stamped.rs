@@ -49,6 +49,11 @@ impl<T: Payload> Field for Stamped<T> {
             FieldShape::new("payload", T::SHAPE),
         ],
     });
+    const IS_INLINE: bool = T::IS_INLINE;
+
+    fn heap_bytes(&self) -> usize {
+        self.payload.heap_bytes()
+    }
 
     fn write(&self, writer: &mut Writer<'_>) {
         Header::write_parts(self.wall_time, self.frame.name(), writer);

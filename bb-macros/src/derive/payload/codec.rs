@@ -1,7 +1,9 @@
-//! The implementation of `Field`: the shape, writing, reading.
+//! The implementation of `Field`: the shape, the use of the heap, writing, reading.
 //!
 //! ```text
 //! const SHAPE: Shape = Shape::Struct(&StructShape { name: "Imu", fields: &[FieldShape::new("rate", …::SHAPE)] });
+//! const IS_INLINE: bool = true && FieldOf::<f64>::IS_INLINE;
+//! fn heap_bytes(&self) -> usize { match self { Self { rate: f0 } => 0 + FieldOf::<f64>::heap_bytes(f0) } }
 //! fn write(…) { match self { Self { rate: f0 } => { FieldOf::write(f0, writer); } } }
 //! fn read(…) { Ok(Self { rate: FieldOf::<f64>::read(reader, "rate")? }) }
 //! ```
@@ -9,12 +11,18 @@
 use super::patterns;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
-use syn::{Data, DataEnum, DeriveInput, Fields, Member};
+use syn::{Data, DataEnum, DeriveInput, Field, Fields, Member};
 
 pub(super) fn field(item: &DeriveInput, text: &TokenStream) -> TokenStream {
     let name = &item.ident;
     let (generics, arguments, bounds) = item.generics.split_for_impl();
-    let Parts { shape, write, read } = match &item.data {
+    let all_fields: Vec<&Field> = match &item.data {
+        Data::Struct(data) => data.fields.iter().collect(),
+        Data::Enum(data) => data.variants.iter().flat_map(|variant| &variant.fields).collect(),
+        Data::Union(_) => Vec::new(),
+    };
+    let kinds = all_fields.iter().map(|field| &field.ty);
+    let Parts { shape, heap_bytes, write, read } = match &item.data {
         Data::Struct(data) => of_struct(&data.fields, text),
         Data::Enum(data) => of_enum(data, text),
         Data::Union(_) => of_struct(&Fields::Unit, text),
@@ -27,6 +35,10 @@ pub(super) fn field(item: &DeriveInput, text: &TokenStream) -> TokenStream {
             #[automatically_derived]
             impl #generics ::bb_core::Field for #name #arguments #bounds {
                 const SHAPE: Shape = #shape;
+                const IS_INLINE: bool = true #(&& FieldOf::<#kinds>::IS_INLINE)*;
+                fn heap_bytes(&self) -> usize {
+                    match self { #heap_bytes }
+                }
                 fn write(&self, writer: &mut Writer<'_>) {
                     match self { #write }
                 }
@@ -40,6 +52,7 @@ pub(super) fn field(item: &DeriveInput, text: &TokenStream) -> TokenStream {
 
 struct Parts {
     shape: TokenStream,
+    heap_bytes: TokenStream,
     write: TokenStream,
     read: TokenStream,
 }
@@ -47,12 +60,14 @@ struct Parts {
 fn of_struct(fields: &Fields, text: &TokenStream) -> Parts {
     let shape = struct_shape(fields, text);
     let (patterns, writes, reads) = (patterns(fields), writes(fields), reads(fields, ""));
+    let heap_bytes = heap_bytes(fields);
     let (nothing_out, nothing_in) = match fields.is_empty() {
         true => (quote!(writer.nothing();), quote!(reader.nothing()?;)),
         false => (quote!(), quote!()),
     };
     Parts {
         shape: quote!(Shape::Struct(&#shape)),
+        heap_bytes: quote!(Self { #patterns } => #heap_bytes,),
         write: quote!(Self { #patterns } => { #writes #nothing_out }),
         read: quote!(#nothing_in ::core::result::Result::Ok(Self { #reads })),
     }
@@ -63,6 +78,7 @@ fn of_enum(data: &DataEnum, text: &TokenStream) -> Parts {
     let lists = data.variants.iter().filter(|variant| !variant.fields.is_empty()).count();
     let mut before = 0;
     let (mut shapes, mut write, mut read) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+    let mut sums = TokenStream::new();
     for (number, variant) in (0u32..).zip(&data.variants) {
         let (name, fields) = (&variant.ident, &variant.fields);
         let variant_text = crate::names::text(name);
@@ -73,6 +89,8 @@ fn of_enum(data: &DataEnum, text: &TokenStream) -> Parts {
         shapes.extend(quote!(#shape,));
         let (patterns, writes) = (patterns(fields), writes(fields));
         let reads = reads(fields, &format!("{variant_text}."));
+        let sum = heap_bytes(fields);
+        sums.extend(quote!(Self::#name { #patterns } => #sum,));
         if fields.is_empty() {
             write.extend(quote!(Self::#name { #patterns } => writer.variant(#number, #lists),));
             read.extend(quote!(#number => { reader.absent(#lists)?; Self::#name { #reads } }));
@@ -96,9 +114,11 @@ fn of_enum(data: &DataEnum, text: &TokenStream) -> Parts {
     }
     if data.variants.is_empty() {
         write = quote!(_ => { let _ = writer; });
+        sums = quote!(_ => 0,);
     }
     Parts {
         shape: quote!(Shape::Enum(&EnumShape { name: #text, variants: &[#shapes] })),
+        heap_bytes: sums,
         write,
         read: quote!(::core::result::Result::Ok(match reader.variant()? {
             #read
@@ -122,6 +142,13 @@ fn writes(fields: &Fields) -> TokenStream {
         quote!(FieldOf::<#kind>::write(#bound, writer);)
     });
     writes.collect()
+}
+
+/// `0 + FieldOf::<f64>::heap_bytes(f0)`
+fn heap_bytes(fields: &Fields) -> TokenStream {
+    let bounds = (0..fields.len()).map(|index| format_ident!("f{index}"));
+    let kinds = fields.iter().map(|field| &field.ty);
+    quote!(0 #(+ FieldOf::<#kinds>::heap_bytes(#bounds))*)
 }
 
 fn reads(fields: &Fields, within: &str) -> TokenStream {

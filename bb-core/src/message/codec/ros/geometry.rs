@@ -26,6 +26,7 @@ impl Field for Point {
             FieldShape::new("z", Shape::F64),
         ],
     });
+    const IS_INLINE: bool = true;
     fn write(&self, writer: &mut Writer<'_>) {
         self.0.write(writer);
     }

@@ -1,0 +1,444 @@
+//! Topics that are made while the robot runs, and the subscriptions that are waiting for them.
+
+use super::dynamic::Tap;
+use super::queue::Queue;
+use super::{AnyTopic, DynamicMessage, DynamicSubscription, Overflow, Payloads, Select, Topic};
+use crate::message::Payload;
+use crate::message::codec::intern;
+use std::any::{Any, type_name};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+/// The topics of one robot that it does not declare. A topic that is made here is subscribed to by those whose selection
+/// includes it, whether they subscribed before or after.
+///
+/// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics, and of subscriptions only those that live.
+#[derive(Default)]
+pub(crate) struct Registry {
+    /// The paths of all other topics of the robot.
+    declared: Box<[&'static str]>,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    topics: BTreeMap<&'static str, Made>,
+    /// Topics that were made so far.
+    made: u64,
+    selections: Selections,
+    is_closed: bool,
+}
+
+/// Where another topic has room.
+enum Room {
+    Free,
+    /// The path of a topic that nobody uses.
+    Of(&'static str),
+}
+
+/// A topic, and which one it is in the order in which they were made.
+struct Made {
+    number: u64,
+    topic: Arc<dyn AnyTopic>,
+}
+
+impl Registry {
+    /// The largest number of paths. Beyond it, a topic without a publisher and without a typed subscription makes room.
+    pub(crate) const MAX_TOPICS: usize = 1024;
+
+    /// For a robot that declares these paths.
+    pub(crate) fn new(declared: impl IntoIterator<Item = &'static str>) -> Self {
+        Self { declared: declared.into_iter().collect(), state: Mutex::default() }
+    }
+
+    /// The paths that the robot declares.
+    pub(crate) fn declared(&self) -> &[&'static str] {
+        &self.declared
+    }
+
+    /// Subscribes to what is selected of `topics`, of the topics made here, and of those that will be.
+    pub(crate) fn subscribe(
+        &self,
+        topics: &[&dyn AnyTopic],
+        select: Select<'_>,
+        payloads: &Payloads<'_>,
+        overflow: Overflow,
+    ) -> DynamicSubscription {
+        let mut state = self.lock();
+        let made: Vec<_> = state.topics.values().map(|made| Arc::clone(&made.topic)).collect();
+        let topics: Vec<&dyn AnyTopic> = topics.iter().copied().chain(made.iter().map(|made| &**made)).collect();
+        // Under the lock, so that a topic made meanwhile is subscribed to once.
+        let subscription = DynamicSubscription::among(&topics, &self.declared, select, payloads, overflow);
+        if !state.is_closed {
+            state.selections.add(Selection::new(select, payloads, subscription.tap()));
+        }
+        drop(state);
+        subscription.warn();
+        subscription
+    }
+
+    /// The topic at `path`, made if it is not there.
+    pub(crate) fn topic<T: Payload>(&self, path: &str) -> Result<Arc<Topic<T>>, PathError> {
+        if !is_path(path) {
+            return Err(PathError::Malformed(path.into()));
+        }
+        if self.declared.contains(&path) {
+            return Err(PathError::Declared(path.into()));
+        }
+        let mut state = self.lock();
+        if state.is_closed {
+            return Err(PathError::Stopped(path.into()));
+        }
+        if let Some(made) = state.topics.get(path) {
+            let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&made.topic) as _;
+            return topic.downcast().map_err(|_| PathError::other_payload::<T>(&*made.topic));
+        }
+        let room = state.room().ok_or_else(|| PathError::TooMany(path.into()))?;
+        // Last, since a name that is interned stays.
+        let path = intern(path).ok_or_else(|| PathError::TooMany(path.into()))?;
+        let evicted = match room {
+            Room::Free => None,
+            Room::Of(unused) => state.topics.remove(unused),
+        };
+        let topic = Arc::new(Topic::<T>::new(path));
+        state.selections.tap(&*topic);
+        let number = state.made;
+        state.made += 1;
+        state.topics.insert(path, Made { number, topic: Arc::clone(&topic) as _ });
+        drop(state);
+        drop(evicted);
+        Ok(topic)
+    }
+
+    /// All topics made here, by path.
+    pub(crate) fn topics(&self) -> Vec<Arc<dyn AnyTopic>> {
+        self.lock().topics.values().map(|made| Arc::clone(&made.topic)).collect()
+    }
+
+    /// Tells the subscribers that no more will come. No further topic is made.
+    pub(crate) fn close(&self) {
+        let mut state = self.lock();
+        state.is_closed = true;
+        state.selections = Selections::default();
+        drop(state);
+        self.topics().iter().for_each(|topic| topic.close());
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    /// Room for another topic. An untyped subscription to a topic that makes room loses nothing: if it is made again, it is
+    /// subscribed to again.
+    fn room(&self) -> Option<Room> {
+        if self.topics.len() < Registry::MAX_TOPICS {
+            return Some(Room::Free);
+        }
+        // A publisher, and whoever subscribes at this moment, holds the topic.
+        let is_used = |made: &Made| {
+            Arc::strong_count(&made.topic) > 1 || made.topic.subscribers().iter().any(|one| one.is_typed)
+        };
+        let unused = self.topics.iter().filter(|(_, made)| !is_used(made));
+        unused.min_by_key(|(_, made)| made.number).map(|(path, _)| Room::Of(path))
+    }
+}
+
+impl fmt::Debug for Registry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Registry").field("declared", &self.declared).finish_non_exhaustive()
+    }
+}
+
+/// What live subscriptions select.
+#[derive(Default)]
+struct Selections {
+    all: Vec<Selection>,
+    /// How many there may be before those that were dropped are removed: twice what was left the last time.
+    clean_at: usize,
+}
+
+impl Selections {
+    const FEW: usize = 64;
+
+    fn add(&mut self, selection: Selection) {
+        if self.all.len() >= self.clean_at {
+            self.clean();
+        }
+        self.all.push(selection);
+    }
+
+    /// Subscribes all that select it to a new topic.
+    fn tap(&mut self, topic: &dyn AnyTopic) {
+        self.clean();
+        for selection in self.all.iter().filter(|selection| selection.includes(topic)) {
+            if let Some(queue) = selection.queue.upgrade() {
+                topic.tap(&Tap(queue));
+            }
+        }
+    }
+
+    fn clean(&mut self) {
+        self.all.retain(Selection::is_alive);
+        self.clean_at = (2 * self.all.len()).max(Self::FEW);
+    }
+}
+
+struct Selection {
+    select: OwnedSelect,
+    payloads: Option<Box<[Box<str>]>>,
+    queue: Weak<Queue<DynamicMessage>>,
+}
+
+impl Selection {
+    fn new(select: Select<'_>, payloads: &Payloads<'_>, tap: Tap) -> Self {
+        let payloads = payloads.names().map(|names| names.iter().map(|name| Box::from(*name)).collect());
+        Self { select: select.into(), payloads, queue: Arc::downgrade(&tap.0) }
+    }
+
+    /// A subscription that was dropped may still be on the lists of silent topics.
+    fn is_alive(&self) -> bool {
+        self.queue.upgrade().is_some_and(|queue| !queue.is_abandoned())
+    }
+
+    fn includes(&self, topic: &dyn AnyTopic) -> bool {
+        let payload = topic.payload_name();
+        self.select.includes(topic.path())
+            && self.payloads.as_ref().is_none_or(|names| names.iter().any(|name| **name == *payload))
+    }
+}
+
+/// See [`Select`].
+enum OwnedSelect {
+    All,
+    Path(Box<str>),
+    Below(Box<str>),
+    AnyOf(Box<[OwnedSelect]>),
+}
+
+impl From<Select<'_>> for OwnedSelect {
+    fn from(select: Select<'_>) -> Self {
+        match select {
+            Select::All => Self::All,
+            Select::Path(path) => Self::Path(path.into()),
+            Select::Below(above) => Self::Below(above.into()),
+            Select::AnyOf(several) => Self::AnyOf(several.iter().map(|select| Self::from(*select)).collect()),
+        }
+    }
+}
+
+impl OwnedSelect {
+    fn includes(&self, path: &str) -> bool {
+        match self {
+            Self::All => Select::All.includes(path),
+            Self::Path(selected) => Select::Path(selected).includes(path),
+            Self::Below(above) => Select::Below(above).includes(path),
+            Self::AnyOf(several) => several.iter().any(|select| select.includes(path)),
+        }
+    }
+}
+
+/// The longest path that is made at run time.
+const MAX_PATH_BYTES: usize = 255;
+
+/// Names with `/` between them.
+fn is_path(path: &str) -> bool {
+    let is_name = |name: &str| {
+        name.chars().any(char::is_alphanumeric)
+            && name.chars().all(|character| character.is_alphanumeric() || "_-.".contains(character))
+    };
+    path.len() <= MAX_PATH_BYTES && path.split('/').all(is_name)
+}
+
+/// Why nothing can be published at a path of one's own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum PathError {
+    Malformed(String),
+    Declared(String),
+    OtherPayload { path: &'static str, payload: String, wanted: String },
+    TooMany(String),
+    Stopped(String),
+}
+
+impl PathError {
+    fn other_payload<T: Payload>(topic: &dyn AnyTopic) -> Self {
+        let payload = topic.payload_name();
+        // Two types may have the same name.
+        let wanted = if payload == T::NAME { type_name::<T>() } else { T::NAME };
+        Self::OtherPayload { path: topic.path(), payload: payload.into(), wanted: wanted.into() }
+    }
+}
+
+impl fmt::Display for PathError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Malformed(path) => write!(
+                f,
+                "cannot publish at `{path}`: a path is names of letters, digits, `_`, `-` and `.` with `/` between \
+                 them, at most {MAX_PATH_BYTES} bytes"
+            ),
+            Self::Declared(path) => {
+                write!(f, "cannot publish at `{path}`: only its own publisher does; choose another path")
+            }
+            Self::OtherPayload { path, payload, wanted } => {
+                write!(f, "cannot publish `{wanted}` at `{path}`: it publishes `{payload}`; choose another path")
+            }
+            Self::TooMany(path) => write!(
+                f,
+                "cannot publish at `{path}`: {} other paths are in use, or their names fill the memory for names; \
+                 publish at fewer paths",
+                Registry::MAX_TOPICS
+            ),
+            Self::Stopped(path) => write!(f, "cannot publish at `{path}`: the robot has stopped"),
+        }
+    }
+}
+
+impl std::error::Error for PathError {}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Subscription;
+    use super::*;
+    use crate::message::Stamped;
+    use crate::payload::{Imu, JointState};
+    use crate::time::MonotonicTime;
+
+    fn state(position: f64) -> Stamped<JointState> {
+        Stamped::new(MonotonicTime::ZERO, JointState { position, velocity: None, effort: None })
+    }
+
+    fn registry() -> Registry {
+        Registry::new(["sensor/base/imu", "health"])
+    }
+
+    fn listen(registry: &Registry, select: Select<'_>) -> DynamicSubscription {
+        registry.subscribe(&[], select, &Payloads::ALL, Overflow::default())
+    }
+
+    fn refusal(registry: &Registry, path: &str) -> String {
+        registry.topic::<JointState>(path).map_or_else(|error| error.to_string(), |_| "accepted".into())
+    }
+
+    #[test]
+    fn those_who_subscribed_earlier_receive_what_they_selected() {
+        let registry = registry();
+        let all = listen(&registry, Select::All);
+        let below = listen(&registry, Select::AnyOf(&[Select::Below("mission"), Select::Path("other")]));
+        let elsewhere = listen(&registry, Select::Below("sensor"));
+        let filtered = registry.subscribe(&[], Select::All, &Payloads::from(["Imu"]), Overflow::default());
+        let progress = registry.topic("mission/progress").expect("it is free");
+        progress.publish(&state(1.0));
+        let late = listen(&registry, Select::Path("mission/progress"));
+        progress.publish(&state(2.0));
+        let counts = [&all, &below, &elsewhere, &filtered, &late].map(|one| one.drain().count());
+        assert_eq!(counts, [2, 2, 0, 0, 1]);
+        assert_eq!(late.paths(), ["mission/progress"]);
+        assert_eq!(late.unmatched(), []);
+        assert_eq!(elsewhere.unmatched().len(), 1);
+    }
+
+    #[test]
+    fn a_path_is_made_once() {
+        let registry = registry();
+        let all = listen(&registry, Select::All);
+        let first = registry.topic("mission/progress").expect("it is free");
+        let second = registry.topic("mission/progress").expect("it has the same payload");
+        assert!(Arc::ptr_eq(&first, &second));
+        first.publish(&state(1.0));
+        second.publish(&state(2.0));
+        assert_eq!(all.drain().count(), 2);
+        assert_eq!(registry.topics().iter().map(|topic| topic.path()).collect::<Vec<_>>(), ["mission/progress"]);
+    }
+
+    #[test]
+    fn paths_of_others_and_odd_ones_are_refused() {
+        let registry = registry();
+        for path in ["sensor/base/imu", "health"] {
+            let message = format!("cannot publish at `{path}`: only its own publisher does; choose another path");
+            assert_eq!(refusal(&registry, path), message);
+        }
+        let long = "a".repeat(256);
+        for path in ["", "/", "/a", "a/", "a//b", "a b", "a/..", "a\nb", "a:b", "a/*", &long] {
+            assert!(refusal(&registry, path).contains("a path is names of letters"), "{path:?}");
+        }
+        for path in ["a", "sensor/base", "sensor/base/imu/raw", "café/2", "a-b/c_d/e.f", &long[1..]] {
+            assert_eq!(refusal(&registry, path), "accepted");
+        }
+        let other = registry.topic::<Imu>("a").map(drop).map_err(|error| error.to_string());
+        assert_eq!(
+            other,
+            Err("cannot publish `Imu` at `a`: it publishes `JointState`; choose another path".into())
+        );
+    }
+
+    #[test]
+    fn two_types_of_one_name_are_told_apart() {
+        mod elsewhere {
+            #[derive(Clone, Debug, crate::Payload)]
+            pub(super) struct JointState;
+        }
+        let registry = registry();
+        assert!(registry.topic::<JointState>("a").is_ok());
+        let error = registry.topic::<elsewhere::JointState>("a").map(drop).map_err(|error| error.to_string());
+        assert!(
+            error.is_err_and(|error| error.contains("elsewhere::JointState` at `a`: it publishes `JointState`"))
+        );
+    }
+
+    #[test]
+    fn a_closed_registry_makes_no_topic_and_ends_subscriptions() {
+        let registry = registry();
+        let topic = registry.topic::<JointState>("a").expect("it is free");
+        let subscription: Subscription<_> = topic.subscribe(Overflow::default());
+        registry.close();
+        assert!(subscription.recv().is_none());
+        assert_eq!(refusal(&registry, "b"), "cannot publish at `b`: the robot has stopped");
+        topic.publish(&state(1.0));
+        assert_eq!(registry.topics()[0].statistics().published, 1);
+    }
+
+    #[test]
+    fn topics_nobody_uses_make_room_and_used_ones_do_not() {
+        let registry = registry();
+        let all = listen(&registry, Select::All);
+        let kept = registry.topic::<JointState>("kept").expect("it is free");
+        let path = |number: usize| format!("scratch/{number}");
+        let heard = registry.topic::<JointState>("heard").expect("it is free").subscribe(Overflow::default());
+        for number in 0..2 * Registry::MAX_TOPICS {
+            let topic = registry.topic(&path(number)).expect("an older one makes room");
+            topic.publish(&state(0.0));
+            assert!(all.try_recv().is_some_and(|message| message.path() == path(number)));
+        }
+        assert_eq!(registry.topics().len(), Registry::MAX_TOPICS);
+        // The same topics as before, for their publishers and typed subscribers.
+        registry.topic("kept").expect("it is there").publish(&state(1.0));
+        registry.topic("heard").expect("it is there").publish(&state(1.0));
+        assert_eq!((kept.statistics().published, heard.drain().count()), (1, 1));
+        // One that was removed is heard again when it is made again.
+        registry.topic(&path(0)).expect("an older one makes room").publish(&state(1.0));
+        assert_eq!(all.drain().count(), 3);
+
+        let taken: Vec<_> = registry.topics();
+        assert!(refusal(&registry, "one/more").starts_with("cannot publish at `one/more`: 1024 other paths"));
+        drop(taken);
+        assert_eq!(refusal(&registry, "one/more"), "accepted");
+    }
+
+    #[test]
+    fn subscriptions_that_were_dropped_vanish() {
+        let registry = registry();
+        let topic = registry.topic::<JointState>("silent").expect("it is free");
+        let kept: Vec<_> = (0..10).map(|_| listen(&registry, Select::All)).collect();
+        for _ in 0..10_000 {
+            drop(listen(&registry, Select::All));
+        }
+        let count = || registry.lock().selections.all.len();
+        assert!(count() <= 2 * Selections::FEW);
+        registry.topic::<JointState>("another").map(drop).expect("it is free");
+        assert_eq!(count(), kept.len());
+        drop(topic);
+    }
+}

@@ -1,0 +1,164 @@
+//! What is left to do once no lock is held: wake tasks and drop messages. Both run a user's code.
+
+use std::any::Any;
+use std::mem::{forget, needs_drop};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::task::Waker;
+
+/// Wakers to wake and messages to drop, collected while locks may be held. [`run`](Self::run) it when none is; dropping
+/// it does the same. A panic in one of them is logged and does not keep the others from running.
+#[derive(Default)]
+pub(crate) struct Wakers {
+    /// The first few need no allocation.
+    first: [Option<Waker>; 4],
+    more: Vec<Waker>,
+    evicted: Vec<Box<dyn Any + Send>>,
+    drops_at_once: bool,
+}
+
+impl Wakers {
+    /// For a publisher that holds no lock of its own: evicted messages are dropped as they come, without an allocation.
+    pub(super) fn dropping_at_once() -> Self {
+        let mut wakers = Self::default();
+        wakers.drops_at_once = true;
+        wakers
+    }
+
+    /// Adds a task to wake.
+    pub(super) fn wake(&mut self, waker: Waker) {
+        match self.first.iter_mut().find(|slot| slot.is_none()) {
+            Some(slot) => *slot = Some(waker),
+            None => self.more.push(waker),
+        }
+    }
+
+    /// Adds a message to drop; one that runs no code when it is dropped is dropped at once. No lock of this module may be
+    /// held.
+    #[inline]
+    pub(super) fn discard<M: Send + 'static>(&mut self, message: M) {
+        if self.drops_at_once || !needs_drop::<M>() {
+            discard(message);
+        } else {
+            self.evicted.push(Box::new(message));
+        }
+    }
+
+    /// Whether there is nothing to do.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        // The slots are filled in order.
+        self.first[0].is_none() && self.evicted.is_empty()
+    }
+
+    /// Wakes the tasks in the order in which their messages were enqueued, then drops the messages.
+    pub(crate) fn run(self) {
+        drop(self);
+    }
+
+    fn run_all(&mut self) {
+        self.first.iter_mut().filter_map(Option::take).chain(self.more.drain(..)).for_each(wake);
+        self.evicted.drain(..).for_each(discard);
+    }
+}
+
+impl Drop for Wakers {
+    #[inline]
+    fn drop(&mut self) {
+        if !self.is_empty() {
+            self.run_all();
+        }
+    }
+}
+
+/// Wakes a task. A panic in its waker is logged.
+pub(super) fn wake(waker: Waker) {
+    contain("a waker", || waker.wake());
+}
+
+/// Drops a message or a waker. A panic in its `Drop` is logged.
+#[inline]
+pub(super) fn discard<M>(value: M) {
+    if needs_drop::<M>() {
+        contain("a message's or a waker's `Drop`", || drop(value));
+    }
+}
+
+/// Runs a user's code that must not end the thread which happens to run it.
+#[inline]
+fn contain(what: &'static str, call: impl FnOnce()) {
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(call)) {
+        log(what, panic);
+    }
+}
+
+#[cold]
+fn log(what: &'static str, panic: Box<dyn Any + Send>) {
+    let message = panic.downcast_ref::<&str>().copied();
+    let message = message.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    tracing::error!(panic = message.unwrap_or("no message"), "{what} panicked");
+    // The payload of a panic may itself panic when it is dropped. The payload of that second panic is leaked.
+    if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(panic))) {
+        forget(again);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::panic::panic_any;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::task::Wake;
+
+    /// Counts its wakes and drops, and panics in each of them.
+    struct Faulty(Arc<AtomicUsize>);
+
+    /// A panic whose payload panics, too.
+    struct Payload;
+
+    impl Drop for Payload {
+        fn drop(&mut self) {
+            panic!("in the payload of a panic");
+        }
+    }
+
+    impl Wake for Faulty {
+        fn wake(self: Arc<Self>) {
+            self.0.fetch_add(1, Ordering::SeqCst);
+            panic_any(Payload);
+        }
+    }
+
+    struct Evicted(Arc<AtomicUsize>);
+
+    impl Drop for Evicted {
+        fn drop(&mut self) {
+            self.0.fetch_add(1, Ordering::SeqCst);
+            panic!("in a message's drop");
+        }
+    }
+
+    #[test]
+    fn a_panic_keeps_no_other_from_being_woken_or_dropped() {
+        let (woken, dropped) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
+        let mut wakers = Wakers::default();
+        assert!(wakers.is_empty());
+        for _ in 0..7 {
+            wakers.wake(Arc::new(Faulty(Arc::clone(&woken))).into());
+            wakers.discard(Evicted(Arc::clone(&dropped)));
+        }
+        assert!(!wakers.is_empty());
+        assert_eq!((woken.load(Ordering::SeqCst), dropped.load(Ordering::SeqCst)), (0, 0));
+        wakers.run();
+        assert_eq!((woken.load(Ordering::SeqCst), dropped.load(Ordering::SeqCst)), (7, 7));
+    }
+
+    #[test]
+    fn dropping_them_runs_them() {
+        let woken = Arc::new(AtomicUsize::new(0));
+        let mut wakers = Wakers::default();
+        wakers.wake(Arc::new(Faulty(Arc::clone(&woken))).into());
+        drop(wakers);
+        assert_eq!(woken.load(Ordering::SeqCst), 1);
+    }
+}

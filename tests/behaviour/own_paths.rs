@@ -1,0 +1,143 @@
+//! What commands, controllers and outside code publish at paths of their own.
+
+use crate::components::{Counter, Number};
+use bb_core::prelude::*;
+use bb_core::{DynamicSubscription, Publisher};
+
+/// How far a mission has come.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub(crate) struct Progress {
+    /// From 0 to 1.
+    pub(crate) done: f64,
+}
+
+/// A controller that publishes more than its state.
+#[derive(Debug)]
+pub(crate) struct Planner(Publisher<Progress>);
+
+impl Controller for Planner {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &ServiceContext) -> Result<Self, Fault> {
+        Ok(Self(context.bus().publisher("mission/plan/progress")?))
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        self.0.publish(Progress { done: 0.5 });
+        Ok(Reading::nothing())
+    }
+}
+
+/// A command that publishes how far it is.
+#[derive(Debug)]
+pub(crate) struct Drive;
+
+impl Command for Drive {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        let progress = context.bus().publisher("mission/drive/progress")?;
+        for step in 0..3 {
+            progress.publish(Progress { done: f64::from(step) / 2.0 });
+            context.sleep(Duration::from_millis(10)).await;
+        }
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Missionary;
+    commands { arm: Arm; drive: Drive; }
+    controllers { controller planner: Planner() { rate: 10 Hz; } }
+    link base { sensor counter: Counter(count = 3) { rate: 100 Hz; } }
+}
+
+fn told(subscription: &DynamicSubscription) -> Vec<(&'static str, i64, f64)> {
+    let told = |message: bb_core::DynamicMessage| {
+        let done = message.downcast::<Progress>().map_or(f64::NAN, |progress| progress.done);
+        (message.path(), message.stamp().monotonic_time.as_nanos() / 1_000_000, done)
+    };
+    subscription.drain().map(told).collect()
+}
+
+#[test]
+fn a_subtree_is_heard_without_being_told_of_its_publishers() -> Result<(), Box<dyn std::error::Error>> {
+    let builder = Missionary::builder();
+    let early = builder.subscribe_any(Select::Below("mission"), None, Overflow::default());
+    let by_payload = builder.subscribe_any(Select::All, ["Progress", "Number"], Overflow::default());
+    let mut simulation = builder.simulate()?;
+    simulation.command(missionary::command::arm, NoArguments)?;
+    simulation.run_for(Duration::from_millis(50));
+    simulation.command(missionary::command::drive, NoArguments)?;
+    simulation.run_for(Duration::from_millis(45));
+
+    let drive = "mission/drive/progress";
+    let progress = [(drive, 50, 0.0), (drive, 60, 0.5), (drive, 70, 1.0)];
+    let mut expected = vec![("mission/plan/progress", 0, 0.5)];
+    expected.extend(progress);
+    assert_eq!(told(&early), expected);
+    assert_eq!(by_payload.drain().count(), 3 + expected.len());
+    Ok(())
+}
+
+#[test]
+fn outside_code_publishes_and_is_listed() -> Result<(), Box<dyn std::error::Error>> {
+    let mut simulation = Missionary::builder().simulate()?;
+    let bus = simulation.bus();
+    let all = simulation.subscribe_any(Select::Path("radio/link"), None, Overflow::default());
+    assert_eq!(all.unmatched().len(), 1);
+    assert!(bus.subscribe::<Progress>("radio/link", Overflow::default()).is_err());
+
+    let radio = bus.publisher::<Progress>("radio/link")?;
+    let typed = bus.subscribe::<Progress>("radio/link", Overflow::default())?;
+    simulation.run_for(Duration::from_millis(7));
+    radio.publish(Progress { done: 0.25 });
+    let message = Stamped::new(MonotonicTime::from_nanos(3_000_000), Progress { done: 0.5 });
+    radio.clone().forward(&message);
+    assert_eq!(told(&all), [("radio/link", 7, 0.25), ("radio/link", 3, 0.5)]);
+    assert_eq!(typed.drain().map(|message| message.origin.robot).collect::<Vec<_>>(), ["Missionary", ""]);
+
+    assert!(bus.paths().contains(&"radio/link") && bus.paths().contains(&"mission/plan/progress"));
+    let listed: Vec<_> = bus.subscribers("radio/link").iter().map(|one| one.is_typed).collect();
+    assert_eq!(listed, [true, false]);
+    let report = simulation.report();
+    let topic = report.topic("radio/link").ok_or("it is in the report")?;
+    assert_eq!((topic.payload, topic.published, topic.subscribers), ("Progress", 2, 2));
+
+    let wrong = bus.subscribe::<Number>("radio/link", Overflow::default()).map(drop);
+    assert_eq!(
+        wrong.map_err(|error| error.to_string()),
+        Err("`radio/link` publishes `Progress`, not `Number`".into())
+    );
+    let typo = bus.subscribe::<Progress>("radio/lnik", Overflow::default()).map(drop);
+    let near = "nothing publishes at `radio/lnik`; did you mean `radio/link`?";
+    assert_eq!(typo.map_err(|error| error.to_string()), Err(near.into()));
+
+    simulation.stop();
+    assert!(typed.recv().is_none());
+    let late = bus.publisher::<Progress>("radio/other").map(drop).map_err(|error| error.to_string());
+    assert_eq!(late, Err("cannot publish at `radio/other`: the robot has stopped".into()));
+    Ok(())
+}
+
+#[test]
+fn a_path_of_the_robot_is_refused() -> Result<(), StartError> {
+    let simulation = Missionary::builder().simulate()?;
+    let bus = simulation.bus();
+    for path in ["sensor/base/counter", "controller/planner", "command/drive", "health", "safety/error", "journal"]
+    {
+        let refusal = bus.publisher::<Progress>(path).map(drop).map_err(|error| error.to_string());
+        let expected = format!("cannot publish at `{path}`: only its own publisher does; choose another path");
+        assert_eq!(refusal, Err(expected));
+    }
+    let taken = bus.publisher::<Number>("mission/plan/progress").map(drop).map_err(|error| error.to_string());
+    let expected =
+        "cannot publish `Number` at `mission/plan/progress`: it publishes `Progress`; choose another path";
+    assert_eq!(taken, Err(expected.into()));
+    assert!(bus.publisher::<Progress>("").is_err() && bus.publisher::<Progress>("sensor//x").is_err());
+    assert!(bus.publisher::<Progress>("command/drive/progress").is_ok());
+    Ok(())
+}
