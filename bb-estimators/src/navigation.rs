@@ -11,6 +11,7 @@
 //! [`Eskf`] is the filter, one type parameter for its optional states. Sensors are values that implement
 //! [`Measurement`](measurement::Measurement), each with a [`Stream`] that holds its gate, counts and statistics.
 
+mod bank;
 pub mod chi_square;
 mod consistency;
 mod eskf;
@@ -18,6 +19,7 @@ mod math;
 mod measurement;
 mod stream;
 
+pub use bank::Bank;
 pub use consistency::{Consistency, nees};
 pub use eskf::{
     ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuMean, Keyframe, NAVIGATION,

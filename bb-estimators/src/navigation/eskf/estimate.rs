@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 use super::states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
-use crate::navigation::math::{renormalised, rotation};
+use crate::navigation::math::{renormalised, rotation, rotation_vector};
 
 /// Pose at an earlier time that relative poses refer to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +86,26 @@ impl<const N: usize> Estimate<N> {
             }
         }
         corrected
+    }
+
+    /// The error that takes this estimate to `other`: `self.corrected(&self.error_to(&other))` is `other`, but for stamps
+    /// and the last sample of the IMU.
+    pub fn error_to<S: States>(&self, other: &Self) -> SVector<f64, N> {
+        let mut error = other.optional - self.optional;
+        let mut set = |index: usize, part: Vector3<f64>| error.fixed_rows_mut::<3>(index).copy_from(&part);
+        let turn = |from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>| rotation_vector(&(to * from.inverse()));
+        set(POSITION, other.position - self.position);
+        set(VELOCITY, other.velocity - self.velocity);
+        set(ROTATION, turn(&self.world_from_body, &other.world_from_body));
+        set(ACCELEROMETER_BIAS, other.accelerometer_bias - self.accelerometer_bias);
+        set(GYROSCOPE_BIAS, other.gyroscope_bias - self.gyroscope_bias);
+        if let (Some(index), Some(from), Some(to)) =
+            (offset::<S>(Optional::Keyframe), self.keyframe, other.keyframe)
+        {
+            set(index, to.position - from.position);
+            set(index + 3, turn(&from.world_from_body, &to.world_from_body));
+        }
+        error
     }
 
     /// Whether every component is a number.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, POSITION};
-use super::{ALL, All, orientation, sample, started, vector};
+use super::{ALL, All, Estimate, estimate, orientation, sample, started, vector};
 use crate::navigation::{
     AbsolutePose, Eskf, EskfParams, GnssPosition, GnssVelocity, ImuMean, Refusal, RelativePose, Start, Stream,
     StreamParams, ZeroVelocity,
@@ -58,6 +58,14 @@ proptest! {
         prop_assert!((turn * plain.velocity - moved_to.velocity).norm() < 1e-9);
         prop_assert!((turn * plain.world_from_body).angle_to(&moved_to.world_from_body) < 1e-9);
         prop_assert!((plain.gyroscope_bias - moved_to.gyroscope_bias).norm() < 1e-9);
+    }
+
+    #[test]
+    fn errors_between_estimates_are_what_corrects_one_to_the_other(from in estimate(), to in estimate()) {
+        let to = Estimate { angular_velocity: from.angular_velocity, specific_force: from.specific_force, ..to };
+        let error = from.error_to::<All>(&to);
+        let reached = from.corrected::<All>(&error).error_to::<All>(&to);
+        prop_assert!(reached.amax() < 1e-9, "{}", reached);
     }
 
     #[test]
