@@ -10,6 +10,7 @@
 //!
 //! [`Eskf`] is the filter, one type parameter for its optional states. Sensors are values that implement
 //! [`Measurement`](measurement::Measurement), each with a [`Stream`] that holds its gate, counts and statistics.
+//! A [`Bank`] runs several filters and finds which fits; [`Navigator`] is one that is ready for use.
 
 mod bank;
 pub mod chi_square;
@@ -17,6 +18,7 @@ mod consistency;
 mod eskf;
 mod math;
 mod measurement;
+mod navigator;
 mod stream;
 
 pub use bank::Bank;
@@ -30,4 +32,5 @@ pub use measurement::{
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
     ZeroVelocity,
 };
+pub use navigator::{Aiding, NAVIGATED, Navigated, Navigator};
 pub use stream::{Counts, Fused, Stream, StreamParams};

@@ -9,7 +9,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::eskf::{Eskf, Estimate, ImuMean, Refusal, Start, States};
-use super::math::exp;
+use super::math::{exp, ln};
 use super::measurement::Measurement;
 use super::stream::{Fused, Stream};
 
@@ -31,7 +31,7 @@ pub struct Bank<S: States, const N: usize, const M: usize> {
 impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
     /// A bank of filters, each with how plausible it is beforehand: positive, of any sum.
     pub fn new(filters: [(Eskf<S, N>, f64); M]) -> Self {
-        let log_weights = filters.map(|(_, prior)| super::math::ln(prior.max(f64::MIN_POSITIVE)));
+        let log_weights = filters.map(|(_, prior)| ln(prior.max(f64::MIN_POSITIVE)));
         let mut bank = Self { filters: filters.map(|(filter, _)| filter), log_weights, alive: [true; M] };
         bank.normalise();
         bank
@@ -58,6 +58,9 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
 
     /// Corrects all filters by a measurement, and weighs them by it; see [`Eskf::update`].
     ///
+    /// The gate is that of all together: what one filter accepts, all fuse, and it counts against those that did not
+    /// expect it. What none accepts says nothing about which is right.
+    ///
     /// # Errors
     ///
     /// As the most plausible filter. Others may have taken it.
@@ -68,16 +71,16 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
     ) -> Result<Fused, Refusal> {
         let best = self.best();
         let mut answer = Err(Refusal::NotStarted);
-        for i in 0..M {
-            if !self.alive[i] {
-                continue;
-            }
-            let result = self.filters[i].update(&mut streams[i], measurement);
-            match result {
-                Ok(Fused { log_likelihood, .. }) | Err(Refusal::Gate { log_likelihood, .. }) => {
-                    self.log_weights[i] += log_likelihood;
-                }
-                Err(_) => {}
+        let is_plausible = (0..M).any(|i| self.alive[i] && self.filters[i].accepts(&streams[i], measurement));
+        for i in (0..M).filter(|i| self.alive[*i]) {
+            let (filter, stream) = (&mut self.filters[i], &mut streams[i]);
+            let result = if is_plausible {
+                filter.update_ungated(stream, measurement)
+            } else {
+                filter.update(stream, measurement)
+            };
+            if let (true, Ok(fused)) = (is_plausible, &result) {
+                self.log_weights[i] += fused.log_likelihood;
             }
             if i == best {
                 answer = result;

@@ -3,10 +3,13 @@
 use crate::navigation::chi_square::limit;
 use crate::navigation::consistency::Consistency;
 use crate::navigation::eskf::Refusal;
-use crate::navigation::math::{ln, sqrt};
+use crate::navigation::math::sqrt;
 
 /// The largest dimension of a measurement whose limits are kept.
 const DIMENSIONS: usize = 7;
+
+/// The most that a covariance is raised by at once.
+const MOST_RAISED: f64 = 1e6;
 
 /// How the measurements of one sensor are judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +20,11 @@ pub struct StreamParams {
     ///
     /// Small: lets more outliers pass. Large: refuses what a filter that is off needs. Default: 1e-4.
     pub gate: f64,
+    /// How many measurements in a row the gate refuses before it takes the filter to be wrong, not the sensor: the next is
+    /// fused with the covariance raised to fit it; 0 for never.
+    ///
+    /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long. Default: 3.
+    pub patience: u32,
     /// Part of good measurements that are weighed down as outliers are, by Huber's function of their Mahalanobis distance; 0
     /// for none.
     ///
@@ -33,7 +41,7 @@ pub struct StreamParams {
 
 impl Default for StreamParams {
     fn default() -> Self {
-        Self { variance_factor: 1.0, gate: 1e-4, robust: 0.0, adaptation: 0.0, most_adaptation: 100.0 }
+        Self { variance_factor: 1.0, gate: 1e-4, patience: 3, robust: 0.0, adaptation: 0.0, most_adaptation: 100.0 }
     }
 }
 
@@ -54,6 +62,8 @@ pub struct Counts {
     pub late: u64,
     /// [`Refusal::InTheFuture`].
     pub future: u64,
+    /// Fused although the gate was against it, after [`StreamParams::patience`]; among those fused.
+    pub recoveries: u64,
     /// Refused by the gate since the last one that was fused.
     pub gate_in_a_row: u64,
 }
@@ -67,12 +77,33 @@ pub struct Fused {
     pub dimension: usize,
     /// The weight that it had, 1 unless [`StreamParams::robust`] took it down.
     pub weight: f64,
+    /// What the covariance was raised by before, 1 unless the gate had run out of patience.
+    pub raised: f64,
+    /// What the gate lets pass, all but when it was overruled.
+    pub limit: f64,
     /// Logarithm of the likelihood of the innovation, but for the constant that depends on the dimension alone: to compare
-    /// models. Normal up to the gate; beyond it the tails are those of a multivariate Cauchy distribution, so that no outlier
-    /// decides by itself.
+    /// models.
     pub log_likelihood: f64,
     /// The first component of the whitened innovation.
     pub(crate) whitened: f64,
+}
+
+/// Whether the gate decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Gate {
+    /// It refuses what is too far off.
+    Closed,
+    /// It lets everything pass.
+    Open,
+}
+
+/// How a measurement is fused.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Verdict {
+    pub(crate) weight: f64,
+    pub(crate) raised: f64,
+    pub(crate) limit: f64,
+    pub(crate) log_likelihood: f64,
 }
 
 /// One sensor, as a filter knows it.
@@ -125,18 +156,29 @@ impl Stream {
         self.noise_factor * self.params.variance_factor
     }
 
-    /// The weight of a measurement and its log likelihood, or that it is refused.
+    /// How a measurement is fused, or that it is refused.
     #[inline]
-    pub(crate) fn weigh(&self, nis: f64, dimension: usize, log_density: f64) -> Result<(f64, f64), Refusal> {
+    pub(crate) fn weigh(
+        &self,
+        nis: f64,
+        dimension: usize,
+        log_density: f64,
+        gate: Gate,
+    ) -> Result<Verdict, Refusal> {
+        let log_likelihood = log_density - 0.5 * nis;
         let kept = dimension.min(DIMENSIONS - 1);
-        let gate = if kept == dimension { self.gates[kept] } else { limit(dimension, self.params.gate) };
-        if nis > gate {
-            let log_likelihood = log_density - 0.5 * gate - 0.5 * (dimension as f64 + 1.0) * ln(nis / gate);
-            return Err(Refusal::Gate { nis, limit: gate, log_likelihood });
+        let most = if kept == dimension { self.gates[kept] } else { limit(dimension, self.params.gate) };
+        if nis > most && matches!(gate, Gate::Closed) {
+            let StreamParams { patience, .. } = self.params;
+            if patience > 0 && self.counts.gate_in_a_row >= u64::from(patience) {
+                let raised = (nis / dimension as f64).min(MOST_RAISED);
+                return Ok(Verdict { weight: 1.0, raised, limit: most, log_likelihood });
+            }
+            return Err(Refusal::Gate { nis, limit: most });
         }
         let huber = if kept == dimension { self.huber[kept] } else { limit(dimension, self.params.robust) };
         let weight = if nis > huber { sqrt(huber / nis) } else { 1.0 };
-        Ok((weight, log_density - 0.5 * nis))
+        Ok(Verdict { weight, raised: 1.0, limit: most, log_likelihood })
     }
 
     #[inline]
@@ -153,6 +195,11 @@ impl Stream {
                     self.counts.fused += 1;
                 }
                 self.counts.gate_in_a_row = 0;
+                if fused.raised > 1.0 {
+                    // What did not fit says nothing about those that do.
+                    self.counts.recoveries += 1;
+                    return;
+                }
                 self.noise_factor = adapt(self.noise_factor, fused.nis / fused.dimension as f64);
                 self.consistency.add(fused);
             }

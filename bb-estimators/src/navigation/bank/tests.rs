@@ -96,10 +96,9 @@ fn a_filter_that_was_dropped_costs_nothing_more() {
 fn outliers_do_not_decide() {
     let (mut bank, [_, mut gnss]) = fly(0.0);
     let before = bank.weights();
-    for _ in 0..5 {
+    for _ in 0..3 {
         let far = GnssPosition::new(Vector3::new(0.0, 1e4, 0.0), 1.0, 1.0);
         assert!(bank.update(&mut gnss, &far).is_err());
     }
-    let after = bank.weights();
-    assert!((after[0] - before[0]).abs() < 0.2, "{before:?} {after:?}");
+    assert_eq!(bank.weights(), before);
 }

@@ -119,6 +119,11 @@ impl<const N: usize> Covariance<N> {
         p[state][state] += variance;
     }
 
+    /// Multiplies all of it: what is known is known so much less.
+    pub(super) fn raise(&mut self, factor: f64) {
+        self.matrix *= factor;
+    }
+
     /// Adds to a variance.
     pub(super) fn inflate(&mut self, state: usize, variance: f64) {
         self.rows_mut()[state][state] += variance;

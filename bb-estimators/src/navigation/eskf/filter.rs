@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::covariance::Covariance;
+use super::covariance::{Covariance, Innovation};
 use super::estimate::{Estimate, Keyframe};
 use super::params::EskfParams;
 use super::propagation::{Densities, Transition};
@@ -14,7 +14,7 @@ use super::states::{
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE, ParamsError};
 use crate::navigation::math::{Integrals, exp};
 use crate::navigation::measurement::{Linearised, Measurement};
-use crate::navigation::stream::{Fused, Stream};
+use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
 
 /// A correction of the rotation below this squared angle, rad², leaves the covariance as it is: to rounding, the same.
 const RESET: f64 = 1e-12;
@@ -287,53 +287,95 @@ impl<S: States, const N: usize> Eskf<S, N> {
         stream: &mut Stream,
         measurement: &M,
     ) -> Result<Fused, Refusal> {
-        let result = self.try_update(stream, measurement);
+        let result = self.fuse(stream, measurement, Gate::Closed);
         stream.count(&result);
         result
     }
 
-    fn try_update<M: Measurement<D>, const D: usize>(
+    /// [`update`](Self::update) whatever the gate says.
+    pub(crate) fn update_ungated<M: Measurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
         measurement: &M,
     ) -> Result<Fused, Refusal> {
-        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
-        let mut model = Linearised::new();
-        measurement.linearise::<S, N>(estimate, &mut model)?;
-        let Linearised { residual, jacobian, noise } = &mut model;
-        let is_finite = |row: &[f64]| row.iter().all(|x| x.is_finite());
-        if !is_finite(residual) || !jacobian.iter().all(|row| is_finite(row)) || !is_finite(noise.as_slice()) {
-            return Err(Refusal::NonFinite);
-        }
-        if (0..D).any(|i| noise[(i, i)] < 0.0) {
-            return Err(Refusal::Noise);
-        }
-        *noise *= stream.noise_factor();
-        let projected = self.covariance.project(jacobian);
-        let innovation = self.covariance.innovation(jacobian, &projected, residual, noise);
-        let mut innovation = innovation.ok_or(Refusal::Noise)?;
+        let result = self.fuse(stream, measurement, Gate::Open);
+        stream.count(&result);
+        result
+    }
+
+    /// Whether the gate of `stream` would let a measurement pass.
+    pub(crate) fn accepts<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
+        let innovation = self.linearised(stream, measurement).and_then(|model| self.innovation(&model));
+        innovation.is_ok_and(|innovation| {
+            stream.weigh(innovation.nis(), D, innovation.log_density(), Gate::Closed).is_ok()
+        })
+    }
+
+    fn fuse<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &Stream,
+        measurement: &M,
+        gate: Gate,
+    ) -> Result<Fused, Refusal> {
+        let mut model = self.linearised(stream, measurement)?;
+        let mut innovation = self.innovation(&model)?;
         let nis = innovation.nis();
-        let (weight, log_likelihood) = stream.weigh(nis, D, innovation.log_density())?;
-        if weight < 1.0 {
-            *noise /= weight;
-            let softened = self.covariance.innovation(jacobian, &projected, residual, noise);
-            innovation = softened.ok_or(Refusal::Noise)?;
+        let Verdict { weight, raised, limit, log_likelihood } =
+            stream.weigh(nis, D, innovation.log_density(), gate)?;
+        let before = (self.covariance, self.estimate);
+        if weight < 1.0 || raised > 1.0 {
+            model.noise /= weight;
+            self.covariance.raise(raised);
+            innovation = self.innovation(&model).inspect_err(|_| self.covariance = before.0)?;
         }
-        let before = (self.covariance, *estimate);
         let error = self.covariance.update(&innovation);
-        let corrected = estimate.corrected::<S>(&error);
-        self.estimate = Some(corrected);
-        self.reset_rotation(ROTATION, &error);
-        if let Some(index) = offset::<S>(Optional::Keyframe) {
-            self.reset_rotation(index + 3, &error);
-        }
-        if !corrected.is_finite() || !self.covariance.is_sane() {
-            self.covariance = before.0;
-            self.estimate = Some(before.1);
+        self.correct(&error);
+        if !self.estimate.is_some_and(|estimate| estimate.is_finite()) || !self.covariance.is_sane() {
+            (self.covariance, self.estimate) = before;
             return Err(Refusal::NonFinite);
         }
         let whitened = innovation.whitened.first().copied().unwrap_or(0.0);
-        Ok(Fused { nis, dimension: D, weight, log_likelihood, whitened })
+        Ok(Fused { nis, dimension: D, weight, raised, limit, log_likelihood, whitened })
+    }
+
+    #[inline]
+    fn linearised<M: Measurement<D>, const D: usize>(
+        &self,
+        stream: &Stream,
+        measurement: &M,
+    ) -> Result<Linearised<D, N>, Refusal> {
+        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
+        let mut model = Linearised::new();
+        measurement.linearise::<S, N>(estimate, &mut model)?;
+        let is_finite = |row: &[f64]| row.iter().all(|x| x.is_finite());
+        if !is_finite(&model.residual)
+            || !model.jacobian.iter().all(|row| is_finite(row))
+            || !is_finite(model.noise.as_slice())
+        {
+            return Err(Refusal::NonFinite);
+        }
+        if (0..D).any(|i| model.noise[(i, i)] < 0.0) {
+            return Err(Refusal::Noise);
+        }
+        model.noise *= stream.noise_factor();
+        Ok(model)
+    }
+
+    #[inline]
+    fn innovation<const D: usize>(&self, model: &Linearised<D, N>) -> Result<Innovation<D, N>, Refusal> {
+        let projected = self.covariance.project(&model.jacobian);
+        let innovation = self.covariance.innovation(&model.jacobian, &projected, &model.residual, &model.noise);
+        innovation.ok_or(Refusal::Noise)
+    }
+
+    /// Adds the error's mean to the estimate.
+    fn correct(&mut self, error: &SVector<f64, N>) {
+        let Some(estimate) = &mut self.estimate else { return };
+        *estimate = estimate.corrected::<S>(error);
+        self.reset_rotation(ROTATION, error);
+        if let Some(index) = offset::<S>(Optional::Keyframe) {
+            self.reset_rotation(index + 3, error);
+        }
     }
 
     /// The errors are about the corrected rotation from now on: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.

@@ -32,8 +32,6 @@ pub enum Refusal {
         nis: f64,
         /// What the gate lets pass.
         limit: f64,
-        /// As [`Fused::log_likelihood`](crate::navigation::Fused::log_likelihood).
-        log_likelihood: f64,
     },
     /// A relative pose refers to a keyframe that the filter does not hold.
     NoKeyframe {
@@ -65,7 +63,7 @@ impl fmt::Display for Refusal {
             }
             Self::Gap { seconds } => write!(f, "no sample for {seconds} s, which is too long to bridge"),
             Self::Noise => f.write_str("the covariance is not positive definite"),
-            Self::Gate { nis, limit, .. } => {
+            Self::Gate { nis, limit } => {
                 write!(f, "normalised innovation squared is {nis:.1}, beyond the gate of {limit:.1}")
             }
             Self::NoKeyframe { id } => write!(f, "keyframe {id} is not held"),
