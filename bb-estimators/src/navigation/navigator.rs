@@ -20,6 +20,9 @@ const ACCELEROMETER: [f64; 3] = [1.0, 3.0, 10.0];
 /// What the variance of positions from satellites may be of what the receiver says: some are cautious.
 const GNSS: [f64; 3] = [1.0, 0.25, 0.0625];
 
+/// How much less plausible it is beforehand, for each thing that differs from what the data sheets say.
+const DEPARTURE: f64 = 0.1;
+
 /// States of the [`Navigator`]: those of navigation, a keyframe, and the scale of relative poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Navigated;
@@ -74,11 +77,24 @@ impl Navigator {
         let mut gnss = [Stream::new(open); FILTERS];
         for (i, slot) in filters.iter_mut().enumerate() {
             let Some(hypothesis) = Hypothesis::number(i, aiding) else { continue };
-            *slot = (Eskf::new(hypothesis.apply(&params))?, 1.0);
+            *slot = (Eskf::new(hypothesis.apply(&params))?, hypothesis.prior());
             gnss[i] = Stream::new(StreamParams { variance_factor: hypothesis.gnss, ..open });
         }
         let gated = [Stream::default(); FILTERS];
         Ok(Self { bank: Bank::new(filters), gnss, poses: gated, relative: gated })
+    }
+
+    /// One filter with these parameters, in place of a bank, for those who have tuned it.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    pub fn single(params: EskfParams) -> Result<Self, ParamsError> {
+        let mut filters = [(Eskf::new(params)?, 0.0); FILTERS];
+        filters[0].1 = 1.0;
+        let open = [Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }); FILTERS];
+        let gated = [Stream::default(); FILTERS];
+        Ok(Self { bank: Bank::new(filters), gnss: open, poses: gated, relative: gated })
     }
 
     /// See [`Eskf::start`].
@@ -161,6 +177,12 @@ impl Hypothesis {
             Aiding::RelativePoses if i < 2 => Some(Self { gyroscope, accelerometer, gnss: 1.0, scale: i == 1 }),
             Aiding::RelativePoses => None,
         }
+    }
+
+    /// How plausible it is before anything was measured; of any sum.
+    fn prior(self) -> f64 {
+        let departs = [self.gyroscope != 1.0, self.accelerometer != 1.0, self.gnss != 1.0, self.scale];
+        departs.into_iter().filter(|departs| *departs).map(|_| DEPARTURE).product()
     }
 
     fn apply(self, params: &EskfParams) -> EskfParams {
