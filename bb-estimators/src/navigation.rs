@@ -10,12 +10,13 @@
 //!
 //! [`Eskf`] is the filter, one type parameter for its optional states. Sensors are values that implement
 //! [`Measurement`](measurement::Measurement), each with a [`Stream`] that holds its gate, counts and statistics.
-//! A [`Bank`] runs several filters and finds which fits; [`Navigator`] is one that is ready for use.
+//! [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several filters and finds which fits; [`Navigator`] is one that is ready for use.
 
 mod bank;
 pub mod chi_square;
 mod consistency;
 mod eskf;
+mod history;
 mod math;
 mod measurement;
 mod navigator;
@@ -27,6 +28,7 @@ pub use eskf::{
     ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuMean, Keyframe, NAVIGATION,
     Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
 };
+pub use history::{Arrivals, History, Placed, Replayed};
 pub use measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, Linearised,
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
