@@ -8,10 +8,11 @@
 //! * An accelerometer measures specific force: at rest it reads one g upwards.
 //! * All quantities are SI; stamps are nanoseconds since any fixed moment.
 //!
-//! [`Eskf`] is the filter, one type parameter for its optional states. Sensors are values that implement
+//! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are values that implement
 //! [`Measurement`](measurement::Measurement), each with a [`Stream`] that holds its gate, counts and statistics.
 //! [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several filters and finds which fits; [`Navigator`] is one that is ready for use.
 
+mod alignment;
 mod bank;
 pub mod chi_square;
 mod consistency;
@@ -22,6 +23,7 @@ mod measurement;
 mod navigator;
 mod stream;
 
+pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
 pub use consistency::{Consistency, nees};
 pub use eskf::{
