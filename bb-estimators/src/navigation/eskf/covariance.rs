@@ -4,11 +4,18 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector};
 
+use super::states::ROTATION;
 use crate::navigation::math::{ln, sqrt};
 
 /// One update never takes more than this ratio of variance out of a direction: what rounding adds, 1e-16 of what was
 /// there, stays far below what is left.
 const LEAST_NOISE: f64 = 1e-10;
+
+/// The largest variance of a position or a velocity: 10,000 km, or as much a second.
+const MOST_VARIANCE: f64 = 1e14;
+
+/// The largest variance of a rotation error, rad²: a hundred turns are as good as one.
+const MOST_ROTATION: f64 = 4e5;
 
 /// Updates between two checks by a Cholesky decomposition.
 const CHECK_EVERY: u32 = 1024;
@@ -39,6 +46,18 @@ impl<const D: usize, const N: usize> Innovation<D, N> {
     /// Normalised innovation squared.
     pub(super) fn nis(&self) -> f64 {
         self.whitened.iter().map(|x| x * x).sum()
+    }
+
+    /// The mean of the errors, given the residual.
+    #[inline]
+    pub(super) fn mean(&self) -> SVector<f64, N> {
+        let mut mean = SVector::<f64, N>::zeros();
+        for (gain, whitened) in self.gain.iter().zip(&self.whitened) {
+            for i in 0..N {
+                mean[i] += gain[i] * whitened;
+            }
+        }
+        mean
     }
 
     /// `-½ ln det S`.
@@ -122,6 +141,24 @@ impl<const N: usize> Covariance<N> {
     /// Multiplies all of it: what is known is known so much less.
     pub(super) fn raise(&mut self, factor: f64) {
         self.matrix *= factor;
+    }
+
+    /// Keeps variances of position, velocity and rotation below what is as good as unknown, so that no number overflows.
+    #[inline]
+    pub(super) fn bound(&mut self) {
+        let limits = [MOST_VARIANCE; ROTATION].into_iter().chain([MOST_ROTATION; 3]);
+        for (i, limit) in limits.enumerate() {
+            let variance = self.matrix[(i, i)];
+            if variance > limit {
+                self.shrink(i, sqrt(limit / variance));
+            }
+        }
+    }
+
+    #[cold]
+    fn shrink(&mut self, state: usize, factor: f64) {
+        self.decay(state, factor, 0.0);
+        self.updates = CHECK_EVERY;
     }
 
     /// Adds to a variance.
@@ -219,14 +256,12 @@ impl<const N: usize> Covariance<N> {
         Some(Innovation { gain, whitened, density })
     }
 
-    /// `P ← P - Wᵀ W`, the update in the order of the decomposition, one scalar after the other; gives the error's mean.
+    /// `P ← P - Wᵀ W`, the update in the order of the decomposition, one scalar after the other.
     #[inline]
-    pub(super) fn update<const D: usize>(&mut self, innovation: &Innovation<D, N>) -> SVector<f64, N> {
-        let mut mean = SVector::<f64, N>::zeros();
+    pub(super) fn update<const D: usize>(&mut self, innovation: &Innovation<D, N>) {
         let p = self.rows_mut();
-        for (gain, whitened) in innovation.gain.iter().zip(&innovation.whitened) {
+        for gain in &innovation.gain {
             for i in 0..N {
-                mean[i] += gain[i] * whitened;
                 let factor = gain[i];
                 // Both halves: the same product, so they round alike.
                 for j in 0..N {
@@ -238,7 +273,6 @@ impl<const N: usize> Covariance<N> {
         if self.updates >= CHECK_EVERY || (0..N).any(|i| self.matrix[(i, i)] <= 0.0) {
             self.enforce();
         }
-        mean
     }
 
     /// Whether a Cholesky decomposition exists.
@@ -275,10 +309,5 @@ impl<const N: usize> Covariance<N> {
             }
             fraction *= 10.0;
         }
-    }
-
-    /// Whether every variance is a number to compute with.
-    pub(super) fn is_sane(&self) -> bool {
-        (0..N).all(|i| (0.0..1e18).contains(&self.matrix[(i, i)]))
     }
 }

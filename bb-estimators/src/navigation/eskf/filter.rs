@@ -228,6 +228,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         transition.apply(&mut self.covariance, &self.densities);
+        self.covariance.bound();
         self.decay(dt);
         Ok(())
     }
@@ -270,6 +271,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         };
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         transition.apply(&mut self.covariance, &densities);
+        self.covariance.bound();
         self.gaps = self.gaps.wrapping_add(1);
         self.decay(dt);
         Ok(())
@@ -322,17 +324,31 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let nis = innovation.nis();
         let Verdict { weight, raised, limit, log_likelihood } =
             stream.weigh(nis, D, innovation.log_density(), gate)?;
-        let before = (self.covariance, self.estimate);
+        let mut before = None;
         if weight < 1.0 || raised > 1.0 {
             model.noise /= weight;
+            before = Some(self.covariance);
             self.covariance.raise(raised);
-            innovation = self.innovation(&model).inspect_err(|_| self.covariance = before.0)?;
+            match self.innovation(&model) {
+                Ok(softened) => innovation = softened,
+                Err(error) => {
+                    self.covariance = before.unwrap_or(self.covariance);
+                    return Err(error);
+                }
+            }
         }
-        let error = self.covariance.update(&innovation);
-        self.correct(&error);
-        if !self.estimate.is_some_and(|estimate| estimate.is_finite()) || !self.covariance.is_sane() {
-            (self.covariance, self.estimate) = before;
+        let error = innovation.mean();
+        let corrected = self.estimate.as_ref().ok_or(Refusal::NotStarted)?.corrected::<S>(&error);
+        // Of finite numbers all is finite, unless they are beyond all reason.
+        if !corrected.is_finite() {
+            self.covariance = before.unwrap_or(self.covariance);
             return Err(Refusal::NonFinite);
+        }
+        self.estimate = Some(corrected);
+        self.covariance.update(&innovation);
+        self.reset_rotation(ROTATION, &error);
+        if let Some(index) = offset::<S>(Optional::Keyframe) {
+            self.reset_rotation(index + 3, &error);
         }
         let whitened = innovation.whitened.first().copied().unwrap_or(0.0);
         Ok(Fused { nis, dimension: D, weight, raised, limit, log_likelihood, whitened })
@@ -366,16 +382,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let projected = self.covariance.project(&model.jacobian);
         let innovation = self.covariance.innovation(&model.jacobian, &projected, &model.residual, &model.noise);
         innovation.ok_or(Refusal::Noise)
-    }
-
-    /// Adds the error's mean to the estimate.
-    fn correct(&mut self, error: &SVector<f64, N>) {
-        let Some(estimate) = &mut self.estimate else { return };
-        *estimate = estimate.corrected::<S>(error);
-        self.reset_rotation(ROTATION, error);
-        if let Some(index) = offset::<S>(Optional::Keyframe) {
-            self.reset_rotation(index + 3, error);
-        }
     }
 
     /// The errors are about the corrected rotation from now on: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.

@@ -188,6 +188,36 @@ fn a_gate_that_refuses_all_gives_way() {
 }
 
 #[test]
+fn absurd_but_finite_samples_leave_finite_numbers() {
+    let mut filter: Plain = started();
+    for i in 1..3000_i64 {
+        let absurd = Vector3::new(-1e3, 9e2, 1e3) * (i % 3 - 1) as f64;
+        let wild = ImuMean { time_ns: i * 100_000_000, angular_velocity: absurd, specific_force: absurd * 1e3 };
+        filter.propagate(&wild).unwrap();
+    }
+    let is_finite = |filter: &Plain| filter.covariance().iter().all(|x| x.is_finite());
+    assert!(is_finite(&filter));
+    let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+    let level = EskfParams::default().gravity;
+    for i in 3000..4000 {
+        let still = ImuMean {
+            time_ns: i * 100_000_000,
+            angular_velocity: Vector3::zeros(),
+            specific_force: Vector3::new(0.0, 0.0, level),
+        };
+        filter.propagate(&still).unwrap();
+        filter
+            .update(&mut stream, &AbsolutePose::new((Vector3::zeros(), 1.0), (UnitQuaternion::identity(), 0.1)))
+            .unwrap();
+    }
+    assert!(is_finite(&filter) && filter.is_consistent(), "{}", filter.repairs());
+    let estimate = filter.estimate().unwrap();
+    assert!(
+        estimate.position.iter().all(|x| x.is_finite()) && (estimate.world_from_body.norm() - 1.0).abs() < 1e-12
+    );
+}
+
+#[test]
 fn an_outlier_weighs_less_where_it_is_asked_for() {
     let outlier = GnssPosition::new(Vector3::new(20.0, 0.0, 0.0), 1.0, 1.0);
     let moved = |robust: f64| {
