@@ -21,6 +21,8 @@ mod history;
 mod math;
 mod measurement;
 mod navigator;
+#[cfg(test)]
+mod noise;
 mod stream;
 
 pub use alignment::{Alignment, AlignmentParams};

@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Bank;
+use crate::navigation::noise::Noise;
 use crate::navigation::{
     Eskf, EskfParams, GaussMarkov, GnssPosition, ImuMean, Optional, RelativePose, Start, States, Stream,
     StreamParams,
@@ -16,24 +17,6 @@ impl States for Odometry {
 }
 
 const N: usize = Odometry::DIMENSION;
-
-/// Noise that is the same in every run, of about unit variance.
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> f64 {
-        // Twelve uniform numbers of a linear congruential generator.
-        let mut uniform = || {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
-
-    fn vector(&mut self, deviation: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| self.next() * deviation)
-    }
-}
 
 /// A minute of straight flight at 20 m/s with odometry at 10 Hz, whose scale is off, and a fix a second.
 fn fly(scale: f64) -> (Bank<Odometry, N, 2>, [[Stream; 2]; 2]) {

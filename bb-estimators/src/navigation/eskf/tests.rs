@@ -1,5 +1,6 @@
 //! The transition and every Jacobian against numeric differentiation, and the laws of the filter.
 
+mod consistency;
 mod jacobians;
 mod laws;
 mod transition;
