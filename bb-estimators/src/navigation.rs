@@ -8,18 +8,19 @@
 //! * An accelerometer measures specific force: at rest it reads one g upwards.
 //! * All quantities are SI; stamps are nanoseconds since any fixed moment.
 //!
-//! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are values that implement
-//! [`Measurement`](measurement::Measurement), each with a [`Stream`] that holds its gate, counts and statistics.
-//! [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several filters and finds which fits; [`Navigator`] is one that is ready for use.
+//! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
+//! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
+//! counts and statistics. [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several
+//! filters and finds which fits; [`Navigator`] is one that is ready for use.
 
 mod alignment;
 mod bank;
 pub mod chi_square;
 mod consistency;
-mod eskf;
+pub mod eskf;
 mod history;
 mod math;
-mod measurement;
+pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;

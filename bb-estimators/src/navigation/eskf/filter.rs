@@ -90,7 +90,7 @@ impl Start {
     }
 }
 
-/// An error-state Kalman filter with the optional states `S` and `N` errors in all; see the [module](self).
+/// An error-state Kalman filter with the optional states `S` and `N` errors in all; see the [module](super).
 ///
 /// ```
 /// use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Navigation, Start, Stream};
@@ -117,6 +117,8 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
     covariance: Covariance<N>,
     resets: u32,
     gaps: u32,
+    /// When the position was last corrected by one of the world.
+    fixed_ns: i64,
     states: core::marker::PhantomData<S>,
 }
 
@@ -141,7 +143,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         };
         let covariance = Covariance::new();
         let states = core::marker::PhantomData;
-        Ok(Self { params, densities, estimate: None, covariance, resets: 0, gaps: 0, states })
+        Ok(Self { params, densities, estimate: None, covariance, resets: 0, gaps: 0, fixed_ns: 0, states })
     }
 
     /// The parameters that the filter was made with.
@@ -193,6 +195,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             return Err(Refusal::Noise);
         }
         self.resets = self.resets.wrapping_add(1);
+        self.fixed_ns = start.time_ns;
         self.estimate = Some(estimate);
         self.covariance = covariance;
         Ok(())
@@ -346,6 +349,9 @@ impl<S: States, const N: usize> Eskf<S, N> {
         }
         self.estimate = Some(corrected);
         self.covariance.update(&innovation);
+        if Self::fixes_position(&model) {
+            self.fixed_ns = corrected.time_ns;
+        }
         self.reset_rotation(ROTATION, &error);
         if let Some(index) = offset::<S>(Optional::Keyframe) {
             self.reset_rotation(index + 3, &error);
@@ -382,6 +388,15 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let projected = self.covariance.project(&model.jacobian);
         let innovation = self.covariance.innovation(&model.jacobian, &projected, &model.residual, &model.noise);
         innovation.ok_or(Refusal::Noise)
+    }
+
+    /// Whether a measurement sees a horizontal position in the world, and not one relative to the keyframe.
+    fn fixes_position<const D: usize>(model: &Linearised<D, N>) -> bool {
+        let keyframe = offset::<S>(Optional::Keyframe);
+        model.jacobian.iter().any(|row| {
+            let sees = |first: usize| row[first] != 0.0 || row[first + 1] != 0.0;
+            sees(POSITION) && !keyframe.is_some_and(sees)
+        })
     }
 
     /// The errors are about the corrected rotation from now on: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.
@@ -475,6 +490,12 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// How often the filter was started.
     pub fn resets(&self) -> u32 {
         self.resets
+    }
+
+    /// For how long the horizontal position has not been corrected by one in the world, s: relative poses, velocities and
+    /// heights do not count. 0 before the start.
+    pub fn dead_reckoning_s(&self) -> f64 {
+        self.estimate.map_or(0.0, |estimate| estimate.time_ns.saturating_sub(self.fixed_ns) as f64 * 1e-9)
     }
 
     /// How many gaps were bridged.

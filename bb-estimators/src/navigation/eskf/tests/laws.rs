@@ -6,8 +6,8 @@ use proptest::prelude::*;
 use super::super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, POSITION};
 use super::{ALL, All, Estimate, estimate, orientation, sample, started, vector};
 use crate::navigation::{
-    AbsolutePose, Eskf, EskfParams, GnssPosition, GnssVelocity, ImuMean, Refusal, RelativePose, Start, Stream,
-    StreamParams, ZeroVelocity,
+    AbsolutePose, Eskf, EskfParams, GnssPosition, GnssVelocity, Height, ImuMean, Refusal, RelativePose, Start,
+    Stream, StreamParams, ZeroVelocity,
 };
 
 type Plain = Eskf<Navigation, 15>;
@@ -151,6 +151,34 @@ fn refusals_are_named_and_counted() {
     assert_eq!((counts.not_applicable, counts.invalid, counts.gate, counts.gate_in_a_row), (2, 2, 1, 1));
     assert!(filter.update(&mut stream, &fix).is_ok());
     assert_eq!((stream.counts().fused, stream.counts().gate_in_a_row), (1, 0));
+}
+
+#[test]
+fn only_a_position_in_the_world_ends_dead_reckoning() {
+    let mut filter: Eskf<All, ALL> = started();
+    let mut stream = Stream::default();
+    filter.set_keyframe(0);
+    let variance = filter.pose_covariance().fixed_view::<2, 2>(0, 0).trace();
+    for i in 1..=500 {
+        filter.propagate(&sample(i)).unwrap();
+        if i % 10 == 0 {
+            let pose = *filter.estimate().unwrap();
+            let keyframe = pose.keyframe.unwrap();
+            let back = keyframe.world_from_body.inverse();
+            let way = back * (pose.position - keyframe.position);
+            let relative = RelativePose::new(0, (way, 0.05), (back * pose.world_from_body, 0.01));
+            filter.update(&mut stream, &relative).unwrap();
+            filter.update(&mut stream, &GnssVelocity::new(pose.velocity, 0.1, 0.1)).unwrap();
+            filter.update(&mut stream, &Height { height: pose.position.z, deviation: 1.0 }).unwrap();
+            // What was not known at the start stays so.
+            let horizontal = filter.pose_covariance().fixed_view::<2, 2>(0, 0).trace();
+            assert!(horizontal >= variance, "{horizontal} m², {variance} m² at the start");
+        }
+    }
+    assert!((filter.dead_reckoning_s() - 5.0).abs() < 1e-9);
+    let position = filter.estimate().unwrap().position;
+    filter.update(&mut stream, &GnssPosition::new(position, 1.0, 1.0)).unwrap();
+    assert_eq!(filter.dead_reckoning_s(), 0.0);
 }
 
 #[test]
