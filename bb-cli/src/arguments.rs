@@ -2,6 +2,7 @@
 
 use crate::evaluate::Evaluator;
 use crate::filters::{Axes, Chosen, FILTERS, Filter, Setting};
+use crate::navigation::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
 use crate::plot::Picture;
 use crate::recording::{MovingTopic, Topics};
 use crate::{files, filters};
@@ -32,6 +33,9 @@ enum Eval {
     /// Plays recordings through attitude filters and prints their errors against the truth.
     #[command(after_help = EXAMPLES)]
     Attitude(AttitudeArguments),
+    /// Plays drives and flights through navigation filters and prints their errors against the truth.
+    #[command(after_help = NAVIGATION_EXAMPLES)]
+    Navigation(NavigationArguments),
 }
 
 const EXAMPLES: &str =
@@ -41,6 +45,30 @@ Examples:
   bb eval attitude walk.mcap
   bb eval attitude recordings/ --filter mekf,madgwick --axes six --plot errors.svg
   bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json";
+
+const NAVIGATION_EXAMPLES: &str = "Exit code: 0; 1 if a data set could not be evaluated; 2 for a wrong use.
+
+Examples:
+  bb eval navigation drives/kitti_s2
+  bb eval navigation drives/kitti_s2 drives/kitti_s5 --filter eskf --json
+  bb eval navigation flights/one --filter eskf-single --set gyroscope_noise=1e-3";
+
+#[derive(Debug, Args)]
+struct NavigationArguments {
+    /// Prefixes of data sets: `folder/name` for `folder/name_imu.csv`, `folder/name_keyframes.csv` and the others.
+    #[arg(value_name = "DATA", required = true)]
+    data: Vec<PathBuf>,
+    /// The filters; several with commas.
+    #[arg(long = "filter", value_name = "NAME", value_delimiter = ',', default_value = NAVIGATION_FILTERS[0].name,
+          value_parser = navigation_filter, long_help = navigation_filters_in_words())]
+    filters: Vec<NavigationFilter>,
+    /// Sets a parameter, in SI, in place of what the data set says.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    settings: Vec<NavigationSetting>,
+    /// Prints an array of objects instead of the table.
+    #[arg(long)]
+    json: bool,
+}
 
 #[derive(Debug, Args)]
 struct AttitudeArguments {
@@ -82,6 +110,22 @@ struct AttitudeArguments {
 
 /// What to do.
 #[derive(Debug)]
+pub(crate) enum Job {
+    Attitude(Attitude),
+    Navigation(Navigation),
+}
+
+/// `bb eval navigation`.
+#[derive(Debug)]
+pub(crate) struct Navigation {
+    pub(crate) data: Vec<PathBuf>,
+    pub(crate) filters: Vec<NavigationFilter>,
+    pub(crate) settings: Vec<NavigationSetting>,
+    pub(crate) json: bool,
+}
+
+/// `bb eval attitude`.
+#[derive(Debug)]
 pub(crate) struct Attitude {
     pub(crate) paths: Vec<PathBuf>,
     pub(crate) evaluator: Evaluator,
@@ -90,9 +134,15 @@ pub(crate) struct Attitude {
 }
 
 /// Reads the command line. An error is what to print, and has the exit code: help, which was asked for, has 0.
-pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Attitude, clap::Error> {
-    let Bb { command: Command::Eval { what: Eval::Attitude(arguments) } } = Bb::try_parse_from(arguments)?;
-    arguments.check().map_err(|(kind, fault)| {
+pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job, clap::Error> {
+    let Bb { command: Command::Eval { what } } = Bb::try_parse_from(arguments)?;
+    let arguments = match what {
+        Eval::Attitude(arguments) => arguments,
+        Eval::Navigation(NavigationArguments { data, filters, settings, json }) => {
+            return Ok(Job::Navigation(Navigation { data, filters, settings, json }));
+        }
+    };
+    arguments.check().map(Job::Attitude).map_err(|(kind, fault)| {
         let mut bb = Bb::command();
         bb.build();
         let attitude = bb.find_subcommand_mut("eval").and_then(|eval| eval.find_subcommand_mut("attitude"));
@@ -163,6 +213,20 @@ impl AttitudeArguments {
         };
         Ok(FILTERS.iter().filter(is_chosen).collect())
     }
+}
+
+fn navigation_filter(name: &str) -> Result<NavigationFilter, String> {
+    let known = NAVIGATION_FILTERS.map(|filter| filter.name);
+    let found = NAVIGATION_FILTERS.into_iter().find(|filter| filter.name == name);
+    found.ok_or_else(|| format!("no filter `{name}`; {}", filters::near(name, &known)))
+}
+
+fn navigation_filters_in_words() -> String {
+    let mut text = String::from("The filters; several with commas. Those there are:\n");
+    for filter in NAVIGATION_FILTERS {
+        text += &format!("\n{}: {}", filter.name, filter.about);
+    }
+    text
 }
 
 fn filters_in_words() -> String {

@@ -1,9 +1,12 @@
-//! The command `bb`: attitude filters, scored on recordings.
+//! The command `bb`: attitude and navigation filters, scored on recordings.
 //!
 //! `bb eval attitude FILES…` plays each bag through the filters and prints their errors against the truth; the guide is
 //! `docs/evaluate.md`. What it is made of is a library, for others that score: [`Score`] and [`Averages`] are the one
 //! definition of the figures, [`evaluate`](fn@evaluate) gives them for one recording, [`Picture`] draws
 //! lines over time.
+//!
+//! `bb eval navigation DATA…` does the same for navigation filters on data sets of CSV files; [`evaluate_navigation`] is its
+//! library.
 
 mod arguments;
 mod averages;
@@ -11,6 +14,7 @@ mod error_plot;
 mod evaluate;
 mod files;
 mod filters;
+mod navigation;
 mod plot;
 mod progress;
 mod recording;
@@ -20,12 +24,15 @@ mod score;
 pub use averages::Averages;
 pub use evaluate::{Evaluation, Evaluator, Run, evaluate};
 pub use filters::{Axes, Chosen, FILTERS, Filter, Refused, Running, Setting};
+pub use navigation::{
+    DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
+};
 pub use plot::{Line, Panel, Picture};
 pub use progress::Progress;
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
 
-use arguments::Attitude;
+use arguments::{Attitude, Job, Navigation};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -33,15 +40,19 @@ use std::process::ExitCode;
 /// Runs the command with these arguments, its own name first. The exit code is 2 for a wrong use and 1 for a
 /// recording that could not be evaluated, or not to its end.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let attitude = match arguments::parse(arguments) {
-        Ok(attitude) => attitude,
+    let job = match arguments::parse(arguments) {
+        Ok(job) => job,
         Err(error) => {
             // A terminal that is gone is told nothing.
             let _ = error.print();
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    match eval_attitude(&attitude) {
+    let done = match &job {
+        Job::Attitude(attitude) => eval_attitude(attitude),
+        Job::Navigation(navigation) => eval_navigation(navigation),
+    };
+    match done {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
@@ -49,6 +60,34 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Whether every data set could be evaluated.
+fn eval_navigation(job: &Navigation) -> Result<bool, String> {
+    let Navigation { data, filters, settings, json } = job;
+    let (mut scores, mut faults) = (Vec::new(), Vec::new());
+    for prefix in data {
+        let data = match DataSet::read(prefix) {
+            Ok(data) => data,
+            Err(fault) => {
+                faults.push(fault);
+                continue;
+            }
+        };
+        let progress = Progress::new("evaluating", (data.keyframes.len() * filters.len()) as u64);
+        for filter in filters {
+            match evaluate_navigation(&data, filter, settings, || progress.add(1)) {
+                Ok(score) => scores.push((prefix.clone(), filter.name, score)),
+                Err(fault) => faults.push(format!("{}: {}: {fault}", prefix.display(), filter.name)),
+            }
+        }
+        progress.finish();
+    }
+    say(&if *json { navigation::json(&scores)? } else { navigation::table(&scores) })?;
+    for fault in &faults {
+        eprintln!("error: {fault}");
+    }
+    Ok(faults.is_empty())
 }
 
 /// Whether every recording could be evaluated to its end.

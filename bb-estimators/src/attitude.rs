@@ -35,7 +35,7 @@ mod low_pass;
 pub mod madgwick;
 pub mod mahony;
 pub mod mekf;
-mod params;
+pub(crate) mod params;
 mod real;
 mod rotation;
 mod sample;

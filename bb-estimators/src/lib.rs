@@ -1,7 +1,8 @@
-//! Attitude filters and their fusion.
+//! Attitude filters and their fusion, and navigation.
 //!
-//! Each algorithm is a plain value, values in, values out, with no runtime in sight: the modules below [`attitude`],
-//! which build without the feature `runtime`, in `f64` or `f32`, and without the standard library. The estimators at the top of this crate wrap them for `robot!`:
+//! Each algorithm is a plain value, values in, values out, with no runtime in sight: the modules below [`attitude`], in
+//! `f64` or `f32`, and [`navigation`], in `f64`. They build without the feature `runtime` and without the standard library.
+//! The estimators at the top of this crate wrap attitude filters for `robot!`:
 //!
 //! | declared as | takes | emits |
 //! |---|---|---|
@@ -16,6 +17,7 @@
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 pub mod attitude;
+pub mod navigation;
 #[cfg(feature = "simulation")]
 pub mod simulation;
 

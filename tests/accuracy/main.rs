@@ -5,5 +5,6 @@
 
 mod attitude;
 mod command;
+mod navigation;
 mod recordings;
 mod single;

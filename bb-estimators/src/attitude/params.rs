@@ -28,7 +28,7 @@ impl fmt::Display for ParamsError {
 impl Error for ParamsError {}
 
 /// Accepts `value` if it lies in `min..=max`; NaN and infinity never do.
-pub(super) fn accept(
+pub(crate) fn accept(
     parameter: &'static str,
     value: f64,
     (min, max): (f64, f64),

@@ -9,7 +9,8 @@ use bb_estimators::attitude::{
     AttitudeFilter, ComplementaryFilter, FusionFilter, ImuSample, MadgwickFilter, MahonyFilter, MekfFilter,
     OrientationError, Real, TiltFilter, VqfFilter,
 };
-use nalgebra::UnitQuaternion;
+use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Optional, Start, States, Stream};
+use nalgebra::{UnitQuaternion, Vector3};
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
@@ -40,6 +41,24 @@ fn all<T: Real>(sample: &ImuSample<T>) -> Option<f64> {
     let mean = average(&orientations.map(|orientation| (orientation, T::ONE))).ok()?;
     let mean = average_pair(&mean, T::ONE, &truth, T::HALF).ok()?;
     Some(OrientationError::between(&mean, &truth)?.heading)
+}
+
+/// A rover with an antenna on a mast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rover;
+
+impl States for Rover {
+    const OPTIONAL: &'static [Optional] = &[Optional::GnssLeverArm];
+}
+
+/// Where it is, east of the origin, after one sample and one fix, m.
+pub fn navigate(sample: &ImuMean) -> Option<f64> {
+    let mut filter = Eskf::<Rover, { Rover::DIMENSION }>::new(EskfParams::default()).ok()?;
+    let rest = Vector3::zeros();
+    filter.start(&Start::at(0, (rest, 5.0), (rest, 0.1), (UnitQuaternion::identity(), 0.1))).ok()?;
+    filter.propagate(sample).ok()?;
+    filter.update(&mut Stream::default(), &GnssPosition::new(rest, 1.0, 2.0)).ok()?;
+    Some(filter.estimate()?.position.x)
 }
 
 fn updated<T: Real, F: AttitudeFilter<T>>(sample: &ImuSample<T>) -> Option<UnitQuaternion<T>> {

@@ -1,0 +1,75 @@
+//! What `bb eval navigation` prints.
+
+use super::evaluate::NavigationScore;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// A data set, a filter's name, and its score.
+pub(crate) type Scored = (PathBuf, &'static str, NavigationScore);
+
+/// One object of `--json`; what the truth does not hold is null.
+#[derive(Serialize)]
+struct Object {
+    file: String,
+    filter: &'static str,
+    position_rmse_m: f64,
+    orientation_rmse_deg: Option<f64>,
+    velocity_rmse_mps: Option<f64>,
+    nees: f64,
+    keyframes: usize,
+    us_per_imu_sample: f64,
+    ms_per_keyframe_p50: f64,
+    ms_per_keyframe_p99: f64,
+    refused: u64,
+}
+
+pub(crate) fn json(scores: &[Scored]) -> Result<String, String> {
+    let object = |(file, filter, score): &Scored| Object {
+        file: file.display().to_string(),
+        filter,
+        position_rmse_m: score.position_rmse_m,
+        orientation_rmse_deg: score.orientation_rmse_deg,
+        velocity_rmse_mps: score.velocity_rmse_mps,
+        nees: score.nees,
+        keyframes: score.keyframes,
+        us_per_imu_sample: score.us_per_imu_sample,
+        ms_per_keyframe_p50: score.ms_per_keyframe_p50,
+        ms_per_keyframe_p99: score.ms_per_keyframe_p99,
+        refused: score.refused,
+    };
+    let objects: Vec<_> = scores.iter().map(object).collect();
+    Ok(serde_json::to_string_pretty(&objects).map_err(|error| error.to_string())? + "\n")
+}
+
+pub(crate) fn table(scores: &[Scored]) -> String {
+    if scores.is_empty() {
+        return String::new();
+    }
+    let name = |file: &PathBuf| file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
+    let width = scores.iter().map(|(file, ..)| name(file).chars().count()).max().unwrap_or(0).max(4);
+    let mut text = String::from("Root mean square errors at the keyframes:\n\n");
+    let head = ["position m", "orient. deg", "velocity m/s", "NEES", "keyframes", "us/sample"];
+    let _ = write!(text, "{:width$}  {:11}", "data", "filter");
+    for cell in head {
+        let _ = write!(text, "  {cell:>12}");
+    }
+    text.push('\n');
+    for (file, filter, score) in scores {
+        let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+        let cells = [
+            number(Some(score.position_rmse_m)),
+            number(score.orientation_rmse_deg),
+            number(score.velocity_rmse_mps),
+            format!("{:.2}", score.nees),
+            score.keyframes.to_string(),
+            format!("{:.2}", score.us_per_imu_sample),
+        ];
+        let _ = write!(text, "{:width$}  {filter:11}", name(file));
+        for cell in cells {
+            let _ = write!(text, "  {cell:>12}");
+        }
+        text.push('\n');
+    }
+    text
+}

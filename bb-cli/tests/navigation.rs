@@ -1,0 +1,80 @@
+//! `bb eval navigation`, on a small data set made here.
+
+mod common;
+
+use common::{bb, file};
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Ten seconds of straight motion at 2 m/s to the east, with a fix a second. Gives the prefix of its files.
+fn drive(name: &str) -> PathBuf {
+    let (mut imu, mut keyframes) =
+        (String::from("t,gx,gy,gz,ax,ay,az,dt\n"), String::from("k,t,imu_start,truth_row,eval\n"));
+    let mut truth = String::from("t,px,py,pz,qw,qx,qy,qz,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz\n");
+    let mut gps = String::from("k,t,x,y,z,sigma_h,sigma_v\n");
+    for i in 0..1000 {
+        let _ = writeln!(imu, "{},0,0,0,0,0,9.81,0.01", f64::from(i) * 0.01);
+    }
+    for k in 0..=100 {
+        let t = f64::from(k) * 0.1;
+        let _ = writeln!(keyframes, "{k},{t},{},{k},1", k * 10);
+        let _ = writeln!(truth, "{t},{},0,0,1,0,0,0,2,0,0,nan,nan,nan,nan,nan,nan", 2.0 * t);
+        if k % 10 == 0 {
+            let _ = writeln!(gps, "{k},{t},{},0,0,0.5,1", 2.0 * t);
+        }
+    }
+    let init = "px,…\n0.2,0,0,1,0,0,0,2,0,0,0,0,0,0,0,0,0.01,0.5,0.1,0.001,0.01\n";
+    let noise = "gyro_nd,gyro_rw,accel_nd,accel_rw,gravity\n1e-4,1e-6,1e-3,1e-5,9.81\n";
+    let files = [("truth", &*truth), ("keyframes", &keyframes), ("gps", &gps), ("init", init), ("noise", noise)];
+    for (what, text) in files {
+        file(&format!("{name}_{what}.csv"), text.as_bytes());
+    }
+    let last = file(&format!("{name}_imu.csv"), imu.as_bytes());
+    last.with_file_name(name)
+}
+
+#[test]
+fn a_drive_is_scored() {
+    let drive = drive("straight");
+    let prefix = drive.to_str().expect("is text");
+    let output = bb(&["eval", "navigation", prefix, "--filter", "eskf,eskf-single", "--json"]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+    assert_eq!((rows.len(), &rows[0]["filter"], &rows[1]["filter"]), (2, &"eskf".into(), &"eskf-single".into()));
+    for row in &rows {
+        let number = |name: &str| row[name].as_f64().unwrap_or_else(|| panic!("{name} is no number: {row}"));
+        assert!(number("position_rmse_m") < 0.3 && number("velocity_rmse_mps") < 0.2, "{row}");
+        assert!(number("orientation_rmse_deg") < 1.0 && number("nees") < 6.0, "{row}");
+        assert!(number("us_per_imu_sample") > 0.0 && number("ms_per_keyframe_p50") > 0.0, "{row}");
+        assert!(number("ms_per_keyframe_p99") >= number("ms_per_keyframe_p50"), "{row}");
+        assert_eq!((&row["keyframes"], &row["refused"], &row["file"]), (&90.into(), &0.into(), &prefix.into()));
+    }
+    let output = bb(&["eval", "navigation", prefix]);
+    assert!(output.out.contains("straight  eskf ") && output.out.contains("NEES"), "{}", output.out);
+}
+
+#[test]
+fn mistakes_are_named() {
+    let good = drive("good");
+    let good = good.to_str().expect("is text");
+    let broken = drive("broken");
+    file("broken_imu.csv", b"t,gx,gy,gz,ax,ay,az,dt\n0,0,0,0,0,0,9.81,0.01\n0,0,zero,0,0,0,9.81,0.01\n");
+    let broken = broken.to_str().expect("is text");
+    let output = bb(&["eval", "navigation", "no_such", broken, good]);
+    assert_eq!(output.code, Some(1));
+    assert!(output.err.contains("no_such_imu.csv: there is no such file"), "{}", output.err);
+    assert!(output.err.contains("broken_imu.csv, line 3: invalid float literal"), "{}", output.err);
+    assert!(output.out.contains("good"), "{}", output.out);
+    for (arguments, fault) in [
+        (&["--filter", "eskff"][..], "no filter `eskff`; did you mean `eskf`?"),
+        (&["--set", "gyro_noise=1"], "no parameter `gyro_noise`; did you mean `gyroscope_noise`?"),
+        (&["--set", "gravity=down"], "`gravity` is `down`, but must be a number in SI"),
+    ] {
+        let output = bb(&[&["eval", "navigation", good], arguments].concat());
+        assert!(output.code == Some(2) && output.err.contains(fault), "{fault}: {}", output.err);
+    }
+    let output = bb(&["eval", "navigation", good, "--set", "gravity=100"]);
+    let fault = "`gravity` is 100 m/s²: choose a value from 1 to 30 m/s²";
+    assert!(output.code == Some(1) && output.err.contains(fault), "{}", output.err);
+}

@@ -1,0 +1,43 @@
+//! Position, velocity and attitude from inertial sensors and whatever else a robot has.
+//!
+//! Conventions of every file below:
+//!
+//! * The world is a local tangent frame: x east, y north, z up, gravity along -z.
+//! * The body is the IMU: its origin is where the accelerometer is, its axes are those of the IMU.
+//! * `world_from_body` takes coordinates in the body to the world.
+//! * An accelerometer measures specific force: at rest it reads one g upwards.
+//! * All quantities are SI; stamps are nanoseconds since any fixed moment.
+//!
+//! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
+//! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
+//! counts and statistics. [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several
+//! filters and finds which fits; [`Navigator`] is one that is ready for use.
+
+mod alignment;
+mod bank;
+pub mod chi_square;
+mod consistency;
+pub mod eskf;
+mod history;
+mod math;
+pub mod measurement;
+mod navigator;
+#[cfg(test)]
+mod noise;
+mod stream;
+
+pub use alignment::{Alignment, AlignmentParams};
+pub use bank::Bank;
+pub use consistency::{Consistency, nees};
+pub use eskf::{
+    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuMean, Keyframe, NAVIGATION,
+    Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
+};
+pub use history::{Arrivals, History, Placed, Replayed};
+pub use measurement::{
+    AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, Linearised,
+    MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
+    ZeroVelocity,
+};
+pub use navigator::{Aiding, NAVIGATED, Navigated, Navigator};
+pub use stream::{Counts, Fused, Stream, StreamParams};

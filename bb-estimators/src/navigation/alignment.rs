@@ -1,0 +1,213 @@
+//! Where a filter starts: from rest, or in motion with the course that satellites show. From a given pose it is
+//! [`Start::at`].
+//!
+//! P. D. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd edition, 2013, section 5.6.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::eskf::{ImuMean, Refusal, Start};
+use super::math::{atan2, sqrt};
+use crate::attitude::initial::initial_orientation;
+
+#[cfg(test)]
+mod tests;
+
+/// What is taken for rest, and what the sensors are like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AlignmentParams {
+    /// How long rest must last, s.
+    ///
+    /// Small: starts soon. Large: the bias of the gyroscope is better known. Default: 1.
+    pub rest_time: f64,
+    /// The most that the angular velocity varies at rest, standard deviation of a component, rad/s.
+    ///
+    /// Small: noise is taken for motion. Large: motion is taken for rest. Default: 0.01. Source: MEMS gyroscopes at 100 Hz
+    /// have 0.002 rad/s.
+    pub rest_rotation: f64,
+    /// The most that the specific force varies at rest, standard deviation of a component, m/s².
+    ///
+    /// Small: noise is taken for motion. Large: motion is taken for rest. Default: 0.1. Source: MEMS accelerometers at 100 Hz
+    /// have 0.02 m/s².
+    pub rest_force: f64,
+    /// The largest bias of the gyroscope, rad/s: a steady rotation that is faster is no bias. Default: 0.1.
+    pub largest_bias: f64,
+    /// Standard deviation of the accelerometer's bias, m/s². Default: 0.1.
+    pub accelerometer_bias: f64,
+    /// Horizontal acceleration while in motion, which tilts what the accelerometer shows, m/s². Default: 1.
+    pub acceleration: f64,
+    /// Gravity, m/s². Default: 9.80665.
+    pub gravity: f64,
+}
+
+impl Default for AlignmentParams {
+    fn default() -> Self {
+        Self {
+            rest_time: 1.0,
+            rest_rotation: 0.01,
+            rest_force: 0.1,
+            largest_bias: 0.1,
+            accelerometer_bias: 0.1,
+            acceleration: 1.0,
+            gravity: 9.80665,
+        }
+    }
+}
+
+/// Gathers samples until a filter can start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alignment {
+    params: AlignmentParams,
+    /// Of the samples gathered.
+    count: f64,
+    first_ns: Option<i64>,
+    last_ns: i64,
+    rotation: Moments,
+    force: Moments,
+}
+
+/// Mean, and sum of squared differences to it; B. P. Welford, Technometrics 4(3), 1962.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Moments {
+    mean: Vector3<f64>,
+    squares: Vector3<f64>,
+}
+
+impl Moments {
+    fn add(&mut self, count: f64, value: &Vector3<f64>) {
+        let before = value - self.mean;
+        self.mean += before / count;
+        self.squares += before.component_mul(&(value - self.mean));
+    }
+
+    /// The largest standard deviation of a component.
+    fn deviation(&self, count: f64) -> f64 {
+        sqrt(self.squares.max() / count)
+    }
+}
+
+impl Alignment {
+    /// One without a sample.
+    pub fn new(params: AlignmentParams) -> Self {
+        let (rotation, force) = (Moments::default(), Moments::default());
+        Self { params, count: 0.0, first_ns: None, last_ns: i64::MIN, rotation, force }
+    }
+
+    /// Takes a sample. One that shows motion begins a new rest.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] if a value is not finite, or time does not increase. Nothing has changed then.
+    pub fn add(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        let ImuMean { time_ns, angular_velocity, specific_force } = sample;
+        if !angular_velocity.iter().chain(specific_force.iter()).all(|x| x.abs() < 1e6) {
+            return Err(Refusal::NonFinite);
+        }
+        if self.first_ns.is_some() && *time_ns <= self.last_ns {
+            return Err(Refusal::TimeNotIncreasing { previous_ns: self.last_ns, time_ns: *time_ns });
+        }
+        let mut longer = *self;
+        longer.first_ns = self.first_ns.or(Some(*time_ns));
+        longer.last_ns = *time_ns;
+        longer.count += 1.0;
+        longer.rotation.add(longer.count, angular_velocity);
+        longer.force.add(longer.count, specific_force);
+        *self = if longer.is_still() { longer } else { Self::new(self.params).beginning_with(sample) };
+        Ok(())
+    }
+
+    /// For how long the body has been at rest, s.
+    pub fn rest_s(&self) -> f64 {
+        self.first_ns.map_or(0.0, |first_ns| self.last_ns.saturating_sub(first_ns) as f64 * 1e-9)
+    }
+
+    /// A start from rest: tilt from gravity, the bias of the gyroscope from what it reads.
+    ///
+    /// `position` (m) and `heading` (rad, of the body's x axis, from east counter-clockwise) come with their standard
+    /// deviations.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NotObservable`] if rest has not lasted long enough, or the body's x axis is vertical.
+    pub fn at_rest(&self, position: (Vector3<f64>, f64), heading: (f64, f64)) -> Result<Start, Refusal> {
+        let AlignmentParams { rest_time, largest_bias, accelerometer_bias, gravity, .. } = self.params;
+        if self.rest_s() < rest_time || self.rotation.mean.norm() > largest_bias {
+            return Err(Refusal::NotObservable);
+        }
+        let world_from_body = self.orientation(&Vector3::x(), heading.0)?;
+        let tilt = accelerometer_bias / gravity;
+        let start = Start::at(self.last_ns, position, (Vector3::zeros(), 0.02), (world_from_body, tilt));
+        let bias = self.rotation.deviation(self.count) / sqrt(self.count);
+        Ok(Start {
+            gyroscope_bias: self.rotation.mean,
+            // Of noise that is not white over the whole of it, no less than a part is known.
+            gyroscope_bias_deviation: bias.max(1e-4),
+            accelerometer_bias_deviation: accelerometer_bias,
+            rotation_covariance: rotation_covariance(tilt, heading.1),
+            ..start
+        })
+    }
+
+    /// A start in motion: tilt from the last specific force, heading from the course.
+    ///
+    /// `position` (m) and `velocity` (m/s) in the world come with their standard deviations; `forward` is the direction in
+    /// which the body travels, in the body, and `slip` how far it may differ from that, rad.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NotObservable`] without a sample, in free fall, or if the velocity is less than five of its standard
+    /// deviations.
+    pub fn in_motion(
+        &self,
+        position: (Vector3<f64>, f64),
+        velocity: (Vector3<f64>, f64),
+        forward: &Vector3<f64>,
+        slip: f64,
+    ) -> Result<Start, Refusal> {
+        let AlignmentParams { accelerometer_bias, acceleration, gravity, largest_bias, .. } = self.params;
+        let speed = velocity.0.xy().norm();
+        // Nor if it is not a number.
+        if self.first_ns.is_none() || speed.is_nan() || speed <= 5.0 * velocity.1 {
+            return Err(Refusal::NotObservable);
+        }
+        let course = atan2(velocity.0.y, velocity.0.x);
+        let world_from_body = self.orientation(forward, course)?;
+        let tilt = (accelerometer_bias + acceleration) / gravity;
+        let drift = velocity.1 / speed;
+        Ok(Start {
+            gyroscope_bias_deviation: largest_bias / 3.0,
+            accelerometer_bias_deviation: accelerometer_bias,
+            rotation_covariance: rotation_covariance(tilt, sqrt(drift * drift + slip * slip)),
+            ..Start::at(self.last_ns, position, velocity, (world_from_body, tilt))
+        })
+    }
+
+    fn is_still(&self) -> bool {
+        self.rotation.deviation(self.count) <= self.params.rest_rotation
+            && self.force.deviation(self.count) <= self.params.rest_force
+    }
+
+    fn beginning_with(mut self, sample: &ImuMean) -> Self {
+        self.first_ns = Some(sample.time_ns);
+        self.last_ns = sample.time_ns;
+        self.count = 1.0;
+        self.rotation.mean = sample.angular_velocity;
+        self.force.mean = sample.specific_force;
+        self
+    }
+
+    /// Levelled, with the horizontal part of `forward`, of the body, at `heading`.
+    fn orientation(&self, forward: &Vector3<f64>, heading: f64) -> Result<UnitQuaternion<f64>, Refusal> {
+        let level = initial_orientation(&self.force.mean, None).map_err(|_| Refusal::NotObservable)?;
+        let ahead = level * forward;
+        if ahead.xy().norm() < 1e-3 || !heading.is_finite() {
+            return Err(Refusal::NotObservable);
+        }
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading - atan2(ahead.y, ahead.x));
+        Ok(turn * level)
+    }
+}
+
+/// World axes: tilt about the horizontal ones, heading about the vertical.
+fn rotation_covariance(tilt: f64, heading: f64) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::new(tilt * tilt, tilt * tilt, heading * heading))
+}

@@ -1,0 +1,37 @@
+//! An error-state Kalman filter for position, velocity and attitude.
+//!
+//! J. Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508, 2017; P. D. Groves, "Principles of
+//! GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd edition, 2013, chapters 5 and 14.
+//!
+//! # States
+//!
+//! Errors are what truth is more than the estimate. Position and velocity are those of the IMU, in the world; the
+//! rotation error is one of the world, `R_true = exp(θ) R`; biases are in the body. Then nothing of the filter depends on
+//! how the sensor is mounted, nor on the world's heading or origin, and between two samples no error has a transition of its
+//! own: see `propagation.rs`, which has the equations. [`Optional`] states follow, by type.
+//!
+//! # Update
+//!
+//! A measurement of several numbers is decomposed once, `H P Hᵀ + R = L Lᵀ`, for its normalised innovation squared and for
+//! the update `P - Wᵀ W` with `W = L⁻¹ H P`, which is that of one scalar after the other. The covariance is symmetric to
+//! the last bit. The noise of a scalar is taken as at least 1e-10 of its predicted variance, which bounds what rounding
+//! can do; a Cholesky decomposition every 1024 updates checks it, and [`Eskf::repairs`] counts what it found.
+
+mod covariance;
+mod estimate;
+mod filter;
+mod params;
+mod propagation;
+mod refusal;
+mod states;
+#[cfg(test)]
+mod tests;
+
+pub use estimate::{Estimate, Keyframe};
+pub use filter::{Eskf, ImuMean, Start};
+pub use params::{EskfParams, GaussMarkov};
+pub use refusal::Refusal;
+pub use states::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
+    offset,
+};

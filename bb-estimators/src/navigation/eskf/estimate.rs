@@ -1,0 +1,118 @@
+//! The nominal state, which the errors are errors of.
+
+use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
+
+use super::states::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
+};
+use crate::navigation::math::{renormalised, rotation, rotation_vector};
+
+/// Pose at an earlier time that relative poses refer to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Keyframe {
+    /// What the user calls it.
+    pub id: u64,
+    /// In the world, m.
+    pub position: Vector3<f64>,
+    /// Takes body coordinates to the world.
+    pub world_from_body: UnitQuaternion<f64>,
+}
+
+/// What a filter estimates, at one instant.
+///
+/// The world is a local tangent frame, x east, y north, z up; gravity points along -z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate<const N: usize> {
+    /// The instant, nanoseconds since any fixed moment.
+    pub time_ns: i64,
+    /// Of the body's origin, the IMU, in the world, m.
+    pub position: Vector3<f64>,
+    /// Of the same, in the world, m/s.
+    pub velocity: Vector3<f64>,
+    /// Takes body coordinates to the world.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// What the accelerometer reads more than the specific force, body axes, m/s².
+    pub accelerometer_bias: Vector3<f64>,
+    /// What the gyroscope reads more than the angular velocity, body axes, rad/s.
+    pub gyroscope_bias: Vector3<f64>,
+    /// Angular velocity over the last sample, bias removed, body axes, rad/s.
+    pub angular_velocity: Vector3<f64>,
+    /// Specific force over the last sample, bias removed, body axes, m/s².
+    pub specific_force: Vector3<f64>,
+    /// The keyframe, if one was set and the filter keeps one.
+    pub keyframe: Option<Keyframe>,
+    /// Optional states at their places in the error vector.
+    pub(super) optional: SVector<f64, N>,
+}
+
+impl<const N: usize> Estimate<N> {
+    /// An optional state of one number; 0 if the filter `S` does not estimate it, which is its nominal value.
+    pub fn scalar<S: States>(&self, state: Optional) -> f64 {
+        offset::<S>(state).map_or(0.0, |index| self.optional[index])
+    }
+
+    /// An optional state of three numbers; zero if the filter `S` does not estimate it.
+    pub fn vector<S: States>(&self, state: Optional) -> Vector3<f64> {
+        offset::<S>(state).map_or(Vector3::zeros(), |index| self.optional.fixed_rows::<3>(index).into_owned())
+    }
+
+    /// `world_from_body` as a matrix.
+    pub fn rotation(&self) -> Matrix3<f64> {
+        self.world_from_body.to_rotation_matrix().into_inner()
+    }
+
+    /// The estimate with `error` added: the inverse of an error's definition.
+    pub fn corrected<S: States>(&self, error: &SVector<f64, N>) -> Self {
+        let part = |index: usize| error.fixed_rows::<3>(index).into_owned();
+        let turned = |index: usize, q: &UnitQuaternion<f64>| renormalised(&(rotation(&part(index)) * q));
+        let mut corrected = *self;
+        corrected.position += part(POSITION);
+        corrected.velocity += part(VELOCITY);
+        corrected.world_from_body = turned(ROTATION, &self.world_from_body);
+        corrected.accelerometer_bias += part(ACCELEROMETER_BIAS);
+        corrected.gyroscope_bias += part(GYROSCOPE_BIAS);
+        corrected.specific_force -= part(ACCELEROMETER_BIAS);
+        corrected.angular_velocity -= part(GYROSCOPE_BIAS);
+        for i in NAVIGATION..N {
+            corrected.optional[i] += error[i];
+        }
+        if let Some(index) = offset::<S>(Optional::Keyframe) {
+            for i in index..index + Optional::Keyframe.dimension() {
+                corrected.optional[i] = 0.0;
+            }
+            if let Some(keyframe) = &mut corrected.keyframe {
+                keyframe.position += part(index);
+                keyframe.world_from_body = turned(index + 3, &keyframe.world_from_body);
+            }
+        }
+        corrected
+    }
+
+    /// The error that takes this estimate to `other`: `self.corrected(&self.error_to(&other))` is `other`, but for stamps
+    /// and the last sample of the IMU.
+    pub fn error_to<S: States>(&self, other: &Self) -> SVector<f64, N> {
+        let mut error = other.optional - self.optional;
+        let mut set = |index: usize, part: Vector3<f64>| error.fixed_rows_mut::<3>(index).copy_from(&part);
+        let turn = |from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>| rotation_vector(&(to * from.inverse()));
+        set(POSITION, other.position - self.position);
+        set(VELOCITY, other.velocity - self.velocity);
+        set(ROTATION, turn(&self.world_from_body, &other.world_from_body));
+        set(ACCELEROMETER_BIAS, other.accelerometer_bias - self.accelerometer_bias);
+        set(GYROSCOPE_BIAS, other.gyroscope_bias - self.gyroscope_bias);
+        if let (Some(index), Some(from), Some(to)) =
+            (offset::<S>(Optional::Keyframe), self.keyframe, other.keyframe)
+        {
+            set(index, to.position - from.position);
+            set(index + 3, turn(&from.world_from_body, &to.world_from_body));
+        }
+        error
+    }
+
+    /// Whether every component is a number.
+    pub(super) fn is_finite(&self) -> bool {
+        let vectors = [&self.position, &self.velocity, &self.accelerometer_bias, &self.gyroscope_bias];
+        vectors.iter().all(|vector| vector.iter().all(|x| x.is_finite()))
+            && self.world_from_body.coords.iter().all(|x| x.is_finite())
+            && self.optional.iter().all(|x| x.is_finite())
+    }
+}

@@ -1,0 +1,148 @@
+//! Which errors a filter estimates, and where each is in the error vector.
+
+use core::fmt::Debug;
+
+/// Error of the position in the world, m.
+pub const POSITION: usize = 0;
+/// Error of the velocity in the world, m/s.
+pub const VELOCITY: usize = 3;
+/// Rotation error in the world, rad: `R_true = exp(θ) R`.
+pub const ROTATION: usize = 6;
+/// Error of the accelerometer's bias, body axes, m/s².
+pub const ACCELEROMETER_BIAS: usize = 9;
+/// Error of the gyroscope's bias, body axes, rad/s.
+pub const GYROSCOPE_BIAS: usize = 12;
+/// The number of states that every filter has; optional ones follow.
+pub const NAVIGATION: usize = 15;
+
+/// An optional state, or a group of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Optional {
+    /// Pose of the last keyframe, for relative poses: position error, then rotation error, both in the world; see
+    /// [`RelativePose`](crate::navigation::RelativePose). It is a stochastic clone: S. I. Roumeliotis,
+    /// J. W. Burdick, "Stochastic cloning", ICRA 2002.
+    Keyframe,
+    /// Scale of relative translations, less 1: `measured = (1 + s) true`.
+    RelativeScale,
+    /// Position of the GNSS antenna in the body, m.
+    GnssLeverArm,
+    /// How much later than its stamp a GNSS measurement was taken, s.
+    GnssDelay,
+    /// Scale of the wheel speed, less 1: `measured = (1 + s) true`.
+    WheelScale,
+    /// Magnetic field of the body itself, in the body, T.
+    HardIron,
+    /// What the barometric height reads more than the height in the world, m.
+    BarometerBias,
+}
+
+impl Optional {
+    /// How many numbers it is.
+    pub const fn dimension(self) -> usize {
+        match self {
+            Self::Keyframe => 6,
+            Self::GnssLeverArm | Self::HardIron => 3,
+            Self::RelativeScale | Self::GnssDelay | Self::WheelScale | Self::BarometerBias => 1,
+        }
+    }
+
+    const fn code(self) -> u8 {
+        self as u8
+    }
+}
+
+/// The optional states of a filter, as a type, so that the compiler knows the size of every matrix and leaves out what a
+/// filter has not.
+///
+/// ```
+/// use bb_estimators::navigation::{Eskf, Optional, States};
+///
+/// /// A rover whose wheels wear, with an antenna on a mast.
+/// #[derive(Clone, Copy, Debug, PartialEq)]
+/// struct Rover;
+///
+/// impl States for Rover {
+///     const OPTIONAL: &'static [Optional] = &[Optional::WheelScale, Optional::GnssLeverArm];
+/// }
+///
+/// type RoverFilter = Eskf<Rover, { Rover::DIMENSION }>;
+/// assert_eq!(Rover::DIMENSION, 19);
+/// ```
+pub trait States: Copy + Debug + PartialEq {
+    /// In the order of the error vector, each at most once.
+    const OPTIONAL: &'static [Optional];
+
+    /// The number of errors that are estimated: the second parameter of [`Eskf`](super::Eskf).
+    const DIMENSION: usize = NAVIGATION + dimension(Self::OPTIONAL);
+}
+
+/// Navigation states alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Navigation;
+
+impl States for Navigation {
+    const OPTIONAL: &'static [Optional] = &[];
+}
+
+/// Where the errors of an optional state begin, if the filter estimates it.
+pub const fn offset<S: States>(state: Optional) -> Option<usize> {
+    let mut index = NAVIGATION;
+    let mut i = 0;
+    while i < S::OPTIONAL.len() {
+        if S::OPTIONAL[i].code() == state.code() {
+            return Some(index);
+        }
+        index += S::OPTIONAL[i].dimension();
+        i += 1;
+    }
+    None
+}
+
+const fn dimension(states: &[Optional]) -> usize {
+    let mut sum = 0;
+    let mut i = 0;
+    while i < states.len() {
+        sum += states[i].dimension();
+        i += 1;
+    }
+    sum
+}
+
+/// Whether no state is listed twice.
+pub(super) const fn distinct(states: &[Optional]) -> bool {
+    let mut i = 0;
+    while i < states.len() {
+        let mut j = 0;
+        while j < i {
+            if states[i].code() == states[j].code() {
+                return false;
+            }
+            j += 1;
+        }
+        i += 1;
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_follow_the_order_of_the_list() {
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        struct Some3;
+        impl States for Some3 {
+            const OPTIONAL: &'static [Optional] =
+                &[Optional::GnssLeverArm, Optional::RelativeScale, Optional::Keyframe];
+        }
+        assert_eq!(Some3::DIMENSION, 25);
+        assert_eq!(offset::<Some3>(Optional::GnssLeverArm), Some(15));
+        assert_eq!(offset::<Some3>(Optional::RelativeScale), Some(18));
+        assert_eq!(offset::<Some3>(Optional::Keyframe), Some(19));
+        assert_eq!(offset::<Some3>(Optional::WheelScale), None);
+        assert_eq!(offset::<Navigation>(Optional::Keyframe), None);
+        assert!(distinct(Some3::OPTIONAL));
+        assert!(!distinct(&[Optional::Keyframe, Optional::Keyframe]));
+    }
+}

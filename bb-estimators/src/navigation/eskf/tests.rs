@@ -1,0 +1,84 @@
+//! The transition and every Jacobian against numeric differentiation, and the laws of the filter.
+
+mod consistency;
+mod jacobians;
+mod laws;
+mod transition;
+
+use nalgebra::{SVector, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+use super::estimate::Estimate;
+use super::filter::{Eskf, ImuMean, Start};
+use super::params::EskfParams;
+use super::states::{Optional, States};
+
+/// Everything that there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct All;
+
+impl States for All {
+    const OPTIONAL: &'static [Optional] = &[
+        Optional::GnssLeverArm,
+        Optional::RelativeScale,
+        Optional::Keyframe,
+        Optional::GnssDelay,
+        Optional::WheelScale,
+        Optional::HardIron,
+        Optional::BarometerBias,
+    ];
+}
+
+const ALL: usize = All::DIMENSION;
+
+fn vector(limit: f64) -> impl Strategy<Value = Vector3<f64>> {
+    let number = move || -limit..limit;
+    (number(), number(), number()).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+}
+
+fn orientation() -> impl Strategy<Value = UnitQuaternion<f64>> {
+    vector(3.0).prop_map(UnitQuaternion::from_scaled_axis)
+}
+
+/// An estimate with a keyframe and all optional states.
+fn estimate() -> impl Strategy<Value = Estimate<ALL>> {
+    let motion = (vector(100.0), vector(20.0), orientation(), vector(2.0), vector(20.0));
+    let rest = (vector(0.5), vector(0.1), vector(30.0), orientation(), proptest::array::uniform32(-0.2..0.2));
+    (motion, rest).prop_map(|((position, velocity, world_from_body, angular_velocity, specific_force), rest)| {
+        let (accelerometer_bias, gyroscope_bias, way, turn, optional) = rest;
+        let keyframe = super::Keyframe { id: 7, position: position - way, world_from_body: turn * world_from_body };
+        let mut estimate = Estimate {
+            time_ns: 0,
+            position,
+            velocity,
+            world_from_body,
+            accelerometer_bias,
+            gyroscope_bias,
+            angular_velocity,
+            specific_force,
+            keyframe: Some(keyframe),
+            optional: SVector::from_fn(|i, _| if i < super::NAVIGATION { 0.0 } else { optional[i % 32] }),
+        };
+        // A keyframe has no values of its own there.
+        estimate = estimate.corrected::<All>(&SVector::zeros());
+        estimate
+    })
+}
+
+/// A filter that is level at rest at the origin, and not very sure of it.
+fn started<S: States, const N: usize>() -> Eskf<S, N> {
+    let mut filter = Eskf::new(EskfParams::default()).unwrap();
+    let start = Start::at(0, (Vector3::zeros(), 2.0), (Vector3::zeros(), 0.5), (UnitQuaternion::identity(), 0.1));
+    filter.start(&start).unwrap();
+    filter
+}
+
+/// A flight that turns and accelerates, sample by sample at 100 Hz.
+fn sample(i: i64) -> ImuMean {
+    let t = i as f64 * 0.01;
+    ImuMean {
+        time_ns: i * 10_000_000,
+        angular_velocity: Vector3::new(0.3 * t.sin(), 0.2 * (1.3 * t).cos(), 0.4 * (0.7 * t).sin()),
+        specific_force: Vector3::new(t.cos(), (0.8 * t).sin(), 9.8 + 0.5 * (0.5 * t).sin()),
+    }
+}

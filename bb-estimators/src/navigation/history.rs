@@ -1,0 +1,279 @@
+//! Measurements that come late or out of order, fused at their own time.
+//!
+//! A bounded history of samples, measurements and states of the filter: a measurement from the past takes the filter back
+//! to the last state before it, and everything after it is done again. What comes out is what would have, had all arrived in the
+//! order of their stamps, to the last bit; T. D. Larsen et al., "Incorporation of time delayed measurements in a
+//! discrete-time Kalman filter", CDC 1998, compare it with methods that are cheaper and approximate.
+
+use super::eskf::{ImuMean, Refusal};
+use super::stream::Fused;
+
+mod ring;
+#[cfg(test)]
+mod tests;
+
+use ring::Ring;
+
+/// A filter with its streams, as one value that can be stored and run again.
+///
+/// ```
+/// use bb_estimators::navigation::{Eskf, Fused, GnssPosition, ImuMean, Refusal, Replayed, Stream};
+///
+/// #[derive(Clone)]
+/// struct Rover {
+///     filter: Eskf,
+///     gnss: Stream,
+/// }
+///
+/// impl Replayed for Rover {
+///     type Measurement = GnssPosition;
+///
+///     fn time_ns(&self) -> Option<i64> {
+///         self.filter.estimate().map(|estimate| estimate.time_ns)
+///     }
+///     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+///         self.filter.propagate(sample)
+///     }
+///     fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {
+///         self.filter.update(&mut self.gnss, fix)
+///     }
+/// }
+/// ```
+pub trait Replayed: Clone {
+    /// What corrects it: an enum, where there are several sensors.
+    type Measurement: Copy;
+
+    /// The time that it has reached; none before its start.
+    fn time_ns(&self) -> Option<i64>;
+
+    /// Moves it over one sample of the IMU.
+    ///
+    /// # Errors
+    ///
+    /// Why the sample is refused; it is then as it was.
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal>;
+
+    /// Corrects it by a measurement of its present time.
+    ///
+    /// # Errors
+    ///
+    /// Why the measurement is refused; it is then as it was.
+    fn update(&mut self, measurement: &Self::Measurement) -> Result<Fused, Refusal>;
+}
+
+/// What became of a measurement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Placed {
+    /// It was fused.
+    Fused(Fused),
+    /// It is newer than the last sample of the IMU, and waits for the next.
+    Waits,
+}
+
+/// A filter with the last `SAMPLES` samples, `MEASUREMENTS` measurements, and `STATES` states of itself, evenly between the
+/// samples.
+///
+/// It reaches back by about `SAMPLES` samples. More states cost memory and save time: a late measurement costs its own delay, and
+/// half the time between two states.
+#[derive(Clone, Debug)]
+pub struct History<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES: usize> {
+    now: F,
+    samples: Ring<ImuMean, SAMPLES>,
+    measurements: Ring<(i64, F::Measurement), MEASUREMENTS>,
+    /// With the number of samples since the one before.
+    states: Ring<F, STATES>,
+    since_state: usize,
+    longest_lead_ns: i64,
+    counts: Arrivals,
+}
+
+/// How measurements arrived.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Arrivals {
+    /// After the last sample that they belong before.
+    pub late: u64,
+    /// Older than the history, and refused.
+    pub too_old: u64,
+    /// Stamped in the future, and refused: clocks that differ.
+    pub in_the_future: u64,
+    /// The longest delay of those that were fused, ns.
+    pub longest_delay_ns: i64,
+}
+
+impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES: usize>
+    History<F, SAMPLES, MEASUREMENTS, STATES>
+{
+    /// The history of a filter that has started. A measurement may be up to `longest_lead_ns` ahead of the last sample.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NotStarted`].
+    pub fn new(started: F, longest_lead_ns: i64) -> Result<Self, Refusal> {
+        const {
+            assert!(STATES >= 1 && SAMPLES >= STATES, "a history needs a state, and a sample for each");
+            assert!(MEASUREMENTS >= 1, "a history needs room for a measurement");
+        }
+        if started.time_ns().is_none() {
+            return Err(Refusal::NotStarted);
+        }
+        let mut states = Ring::new();
+        states.push(started.clone());
+        Ok(Self {
+            now: started,
+            samples: Ring::new(),
+            measurements: Ring::new(),
+            states,
+            since_state: 0,
+            longest_lead_ns,
+            counts: Arrivals::default(),
+        })
+    }
+
+    /// The filter at the time of the last sample.
+    pub fn now(&self) -> &F {
+        &self.now
+    }
+
+    /// How measurements arrived.
+    pub fn arrivals(&self) -> &Arrivals {
+        &self.counts
+    }
+
+    /// Moves on by one sample of the IMU, and fuses what waited for it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Replayed::propagate`]; nothing has changed then.
+    pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        // A sample that is refused must not have fused anything before.
+        let mut alone = self.now.clone();
+        alone.propagate(sample)?;
+        if self.has_measurements_until(sample.time_ns) {
+            self.advance(sample, None);
+        } else {
+            self.now = alone;
+        }
+        self.samples.push(*sample);
+        self.keep_state();
+        Ok(())
+    }
+
+    /// Fuses a measurement at the time it was taken.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::TooOld`], [`Refusal::InTheFuture`], or as [`Replayed::update`].
+    pub fn update(&mut self, time_ns: i64, measurement: &F::Measurement) -> Result<Placed, Refusal> {
+        let now_ns = self.now.time_ns().ok_or(Refusal::NotStarted)?;
+        let is_ahead = time_ns > now_ns;
+        let too_far = is_ahead && time_ns.saturating_sub(now_ns) > self.longest_lead_ns;
+        if too_far || !self.make_room(now_ns) {
+            self.counts.in_the_future += 1;
+            return Err(Refusal::InTheFuture { time_ns });
+        }
+        if is_ahead {
+            self.insert(time_ns, measurement);
+            return Ok(Placed::Waits);
+        }
+        // The last state that is not after it: what that holds is not newer.
+        let is_before = |state: &F| state.time_ns().is_some_and(|state_ns| state_ns <= time_ns);
+        let found = self.states.rposition(is_before);
+        let Some((index, state)) = found.and_then(|index| Some((index, self.states.get(index)?.clone()))) else {
+            self.counts.too_old += 1;
+            return Err(Refusal::TooOld { time_ns });
+        };
+        let place = self.insert(time_ns, measurement);
+        self.counts.late += 1;
+        self.counts.longest_delay_ns = self.counts.longest_delay_ns.max(now_ns.saturating_sub(time_ns));
+        self.states.truncate(index + 1);
+        self.now = state;
+        self.since_state = 0;
+        let from = self.now.time_ns().ok_or(Refusal::NotStarted)?;
+        let first = self.samples.position(|sample| sample.time_ns > from).unwrap_or(self.samples.len());
+        let mut result = Err(Refusal::NotStarted);
+        if from == time_ns {
+            result = self.now.update(measurement);
+            self.states.truncate(index);
+            self.states.push(self.now.clone());
+        }
+        for i in first..self.samples.len() {
+            let Some(sample) = self.samples.get(i).copied() else { break };
+            if let Some(of_it) = self.advance(&sample, Some(place)) {
+                result = of_it;
+            }
+            self.keep_state();
+        }
+        result.map(Placed::Fused)
+    }
+
+    fn has_measurements_until(&self, time_ns: i64) -> bool {
+        let now_ns = self.now.time_ns().unwrap_or(i64::MAX);
+        self.measurements.iter().any(|(at, _)| (now_ns.saturating_add(1)..=time_ns).contains(at))
+    }
+
+    /// Makes room for a measurement: the oldest leaves, and with it the states that do not hold it yet. `false` if all
+    /// still wait for a sample.
+    fn make_room(&mut self, now_ns: i64) -> bool {
+        if self.measurements.len() < MEASUREMENTS {
+            return true;
+        }
+        let Some((left_ns, _)) = self.measurements.get(0).copied() else { return true };
+        if left_ns > now_ns {
+            return false;
+        }
+        self.measurements.pop_front();
+        while self.states.get(0).and_then(F::time_ns).is_some_and(|state_ns| state_ns < left_ns) {
+            self.states.pop_front();
+        }
+        if self.states.len() == 0 {
+            self.states.push(self.now.clone());
+            self.since_state = 0;
+        }
+        true
+    }
+
+    /// Puts a measurement after those that are not newer; its place.
+    fn insert(&mut self, time_ns: i64, measurement: &F::Measurement) -> usize {
+        let place = self.measurements.iter().filter(|(at, _)| *at <= time_ns).count();
+        self.measurements.insert(place, (time_ns, *measurement));
+        place
+    }
+
+    /// Moves `now` over one sample, with the measurements in it; the result of the one at `place`.
+    fn advance(&mut self, sample: &ImuMean, place: Option<usize>) -> Option<Result<Fused, Refusal>> {
+        let mut result = None;
+        let from = self.now.time_ns().unwrap_or(i64::MAX);
+        for (index, (time_ns, measurement)) in self.measurements.iter().enumerate() {
+            if *time_ns <= from || *time_ns > sample.time_ns {
+                continue;
+            }
+            if self.now.time_ns() != Some(*time_ns) {
+                // The sample is a mean: each part of it is the same.
+                let part = ImuMean { time_ns: *time_ns, ..*sample };
+                let _ = self.now.propagate(&part);
+            }
+            let of_it = self.now.update(measurement);
+            if place == Some(index) {
+                result = Some(of_it);
+            }
+        }
+        if self.now.time_ns() != Some(sample.time_ns) {
+            let _ = self.now.propagate(sample);
+        }
+        result
+    }
+
+    /// Keeps the state if it is time to, and forgets what is older than the oldest state.
+    fn keep_state(&mut self) {
+        self.since_state += 1;
+        if self.since_state < SAMPLES / STATES {
+            return;
+        }
+        self.since_state = 0;
+        self.states.push(self.now.clone());
+        let oldest_ns = self.states.get(0).and_then(F::time_ns).unwrap_or(i64::MIN);
+        while self.measurements.get(0).is_some_and(|(time_ns, _)| *time_ns <= oldest_ns) {
+            self.measurements.pop_front();
+        }
+    }
+}

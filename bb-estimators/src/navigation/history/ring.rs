@@ -1,0 +1,105 @@
+//! A queue of bounded length, without allocation.
+
+/// Up to `N` values, the oldest first.
+#[derive(Clone, Debug)]
+pub(super) struct Ring<T, const N: usize> {
+    slots: [Option<T>; N],
+    first: usize,
+    len: usize,
+}
+
+impl<T, const N: usize> Ring<T, N> {
+    pub(super) fn new() -> Self {
+        Self { slots: core::array::from_fn(|_| None), first: 0, len: 0 }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(super) fn get(&self, index: usize) -> Option<&T> {
+        if index >= self.len {
+            return None;
+        }
+        self.slots[(self.first + index) % N].as_ref()
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &T> {
+        (0..self.len).filter_map(|index| self.get(index))
+    }
+
+    pub(super) fn position(&self, is: impl Fn(&T) -> bool) -> Option<usize> {
+        (0..self.len).find(|index| self.get(*index).is_some_and(&is))
+    }
+
+    pub(super) fn rposition(&self, is: impl Fn(&T) -> bool) -> Option<usize> {
+        (0..self.len).rev().find(|index| self.get(*index).is_some_and(&is))
+    }
+
+    /// Adds the newest; the oldest leaves if there is no room.
+    pub(super) fn push(&mut self, value: T) {
+        if self.len == N {
+            self.pop_front();
+        }
+        self.slots[(self.first + self.len) % N] = Some(value);
+        self.len += 1;
+    }
+
+    pub(super) fn pop_front(&mut self) -> Option<T> {
+        if self.len == 0 {
+            return None;
+        }
+        let value = self.slots[self.first].take();
+        self.first = (self.first + 1) % N;
+        self.len -= 1;
+        value
+    }
+
+    /// Puts a value before the one at `index`. If there is no room the newest leaves.
+    pub(super) fn insert(&mut self, index: usize, value: T) {
+        if index >= N {
+            return;
+        }
+        self.truncate(N - 1);
+        self.push(value);
+        for i in (index..self.len - 1).rev() {
+            self.slots.swap((self.first + i) % N, (self.first + i + 1) % N);
+        }
+    }
+
+    /// Keeps the oldest `len`.
+    pub(super) fn truncate(&mut self, len: usize) {
+        while self.len > len {
+            self.len -= 1;
+            self.slots[(self.first + self.len) % N] = None;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all(ring: &Ring<i32, 4>) -> Vec<i32> {
+        ring.iter().copied().collect()
+    }
+
+    #[test]
+    fn there_is_never_more_than_there_is_room_for() {
+        let mut ring = Ring::<i32, 4>::new();
+        for value in [1, 2, 4, 5] {
+            ring.push(value);
+        }
+        ring.push(6);
+        assert_eq!(all(&ring), [2, 4, 5, 6]);
+        ring.insert(1, 3);
+        assert_eq!(all(&ring), [2, 3, 4, 5]);
+        assert_eq!((ring.position(|x| *x > 3), ring.rposition(|x| *x < 5)), (Some(2), Some(2)));
+        ring.truncate(2);
+        assert_eq!((all(&ring), ring.len()), (vec![2, 3], 2));
+        ring.insert(2, 7);
+        ring.insert(0, 1);
+        assert_eq!(all(&ring), [1, 2, 3, 7]);
+        assert_eq!((ring.pop_front(), ring.pop_front(), ring.len()), (Some(1), Some(2), 2));
+    }
+}

@@ -1,0 +1,176 @@
+//! Whatever the order of arrival, the result is that of the order of the stamps.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+use super::{History, Placed, Replayed};
+use crate::navigation::{
+    Eskf, EskfParams, Fused, GnssPosition, GnssVelocity, ImuMean, Refusal, Start, Stream, StreamParams,
+};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sensed {
+    Position(GnssPosition),
+    Velocity(GnssVelocity),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Drone {
+    filter: Eskf,
+    positions: Stream,
+    velocities: Stream,
+}
+
+impl Replayed for Drone {
+    type Measurement = Sensed;
+
+    fn time_ns(&self) -> Option<i64> {
+        self.filter.estimate().map(|estimate| estimate.time_ns)
+    }
+
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.filter.propagate(sample)
+    }
+
+    fn update(&mut self, measurement: &Sensed) -> Result<Fused, Refusal> {
+        match measurement {
+            Sensed::Position(position) => self.filter.update(&mut self.positions, position),
+            Sensed::Velocity(velocity) => self.filter.update(&mut self.velocities, velocity),
+        }
+    }
+}
+
+type Long = History<Drone, 100, 60, 10>;
+
+const SAMPLE_NS: i64 = 10_000_000;
+
+fn drone() -> Drone {
+    let mut filter = Eskf::new(EskfParams::default()).unwrap();
+    let rest = Vector3::zeros();
+    filter.start(&Start::at(0, (rest, 2.0), (rest, 0.5), (UnitQuaternion::identity(), 0.1))).unwrap();
+    let adaptive = StreamParams { adaptation: 0.02, ..StreamParams::default() };
+    Drone { filter, positions: Stream::new(adaptive), velocities: Stream::default() }
+}
+
+fn sample(i: i64) -> ImuMean {
+    let t = i as f64 * 0.01;
+    ImuMean {
+        time_ns: i * SAMPLE_NS,
+        angular_velocity: Vector3::new(0.3 * t.sin(), 0.2 * (1.3 * t).cos(), 0.4),
+        specific_force: Vector3::new(0.3 * t.cos(), 0.2 * (0.8 * t).sin(), 9.8),
+    }
+}
+
+/// With a few that the gate refuses.
+fn sensed(kind: bool, value: f64) -> Sensed {
+    let value = Vector3::new(value, -value, 0.5 * value);
+    match kind {
+        true => Sensed::Position(GnssPosition::new(value * 3.0, 1.0, 2.0)),
+        false => Sensed::Velocity(GnssVelocity::new(value, 0.3, 0.5)),
+    }
+}
+
+/// Two seconds; each measurement arrives when the sample of its arrival has.
+fn fly(mut arrivals: Vec<(i64, i64, Sensed)>) -> Long {
+    arrivals.sort_by_key(|(arrival, _, _)| *arrival);
+    let mut history = Long::new(drone(), SAMPLE_NS).unwrap();
+    let mut arrivals = arrivals.into_iter().peekable();
+    for i in 1..=200 {
+        history.propagate(&sample(i)).unwrap();
+        while let Some((_, time_ns, measurement)) = arrivals.next_if(|(arrival, ..)| *arrival <= i) {
+            match history.update(time_ns, &measurement) {
+                Ok(_) | Err(Refusal::Gate { .. }) => {}
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+    history
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn late_and_out_of_order_is_as_in_order(
+        measured in proptest::collection::vec((1..199 * SAMPLE_NS, 0..80_i64, any::<bool>(), -3.0..3.0), 1..40),
+    ) {
+        let mut measured = measured;
+        // Two at one instant are taken as they come.
+        measured.sort_by_key(|(time_ns, ..)| *time_ns);
+        measured.dedup_by_key(|(time_ns, ..)| *time_ns);
+        let arrives = |delay: i64, (time_ns, kind, value): (i64, bool, f64)| {
+            (((time_ns + SAMPLE_NS - 1) / SAMPLE_NS + delay).min(200), time_ns, sensed(kind, value))
+        };
+        let all = |delayed: i64| -> Vec<_> {
+            let one = |(time_ns, delay, kind, value): &(i64, i64, bool, f64)| {
+                arrives(delayed * delay, (*time_ns, *kind, *value))
+            };
+            measured.iter().map(one).collect()
+        };
+        let (in_order, late) = (fly(all(0)), fly(all(1)));
+        prop_assert_eq!(in_order.now(), late.now());
+        prop_assert_eq!(late.arrivals().too_old, 0);
+    }
+}
+
+#[test]
+fn at_the_time_of_a_sample_it_is_the_filter_alone() {
+    let mut alone = drone();
+    let mut arrivals = Vec::new();
+    for i in 1..=200 {
+        alone.propagate(&sample(i)).unwrap();
+        if i % 20 == 0 {
+            alone.update(&sensed(i % 40 == 0, 0.1)).unwrap();
+            arrivals.push((200, i * SAMPLE_NS, sensed(i % 40 == 0, 0.1)));
+        }
+    }
+    // All at the end is too late for the first second.
+    let kept = arrivals.split_off(arrivals.len() / 2 + 1);
+    let in_time = arrivals.into_iter().map(|(_, time_ns, measured)| (time_ns / SAMPLE_NS + 3, time_ns, measured));
+    let history = fly(in_time.chain(kept).collect());
+    assert_eq!(history.now(), &alone);
+    assert!(history.arrivals().longest_delay_ns == 60 * SAMPLE_NS, "{:?}", history.arrivals());
+}
+
+#[test]
+fn what_is_ahead_waits_and_what_is_too_far_away_is_refused() {
+    let mut history = Long::new(drone(), SAMPLE_NS).unwrap();
+    let measured = sensed(true, 0.1);
+    assert_eq!(history.update(SAMPLE_NS / 2, &measured), Ok(Placed::Waits));
+    let far = 5 * SAMPLE_NS;
+    assert_eq!(history.update(far, &measured), Err(Refusal::InTheFuture { time_ns: far }));
+    assert_eq!(history.update(i64::MAX, &measured), Err(Refusal::InTheFuture { time_ns: i64::MAX }));
+    assert_eq!(history.now().positions.counts().fused, 0);
+    history.propagate(&sample(1)).unwrap();
+    assert_eq!(history.now().positions.counts().fused, 1);
+    for i in 2..300 {
+        history.propagate(&sample(i)).unwrap();
+    }
+    for time_ns in [SAMPLE_NS, i64::MIN] {
+        assert_eq!(history.update(time_ns, &measured), Err(Refusal::TooOld { time_ns }));
+    }
+    let counts = history.arrivals();
+    assert_eq!((counts.in_the_future, counts.too_old, counts.late), (2, 2, 0));
+    let before = history.now().clone();
+    let nan = ImuMean { specific_force: Vector3::repeat(f64::NAN), ..sample(300) };
+    assert_eq!(history.propagate(&nan), Err(Refusal::NonFinite));
+    assert_eq!(history.now(), &before);
+    let nan = GnssPosition::new(Vector3::repeat(f64::NAN), 1.0, 1.0);
+    assert_eq!(history.update(295 * SAMPLE_NS, &Sensed::Position(nan)), Err(Refusal::NonFinite));
+    assert_eq!(history.now().filter, before.filter);
+}
+
+#[test]
+fn more_measurements_than_there_is_room_for_shorten_the_history() {
+    let mut history = History::<Drone, 100, 4, 10>::new(drone(), SAMPLE_NS).unwrap();
+    for i in 1..=90 {
+        history.propagate(&sample(i)).unwrap();
+        history.update(i * SAMPLE_NS, &sensed(false, 0.1)).unwrap();
+    }
+    let early = history.update(30 * SAMPLE_NS, &sensed(false, 0.1));
+    assert!(matches!(early, Err(Refusal::TooOld { .. })), "{early:?}");
+    for i in 91..=100 {
+        history.propagate(&sample(i)).unwrap();
+    }
+    assert!(history.update(95 * SAMPLE_NS, &sensed(false, 0.1)).is_ok());
+}

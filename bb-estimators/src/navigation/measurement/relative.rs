@@ -1,0 +1,76 @@
+//! Relative poses of visual or lidar odometry.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::{Linearised, Measurement, isotropic};
+use crate::navigation::eskf::{Estimate, Optional, POSITION, ROTATION, Refusal, States, offset};
+use crate::navigation::math::{rotation_vector, skew};
+
+/// The pose of the body in the frame of a keyframe, which the filter holds as [`Optional::Keyframe`]:
+/// `translation = (1 + s) R_kᵀ (p - p_k)`, `keyframe_from_body = R_kᵀ R`, with [`Optional::RelativeScale`] s.
+///
+/// With keyframe and present pose both in the error vector, their common error cancels: no information is counted twice,
+/// and heading and position in the world stay as unknown as they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelativePose {
+    /// The keyframe, as [`Eskf::set_keyframe`](crate::navigation::Eskf::set_keyframe) was told.
+    pub keyframe: u64,
+    /// Of the body's origin, in the keyframe's axes, m.
+    pub translation: Vector3<f64>,
+    /// Takes body coordinates to the keyframe's.
+    pub keyframe_from_body: UnitQuaternion<f64>,
+    /// Covariance of the translation, body axes of now, m².
+    pub translation_covariance: Matrix3<f64>,
+    /// Covariance of the rotation vector of the error, body axes of now, rad².
+    pub rotation_covariance: Matrix3<f64>,
+}
+
+impl RelativePose {
+    /// A relative pose with noise that is alike along all axes: standard deviations in m and rad.
+    pub fn new(
+        keyframe: u64,
+        translation: (Vector3<f64>, f64),
+        keyframe_from_body: (UnitQuaternion<f64>, f64),
+    ) -> Self {
+        Self {
+            keyframe,
+            translation: translation.0,
+            keyframe_from_body: keyframe_from_body.0,
+            translation_covariance: isotropic(translation.1),
+            rotation_covariance: isotropic(keyframe_from_body.1),
+        }
+    }
+}
+
+impl Measurement<6> for RelativePose {
+    fn linearise<S: States, const N: usize>(
+        &self,
+        at: &Estimate<N>,
+        model: &mut Linearised<6, N>,
+    ) -> Result<(), Refusal> {
+        let missing = Refusal::NoKeyframe { id: self.keyframe };
+        let index = offset::<S>(Optional::Keyframe).ok_or(missing)?;
+        let keyframe = at.keyframe.filter(|keyframe| keyframe.id == self.keyframe).ok_or(missing)?;
+        let scale = 1.0 + at.scalar::<S>(Optional::RelativeScale);
+        let way = at.position - keyframe.position;
+        let rotation = at.rotation();
+        let to_world = |covariance: &Matrix3<f64>| rotation * covariance * rotation.transpose();
+
+        // In the world's axes, in which the Jacobians of all rotation errors are the simplest.
+        model.set_residual(0, &(keyframe.world_from_body * self.translation - way * scale));
+        model.set_noise(0, &to_world(&self.translation_covariance));
+        model.set_block(0, POSITION, &(Matrix3::identity() * scale));
+        model.set_block(0, index, &(Matrix3::identity() * -scale));
+        model.set_block(0, index + 3, &(skew(&way) * scale));
+        if let Some(scale) = offset::<S>(Optional::RelativeScale) {
+            model.set_column(0, scale, &way);
+        }
+
+        let measured = keyframe.world_from_body * self.keyframe_from_body;
+        model.set_residual(3, &rotation_vector(&(measured * at.world_from_body.inverse())));
+        model.set_noise(3, &to_world(&self.rotation_covariance));
+        model.set_block(3, ROTATION, &Matrix3::identity());
+        model.set_block(3, index + 3, &-Matrix3::identity());
+        Ok(())
+    }
+}

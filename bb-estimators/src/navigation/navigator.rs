@@ -1,0 +1,197 @@
+//! A bank of filters for a robot of which only the data sheets are known: what `bb eval navigation` runs.
+
+use nalgebra::SMatrix;
+
+use super::bank::Bank;
+use super::eskf::{Eskf, EskfParams, Estimate, GaussMarkov, ImuMean, Optional, Refusal, Start, States};
+use super::measurement::{AbsolutePose, GnssPosition, RelativePose};
+use super::stream::{Fused, Stream, StreamParams};
+use crate::attitude::ParamsError;
+
+/// How many filters the bank has room for.
+const FILTERS: usize = 36;
+
+/// What the white noise of the gyroscope may be of that on its data sheet: vibration, scale errors, a mounting that bends.
+const GYROSCOPE: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
+
+/// The same of the accelerometer.
+const ACCELEROMETER: [f64; 3] = [1.0, 3.0, 10.0];
+
+/// What the variance of positions from satellites may be of what the receiver says: some are cautious.
+const GNSS: [f64; 3] = [1.0, 0.25, 0.0625];
+
+/// How much less plausible it is beforehand, for each thing that differs from what the data sheets say.
+const DEPARTURE: f64 = 0.1;
+
+/// States of the [`Navigator`]: those of navigation, a keyframe, and the scale of relative poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Navigated;
+
+impl States for Navigated {
+    const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale];
+}
+
+/// The number of errors of [`Navigated`].
+pub const NAVIGATED: usize = Navigated::DIMENSION;
+
+/// What there is besides the IMU, which decides what the filters of the bank differ in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aiding {
+    /// Positions from satellites, and perhaps poses.
+    Gnss,
+    /// Relative poses, and perhaps poses and positions from satellites.
+    RelativePoses,
+}
+
+/// Position, velocity and attitude from an IMU, positions, poses and relative poses, without tuning: a [`Bank`] of filters
+/// whose noise is that of the data sheets, and multiples of it, and whose relative poses have a scale of 1, and one that
+/// drifts as [`EskfParams::relative_scale`] says.
+#[derive(Clone, Debug)]
+pub struct Navigator {
+    bank: Bank<Navigated, NAVIGATED, FILTERS>,
+    gnss: [Stream; FILTERS],
+    poses: [Stream; FILTERS],
+    relative: [Stream; FILTERS],
+}
+
+/// One filter of the bank: what it multiplies, and whether the scale drifts.
+#[derive(Clone, Copy, Debug)]
+struct Hypothesis {
+    gyroscope: f64,
+    accelerometer: f64,
+    gnss: f64,
+    scale: bool,
+}
+
+impl Navigator {
+    /// Makes one that has not started. The densities of `params` are those of data sheets.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    pub fn new(params: EskfParams, aiding: Aiding) -> Result<Self, ParamsError> {
+        let plain = Eskf::new(params)?;
+        let mut filters = [(plain, 0.0); FILTERS];
+        // Positions are not gated: a filter that is too sure must not refuse what shows that it is.
+        let open = StreamParams { gate: 0.0, ..StreamParams::default() };
+        let mut gnss = [Stream::new(open); FILTERS];
+        for (i, slot) in filters.iter_mut().enumerate() {
+            let Some(hypothesis) = Hypothesis::number(i, aiding) else { continue };
+            *slot = (Eskf::new(hypothesis.apply(&params))?, hypothesis.prior());
+            gnss[i] = Stream::new(StreamParams { variance_factor: hypothesis.gnss, ..open });
+        }
+        let gated = [Stream::default(); FILTERS];
+        Ok(Self { bank: Bank::new(filters), gnss, poses: gated, relative: gated })
+    }
+
+    /// One filter with these parameters, in place of a bank, for those who have tuned it.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    pub fn single(params: EskfParams) -> Result<Self, ParamsError> {
+        let mut filters = [(Eskf::new(params)?, 0.0); FILTERS];
+        filters[0].1 = 1.0;
+        let open = [Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }); FILTERS];
+        let gated = [Stream::default(); FILTERS];
+        Ok(Self { bank: Bank::new(filters), gnss: open, poses: gated, relative: gated })
+    }
+
+    /// See [`Eskf::start`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+        self.bank.start(start)
+    }
+
+    /// See [`Eskf::propagate`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.bank.propagate(sample)
+    }
+
+    /// A position from satellites; see [`Bank::update`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn gnss_position(&mut self, measurement: &GnssPosition) -> Result<Fused, Refusal> {
+        self.bank.update(&mut self.gnss, measurement)
+    }
+
+    /// A pose in the world; see [`Bank::update`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn absolute_pose(&mut self, measurement: &AbsolutePose) -> Result<Fused, Refusal> {
+        self.bank.update(&mut self.poses, measurement)
+    }
+
+    /// A pose relative to the keyframe; see [`Bank::update`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn relative_pose(&mut self, measurement: &RelativePose) -> Result<Fused, Refusal> {
+        self.bank.update(&mut self.relative, measurement)
+    }
+
+    /// See [`Eskf::set_keyframe`].
+    pub fn set_keyframe(&mut self, id: u64) {
+        self.bank.set_keyframe(id);
+    }
+
+    /// See [`Bank::estimate`].
+    pub fn estimate(&self) -> Option<(Estimate<NAVIGATED>, SMatrix<f64, NAVIGATED, NAVIGATED>)> {
+        self.bank.estimate()
+    }
+
+    /// The streams of the most plausible filter: GNSS positions, poses, relative poses.
+    pub fn streams(&self) -> [&Stream; 3] {
+        let best = self.bank.best();
+        [&self.gnss[best], &self.poses[best], &self.relative[best]]
+    }
+
+    /// The parameters of the most plausible filter, which are what the bank has learnt, and how plausible it is.
+    pub fn learnt(&self) -> (EskfParams, f64) {
+        let best = self.bank.best();
+        (*self.bank.filters()[best].params(), self.bank.weights()[best])
+    }
+}
+
+impl Hypothesis {
+    /// The filter of this number, if there is one.
+    fn number(i: usize, aiding: Aiding) -> Option<Self> {
+        let gyroscope = GYROSCOPE[i % GYROSCOPE.len()];
+        let i = i / GYROSCOPE.len();
+        let accelerometer = ACCELEROMETER[i % ACCELEROMETER.len()];
+        let i = i / ACCELEROMETER.len();
+        match aiding {
+            Aiding::Gnss => Some(Self { gyroscope, accelerometer, gnss: *GNSS.get(i)?, scale: false }),
+            Aiding::RelativePoses if i < 2 => Some(Self { gyroscope, accelerometer, gnss: 1.0, scale: i == 1 }),
+            Aiding::RelativePoses => None,
+        }
+    }
+
+    /// How plausible it is before anything was measured; of any sum.
+    fn prior(self) -> f64 {
+        let departs = [self.gyroscope != 1.0, self.accelerometer != 1.0, self.gnss != 1.0, self.scale];
+        departs.into_iter().filter(|departs| *departs).map(|_| DEPARTURE).product()
+    }
+
+    fn apply(self, params: &EskfParams) -> EskfParams {
+        let known = GaussMarkov::constant(0.0);
+        EskfParams {
+            gyroscope_noise: (params.gyroscope_noise * self.gyroscope).min(10.0),
+            accelerometer_noise: (params.accelerometer_noise * self.accelerometer).min(100.0),
+            relative_scale: if self.scale { params.relative_scale } else { known },
+            ..*params
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! What a filter keeps of each sensor: its gate, how it is weighed, and how consistent it was.
+
+use crate::navigation::chi_square::limit;
+use crate::navigation::consistency::Consistency;
+use crate::navigation::eskf::Refusal;
+use crate::navigation::math::sqrt;
+
+/// The largest dimension of a measurement whose limits are kept.
+const DIMENSIONS: usize = 7;
+
+/// The most that a covariance is raised by at once.
+const MOST_RAISED: f64 = 1e6;
+
+/// How the measurements of one sensor are judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StreamParams {
+    /// What the variance of every measurement is multiplied by. Default: 1.
+    pub variance_factor: f64,
+    /// Part of good measurements that the gate refuses; 0 for no gate.
+    ///
+    /// Small: lets more outliers pass. Large: refuses what a filter that is off needs. Default: 1e-4.
+    pub gate: f64,
+    /// How many measurements in a row the gate refuses before it takes the filter to be wrong, not the sensor: the next is
+    /// fused with the covariance raised to fit it; 0 for never.
+    ///
+    /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long. Default: 3.
+    pub patience: u32,
+    /// Part of good measurements that are weighed down as outliers are, by Huber's function of their Mahalanobis distance; 0
+    /// for none.
+    ///
+    /// Small: the weights of a least-squares filter. Large: closer to a median. Default: 0.
+    pub robust: f64,
+    /// How fast the noise of the sensor adapts to its innovations: the change of its variance, per measurement; 0 for
+    /// never.
+    ///
+    /// Small: the noise is as given. Large: follows each innovation. Default: 0.
+    pub adaptation: f64,
+    /// The most that the adapted variance is of the given one; at least 1. Default: 100.
+    pub most_adaptation: f64,
+}
+
+impl Default for StreamParams {
+    fn default() -> Self {
+        Self { variance_factor: 1.0, gate: 1e-4, patience: 3, robust: 0.0, adaptation: 0.0, most_adaptation: 100.0 }
+    }
+}
+
+/// How often a sensor's measurements were taken, and how often refused for which reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Fused with their full weight.
+    pub fused: u64,
+    /// Fused with less.
+    pub weighed_down: u64,
+    /// [`Refusal::Gate`].
+    pub gate: u64,
+    /// [`Refusal::NonFinite`], [`Refusal::OutOfRange`] and [`Refusal::Noise`].
+    pub invalid: u64,
+    /// [`Refusal::NoKeyframe`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
+    pub not_applicable: u64,
+    /// [`Refusal::TooOld`], [`Refusal::TimeNotIncreasing`] and [`Refusal::Gap`].
+    pub late: u64,
+    /// [`Refusal::InTheFuture`].
+    pub future: u64,
+    /// Fused although the gate was against it, after [`StreamParams::patience`]; among those fused.
+    pub recoveries: u64,
+    /// Refused by the gate since the last one that was fused.
+    pub gate_in_a_row: u64,
+}
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fused {
+    /// Normalised innovation squared: its mean is [`dimension`](Self::dimension) if the filter is consistent.
+    pub nis: f64,
+    /// The dimension of the measurement.
+    pub dimension: usize,
+    /// The weight that it had, 1 unless [`StreamParams::robust`] took it down.
+    pub weight: f64,
+    /// What the covariance was raised by before, 1 unless the gate had run out of patience.
+    pub raised: f64,
+    /// What the gate lets pass, all but when it was overruled.
+    pub limit: f64,
+    /// Logarithm of the likelihood of the innovation, but for the constant that depends on the dimension alone: to compare
+    /// models.
+    pub log_likelihood: f64,
+    /// The first component of the whitened innovation.
+    pub(crate) whitened: f64,
+}
+
+/// Whether the gate decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Gate {
+    /// It refuses what is too far off.
+    Closed,
+    /// It lets everything pass.
+    Open,
+}
+
+/// How a measurement is fused.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Verdict {
+    pub(crate) weight: f64,
+    pub(crate) raised: f64,
+    pub(crate) limit: f64,
+    pub(crate) log_likelihood: f64,
+}
+
+/// One sensor, as a filter knows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stream {
+    params: StreamParams,
+    gates: [f64; DIMENSIONS],
+    huber: [f64; DIMENSIONS],
+    noise_factor: f64,
+    counts: Counts,
+    consistency: Consistency,
+}
+
+impl Default for Stream {
+    fn default() -> Self {
+        Self::new(StreamParams::default())
+    }
+}
+
+impl Stream {
+    /// A sensor without a measurement.
+    pub fn new(params: StreamParams) -> Self {
+        Self {
+            params,
+            gates: core::array::from_fn(|dimension| limit(dimension, params.gate)),
+            huber: core::array::from_fn(|dimension| limit(dimension, params.robust)),
+            noise_factor: 1.0,
+            counts: Counts::default(),
+            consistency: Consistency::default(),
+        }
+    }
+
+    /// How it judges.
+    pub fn params(&self) -> &StreamParams {
+        &self.params
+    }
+
+    /// What became of its measurements.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// How consistent those were that the gate let pass.
+    pub fn consistency(&self) -> &Consistency {
+        &self.consistency
+    }
+
+    /// What its variance is multiplied by, from [`StreamParams::variance_factor`] and [`StreamParams::adaptation`].
+    pub fn noise_factor(&self) -> f64 {
+        self.noise_factor * self.params.variance_factor
+    }
+
+    /// How a measurement is fused, or that it is refused.
+    #[inline]
+    pub(crate) fn weigh(
+        &self,
+        nis: f64,
+        dimension: usize,
+        log_density: f64,
+        gate: Gate,
+    ) -> Result<Verdict, Refusal> {
+        let log_likelihood = log_density - 0.5 * nis;
+        let kept = dimension.min(DIMENSIONS - 1);
+        let most = if kept == dimension { self.gates[kept] } else { limit(dimension, self.params.gate) };
+        if nis > most && matches!(gate, Gate::Closed) {
+            let StreamParams { patience, .. } = self.params;
+            if patience > 0 && self.counts.gate_in_a_row >= u64::from(patience) {
+                let raised = (nis / dimension as f64).min(MOST_RAISED);
+                return Ok(Verdict { weight: 1.0, raised, limit: most, log_likelihood });
+            }
+            return Err(Refusal::Gate { nis, limit: most });
+        }
+        let huber = if kept == dimension { self.huber[kept] } else { limit(dimension, self.params.robust) };
+        let weight = if nis > huber { sqrt(huber / nis) } else { 1.0 };
+        Ok(Verdict { weight, raised: 1.0, limit: most, log_likelihood })
+    }
+
+    #[inline]
+    pub(crate) fn count(&mut self, result: &Result<Fused, Refusal>) {
+        let adapt = |factor: f64, share: f64| {
+            let change = self.params.adaptation * (share - 1.0);
+            (factor * (1.0 + change.clamp(-0.5, 1.0))).clamp(1.0, self.params.most_adaptation.max(1.0))
+        };
+        match result {
+            Ok(fused) => {
+                if fused.weight < 1.0 {
+                    self.counts.weighed_down += 1;
+                } else {
+                    self.counts.fused += 1;
+                }
+                self.counts.gate_in_a_row = 0;
+                if fused.raised > 1.0 {
+                    // What did not fit says nothing about those that do.
+                    self.counts.recoveries += 1;
+                    return;
+                }
+                self.noise_factor = adapt(self.noise_factor, fused.nis / fused.dimension as f64);
+                self.consistency.add(fused);
+            }
+            Err(Refusal::Gate { .. }) => {
+                self.counts.gate += 1;
+                self.counts.gate_in_a_row += 1;
+            }
+            Err(Refusal::NonFinite | Refusal::OutOfRange | Refusal::Noise) => self.counts.invalid += 1,
+            Err(Refusal::NoKeyframe { .. } | Refusal::NotObservable | Refusal::NotStarted) => {
+                self.counts.not_applicable += 1;
+            }
+            Err(Refusal::TooOld { .. } | Refusal::TimeNotIncreasing { .. } | Refusal::Gap { .. }) => {
+                self.counts.late += 1;
+            }
+            Err(Refusal::InTheFuture { .. }) => self.counts.future += 1,
+        }
+    }
+}
