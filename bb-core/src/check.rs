@@ -15,6 +15,3 @@ pub use names::{
 };
 pub use options::{Given, check_option, check_required};
 pub use roles::{check_divergence, check_reachable, check_role};
-
-/// Also for names that are read at run time.
-pub(crate) use text::nearest;

@@ -1,26 +1,39 @@
-//! What a user implements: sensors, estimators, actuators, controllers and bridges; their options, inputs and outputs.
+//! What a user implements: sensors, estimators, actuators, services and commands; their options, inputs and outputs, and
+//! what each is given when it starts.
 
 mod actuator;
+mod binding;
+mod bus;
+mod command;
 mod context;
 mod estimator;
 mod external;
-mod fault;
+mod host;
 mod info;
 mod inputs;
 mod options;
 mod outputs;
+mod permit;
+mod record;
 mod sensor;
 mod service;
 
-pub use actuator::{Actuator, ActuatorContext};
-pub use context::{Context, SensorContext};
+pub(crate) use crate::fault::Fault;
+pub(crate) use actuator::Accepts;
+pub use actuator::{Actuator, ActuatorError};
+pub use binding::{Binding, FromParameter};
+pub(crate) use bus::AnyExecution;
+pub use bus::{ActuatorLink, Bus, CommandInfo, DynamicExecution};
+pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Sleep};
+pub use context::{ActuatorContext, ComponentContext, Context, SensorContext, ServiceContext};
 pub use estimator::{Estimator, HandleCall, HandleCast, Reply};
 pub use external::External;
-pub use fault::Fault;
-pub(crate) use fault::Then;
+pub(crate) use host::{DisarmHook, Host};
 pub use info::{Info, Request};
 pub use inputs::{FieldIndex, Input, InputAt, InputField, Inputs, Slot, SyncMiss, declare};
-pub use options::{Dimension, FromQuantity, FromText, NoOptions, OptionField, Options, Range};
+pub use options::{FromQuantity, FromText, NoOptions, OptionField, Options};
 pub use outputs::{OutputAt, Outputs};
+pub(crate) use permit::Permit;
+pub use record::RequestCodec;
 pub use sensor::{Next, Reading, Sensor};
-pub use service::{Bridge, Controller, ServiceContext};
+pub use service::Service;

@@ -1,25 +1,41 @@
-//! What a robot does beside estimating: states, commands, parameters, safety, and the topics on which they are seen.
+//! The robot as a whole: commands, operational state, safety, parameters, supervision and health, and the topics on which
+//! they are seen.
+//!
+//! This state has a single writer of the same kind as an island: a thread with an entry takes the lock for some
+//! microseconds, writes the entry's line into the journal, changes the state and publishes what has changed. No user code runs in there.
+//! What follows from an entry and is user code (disarm callbacks, futures of commands, wakers, handlers, loggers) is collected
+//! as `Effects` and run without the lock, on threads of its own or of the pool: each may block for ever,
+//! and harms only itself.
 
+mod arming;
+mod budgets;
 mod command;
 mod commands;
-mod event;
+mod effects;
 mod execution;
+mod health;
+mod hooks;
+mod machine;
 mod parameters;
-mod safety;
-mod state;
+mod step;
+mod stopping;
 mod system;
-mod tasks;
+mod task;
+mod topics;
 
-pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Role, Sleep};
-pub use commands::{
-    Cancel, CategoryDeclaration, CommandDeclaration, CommandStatistics, Prepared, Refusal, RefusalReason,
-};
-pub use event::{CommandEvent, CommandPhase, ParameterChange, SafetyTransition, StateTransition};
+pub use command::{CommandStatistics, Prepared};
 pub use execution::{CommandError, Execution};
-pub use parameters::{
-    Binding, FromParameter, ParameterDeclaration, ParameterDefault, ParameterError, ParameterType, ParameterValue,
-    ParameterValues,
+pub(crate) use system::{ComponentOrder, Control, Declared, Islands, Parts, Wired};
+pub use topics::SystemTopics;
+
+pub use crate::component::{
+    Arm, Binding, Command, CommandContext, Disarm, FromParameter, NoArguments, Outcome, Sleep,
 };
-pub use safety::{Safety, SafetyError};
-pub use system::SystemTopics;
-pub(crate) use system::{Control, Declared, Setter};
+pub use crate::declaration::{
+    Cancel, CommandDeclaration, ParameterDeclaration, ParameterDefault, ParameterError, ParameterType,
+    ParameterValues, Role,
+};
+pub use crate::event::{
+    CategoryDeclaration, CommandEvent, CommandPhase, ParameterChange, ParameterValue, Refusal, RefusalReason,
+    Safety, SafetyError, SafetyTransition, StateTransition,
+};

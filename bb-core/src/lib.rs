@@ -6,14 +6,20 @@
 //! | what | where |
 //! |---|---|
 //! | messages: a payload with its time, frame and origin; as bytes | [`message`], [`payload`], [`message::codec`] |
-//! | what a user implements: [`Sensor`], [`Estimator`], [`Actuator`], [`Controller`], [`Bridge`], [`Command`], and the derives for options, inputs, outputs, payloads | [`component`] |
 //! | time, real or virtual | [`time`] |
-//! | links, joints and the transforms between them | [`topology`] |
-//! | a running estimator: fan-in, health, drops, counters | [`node`] |
-//! | states, commands, parameters, safety | [`control`] |
 //! | subscriptions | [`pubsub`] |
-//! | what came in, to run it again | [`journal`] |
+//! | links, joints and the transforms between them | [`topology`] |
+//! | what the runtime publishes about itself | [`event`] |
+//! | what `robot!` declares | [`declaration`] |
+//! | the journal of a run, and its replay | [`journal`], [`Replay`] |
+//! | what a handler of telemetry is told | [`telemetry`] |
+//! | what a user implements: [`Sensor`], [`Estimator`], [`Actuator`], [`Service`], [`Command`], and the derives for options, inputs, outputs, payloads | [`component`] |
+//! | make, run, fail, restart: the same for every component | [`lifecycle`] |
+//! | a running estimator: fan-in, health, drops, counters | [`node`] |
+//! | states, commands, parameters, safety, supervision | [`control`] |
 //! | start, run, stop | [`run`] |
+//!
+//! Each module uses only those above it in this table.
 //!
 //! All stored quantities are SI: metres, seconds, radians, kilograms, tesla.
 
@@ -22,41 +28,49 @@ extern crate self as bb_core;
 
 pub mod component;
 pub mod control;
+pub mod declaration;
+pub mod event;
 pub mod journal;
+pub mod lifecycle;
 pub mod message;
 pub mod node;
 pub mod payload;
 pub mod pubsub;
 pub mod run;
+pub mod telemetry;
 pub mod time;
 pub mod topology;
 
 mod check;
+mod fault;
+mod schedule;
 mod stub;
 
 #[doc = include_str!("robot.md")]
 pub use bb_macros::robot;
 pub use bb_macros::{Inputs, Options, Outputs, Payload};
 pub use component::{
-    Actuator, ActuatorContext, Bridge, Context, Controller, Estimator, Fault, HandleCall, HandleCast, Info, Input,
-    Inputs, Options, Outputs, Reading, Reply, Request, Sensor, SensorContext, ServiceContext,
+    Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, HandleCall, HandleCast, Info,
+    Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, Sensor, SensorContext,
+    Service, ServiceContext,
 };
-pub use control::{
-    Command, CommandContext, Execution, Outcome, ParameterError, ParameterValue, Refusal, Role, Safety,
-};
+pub use control::Execution;
+pub use declaration::{ParameterError, Role};
+pub use event::{ComponentFault, HealthReason, HealthState, HealthTransition, ParameterValue, Refusal, Safety};
+pub use fault::Fault;
 pub use message::{Field, Finite, Frame, Origin, Payload, Stamped};
-pub use node::{HealthReason, HealthState, HealthTransition};
 pub use pubsub::{
     DynamicMessage, DynamicSubscription, Overflow, Payloads, Publisher, Select, Subscription, Unmatched,
 };
 pub use run::{
-    ActuatorHandle, Builder, Bus, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Live, OutputHandle,
+    ActuatorHandle, Builder, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Live, OutputHandle,
     ParameterHandle, Replay, ReplayError, Report, Robot, Running, SensorHandle, Simulation, StartError,
 };
 /// Handles of the topics that every robot has: subscribe to them as to any other.
 pub mod system {
-    pub use crate::run::{Health, JournalLines, SafetyErrors, SafetyState, StateMachine};
+    pub use crate::run::{Faults, Health, JournalLines, SafetyErrors, SafetyState, StateMachine};
 }
+pub use telemetry::TelemetryEvent;
 pub use time::{Clock, MonotonicTime, WallTime};
 
 pub use nalgebra;
@@ -64,12 +78,14 @@ pub use nalgebra;
 /// Everything a file that declares or runs a robot needs: `use bb_core::prelude::*;`.
 pub mod prelude {
     pub use crate::component::{
-        Actuator, ActuatorContext, Bridge, Context, Controller, Estimator, External, Fault, HandleCall, HandleCast,
-        Info, Input, NoOptions, Reading, Reply, Request, Sensor, SensorContext, ServiceContext,
+        Actuator, ActuatorContext, Arm, Command, CommandContext, Context, Disarm, Estimator, External, HandleCall,
+        HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reading, Reply, Request, Sensor, SensorContext,
+        Service, ServiceContext,
     };
-    pub use crate::control::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Role, Safety};
+    pub use crate::declaration::Role;
+    pub use crate::event::{HealthReason, HealthState, HealthTransition, Safety};
+    pub use crate::fault::Fault;
     pub use crate::message::{RosMessage, Stamped};
-    pub use crate::node::{HealthReason, HealthState, HealthTransition};
     pub use crate::payload::*;
     pub use crate::pubsub::{Overflow, Select, Subscription};
     pub use crate::robot;
@@ -91,29 +107,30 @@ pub mod __private {
         find_nested, find_output,
     };
     pub use crate::component::{
-        Dimension, FieldIndex, FromQuantity, FromText, Input, InputAt, InputField, OptionField, OutputAt, Range,
-        Slot, SyncMiss, declare,
+        Binding, Command, FieldIndex, FromParameter, FromQuantity, FromText, Input, InputAt, InputField,
+        OptionField, OutputAt, Slot, SyncMiss, declare,
     };
-    pub use crate::control::{
-        Binding, Cancel, CategoryDeclaration, Command, CommandDeclaration, FromParameter, ParameterDeclaration,
-        ParameterDefault, ParameterValues, Prepared,
+    pub use crate::control::Prepared;
+    pub use crate::declaration::{
+        ActuatorDeclaration, Cancel, CommandDeclaration, Dimension, EstimatorDeclaration, HealthDeclaration,
+        InputDeclaration, IslandDeclaration, ParameterDeclaration, ParameterDefault, ParameterValues, Range,
+        SensorDeclaration, WorkerDeclaration,
     };
-    pub use crate::journal::Journal;
+    pub use crate::event::CategoryDeclaration;
+    pub use crate::lifecycle::{AsSensor, AsService, Periodic};
     pub use crate::message::codec::{
         DecodeError, EnumShape, FieldOf, FieldShape, NotField, Reader, RosLayout, Shape, StructShape, Writer,
         is_any, is_finite,
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{
-        AnyIsland, EstimatorDeclaration, HealthDeclaration, Held, InputDeclaration, Island, IslandDeclaration, Key,
-        Node, Sea, Shore, Turn, WorkerDeclaration,
+        AnyIsland, Environment, Island, IslandState, IslandWiring, Key, Next, Node, NodeEntry, Turn,
     };
     pub use crate::pubsub::{AnyTopic, DynamicMessage, Topic};
     pub use crate::run::{
-        ActuatorDeclaration, ActuatorHandle, ActuatorNode, AnyActuator, AsBridge, AsController, AsSensor,
-        BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle, FeedOf, IslandOf,
-        OutputHandle, ParameterHandle, Periodic, Report, Robot, SensorDeclaration, SensorHandle, Source,
-        StartError, Startup, Visit,
+        ActuatorHandle, ActuatorNode, AnyActuator, Assembly, BridgeHandle, CommandHandle, ControllerHandle,
+        EstimatorHandle, EstimatorOfSeveralHandle, FeedOf, IslandOf, OutputHandle, ParameterHandle, Report, Robot,
+        SensorHandle, Source, StartError, Visit,
     };
     pub use crate::stub::{Known, NotProbed, Probe, Unknown, as_known, both_known, stub};
     pub use crate::time::MonotonicTime;

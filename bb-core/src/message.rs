@@ -2,6 +2,7 @@
 
 pub mod codec;
 mod finite;
+pub(crate) mod nearest;
 mod stamped;
 
 pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};

@@ -1,22 +1,31 @@
-//! A running estimator: what it was declared as, its fan-in, its health, its counters; and the islands in which
+//! A running estimator: what comes in, what goes out, its fan-in, health, timers and counters; and the islands in which
 //! estimators run.
 
 mod admission;
+mod backlog;
 mod counters;
-mod declaration;
+mod entry;
+mod environment;
 mod health;
 mod island;
 mod latency;
+mod requests;
 mod running;
 mod shared;
 mod timers;
+mod turn;
 
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
-pub use declaration::{
-    EstimatorDeclaration, HealthDeclaration, InputDeclaration, IslandDeclaration, WorkerDeclaration,
-};
-pub use health::{HealthReason, HealthState, HealthTransition};
-pub use island::{AnyIsland, Held, Island, Key, Sea, Shore};
+pub use entry::NodeEntry;
+pub(crate) use entry::{HealthReport, Report};
+pub use environment::Environment;
+pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Mode, Overseer};
+pub(crate) use island::CallError;
+pub use island::{AnyIsland, Island, IslandState, IslandWiring, Key, Replayed};
 pub use latency::LatencyStatistics;
-pub use running::{Node, Turn};
+pub(crate) use requests::{know_calls, know_casts};
+pub use running::{Next, Node};
 pub(crate) use shared::SharedNode;
+pub use turn::Turn;
+
+pub use crate::event::{HealthReason, HealthState, HealthTransition};

@@ -23,6 +23,7 @@ mod odometry;
 mod path;
 mod power;
 mod range;
+mod ros;
 mod sensor;
 mod trajectory;
 

@@ -1,7 +1,6 @@
 //! Publish and subscribe. A slow subscriber never slows a publisher and never grows without bound.
 
 mod dynamic;
-mod nearest;
 mod publisher;
 mod queue;
 mod registry;
@@ -14,7 +13,7 @@ mod unmatched;
 mod wakers;
 
 pub use dynamic::{DynamicMessage, DynamicSubscription};
-pub(crate) use nearest::nearest_path;
+pub(crate) use publisher::Gate;
 pub use publisher::Publisher;
 pub use queue::Overflow;
 pub(crate) use registry::Registry;
@@ -23,5 +22,4 @@ pub use subscription::{RecvAsync, Subscription};
 pub use topic::{AnyTopic, SubscriberStatistics, Topic, TopicStatistics};
 pub use unmatched::Unmatched;
 pub(crate) use unmatched::unmatched_at;
-#[allow(unused_imports, reason = "for publishers that hold a lock of the robot")]
 pub(crate) use wakers::Wakers;

@@ -1,46 +1,41 @@
-//! A robot that runs: assembled by a [`Builder`], driven by real sensors in threads ([`Running`]) or on virtual time
-//! by whoever calls it ([`Simulation`]).
+//! A robot that runs: assembled by a [`Builder`], driven by real sensors in threads ([`Running`]), on virtual time by its
+//! caller ([`Simulation`]), or from a journal ([`Replay`]).
 
 mod actuator;
-mod agenda;
 mod builder;
-mod bus;
+mod describe;
 mod error;
 mod handle;
+mod host;
 mod live;
 mod machine;
-mod periodic;
 mod replay;
 mod report;
 mod robot;
 mod running;
 mod simulation;
 mod source;
-mod startup;
-mod stop;
-mod supervision;
 mod threads;
+mod timekeeper;
+mod visit;
 
-pub use actuator::{ActuatorDeclaration, ActuatorError, ActuatorNode, AnyActuator};
+pub use crate::component::{ActuatorError, ActuatorLink, Bus};
+pub use crate::declaration::{ActuatorDeclaration, SensorDeclaration, Supervisor};
+pub use crate::event::ComponentFault;
+pub use crate::lifecycle::Supervision;
+pub use actuator::{ActuatorNode, AnyActuator};
 pub use builder::Builder;
-pub(crate) use bus::Directory;
-pub use bus::{ActuatorLink, Bus};
-pub use error::{ComponentFault, StartError};
-pub(crate) use error::{Failed, caught, retire, wake};
+pub use error::StartError;
 pub use handle::{
     ActuatorHandle, BridgeHandle, CommandHandle, Configurable, ControllerHandle, EstimatorHandle,
-    EstimatorOfSeveralHandle, Health, JournalLines, OutputHandle, ParameterHandle, Publisher, SafetyErrors,
-    SafetyState, SensorHandle, StateMachine, Visit, Visitable,
+    EstimatorOfSeveralHandle, Faults, Health, JournalLines, OutputHandle, ParameterHandle, Publisher, SafetyErrors,
+    SafetyState, SensorHandle, StateMachine,
 };
 pub use live::Live;
-pub use periodic::{AsBridge, AsController, AsSensor, Periodic};
 pub use replay::{Replay, ReplayError};
 pub use report::Report;
 pub use robot::{FeedOf, IslandOf, Robot};
 pub use running::Running;
 pub use simulation::Simulation;
-pub use source::{SensorDeclaration, Source};
-pub use startup::Startup;
-pub use stop::StopSignal;
-pub(crate) use supervision::Failures;
-pub use supervision::{Supervision, Supervisor};
+pub use source::{Assembly, Source, SourceStatistics};
+pub use visit::{Visit, Visitable};

@@ -10,8 +10,7 @@ mod unknown;
 pub(crate) use unknown::UNKNOWN_INDEX;
 pub use unknown::Unknown;
 
-use crate::component::{Actuator, Bridge, Controller, Estimator, Inputs, Options, Outputs, Sensor};
-use crate::control::Command;
+use crate::component::{Actuator, Command, Estimator, Inputs, Options, Outputs, Sensor, Service};
 use crate::message::Payload;
 use std::any::Any;
 use std::marker::PhantomData;
@@ -48,18 +47,10 @@ where
 
 impl<T> Probe<T>
 where
-    T: Controller<Options: Options, Output: Payload>,
+    T: Service<Options: Options, Output: Payload>,
 {
-    /// `T` is a controller.
-    pub const IS_CONTROLLER: bool = true;
-}
-
-impl<T> Probe<T>
-where
-    T: Bridge<Options: Options, Output: Payload>,
-{
-    /// `T` is a bridge.
-    pub const IS_BRIDGE: bool = true;
+    /// `T` is a service.
+    pub const IS_SERVICE: bool = true;
 }
 
 impl<T> Probe<T>
@@ -70,7 +61,7 @@ where
     pub const IS_COMMAND: bool = true;
 }
 
-/// What holds of a [`Probe`] that has no constants of its own.
+/// Fallback: every constant is `false`.
 pub trait NotProbed {
     /// It is not known to be a sensor.
     const IS_SENSOR: bool = false;
@@ -78,10 +69,8 @@ pub trait NotProbed {
     const IS_ESTIMATOR: bool = false;
     /// It is not known to be an actuator.
     const IS_ACTUATOR: bool = false;
-    /// It is not known to be a controller.
-    const IS_CONTROLLER: bool = false;
-    /// It is not known to be a bridge.
-    const IS_BRIDGE: bool = false;
+    /// It is not known to be a service.
+    const IS_SERVICE: bool = false;
     /// It is not known to be a command.
     const IS_COMMAND: bool = false;
 }
@@ -143,11 +132,11 @@ macro_rules! __stub_robot {
             type Wiring = ();
             fn options() {}
             fn topics() {}
-            fn wire(_: (), _: &(), _: &$crate::__private::Startup) {}
+            fn wire(_: (), _: &(), _: &$crate::__private::Assembly) {}
             fn sources(
                 _: &$crate::__private::Arc<()>,
                 _: &(),
-                _: &$crate::__private::Startup,
+                _: &$crate::__private::Assembly,
             ) -> ::std::vec::Vec<::std::boxed::Box<dyn $crate::__private::Source>> {
                 ::std::vec::Vec::new()
             }

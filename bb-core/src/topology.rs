@@ -1,14 +1,22 @@
 //! Links, joints and the transforms between them, as constant data; what they weigh and look like, as in URDF.
 
 mod body;
-mod graph;
+mod transforms;
 mod urdf;
 
 pub use body::{Collision, Geometry, Inertial, Material, Visual};
-pub use graph::{GraphFormat, graph};
 
 use crate::message::Frame;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+/// The language that a graph is written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GraphFormat {
+    /// [Mermaid](https://mermaid.js.org), which Markdown viewers draw.
+    Mermaid,
+    /// Graphviz.
+    Dot,
+}
 
 /// A robot's links and joints, in the order of their declaration; the first link is the root.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,8 @@
 //! Whether the options given to a component are complete, of the right dimension and in range.
 
 use super::text::{Text, equal};
-use crate::component::{Dimension, OptionField};
+use crate::component::OptionField;
+use crate::declaration::Dimension;
 
 /// One option as written in `robot!`.
 #[derive(Clone, Copy, Debug)]

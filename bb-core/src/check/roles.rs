@@ -1,7 +1,7 @@
 //! What commands do to the robot's safety, and what an estimator says of its own divergence.
 
 use super::text::{Text, equal};
-use crate::control::Role;
+use crate::declaration::Role;
 
 /// That no command before has the same role, where a robot may have one such command.
 #[track_caller]

@@ -60,7 +60,7 @@ pub(super) const fn equal(a: &str, b: &str) -> bool {
 }
 
 /// The number of the name nearest to `name`, if any is near enough to be meant.
-pub(crate) const fn nearest(names: &[&str], name: &str) -> Option<usize> {
+pub(super) const fn nearest(names: &[&str], name: &str) -> Option<usize> {
     let mut best = None;
     let mut best_distance = name.len() / 3 + 1;
     let mut index = 0;

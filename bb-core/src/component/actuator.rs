@@ -1,8 +1,9 @@
 //! The contract of an actuator.
 
-use super::{Fault, Options};
+use super::{ActuatorContext, Fault, Options, Permit};
+use crate::event::Safety;
 use crate::message::{Payload, Stamped};
-use crate::time::Clock;
+use std::fmt;
 
 /// Moves a joint.
 ///
@@ -66,56 +67,60 @@ pub trait Actuator: Sized + Send + 'static {
     /// Does what it is told.
     ///
     /// # Errors
-    /// What keeps it from going on; the fault is reported, it is disarmed and started anew.
+    /// Why it cannot go on; the fault is reported, and the actuator is made safe and restarted.
     fn handle_command(&mut self, command: &Stamped<Self::Command>) -> Result<(), Fault>;
 
-    /// Makes it safe. Called whenever the robot is disarmed; within 5 s it must have come back.
+    /// Makes it safe. Called whenever the robot is disarmed, and before a restart; it must return within 5 s.
     ///
     /// # Errors
     /// Why it could not be made safe: the robot's safety state is then `error`.
     fn disarm(&mut self) -> Result<(), Fault>;
 
-    /// Takes new options, validated, after a parameter that they are bound to has changed. Unless it is written, the
-    /// actuator is made anew with them.
+    /// Takes new options, validated, after a parameter that they are bound to has changed. The default restarts the
+    /// actuator with them: it is made safe, terminated and dropped before the new one is made.
     ///
     /// # Errors
     /// As for `handle_command`.
     fn handle_options(&mut self, options: Self::Options, context: &ActuatorContext) -> Result<(), Fault> {
-        *self = Self::init(options, context)?;
-        Ok(())
+        let _ = (options, context);
+        Err(Fault::remake())
     }
 
-    /// Closes the device, before it stops; not after a panic.
+    /// Closes the device before the actuator stops or is restarted; not called after a panic.
     fn terminate(&mut self) {}
 }
 
-/// What an actuator is told when it starts.
-#[derive(Clone, Debug)]
-pub struct ActuatorContext {
-    pub(crate) robot: &'static str,
-    pub(crate) path: &'static str,
-    pub(crate) joint: &'static str,
-    pub(crate) clock: Clock,
+/// Why an actuator has not carried out a command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ActuatorError {
+    /// The robot is not armed.
+    NotArmed(Safety),
+    /// The command that sent this has ended or was cancelled: its handles are dead.
+    Cancelled,
+    /// The command holds a NaN or an infinity.
+    NonFinite,
+    /// The actuator has failed and does not run.
+    Stopped,
+    /// The actuator has failed at this command.
+    Failed(String),
 }
 
-impl ActuatorContext {
-    /// The robot's name.
-    pub fn robot(&self) -> &'static str {
-        self.robot
+impl fmt::Display for ActuatorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotArmed(safety) => write!(f, "the robot is not armed ({safety})"),
+            Self::Cancelled => f.write_str("the command that sent this has ended or was cancelled"),
+            Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
+            Self::Stopped => f.write_str("the actuator has failed and does not run"),
+            Self::Failed(message) => write!(f, "the actuator failed: {message}"),
+        }
     }
+}
 
-    /// Its path: `actuator/base_link/pan/servo`.
-    pub fn path(&self) -> &'static str {
-        self.path
-    }
+impl std::error::Error for ActuatorError {}
 
-    /// The joint that it moves.
-    pub fn joint(&self) -> &'static str {
-        self.joint
-    }
-
-    /// The clock of the run.
-    pub fn clock(&self) -> &Clock {
-        &self.clock
-    }
+/// An actuator that takes commands of type `T`.
+pub(crate) trait Accepts<T>: Send + Sync {
+    fn accept(&self, command: T, permit: &Permit) -> Result<(), ActuatorError>;
 }

@@ -1,17 +1,17 @@
-//! What a component is told when it starts.
+//! What a component is given when it starts.
 
-use super::{Fault, Request};
-use crate::control::Control;
+use super::host::Host;
+use super::{Bus, Fault, Permit, Request};
+use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
 use crate::message::Frame;
-use crate::node::{EstimatorDeclaration, InputDeclaration};
-use crate::run::{SensorDeclaration, StopSignal};
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::Transform;
 use nalgebra::Isometry3;
 use std::cell::RefCell;
+use std::ops::Deref;
 use std::sync::Arc;
 
-/// What an estimator is told when it starts: where it stands in the robot, and where its inputs come from.
+/// What an estimator is given when it starts: its place in the robot, and where its inputs come from.
 #[derive(Debug)]
 pub struct Context {
     robot: &'static str,
@@ -52,7 +52,7 @@ impl Context {
             optional: false,
             tolerance_nanos: None,
             stale_after_nanos: None,
-            frame_from_input: Transform::of(frame_from_input),
+            frame_from_input: Some(Transform::of(frame_from_input)),
         });
         let inputs: &'static [InputDeclaration] = Vec::leak(inputs.collect());
         let declaration = EstimatorDeclaration { path: "test", inputs, ..EstimatorDeclaration::NONE };
@@ -76,20 +76,20 @@ impl Context {
 
     /// Takes points from the frame of `input` to the frame of the output: the product of the fixed joints between.
     ///
-    /// The identity where the two are one frame, and where the input has no frame (a robot-level sensor). A moving joint,
-    /// which only an estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span, counts as it stands at zero.
+    /// The identity where both are the same frame, and where the input has no frame (a robot-level sensor).
     ///
     /// # Errors
-    /// No input of that name is declared.
+    /// No input of that name is declared, or a moving joint lies between, whose position nobody computes yet. (Only an
+    /// estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span one.)
     ///
     /// [`Estimator::HANDLES_MOVING_JOINTS`]: super::Estimator::HANDLES_MOVING_JOINTS
     pub fn frame_from_input(&self, input: &str) -> Result<Isometry3<f64>, Fault> {
         let declared = self.declaration.inputs.iter().find(|declared| declared.name == input);
         let declared = declared.ok_or_else(|| Fault::new(format!("no input `{input}` is declared")))?;
-        Ok(declared.frame_from_input.isometry())
+        transform_of(declared)
     }
 
-    /// The time now.
+    /// The time of this start or restart.
     pub fn now(&self) -> MonotonicTime {
         self.now
     }
@@ -105,40 +105,111 @@ impl Context {
     }
 
     /// The same for the driver, or for the only input.
-    pub fn frame_from_driver(&self) -> Isometry3<f64> {
+    ///
+    /// # Errors
+    /// A moving joint lies between.
+    pub fn frame_from_driver(&self) -> Result<Isometry3<f64>, Fault> {
         let driver = self.declaration.inputs.iter().find(|declared| declared.driver);
-        driver.map_or_else(Isometry3::identity, |declared| declared.frame_from_input.isometry())
+        driver.map_or_else(|| Ok(Isometry3::identity()), transform_of)
     }
 }
 
-/// What a sensor is told when it starts.
-#[derive(Clone, Debug)]
-pub struct SensorContext {
-    pub(crate) robot: &'static str,
-    pub(crate) declaration: &'static SensorDeclaration,
-    pub(crate) clock: Clock,
-    pub(crate) stop: StopSignal,
-    pub(crate) control: Control,
+fn transform_of(input: &InputDeclaration) -> Result<Isometry3<f64>, Fault> {
+    let transform = input.frame_from_input.ok_or_else(|| {
+        let name = input.name;
+        Fault::new(format!(
+            "a moving joint lies between the input `{name}` and the output, and its position is not known"
+        ))
+    })?;
+    Ok(transform.isometry())
 }
 
-impl SensorContext {
-    /// Registers what makes its hardware safe when the robot is disarmed: a lidar's motor, a laser. All callbacks run at
-    /// the same time, and must have come back within 5 s; one that fails leads to the safety state `error`. What it registers
-    /// when it is made anew takes the place of what it had registered before.
-    pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
-        self.control.on_disarm(self.declaration.path, Arc::new(hook));
+/// What every component that runs on a thread of its own, or owns hardware, is given when it starts.
+#[derive(Clone, Debug)]
+pub struct ComponentContext {
+    path: &'static str,
+    host: Arc<dyn Host>,
+}
+
+impl ComponentContext {
+    pub(crate) fn new(path: &'static str, host: Arc<dyn Host>) -> Self {
+        Self { path, host }
     }
 
     /// The robot's name.
     pub fn robot(&self) -> &'static str {
-        self.robot
+        self.host.origin().robot
     }
 
-    /// The sensor's path: `sensor/base_link/imu`.
+    /// The component's path: `sensor/base_link/imu`.
     pub fn path(&self) -> &'static str {
-        self.declaration.path
+        self.path
     }
 
+    /// The clock of the run.
+    pub fn clock(&self) -> &Clock {
+        self.host.clock()
+    }
+
+    /// Whether the robot has been told to stop: a component that waits for its device gives up its wait then.
+    pub fn is_stopping(&self) -> bool {
+        self.host.is_stopping()
+    }
+
+    /// Registers what makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches a laser off. All
+    /// callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that fails or takes longer
+    /// leads to the safety state `error`. A restart of the component replaces what it registered before.
+    pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
+        self.host.on_disarm(self.path, Arc::new(hook));
+    }
+
+    /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
+    /// is published at `safety/error`.
+    pub fn hardware_error(&self, message: impl Into<String>) {
+        self.host.hardware_error(self.path, message.into());
+    }
+}
+
+macro_rules! component_context {
+    ($(#[$doc:meta])* $name:ident, $declaration:ty) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug)]
+        pub struct $name {
+            common: ComponentContext,
+            declaration: &'static $declaration,
+        }
+
+        impl $name {
+            pub(crate) fn new(declaration: &'static $declaration, host: Arc<dyn Host>) -> Self {
+                Self { common: ComponentContext::new(declaration.path, host), declaration }
+            }
+        }
+
+        impl Deref for $name {
+            type Target = ComponentContext;
+            fn deref(&self) -> &ComponentContext {
+                &self.common
+            }
+        }
+    };
+}
+
+component_context! {
+    /// What a sensor is given when it starts.
+    SensorContext, SensorDeclaration
+}
+
+component_context! {
+    /// What a controller or a bridge is given when it starts.
+    ServiceContext, SensorDeclaration
+}
+
+component_context! {
+    /// What an actuator is given when it starts.
+    ActuatorContext, ActuatorDeclaration
+}
+
+impl SensorContext {
     /// The frame of what it publishes.
     pub fn frame(&self) -> Frame {
         self.declaration.frame
@@ -146,7 +217,7 @@ impl SensorContext {
 
     /// The declared period in seconds, if it has a `rate`.
     pub fn period_s(&self) -> Option<f64> {
-        self.declaration.period_nanos.map(|nanos| nanos as f64 * 1e-9)
+        period_s(self.declaration)
     }
 
     /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; none if a
@@ -154,14 +225,27 @@ impl SensorContext {
     pub fn root_from_frame(&self) -> Option<Isometry3<f64>> {
         self.declaration.root_from_frame.map(|transform| transform.isometry())
     }
+}
 
-    /// The clock of the run.
-    pub fn clock(&self) -> &Clock {
-        &self.clock
+impl ServiceContext {
+    /// The declared period in seconds, if it has a `rate`.
+    pub fn period_s(&self) -> Option<f64> {
+        period_s(self.declaration)
     }
 
-    /// Whether the robot has been told to stop: a sensor that waits for its device gives up its wait then.
-    pub fn is_stopping(&self) -> bool {
-        self.stop.is_set()
+    /// Topics, actuators, parameters and commands, by path.
+    pub fn bus(&self) -> Bus {
+        Bus::new(Arc::clone(&self.common.host), Permit::UNLIMITED)
     }
+}
+
+impl ActuatorContext {
+    /// The joint that it moves.
+    pub fn joint(&self) -> &'static str {
+        self.declaration.joint
+    }
+}
+
+fn period_s(declaration: &SensorDeclaration) -> Option<f64> {
+    declaration.period_nanos.map(|nanos| nanos as f64 * 1e-9)
 }

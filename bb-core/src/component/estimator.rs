@@ -1,6 +1,6 @@
 //! The contract of an estimator.
 
-use super::{Context, Fault, Info, Inputs, Options, Outputs, Request};
+use super::{Context, Fault, Info, Inputs, Options, Outputs, Request, RequestCodec};
 
 /// Consumes messages and emits derived state. See the crate's README for one from scratch.
 ///
@@ -65,7 +65,7 @@ pub trait Estimator: Sized + Send + 'static {
     /// Handles one message, or the snapshot of all inputs when the driver has arrived.
     ///
     /// # Errors
-    /// What keeps it from going on; the fault is reported, and it is started anew from a clean state.
+    /// Why it cannot go on; the fault is reported, and the estimator is restarted with fresh state.
     fn handle_input(&mut self, input: <Self::Input as Inputs>::View<'_>) -> Result<Reply<Self::Output>, Fault>;
 
     /// Handles a timer, a tick or a timeout that it has asked for. What it emits is stamped with the time now.
@@ -86,17 +86,17 @@ pub trait Estimator: Sized + Send + 'static {
         Ok(Reply::none())
     }
 
-    /// Takes new options, validated, after a parameter that they are bound to has changed. Unless it is written, the
-    /// estimator is made anew with them.
+    /// Takes new options, validated, after a parameter that they are bound to has changed. The default restarts the
+    /// estimator with them: it is terminated and dropped before the new one is made.
     ///
     /// # Errors
     /// As for [`handle_input`](Self::handle_input).
     fn handle_options(&mut self, options: Self::Options, context: &Context) -> Result<(), Fault> {
-        *self = Self::init(options, context)?;
-        Ok(())
+        let _ = (options, context);
+        Err(Fault::remake())
     }
 
-    /// Cleans up, before it stops or is started anew, also after an error; not after a panic.
+    /// Cleans up before it stops or is restarted, also after an error; not called after a panic.
     fn terminate(&mut self) {}
 }
 
@@ -110,6 +110,10 @@ pub trait Estimator: Sized + Send + 'static {
 pub trait HandleCall<Q>: Estimator {
     /// What it answers.
     type Response;
+
+    /// How a journal holds these requests, so that a replay makes them again: `Some(RequestCodec::bytes())` for a request
+    /// that derives [`Payload`](crate::Payload). By default the journal holds only what they made the estimator emit.
+    const RECORD: Option<RequestCodec<Q>> = None;
 
     /// Answers, and may emit outputs beside.
     ///
@@ -126,6 +130,9 @@ pub trait HandleCall<Q>: Estimator {
     label = "no `HandleCast<{Q}>`"
 )]
 pub trait HandleCast<Q>: Estimator {
+    /// See [`HandleCall::RECORD`].
+    const RECORD: Option<RequestCodec<Q>> = None;
+
     /// Takes it.
     ///
     /// # Errors

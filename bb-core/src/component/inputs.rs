@@ -5,8 +5,8 @@
 //! struct that the estimator takes, or names the input that was missing or too old.
 
 use crate::Payload;
+use crate::declaration::{EstimatorDeclaration, InputDeclaration};
 use crate::message::Stamped;
-use crate::node::{EstimatorDeclaration, InputDeclaration};
 use crate::time::MonotonicTime;
 use std::cell::Cell;
 use std::ops::Deref;

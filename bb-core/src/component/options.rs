@@ -1,5 +1,6 @@
 //! Typed options with defaults, ranges, units and docs.
 
+use crate::declaration::{Dimension, Range};
 use std::time::Duration;
 
 /// The options of a sensor or an estimator: a plain struct, filled from the parentheses in `robot!`.
@@ -58,26 +59,6 @@ pub struct OptionField {
     pub unit: &'static str,
     /// The numbers accepted, in SI.
     pub range: Option<Range>,
-}
-
-/// The physical dimension of a quantity.
-#[derive(Clone, Copy, Debug)]
-pub struct Dimension {
-    /// Exponents of metre, kilogram, second, ampere, kelvin and radian.
-    pub exponents: [i8; 6],
-    /// With its article, for messages: "a length".
-    pub name: &'static str,
-}
-
-/// An interval of numbers, both ends included.
-#[derive(Clone, Copy, Debug)]
-pub struct Range {
-    /// The smallest accepted.
-    pub start: f64,
-    /// The largest accepted.
-    pub end: f64,
-    /// As the user wrote it, for messages.
-    pub text: &'static str,
 }
 
 /// For components without options.

@@ -60,8 +60,9 @@ pub trait Sensor: Sized + Send + 'static {
     /// A read that waits must come back now and then with [`Reading::nothing`], so that the robot can stop.
     ///
     /// # Errors
-    /// What keeps it from going on; the fault is reported, and it is started anew from a clean state. A
-    /// [`Fault::permanent`] leaves it stopped.
+    /// Why there is no reading: the device is unplugged, say. The fault is reported and the sensor is restarted, after a
+    /// backoff of at most a second, for as long as the robot runs; nothing else is restarted. A [`Fault::permanent`]
+    /// leaves it stopped.
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
 
     /// When it is to be read first; none: at once. A recording gives the stamp of its first message: virtual time
@@ -70,17 +71,18 @@ pub trait Sensor: Sized + Send + 'static {
         None
     }
 
-    /// Takes new options, validated, after a parameter that they are bound to has changed. Unless it is written, the
-    /// sensor is made anew with them.
+    /// Takes new options, validated, after a parameter that they are bound to has changed. The default restarts the
+    /// sensor with them: it is terminated and dropped before the new one is made.
     ///
     /// # Errors
     /// As for [`read`](Self::read).
     fn handle_options(&mut self, options: Self::Options, context: &SensorContext) -> Result<(), Fault> {
-        *self = Self::init(options, context)?;
-        Ok(())
+        let _ = (options, context);
+        Err(Fault::remake())
     }
 
-    /// Closes the device, before it stops or is started anew; not after a panic.
+    /// Closes the device before the sensor stops or is restarted; not called after a panic. When the robot stops, it has
+    /// been disarmed before.
     fn terminate(&mut self) {}
 }
 

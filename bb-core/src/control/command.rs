@@ -1,219 +1,144 @@
-//! The contract of a command.
+//! Commands with their options, whatever their types.
 
-use super::system::{Control, Setter};
-use super::tasks::{Alarm, Sleeper};
-use super::{ParameterError, ParameterValue};
-use crate::component::{Fault, NoOptions, Options};
-use crate::node::HealthTransition;
-use crate::run::Bus;
-use crate::time::MonotonicTime;
-use std::future::Future;
-use std::pin::Pin;
-use std::task::{Context, Poll};
-use std::time::Duration;
+use super::task::{RunningFuture, Value};
+use crate::component::{Binding, Command, CommandContext, Options, Outcome};
+use crate::declaration::{ParameterValues, Role};
+use crate::event::Refusal;
+use crate::fault::Fault;
+use crate::message::Field;
+use crate::message::codec::{Shape, from_json, to_json};
+use std::any::Any;
+use std::fmt;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A short task that a robot is told to do: arm, stop, move somewhere.
-///
-/// It is an `async` function on the robot's own clock: [`CommandContext::sleep`] takes virtual time on a robot that is
-/// simulated. It may await anything else too. A command is cancelled by dropping its future, so what must be undone
-/// belongs in a `Drop`.
-///
-/// ```
-/// use bb_core::prelude::*;
-///
-/// /// Waits until the robot stands, then declares it degraded.
-/// #[derive(Debug)]
-/// pub struct SlowDown;
-///
-/// impl Command for SlowDown {
-///     type Options = NoOptions;
-///     type Arguments = NoArguments;
-///     type Output = ();
-///
-///     async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-///         context.sleep(Duration::from_millis(200)).await;
-///         Ok(Outcome::done(()).next_state("degraded"))
-///     }
-/// }
-/// ```
-#[diagnostic::on_unimplemented(
-    message = "`{Self}` is not a command",
-    label = "cannot be declared in `commands`",
-    note = "implement `bb_core::Command` for it"
-)]
-pub trait Command: Sized + Send + 'static {
-    /// What `Name(…)` in `robot!` fills.
-    type Options: Options;
-    /// What its caller gives. One that a change of health starts gets the default.
-    type Arguments: Default + Send + 'static;
-    /// What it gives back.
-    type Output: Send + 'static;
+/// What a command has done since the start.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CommandStatistics {
+    /// Its name.
+    pub name: &'static str,
+    /// How often it was started.
+    pub started: u64,
+    /// How often it has succeeded.
+    pub succeeded: u64,
+    /// How often it has failed.
+    pub failed: u64,
+    /// How often it took too long.
+    pub timed_out: u64,
+    /// How often it was cancelled.
+    pub cancelled: u64,
+    /// How often it was refused.
+    pub refused: u64,
+    /// Why, the last time.
+    pub last_refusal: Option<Refusal>,
+}
 
-    /// Whether it arms or disarms the robot.
-    const ROLE: Role = Role::Plain;
+/// The arguments of a command, of its own type.
+pub(crate) type Arguments = Box<dyn Any + Send>;
 
-    /// Runs it.
-    ///
-    /// # Errors
-    /// Why it has failed; reported to the caller and on its topic.
-    fn run(
-        options: Self::Options,
-        arguments: Self::Arguments,
+/// A command with its options, whatever its type.
+pub(super) trait AnyCommand: Send + Sync {
+    fn role(&self) -> Role;
+    /// The parameters that its options are bound to.
+    fn bound_to(&self) -> &'static [usize];
+    /// `arguments` are its own, or none: the default. User code runs here.
+    fn start(
+        &self,
+        arguments: Option<Arguments>,
+        parameters: &ParameterValues,
         context: CommandContext,
-    ) -> impl Future<Output = Result<Outcome<Self::Output>, Fault>> + Send;
+    ) -> Result<RunningFuture, Fault>;
+    /// Whether its options would be valid with these parameters. User code runs here.
+    fn check(&self, parameters: &ParameterValues) -> Result<(), String>;
+    /// What its arguments and its result are made of.
+    fn shapes(&self) -> (Shape, Shape);
+    /// Its arguments from JSON; the default ones from an empty text.
+    fn arguments(&self, json: &str) -> Result<Arguments, Fault>;
+    /// Its result as JSON.
+    fn result_json(&self, result: Value) -> Result<String, Fault>;
 }
 
-/// What a command does to the robot's safety when it succeeds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Role {
-    /// Nothing.
-    #[default]
-    Plain,
-    /// The robot is armed.
-    Arming,
-    /// The robot is disarmed: all other commands are cancelled, and whoever owns hardware makes it safe.
-    Disarming,
+/// A command as `robot!` lists it.
+pub struct Prepared(pub(super) Box<dyn AnyCommand>);
+
+struct OfType<C: Command> {
+    /// Options may be sent, and need not be shared.
+    options: Mutex<C::Options>,
+    binding: Binding<C::Options>,
 }
 
-/// For commands without arguments.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NoArguments;
-
-/// How a command has ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[must_use]
-pub struct Outcome<T> {
-    pub(super) value: T,
-    pub(super) next_state: Option<&'static str>,
-}
-
-impl<T> Outcome<T> {
-    /// With that value; the robot goes back to the state it was in.
-    pub fn done(value: T) -> Self {
-        Self { value, next_state: None }
-    }
-
-    /// Names the state that follows: `idle` or a declared one. Another name fails the command.
-    pub fn next_state(mut self, state: &'static str) -> Self {
-        self.next_state = Some(state);
-        self
-    }
-
-    /// The value.
-    pub fn value(&self) -> &T {
-        &self.value
+impl Prepared {
+    /// The command `C` with its options.
+    pub fn new<C: Command>(options: &C::Options, binding: Binding<C::Options>) -> Self {
+        Self(Box::new(OfType::<C> { options: Mutex::new(options.clone()), binding }))
     }
 }
 
-/// What a running command is told, and what it may do.
-#[derive(Clone, Debug)]
-pub struct CommandContext {
-    pub(super) name: &'static str,
-    pub(super) health: Option<HealthTransition>,
-    pub(super) control: Control,
-}
-
-impl CommandContext {
-    /// The name it was declared under.
-    pub fn name(&self) -> &'static str {
-        self.name
-    }
-
-    /// The change of health that started it, if one did: estimator, reason, source, previous and new state.
-    pub fn health(&self) -> Option<&HealthTransition> {
-        self.health.as_ref()
-    }
-
-    /// The time now: when the robot's commands have gone on, the same for all of them.
-    pub fn now(&self) -> MonotonicTime {
-        self.control.moment()
-    }
-
-    /// Waits on the robot's clock.
-    pub fn sleep(&self, duration: Duration) -> Sleep {
-        let until = self.now() + duration;
-        Sleep { until, control: self.control.clone(), sleeper: self.control.sleeper(), alarm: None }
-    }
-
-    /// The operational state.
-    pub fn state(&self) -> &'static str {
-        self.control.state()
-    }
-
-    /// Topics and actuators, by path.
-    pub fn bus(&self) -> Bus {
-        Bus::new(self.control.clone())
-    }
-
-    /// The value of the parameter at `path`: `param/imu/beta`.
-    pub fn parameter(&self, path: &str) -> Option<ParameterValue> {
-        self.control.parameter_at(path)
-    }
-
-    /// Sets the parameter at `path`.
-    ///
-    /// # Errors
-    /// What was expected.
-    pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
-        self.control.set_parameter_at(path, value.into(), Setter::Command)
+impl<C: Command> OfType<C> {
+    fn bound(&self, parameters: &ParameterValues) -> Result<C::Options, String> {
+        // A copy of their own, so that no user code runs under the lock but their `clone`, which nobody else waits for.
+        let options = lock(&self.options).clone();
+        let bound = self.binding.bound(&options, parameters)?;
+        bound.validate()?;
+        Ok(bound)
     }
 }
 
-/// The future of [`CommandContext::sleep`].
-#[derive(Debug)]
-pub struct Sleep {
-    until: MonotonicTime,
-    control: Control,
-    sleeper: Sleeper,
-    alarm: Option<Alarm>,
-}
+impl<C: Command> AnyCommand for OfType<C> {
+    fn role(&self) -> Role {
+        C::ROLE
+    }
 
-impl Future for Sleep {
-    type Output = ();
+    fn bound_to(&self) -> &'static [usize] {
+        self.binding.parameters
+    }
 
-    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        if self.control.moment() >= self.until {
-            return Poll::Ready(());
+    fn start(
+        &self,
+        arguments: Option<Arguments>,
+        parameters: &ParameterValues,
+        context: CommandContext,
+    ) -> Result<RunningFuture, Fault> {
+        let arguments = match arguments.map(|arguments| arguments.downcast::<C::Arguments>()) {
+            None => C::Arguments::default(),
+            Some(Ok(arguments)) => *arguments,
+            Some(Err(_)) => return Err(Fault::new("these are not its arguments")),
+        };
+        let options = self.bound(parameters).map_err(Fault::new)?;
+        let run = C::run(options, arguments, context);
+        Ok(Box::pin(async move {
+            let Outcome { value, next_state } = run.await?;
+            Ok(Outcome { value: Box::new(value) as Value, next_state })
+        }))
+    }
+
+    fn check(&self, parameters: &ParameterValues) -> Result<(), String> {
+        self.bound(parameters).map(drop)
+    }
+
+    fn shapes(&self) -> (Shape, Shape) {
+        (C::Arguments::SHAPE, C::Output::SHAPE)
+    }
+
+    fn arguments(&self, json: &str) -> Result<Arguments, Fault> {
+        if json.trim().is_empty() {
+            return Ok(Box::new(C::Arguments::default()));
         }
-        self.alarm = Some(self.sleeper.wake_at(self.until, self.alarm, context.waker().clone()));
-        Poll::Pending
+        Ok(Box::new(from_json::<C::Arguments>(json)?))
+    }
+
+    fn result_json(&self, result: Value) -> Result<String, Fault> {
+        let result = result.downcast::<C::Output>().map_err(|_| Fault::new("its result has another type"))?;
+        Ok(to_json(&*result))
     }
 }
 
-impl Drop for Sleep {
-    fn drop(&mut self) {
-        if let Some(alarm) = self.alarm {
-            self.sleeper.forget(alarm);
-        }
-    }
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Arms the robot.
-#[derive(Debug)]
-pub struct Arm;
-
-impl Command for Arm {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-    const ROLE: Role = Role::Arming;
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        Ok(Outcome::done(()))
-    }
-}
-
-/// Disarms the robot.
-#[derive(Debug)]
-pub struct Disarm;
-
-impl Command for Disarm {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-    const ROLE: Role = Role::Disarming;
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        Ok(Outcome::done(()))
+impl fmt::Debug for Prepared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Prepared").field(&self.0.role()).finish()
     }
 }

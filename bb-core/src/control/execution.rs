@@ -1,11 +1,14 @@
 //! What the caller of a command holds.
 
-use super::tasks::{Signal, Value, lock};
+use super::system::WeakControl;
+use super::task::Value;
+use crate::component::AnyExecution;
+use crate::fault::Fault;
 use std::fmt;
 use std::future::Future;
 use std::marker::PhantomData;
 use std::pin::Pin;
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
@@ -23,15 +26,19 @@ pub enum CommandError {
     Failed(String),
     /// It took longer than its `timeout`.
     TimedOut,
-    /// It was cancelled: by its caller, by another command, or since the robot was disarmed or stopped.
+    /// It was cancelled: by its caller, by another command, or because the robot was disarmed or stopped.
     Cancelled,
 }
 
 /// Where the result is left.
 pub(super) struct Slot {
+    /// The number of the execution.
+    id: u64,
+    /// The number of the command.
+    command: usize,
+    control: WeakControl,
     state: Mutex<State>,
     changed: Condvar,
-    signal: Arc<Signal>,
 }
 
 #[derive(Default)]
@@ -43,7 +50,7 @@ struct State {
 }
 
 impl State {
-    /// The result; an error if somebody has taken it already.
+    /// The result; an error if it was taken already.
     fn take(&mut self) -> Option<Result<Value, CommandError>> {
         let taken = || Err(CommandError::Failed("its result was taken already".into()));
         self.has_ended.then(|| self.result.take().unwrap_or_else(taken))
@@ -51,22 +58,48 @@ impl State {
 }
 
 impl Slot {
-    pub(super) fn new(signal: Arc<Signal>) -> Self {
-        Self { state: Mutex::default(), changed: Condvar::new(), signal }
+    pub(super) fn new(id: u64, command: usize, control: WeakControl) -> Self {
+        Self { id, command, control, state: Mutex::default(), changed: Condvar::new() }
     }
 
-    pub(super) fn set(&self, result: Result<Value, CommandError>) {
+    /// Leaves the result; the waker of a task that awaits it, which is user code, and a result that came too late.
+    pub(super) fn set(&self, result: Result<Value, CommandError>) -> (Option<Waker>, Option<Value>) {
         let mut state = lock(&self.state);
         if state.has_ended {
-            return;
+            return (None, result.ok());
         }
-        (state.result, state.has_ended) = (Some(result), true);
+        state.result = Some(result);
+        state.has_ended = true;
         let waker = state.waker.take();
         drop(state);
         self.changed.notify_all();
-        if let Some(waker) = waker {
-            crate::run::wake(waker);
+        (waker, None)
+    }
+
+    fn wait_timeout(&self, timeout: Duration) -> Option<Result<Value, CommandError>> {
+        let deadline = Instant::now().checked_add(timeout);
+        let mut state = lock(&self.state);
+        loop {
+            if let Some(result) = state.take() {
+                return Some(result);
+            }
+            let left = match deadline {
+                Some(deadline) => deadline.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())?,
+                None => Duration::MAX,
+            };
+            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
+    }
+
+    fn cancel(&self) {
+        if let Some(control) = self.control.upgrade() {
+            control.cancel(self.id);
+        }
+    }
+
+    fn json(&self, result: Result<Value, CommandError>) -> Result<String, Fault> {
+        let control = self.control.upgrade().ok_or_else(|| Fault::new("the robot is gone"))?;
+        control.result_json(self.command, result?)
     }
 }
 
@@ -75,9 +108,10 @@ impl<T: 'static> Execution<T> {
         Self { slot, result: PhantomData }
     }
 
-    /// The result, if it has come to an end and nobody has taken it yet.
+    /// The result, if the command has ended and nobody has taken it yet.
     pub fn try_result(&self) -> Option<Result<T, CommandError>> {
-        lock(&self.slot.state).result.take().map(typed)
+        let result = lock(&self.slot.state).result.take();
+        result.map(typed)
     }
 
     /// Waits for the result. On virtual time nobody moves the clock meanwhile: run the simulation and use
@@ -86,34 +120,22 @@ impl<T: 'static> Execution<T> {
     /// # Errors
     /// Why there is none.
     pub fn wait(self) -> Result<T, CommandError> {
-        let mut state = lock(&self.slot.state);
         loop {
-            if let Some(result) = state.take() {
+            if let Some(result) = self.slot.wait_timeout(Duration::MAX) {
                 return typed(result);
             }
-            state = self.slot.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
     /// Waits for the result, `timeout` at most; none after that.
     pub fn wait_timeout(&self, timeout: Duration) -> Option<Result<T, CommandError>> {
-        let deadline = Instant::now().checked_add(timeout);
-        let mut state = lock(&self.slot.state);
-        loop {
-            if let Some(result) = state.take() {
-                return Some(typed(result));
-            }
-            let left = match deadline {
-                Some(deadline) => deadline.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())?,
-                None => Duration::MAX,
-            };
-            state = self.slot.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
-        }
+        self.slot.wait_timeout(timeout).map(typed)
     }
 
-    /// Cancels it.
+    /// Cancels it. Its result is [`CommandError::Cancelled`] at once, and from now on its handles refuse to act; its future is
+    /// dropped as soon as its code gives way.
     pub fn cancel(&self) {
-        self.slot.signal.cancel();
+        self.slot.cancel();
     }
 }
 
@@ -126,15 +148,44 @@ impl<T: 'static> Future for Execution<T> {
     type Output = Result<T, CommandError>;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        // Cloning and dropping wakers is user code: not under the lock.
+        let waker = context.waker().clone();
         let mut state = lock(&self.slot.state);
         match state.take() {
-            Some(result) => Poll::Ready(typed(result)),
+            Some(result) => {
+                drop(state);
+                Poll::Ready(typed(result))
+            }
             None => {
-                state.waker = Some(context.waker().clone());
+                let previous = state.waker.replace(waker);
+                drop(state);
+                drop(previous);
                 Poll::Pending
             }
         }
     }
+}
+
+/// An execution whose caller does not know its types.
+pub(super) struct UntypedExecution(pub(super) Arc<Slot>);
+
+impl AnyExecution for UntypedExecution {
+    fn try_result(&self) -> Option<Result<String, Fault>> {
+        let result = lock(&self.0.state).result.take();
+        result.map(|result| self.0.json(result))
+    }
+
+    fn wait_timeout(&self, timeout: Duration) -> Option<Result<String, Fault>> {
+        self.0.wait_timeout(timeout).map(|result| self.0.json(result))
+    }
+
+    fn cancel(&self) {
+        self.0.cancel();
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<T> fmt::Debug for Execution<T> {

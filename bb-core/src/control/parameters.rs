@@ -1,314 +1,130 @@
-//! Values that may be changed while the robot runs.
+//! Parameters: what is set, what refuses it, who is told.
 
-use crate::Payload;
-use crate::component::{Options, Range};
-use std::fmt;
+use super::system::{Bound, Control};
+use crate::component::Permit;
+use crate::declaration::{ParameterError, ParameterValues};
+use crate::event::{ParameterChange, ParameterValue};
+use crate::journal::Event;
+use crate::node::{BindTarget, Check, NodeEntry};
 use std::sync::Arc;
-use std::time::Duration;
 
-/// A parameter as declared.
-#[derive(Clone, Copy, Debug)]
-pub struct ParameterDeclaration {
-    /// Its path: `param/imu/beta`.
-    pub path: &'static str,
-    /// Its doc comment.
-    pub doc: &'static str,
-    /// Its value at the start, in SI.
-    pub default: ParameterDefault,
-    /// The numbers accepted, in SI.
-    pub range: Option<Range>,
-    /// The unit it was declared with.
-    pub unit: &'static str,
-}
-
-/// The declared value of a parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ParameterDefault {
-    /// `bool`
-    Bool(bool),
-    /// `i64`
-    Integer(i64),
-    /// `f64`
-    Float(f64),
-    /// `String`
-    Text(&'static str),
-}
-
-/// The value of a parameter.
-#[derive(Clone, Debug, PartialEq, Payload)]
-pub enum ParameterValue {
-    /// `bool`
-    Bool(bool),
-    /// `i64`
-    Integer(i64),
-    /// `f64`, in SI
-    Float(f64),
-    /// `String`
-    Text(String),
-}
-
-impl From<ParameterDefault> for ParameterValue {
-    fn from(default: ParameterDefault) -> Self {
-        match default {
-            ParameterDefault::Bool(value) => Self::Bool(value),
-            ParameterDefault::Integer(value) => Self::Integer(value),
-            ParameterDefault::Float(value) => Self::Float(value),
-            ParameterDefault::Text(value) => Self::Text(value.to_owned()),
-        }
+impl Control {
+    pub(crate) fn parameters(&self) -> ParameterValues {
+        self.lock().parameters.clone()
     }
-}
 
-impl ParameterValue {
-    /// Its type as written in `parameters`.
-    pub fn type_name(&self) -> &'static str {
-        match self {
-            Self::Bool(_) => "bool",
-            Self::Integer(_) => "i64",
-            Self::Float(_) => "f64",
-            Self::Text(_) => "String",
-        }
+    pub(crate) fn parameter_at(&self, path: &str) -> Option<ParameterValue> {
+        let number = self.0.declared.parameters.iter().position(|parameter| parameter.path == path)?;
+        self.parameters().all().get(number).cloned()
     }
-}
 
-impl fmt::Display for ParameterValue {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Bool(value) => value.fmt(f),
-            Self::Integer(value) => value.fmt(f),
-            Self::Float(value) => write!(f, "{value:?}"),
-            Self::Text(value) => write!(f, "{value:?}"),
+    pub(crate) fn set_parameter_at(
+        &self,
+        path: &str,
+        value: ParameterValue,
+        permit: &Permit,
+    ) -> Result<(), ParameterError> {
+        if let Some(number) = self.0.declared.parameters.iter().position(|parameter| parameter.path == path) {
+            return self.set_parameter(number, value, permit);
         }
+        let near = crate::message::nearest::nearest_path(
+            path,
+            self.0.declared.parameters.iter().map(|parameter| parameter.path),
+        );
+        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        Err(ParameterError { path: path.to_owned(), message: format!("no such parameter is declared{hint}") })
     }
-}
 
-/// What a parameter may be.
-pub trait ParameterType: Sized + Clone + Send + Sync + 'static {
-    /// The value, if it is of this type.
-    fn from_value(value: &ParameterValue) -> Option<Self>;
-    /// As a value.
-    fn into_value(self) -> ParameterValue;
-    /// What stands in for a parameter that does not exist.
-    #[doc(hidden)]
-    fn none() -> Self;
-}
-
-macro_rules! parameter_type {
-    ($($kind:ty, $variant:ident, $none:expr;)*) => { $(
-        impl ParameterType for $kind {
-            fn from_value(value: &ParameterValue) -> Option<Self> {
-                match value {
-                    ParameterValue::$variant(value) => Some(value.clone()),
-                    _ => None,
+    /// Sets a parameter, unless it or the options of a component bound to it would be out of range.
+    pub(crate) fn set_parameter(
+        &self,
+        number: usize,
+        value: ParameterValue,
+        permit: &Permit,
+    ) -> Result<(), ParameterError> {
+        let Some(declared) = self.0.declared.parameters.get(number) else { return Ok(()) };
+        declared.check(&value)?;
+        let refuse = |message: String| ParameterError { path: declared.path.to_owned(), message };
+        // Whether options would be valid is user code, so it is asked without the lock; again if another parameter was set
+        // meanwhile.
+        loop {
+            let (values, version, checks) = {
+                let state = self.lock();
+                let bound = state.bound.iter().filter(|component| component.parameters.contains(&number));
+                let checks: Vec<_> =
+                    bound.map(|component| (component.path, Arc::clone(&component.check))).collect();
+                (state.parameters.clone(), state.version, checks)
+            };
+            let Some((values, from)) = values.with(number, value.clone()) else { return Ok(()) };
+            for (path, check) in &checks {
+                check(&values).map_err(|message| refuse(format!("{path} would refuse it: {message}")))?;
+            }
+            let mut step = self.step();
+            if !permit.is_valid() {
+                return Err(refuse("the command that sets it has ended or was cancelled".to_owned()));
+            }
+            if step.state.version != version {
+                continue;
+            }
+            step.line(Event::Parameter { parameter: number, value: value.clone() });
+            step.state.version += 1;
+            step.state.parameters = values.clone();
+            let mut estimators = Vec::new();
+            for component in step.state.bound.iter().filter(|component| component.parameters.contains(&number)) {
+                match &component.target {
+                    BindTarget::Estimator(estimator) => estimators.push(*estimator),
+                    BindTarget::Other(tell) => tell(),
+                    BindTarget::Nobody => {}
                 }
             }
-            fn into_value(self) -> ParameterValue {
-                ParameterValue::$variant(self)
+            for estimator in estimators {
+                step.post(estimator, NodeEntry::Options(values.clone()));
             }
-            fn none() -> Self {
-                $none
+            if let Some(topic) = self.0.topics.parameters.get(number) {
+                step.publish(topic, ParameterChange { path: declared.path, from, to: value.clone() }, step.now);
             }
+            step.finish();
+            return Ok(());
         }
+    }
 
-        impl From<$kind> for ParameterValue {
-            fn from(value: $kind) -> Self {
-                Self::$variant(value)
-            }
-        }
-    )* };
-}
-
-parameter_type! {
-    bool, Bool, false;
-    i64, Integer, 0;
-    f64, Float, 0.0;
-    String, Text, String::new();
-}
-
-impl ParameterDeclaration {
-    /// Checks a new value; the error says what was expected.
-    pub(crate) fn check(&self, value: &ParameterValue) -> Result<(), ParameterError> {
-        let refuse = |message: String| Err(ParameterError { path: self.path.to_owned(), message });
-        let expected = ParameterValue::from(self.default).type_name();
-        if expected != value.type_name() {
-            return refuse(format!("expected a value of type `{expected}`, found `{value}`"));
-        }
-        if let ParameterValue::Float(value) = value
-            && !value.is_finite()
+    /// In a replay: a parameter was set. Those whose options are bound to it are told by lines of their own.
+    pub(crate) fn replay_parameter(&self, number: usize, value: ParameterValue) {
+        let mut step = self.step();
+        let Some((values, from)) = step.state.parameters.with(number, value.clone()) else { return };
+        step.state.parameters = values;
+        if let (Some(topic), Some(declared)) =
+            (self.0.topics.parameters.get(number), self.0.declared.parameters.get(number))
         {
-            return refuse(format!("expected a finite number, found `{value}`"));
+            step.publish(topic, ParameterChange { path: declared.path, from, to: value }, step.now);
         }
-        let Some(range) = self.range else { return Ok(()) };
-        let is_inside = match value {
-            ParameterValue::Float(value) => (range.start..=range.end).contains(value),
-            // As integers: a large one would be rounded to a float inside.
-            ParameterValue::Integer(value) => {
-                (range.start.ceil() as i128..=range.end.floor() as i128).contains(&i128::from(*value))
+        step.finish();
+    }
+
+    /// Remembers that the options of a component are bound to parameters.
+    pub(super) fn bind_to(
+        &self,
+        path: &'static str,
+        parameters: &'static [usize],
+        check: Arc<Check>,
+        target: BindTarget,
+    ) {
+        self.lock().bound.push(Bound { path, parameters, check, target });
+    }
+
+    /// Commands take their options when they start, so that they need not be told.
+    pub(super) fn bind_commands(&self) {
+        for (number, command) in self.0.declared.commands.iter().enumerate() {
+            let bound = self.0.commands.get(number).map_or(&[][..], |command| command.0.bound_to());
+            if bound.is_empty() {
+                continue;
             }
-            ParameterValue::Bool(_) | ParameterValue::Text(_) => true,
-        };
-        if is_inside { Ok(()) } else { refuse(format!("expected a number in {}, found `{value}`", range.text)) }
-    }
-}
-
-/// The values of all parameters at one time.
-#[derive(Clone, Debug)]
-pub struct ParameterValues(pub(super) Arc<[ParameterValue]>);
-
-impl ParameterValues {
-    pub(crate) fn new(values: Vec<ParameterValue>) -> Self {
-        Self(values.into())
-    }
-
-    /// The value of the parameter of that number.
-    pub fn get<T: ParameterType>(&self, number: usize) -> T {
-        self.0.get(number).and_then(T::from_value).unwrap_or_else(T::none)
-    }
-}
-
-/// Which parameters the options of a component are bound to.
-#[derive(Debug)]
-pub struct Binding<O> {
-    /// Puts their values into the options.
-    pub apply: fn(&mut O, &ParameterValues),
-    /// Their numbers.
-    pub parameters: &'static [usize],
-}
-
-impl<O> Clone for Binding<O> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<O> Copy for Binding<O> {}
-
-impl<O: Options> Binding<O> {
-    /// To none.
-    pub const NONE: Self = Self { apply: |_, _| {}, parameters: &[] };
-
-    /// The options with the values put in, validated.
-    pub(crate) fn bound(&self, options: &O, values: &ParameterValues) -> Result<O, String> {
-        let mut options = options.clone();
-        (self.apply)(&mut options, values);
-        options.validate()?;
-        Ok(options)
-    }
-}
-
-/// What an option may be that is bound to a parameter of type `T`.
-#[diagnostic::on_unimplemented(
-    message = "an option of type `{Self}` cannot be bound to a parameter of type `{T}`",
-    label = "is a parameter of type `{T}`"
-)]
-pub trait FromParameter<T> {
-    /// The option's value.
-    fn from_parameter(value: T) -> Self;
-}
-
-macro_rules! from_parameter {
-    ($($parameter:ty => $($option:ty: |$value:ident| $make:expr),+;)*) => { $($(
-        impl FromParameter<$parameter> for $option {
-            fn from_parameter($value: $parameter) -> Self {
-                $make
-            }
+            let control = self.downgrade();
+            let check: Check = Box::new(move |values: &ParameterValues| {
+                let Some(control) = control.upgrade() else { return Ok(()) };
+                control.0.commands.get(number).map_or(Ok(()), |command| command.0.check(values))
+            });
+            self.bind_to(command.path, bound, Arc::new(check), BindTarget::Nobody);
         }
-    )+)* };
-}
-
-from_parameter! {
-    bool => bool: |value| value;
-    f64 => f64: |value| value, f32: |value| (value as f32).clamp(f32::MIN, f32::MAX), Duration: |value| crate::component::FromQuantity::from_quantity(value);
-    // Beyond the option's own range the nearest number: what is out of the range that it states is refused.
-    i64 => i64: |value| value,
-        i32: |value| clamped(value),
-        i16: |value| clamped(value),
-        i8: |value| clamped(value),
-        u64: |value| clamped(value),
-        u32: |value| clamped(value),
-        u16: |value| clamped(value),
-        u8: |value| clamped(value),
-        usize: |value| clamped(value);
-    String => String: |value| value, std::path::PathBuf: |value| value.into();
-}
-
-impl<T, O: FromParameter<T>> FromParameter<T> for Option<O> {
-    fn from_parameter(value: T) -> Self {
-        Some(O::from_parameter(value))
-    }
-}
-
-fn clamped<I: TryFrom<i64> + Bounded>(value: i64) -> I {
-    I::try_from(value).unwrap_or(if value < 0 { I::LEAST } else { I::MOST })
-}
-
-trait Bounded: Sized {
-    const LEAST: Self;
-    const MOST: Self;
-}
-
-macro_rules! bounded {
-    ($($kind:ty),*) => { $(impl Bounded for $kind {
-        const LEAST: Self = <$kind>::MIN;
-        const MOST: Self = <$kind>::MAX;
-    })* };
-}
-
-bounded!(i8, i16, i32, u8, u16, u32, u64, usize);
-
-/// Why a parameter was not set.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ParameterError {
-    /// Its path.
-    pub path: String,
-    /// What was expected.
-    pub message: String,
-}
-
-impl fmt::Display for ParameterError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} is not set: {}", self.path, self.message)
-    }
-}
-
-impl std::error::Error for ParameterError {}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const BETA: ParameterDeclaration = ParameterDeclaration {
-        path: "param/imu/beta",
-        doc: "",
-        default: ParameterDefault::Float(0.1),
-        range: Some(Range { start: 0.0, end: 1.0, text: "0.0..=1.0" }),
-        unit: "",
-    };
-
-    #[test]
-    fn a_refused_value_says_what_was_expected() {
-        let refused = |value: ParameterValue| BETA.check(&value).expect_err("it is refused").to_string();
-        assert_eq!(refused(3.0.into()), "param/imu/beta is not set: expected a number in 0.0..=1.0, found `3.0`");
-        assert_eq!(refused(f64::NAN.into()), "param/imu/beta is not set: expected a finite number, found `NaN`");
-        assert_eq!(refused(true.into()), "param/imu/beta is not set: expected a value of type `f64`, found `true`");
-        assert_eq!(BETA.check(&1.0.into()), Ok(()));
-    }
-
-    #[test]
-    fn the_largest_integers_are_not_rounded_into_their_range() {
-        let (start, end) = (-9_007_199_254_740_992.0, 9_007_199_254_740_992.0);
-        let default = ParameterDefault::Integer(0);
-        let count = ParameterDeclaration { default, range: Some(Range { start, end, text: "" }), ..BETA };
-        let accepts = |value: i64| count.check(&value.into()).is_ok();
-        assert!(accepts(1 << 53) && accepts(-(1 << 53)));
-        assert!(!accepts((1 << 53) + 1) && !accepts(-(1 << 53) - 1));
-        assert!(!accepts(i64::MAX) && !accepts(i64::MIN));
-        assert_eq!(<f32 as FromParameter<f64>>::from_parameter(-1e300), f32::MIN);
-    }
-
-    #[test]
-    fn integers_become_the_nearest_of_their_option() {
-        let option = |value| <u8 as FromParameter<i64>>::from_parameter(value);
-        assert_eq!([option(7), option(-1), option(i64::MAX)], [7, 0, 255]);
-        assert_eq!(<Option<Duration>>::from_parameter(0.25), Some(Duration::from_millis(250)));
     }
 }

@@ -1,312 +1,404 @@
-//! The state of the robot as a whole: safety, operational state, commands that run, parameters.
-//!
-//! Whoever needs something done says so from any thread and goes on: a change of health leaves its command in a list.
-//! `Control::drive` does what is to be done, on the thread that drives commands (in a simulation, the caller's).
+//! The control state, and how it is entered.
 
-mod arming;
-mod changes;
-mod commands;
-mod parameters;
-
-use self::changes::Change;
-pub(crate) use self::parameters::Setter;
-use super::commands::CommandStatistics;
-use super::event::{CommandEvent, ParameterChange, SafetyTransition, StateTransition};
-use super::parameters::{ParameterDeclaration, ParameterValues};
-use super::safety::{Hooks, SafetyError};
-use super::state::Machine;
-use super::tasks::{Bell, Sleeper, Task, lock};
-use super::{CategoryDeclaration, CommandDeclaration, Prepared};
-use crate::journal::{Event, Journal, JournalLine};
-use crate::message::{Origin, Stamp};
-use crate::node::HealthTransition;
-use crate::pubsub::{AnyTopic, Registry, Topic};
-use crate::run::Directory;
+use super::budgets::Budgets;
+use super::command::{CommandStatistics, Prepared};
+use super::effects::Reporter;
+use super::execution::Slot;
+use super::hooks::Hooks;
+use super::machine::Machine;
+use super::task::{Task, Value};
+use super::topics::SystemTopics;
+use crate::component::{DisarmHook, Host, Permit};
+use crate::declaration::{
+    CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, ParameterValues, Supervisor,
+};
+use crate::event::{CategoryDeclaration, ComponentFault, HealthState, HealthTransition, Safety, SafetyError};
+use crate::fault::Fault;
+use crate::journal::Journal;
+use crate::lifecycle::Supervision;
+use crate::message::Origin;
+use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
+use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
+use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
-use std::cell::Cell;
-use std::collections::VecDeque;
+use crate::topology::Topology;
+use std::collections::{HashMap, VecDeque};
 use std::fmt;
-use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::time::{Duration, Instant};
 
 /// What `robot!` declares of all this.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Declared {
+    pub(crate) topology: &'static Topology,
     pub(crate) states: &'static [&'static str],
     pub(crate) categories: &'static [CategoryDeclaration],
     pub(crate) commands: &'static [CommandDeclaration],
     pub(crate) parameters: &'static [ParameterDeclaration],
+    pub(crate) estimators: &'static [EstimatorDeclaration],
 }
 
-/// The topics that every robot has.
-#[derive(Debug)]
-pub struct SystemTopics {
-    pub(crate) state: Topic<StateTransition>,
-    pub(crate) safety: Topic<SafetyTransition>,
-    pub(crate) safety_error: Topic<SafetyError>,
-    pub(crate) health: Topic<HealthTransition>,
-    pub(crate) journal: Topic<JournalLine>,
-    pub(crate) commands: Box<[Topic<CommandEvent>]>,
-    pub(crate) parameters: Box<[Topic<ParameterChange>]>,
-    /// Topics made at run time.
-    pub(crate) registry: Registry,
-}
-
-impl SystemTopics {
-    pub(crate) fn new(declared: Declared) -> Self {
-        Self {
-            state: Topic::new("state_machine"),
-            safety: Topic::new("safety"),
-            safety_error: Topic::new("safety/error"),
-            health: Topic::new("health"),
-            journal: Topic::new("journal"),
-            commands: declared.commands.iter().map(|command| Topic::new(command.path)).collect(),
-            parameters: declared.parameters.iter().map(|parameter| Topic::new(parameter.path)).collect(),
-            registry: Registry::default(),
-        }
-    }
-
-    pub(crate) fn all(&self) -> Vec<&dyn AnyTopic> {
-        let fixed: [&dyn AnyTopic; 5] =
-            [&self.state, &self.safety, &self.safety_error, &self.health, &self.journal];
-        let commands = self.commands.iter().map(|topic| topic as &dyn AnyTopic);
-        fixed
-            .into_iter()
-            .chain(commands)
-            .chain(self.parameters.iter().map(|topic| topic as &dyn AnyTopic))
-            .collect()
-    }
+/// What [`Control::new`] takes.
+pub(crate) struct Parts {
+    pub(crate) declared: Declared,
+    pub(crate) mode: Mode,
+    pub(crate) topics: Arc<SystemTopics>,
+    pub(crate) clock: Clock,
+    pub(crate) origin: Origin,
+    pub(crate) commands: Vec<Prepared>,
+    pub(crate) parameters: ParameterValues,
+    pub(crate) supervision: Supervision,
+    pub(crate) nodes: Box<[SharedNode]>,
+    pub(crate) journal: Option<Journal>,
+    pub(crate) telemetry: Option<Telemetry>,
 }
 
 /// The robot as a whole. Clones are the same one.
 #[derive(Clone)]
-pub(crate) struct Control(Arc<Inner>);
+pub(crate) struct Control(pub(super) Arc<Inner>);
 
-struct Inner {
-    declared: Declared,
-    topics: Arc<SystemTopics>,
-    clock: Clock,
-    origin: Origin,
-    commands: Box<[Prepared]>,
-    state: Mutex<State>,
-    parameters: Mutex<ParameterValues>,
-    bound: Mutex<Vec<Bound>>,
-    hooks: Mutex<Hooks>,
-    sleeper: Sleeper,
-    bell: Bell,
-    /// Whether `State::waiting` holds anything.
-    has_waiting: AtomicBool,
-    /// Where topics and actuators are, once they are made.
-    directory: OnceLock<Arc<dyn Directory>>,
-    /// When commands go on: their time, so that a replay of them is the same.
-    moment_nanos: AtomicI64,
-    journal: Option<Journal>,
-    /// See [`Control::act`].
-    acting: Mutex<()>,
-    /// What making hardware safe answers in a replay.
-    replayed_answer: Mutex<Option<Vec<SafetyError>>>,
+pub(super) struct Inner {
+    pub(super) declared: Declared,
+    pub(super) mode: Mode,
+    pub(super) topics: Arc<SystemTopics>,
+    pub(super) clock: Clock,
+    pub(super) origin: Origin,
+    pub(super) commands: Box<[Prepared]>,
+    pub(super) nodes: Box<[SharedNode]>,
+    pub(super) journal: Option<Journal>,
+    pub(super) telemetry: Option<Telemetry>,
+    pub(super) state: Mutex<State>,
+    /// Told of every entry: for those who wait for the robot to be disarmed, or for commands to be gone.
+    pub(super) changed: Condvar,
+    /// The safety state, for actuators, which ask before every command.
+    pub(super) safety: AtomicU8,
+    pub(super) bell: Bell,
+    pub(super) sleeper: Sleeper,
+    /// When estimators are lost unless a run has been completed.
+    pub(super) watch: Deadlines<usize>,
+    pub(super) limits: Deadlines<Limit>,
+    pub(super) pool: Pool,
+    pub(super) reporter: Reporter,
+    /// Commands to be polled, on virtual time.
+    pub(super) ready: Mutex<VecDeque<Arc<Task>>>,
+    /// Disarm callbacks to be run by the loop of a simulation.
+    pub(super) pending_hooks: Mutex<VecDeque<Vec<(&'static str, DisarmHook)>>>,
+    /// What islands reported in a replay, until the journal says that it was taken note of.
+    pub(super) reports: Mutex<HashMap<usize, VecDeque<Report>>>,
+    pub(super) faults: Mutex<Faults>,
+    /// A sensor or a service was told something, on virtual time.
+    pub(super) has_orders: AtomicBool,
+    /// Tells sensors and services to stop.
+    pub(super) stop: StopSignal,
+    pub(super) islands: OnceLock<Box<dyn Islands>>,
+    pub(super) host: OnceLock<Arc<dyn Host>>,
 }
 
-struct State {
-    machine: Machine,
-    tasks: Vec<Arc<Task>>,
-    waiting: VecDeque<Waiting>,
-    statistics: Vec<CommandStatistics>,
-    next_id: u64,
-    is_stopping: bool,
-    /// What is to be published, in the order in which it happened.
-    changes: VecDeque<(MonotonicTime, Change)>,
-    /// Somebody publishes it.
-    is_told: bool,
+/// Where entries for estimators go.
+pub(crate) trait Islands: Send + Sync {
+    /// Adds an entry. What is returned is dropped without the lock: it may be the last owner of the wiring.
+    fn post(&self, estimator: usize, now: MonotonicTime, entry: NodeEntry) -> Option<Wired>;
 }
 
-/// What was left to do.
-enum Waiting {
-    Start(HealthTransition, usize),
-    GiveUp(&'static str),
+/// Keeps a robot's wiring alive.
+pub(crate) type Wired = Arc<dyn std::any::Any + Send + Sync>;
+
+/// A time limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Limit {
+    /// The `timeout` of an execution.
+    Execution(u64),
+    /// How long an arming command waits for cancelled ones.
+    Arming,
+    /// How long disarm callbacks may take.
+    Disarming(u64),
 }
 
-/// Changes of health that wait for their commands; beyond it the oldest is refused. (That a component is given up is never
-/// lost.)
-const MAX_WAITING: usize = 1024;
+pub(super) struct State {
+    pub(super) machine: Machine,
+    pub(super) executions: Vec<RunningCommand>,
+    pub(super) statistics: Vec<CommandStatistics>,
+    pub(super) next_id: u64,
+    pub(super) parameters: ParameterValues,
+    /// How often parameters were set.
+    pub(super) version: u64,
+    pub(super) bound: Vec<Bound>,
+    pub(super) hooks: Hooks,
+    pub(super) budgets: Budgets,
+    pub(super) health: Vec<Health>,
+    pub(super) components: Vec<Supervised>,
+    pub(super) disarming: Option<Disarming>,
+    pub(super) last_disarm_was_safe: bool,
+    /// How often the robot was disarmed.
+    pub(super) generation: u64,
+    pub(super) is_stopping: bool,
+}
+
+/// An execution of a command.
+pub(super) struct RunningCommand {
+    pub(super) id: u64,
+    /// The number of the command.
+    pub(super) command: usize,
+    pub(super) health: Option<HealthTransition>,
+    pub(super) slot: Arc<Slot>,
+    pub(super) permit: Permit,
+    /// None in a replay.
+    pub(super) task: Option<Arc<Task>>,
+    pub(super) phase: Phase,
+}
+
+/// How far an execution is.
+pub(super) enum Phase {
+    Running,
+    /// Its code has succeeded; the robot is being disarmed by it.
+    Disarming(Option<Value>, Option<&'static str>),
+    /// Its code has succeeded; it arms the robot once cancelled commands are gone.
+    Arming(Option<Value>, Option<&'static str>),
+    /// It was cancelled or has timed out, and its code has not returned yet.
+    Lingering,
+}
+
+/// The health of an estimator as it was published, and how often it was lost.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Health {
+    pub(super) state: HealthState,
+    pub(super) epoch: u32,
+}
 
 /// A component whose options are bound to parameters.
-struct Bound {
-    path: &'static str,
-    parameters: &'static [usize],
-    check: Check,
-    notify: Box<dyn Fn() + Send>,
+pub(super) struct Bound {
+    pub(super) path: &'static str,
+    pub(super) parameters: &'static [usize],
+    pub(super) check: Arc<Check>,
+    pub(super) target: BindTarget,
 }
 
-/// Whether options would be valid with these parameters.
-type Check = Box<dyn Fn(&ParameterValues) -> Result<(), String> + Send>;
+/// A sensor, a service or an actuator that a supervisor looks after.
+pub(super) struct Supervised {
+    pub(super) path: &'static str,
+    pub(super) supervisor: Supervisor,
+    pub(super) order: Box<dyn Fn(ComponentOrder) + Send + Sync>,
+}
+
+/// What a supervisor tells a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ComponentOrder {
+    /// Restart.
+    Restart,
+    /// Stay stopped.
+    GiveUp,
+}
+
+/// The robot is being disarmed.
+pub(super) struct Disarming {
+    pub(super) generation: u64,
+    pub(super) force: bool,
+    /// It ends in `error`, whatever the callbacks say.
+    pub(super) to_error: bool,
+    /// The line of the journal that implies that the callbacks succeed, see [`Step::is_disarmed_at_once`](super::step::Step).
+    pub(super) at_once: Option<u64>,
+    /// The execution that disarms it.
+    pub(super) by: Option<u64>,
+    /// Callbacks that have not returned.
+    pub(super) left: Vec<(usize, &'static str)>,
+    pub(super) errors: Vec<SafetyError>,
+}
+
+/// The newest faults, and how many there were.
+#[derive(Default)]
+pub(super) struct Faults {
+    pub(super) newest: VecDeque<ComponentFault>,
+    pub(super) count: u64,
+}
+
+/// Faults that are kept; of earlier ones only the number is.
+pub(super) const KEPT_FAULTS: usize = 256;
 
 impl Control {
-    pub(crate) fn new(
-        declared: Declared,
-        topics: Arc<SystemTopics>,
-        clock: Clock,
-        origin: Origin,
-        commands: Vec<Prepared>,
-        parameters: ParameterValues,
-        journal: Option<Journal>,
-    ) -> Self {
+    pub(crate) fn new(parts: Parts) -> Self {
+        let Parts { declared, mode, topics, clock, origin, commands, parameters, supervision, .. } = parts;
         let statistics =
             |command: &CommandDeclaration| CommandStatistics { name: command.name, ..Default::default() };
         let state = State {
             machine: Machine::default(),
-            tasks: Vec::new(),
-            waiting: VecDeque::new(),
+            executions: Vec::new(),
             statistics: declared.commands.iter().map(statistics).collect(),
             next_id: 1,
+            parameters,
+            version: 0,
+            bound: Vec::new(),
+            hooks: Hooks::default(),
+            budgets: Budgets::new(declared.topology, supervision),
+            health: vec![Health::default(); declared.estimators.len()],
+            components: Vec::new(),
+            disarming: None,
+            last_disarm_was_safe: true,
+            generation: 0,
             is_stopping: false,
-            changes: VecDeque::new(),
-            is_told: false,
         };
+        let bell = Bell::default();
+        let alarm = bell.clone();
         let control = Self(Arc::new(Inner {
             declared,
+            mode,
             topics,
             clock,
             origin,
             commands: commands.into(),
+            nodes: parts.nodes,
+            journal: parts.journal,
+            telemetry: parts.telemetry,
             state: Mutex::new(state),
-            parameters: Mutex::new(parameters),
-            bound: Mutex::default(),
-            hooks: Mutex::default(),
-            sleeper: Sleeper::default(),
-            bell: Bell::default(),
-            has_waiting: AtomicBool::new(false),
-            directory: OnceLock::new(),
-            moment_nanos: AtomicI64::new(0),
-            journal,
-            acting: Mutex::new(()),
-            replayed_answer: Mutex::default(),
+            changed: Condvar::new(),
+            safety: AtomicU8::new(Safety::Disarmed as u8),
+            sleeper: Sleeper::new(bell.clone()),
+            watch: Deadlines::new(bell.clone()),
+            limits: Deadlines::new(bell.clone()),
+            pool: Pool::new(move || alarm.ring()),
+            bell,
+            reporter: Reporter::default(),
+            ready: Mutex::default(),
+            pending_hooks: Mutex::default(),
+            reports: Mutex::default(),
+            faults: Mutex::default(),
+            has_orders: AtomicBool::new(false),
+            stop: StopSignal::default(),
+            islands: OnceLock::new(),
+            host: OnceLock::new(),
         }));
-        for (number, command) in declared.commands.iter().enumerate() {
-            let used = control.clone_weakly();
-            let check = move |values: &ParameterValues| match used.upgrade() {
-                Some(inner) => inner.commands.get(number).map_or(Ok(()), |command| command.0.check(values)),
-                None => Ok(()),
-            };
-            let bound = control.0.commands.get(number).map_or(&[][..], |command| command.0.bound_to());
-            // A command takes its options when it starts, so that nobody has to be told.
-            control.bind(command.path, bound, check, || {});
-        }
+        control.bind_commands();
         control
     }
 
-    fn clone_weakly(&self) -> std::sync::Weak<Inner> {
-        Arc::downgrade(&self.0)
-    }
-
-    pub(crate) fn health_changed(&self, transition: HealthTransition, command: Option<usize>) {
-        let HealthTransition { estimator, source, from, to, reason, time } = transition;
-        tracing::info!(estimator, source, %from, %to, %reason, %time, "health changed");
-        self.publish(&self.0.topics.health, transition, time);
-        if let Some(command) = command {
-            self.leave(Waiting::Start(transition, command));
-        }
-    }
-
-    fn leave(&self, waiting: Waiting) {
-        let mut state = lock(&self.0.state);
-        let oldest = state.waiting.iter().position(|waiting| matches!(waiting, Waiting::Start(..)));
-        if state.waiting.len() >= MAX_WAITING
-            && let Some(Waiting::Start(health, command)) = oldest.and_then(|oldest| state.waiting.remove(oldest))
-        {
-            self.refuse_waiting(&mut state, command, health, health.time);
-        }
-        state.waiting.push_back(waiting);
-        self.0.has_waiting.store(true, Ordering::Release);
-        drop(state);
-        self.tell();
-        self.0.bell.ring();
-    }
-
-    /// Writes into the journal, if there is one.
-    fn write(&self, now: MonotonicTime, event: Event) {
-        if let Some(journal) = &self.0.journal {
-            journal.write(now, event);
-        }
-    }
-
-    /// With a journal, whoever does anything does it alone, so that it has an order. A command that does something while it
-    /// goes on is in here already; and nobody waits long for one that does not come back from its code.
-    fn act(&self) -> Acting<'_> {
-        if self.0.journal.is_none() || IS_ACTING.get() {
-            return Acting(None);
-        }
-        let start = std::time::Instant::now();
-        loop {
-            match self.0.acting.try_lock() {
-                Ok(guard) => {
-                    IS_ACTING.set(true);
-                    return Acting(Some(guard));
-                }
-                Err(_) if start.elapsed() > LONGEST_ACT => return Acting(None),
-                Err(_) => std::thread::sleep(Duration::from_micros(50)),
-            }
-        }
-    }
-
-    /// Who sets a parameter now: a command that goes on, or somebody outside.
-    pub(crate) fn setter(&self) -> Setter {
-        if GOES_ON.get() { Setter::Command } else { Setter::Outside(self.0.clock.now()) }
-    }
-
-    /// When commands go on.
-    pub(super) fn moment(&self) -> MonotonicTime {
-        MonotonicTime::from_nanos(self.0.moment_nanos.load(Ordering::Acquire))
-    }
-
-    /// The stamp of what is published now; at the time of the commands, if one of them publishes it.
-    pub(crate) fn stamp(&self) -> Stamp {
-        let monotonic_time = if GOES_ON.get() { self.moment() } else { self.0.clock.now() };
-        let wall_time = self.0.clock.wall_at(monotonic_time);
-        Stamp { monotonic_time, wall_time, origin: self.0.origin, ..Stamp::default() }
-    }
-
-    pub(crate) fn set_directory(&self, directory: Arc<dyn Directory>) {
+    /// Says where islands are, once the robot is wired.
+    pub(crate) fn set_islands(&self, islands: Box<dyn Islands>) {
         // It is set once.
-        let _ = self.0.directory.set(directory);
+        let _ = self.0.islands.set(islands);
     }
 
-    pub(crate) fn directory(&self) -> Option<&Arc<dyn Directory>> {
-        self.0.directory.get()
+    /// Says what components and commands see of the robot.
+    pub(crate) fn set_host(&self, host: Arc<dyn Host>) {
+        // It is set once.
+        let _ = self.0.host.set(host);
+    }
+
+    pub(crate) fn downgrade(&self) -> WeakControl {
+        WeakControl(Arc::downgrade(&self.0))
+    }
+
+    /// The state, for a look; entries are processed by [`Self::step`](super::step).
+    pub(super) fn lock(&self) -> MutexGuard<'_, State> {
+        self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until `holds`, `longest` at most; whether it does.
+    pub(super) fn wait_until(&self, longest: Duration, holds: impl Fn(&State) -> bool) -> bool {
+        let deadline = Instant::now() + longest;
+        let mut state = self.lock();
+        while !holds(&state) {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            state = self.0.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+        true
+    }
+
+    /// Has a supervisor look after a sensor, a service or an actuator.
+    pub(crate) fn look_after(
+        &self,
+        path: &'static str,
+        supervisor: Supervisor,
+        order: impl Fn(ComponentOrder) + Send + Sync + 'static,
+    ) {
+        self.lock().components.push(Supervised { path, supervisor, order: Box::new(order) });
+    }
+
+    /// A sensor or a service was told something: on virtual time it obeys before time goes on.
+    pub(crate) fn note_order(&self) {
+        self.0.has_orders.store(true, Ordering::Release);
+    }
+
+    /// Whether any was told something since the last time.
+    pub(crate) fn take_orders(&self) -> bool {
+        self.0.has_orders.swap(false, Ordering::AcqRel)
+    }
+
+    pub(crate) fn state(&self) -> &'static str {
+        self.lock().machine.state()
+    }
+
+    pub(crate) fn safety(&self) -> Safety {
+        self.lock().machine.safety
+    }
+
+    /// The same without the lock: for actuators, which ask under a lock of their own before every command.
+    pub(crate) fn safety_now(&self) -> Safety {
+        match self.0.safety.load(Ordering::SeqCst) {
+            safety if safety == Safety::Armed as u8 => Safety::Armed,
+            safety if safety == Safety::Disarming as u8 => Safety::Disarming,
+            safety if safety == Safety::Error as u8 => Safety::Error,
+            _ => Safety::Disarmed,
+        }
+    }
+
+    pub(crate) fn statistics(&self) -> Vec<CommandStatistics> {
+        self.lock().statistics.clone()
+    }
+
+    /// The newest faults, and how many there were.
+    pub(crate) fn faults(&self) -> (Vec<ComponentFault>, u64) {
+        let faults = self.0.faults.lock().unwrap_or_else(PoisonError::into_inner);
+        (faults.newest.iter().cloned().collect(), faults.count)
     }
 
     pub(crate) fn clock(&self) -> &Clock {
         &self.0.clock
     }
 
+    pub(crate) fn origin(&self) -> Origin {
+        self.0.origin
+    }
+
     pub(crate) fn topics(&self) -> &SystemTopics {
         &self.0.topics
     }
+
+    pub(crate) fn bell(&self) -> &Bell {
+        &self.0.bell
+    }
+
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.0.pool
+    }
+
+    pub(crate) fn stop_signal(&self) -> &StopSignal {
+        &self.0.stop
+    }
+
+    pub(crate) fn is_virtual(&self) -> bool {
+        self.0.mode != Mode::Real
+    }
+
+    pub(super) fn host(&self) -> Result<Arc<dyn Host>, Fault> {
+        self.0.host.get().cloned().ok_or_else(|| Fault::new("the robot is not wired"))
+    }
 }
 
-/// How long anything waits for its turn in the journal.
-const LONGEST_ACT: Duration = Duration::from_millis(100);
+/// Does not keep the robot alive.
+#[derive(Clone)]
+pub(crate) struct WeakControl(Weak<Inner>);
 
-thread_local! {
-    static IS_ACTING: Cell<bool> = const { Cell::new(false) };
-    /// A command goes on, on this thread.
-    static GOES_ON: Cell<bool> = const { Cell::new(false) };
-}
-
-/// See [`Control::act`].
-struct Acting<'a>(Option<MutexGuard<'a, ()>>);
-
-impl Drop for Acting<'_> {
-    fn drop(&mut self) {
-        if self.0.is_some() {
-            IS_ACTING.set(false);
-        }
+impl WeakControl {
+    pub(crate) fn upgrade(&self) -> Option<Control> {
+        self.0.upgrade().map(Control)
     }
 }
 
 impl fmt::Debug for Control {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Control").field("state", &self.state()).finish_non_exhaustive()
+        f.debug_struct("Control").field("robot", &self.0.origin.robot).finish_non_exhaustive()
     }
 }

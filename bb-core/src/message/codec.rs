@@ -44,7 +44,7 @@ pub use derive::{FieldOf, NotField, is_any, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
 pub(crate) use intern::intern;
-pub use json::to_json;
+pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
 pub use reader::Reader;
 pub use ros::{RosLayout, RosMessage};
 pub use schema::Schema;

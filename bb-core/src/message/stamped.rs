@@ -121,6 +121,7 @@ impl<T: Payload> Feeds<T, true> for T {
 
 impl<P: Payload, T: Payload> Feeds<T, false> for P {
     fn feed(_: &Stamped<P>) -> &Stamped<T> {
-        crate::stub::stub()
+        // Named only by a robot that did not verify, and such a robot does not compile.
+        panic!("this robot did not verify")
     }
 }

@@ -1,7 +1,8 @@
 //! What a running estimator counts.
 
 use super::latency::{Latency, LatencyStatistics};
-use super::{EstimatorDeclaration, HealthState};
+use crate::declaration::EstimatorDeclaration;
+use crate::event::HealthState;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -17,11 +18,14 @@ pub enum DropReason {
     NonFinite,
     /// The message's stamp was more than a second ahead of the clock.
     ClockSkew,
-    /// The estimator does not run: it has stopped, or waits for its restart.
+    /// The estimator does not run: it has stopped, or it waits for its restart and more came than can wait.
     Stopped,
     /// The estimator was busy, and its inbox full.
     Overflow,
 }
+
+/// Where no budget is declared, every so many callbacks are measured.
+pub(super) const SAMPLED: u64 = 64;
 
 const REASONS: usize = DropReason::ALL.len();
 
@@ -50,8 +54,12 @@ impl DropReason {
 pub(crate) struct Count(AtomicU64);
 
 impl Count {
-    pub(crate) fn increment(&self) {
-        self.0.store(self.0.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    /// The new count.
+    #[inline]
+    pub(crate) fn increment(&self) -> u64 {
+        let count = self.0.load(Ordering::Relaxed).wrapping_add(1);
+        self.0.store(count, Ordering::Relaxed);
+        count
     }
 
     pub(super) fn set(&self, value: u64) {
@@ -70,31 +78,29 @@ pub(super) struct InputCounters {
     /// Messages that did not fit in the inbox. Those who published them count, whoever holds the estimator meanwhile; they
     /// are not among the other two.
     overflowed: AtomicU64,
-    /// How old messages were when the callback that they led to was over, in nanoseconds; of a driver, where a latency budget
-    /// is declared.
+    /// How old messages of the driver were when the callback that they led to returned, in nanoseconds.
     pub(super) age: Option<Latency>,
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Counters {
+pub(crate) struct Counters {
     pub(super) inputs: Box<[InputCounters]>,
     pub(super) dispatched: Count,
-    pub(super) emitted: Count,
+    pub(crate) emitted: Count,
     pub(super) diverged: Count,
     pub(super) restarts: Count,
     pub(super) transitions: Count,
-    /// How long callbacks took, in nanoseconds; measured where a latency budget is declared.
+    /// How long callbacks took, in nanoseconds: all where a latency budget is declared, else every 64th run.
     pub(super) latency: Latency,
     pub(super) last_divergence: Mutex<Option<&'static str>>,
 }
 
 impl Counters {
     pub(super) fn new(declaration: &EstimatorDeclaration) -> Self {
-        let is_measured = declaration.health.latency_budget_nanos.is_some();
-        let inputs = declaration.inputs.iter().map(|input| InputCounters {
-            age: (is_measured && input.driver).then(Latency::default),
-            ..InputCounters::default()
-        });
+        let inputs = declaration
+            .inputs
+            .iter()
+            .map(|input| InputCounters { age: input.driver.then(Latency::default), ..InputCounters::default() });
         let inputs = inputs.collect();
         Self { inputs, ..Self::default() }
     }
@@ -167,7 +173,7 @@ pub struct EstimatorStatistics {
     pub transitions: u64,
     /// Its health.
     pub health: HealthState,
-    /// How long its callbacks took; measured where a `latency_budget` is declared.
+    /// How long its callbacks took: all where a `latency_budget` is declared, else every 64th run.
     pub latency: LatencyStatistics,
     /// What it said the last time.
     pub last_divergence: Option<&'static str>,
@@ -185,8 +191,8 @@ pub struct InputStatistics {
     pub source: &'static str,
     /// Messages that arrived, the dropped ones included.
     pub received: u64,
-    /// How old its messages were, from their stamp to the end of the callback that they led to: of a driver, where a
-    /// `latency_budget` is declared.
+    /// How old the driver's messages were, from their stamp to the return of the callback that they led to; measured as
+    /// [`EstimatorStatistics::latency`] is.
     pub age: LatencyStatistics,
     dropped: [u64; REASONS],
 }

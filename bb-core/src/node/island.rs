@@ -1,31 +1,41 @@
-//! Estimators that always run together, behind one lock with an inbox.
+//! Estimators that always run together, with one ordered entry.
 //!
 //! Which estimators a message reaches is known at compile time, so `robot!` cuts the dataflow into islands: an estimator
-//! that is fed by one sensor alone, directly or through others, stands in that sensor's island; one that several sensors
-//! feed, or that is declared `runs_on: worker`, begins an island of its own. Inside an island a message goes from
-//! estimator to estimator by plain calls on plain fields, without a lock, an atomic or a queue. At its shore stands this
-//! lock: whoever publishes takes it and runs all that lies downstream; who finds it taken leaves the message in the
-//! inbox, for the holder to deliver before it goes. So there is a single writer, and the order of every input is kept.
+//! that is fed by one sensor alone, directly or through others, belongs to that sensor's island; one that several sensors
+//! feed, or that is declared `runs_on: worker`, begins an island of its own. Inside an island a message goes from estimator
+//! to estimator by plain calls on plain fields, without a lock, an atomic or a queue.
+//!
+//! Everything that reaches an island enters here: messages, and timers, options, requests, restarts, losses and the end. A
+//! publisher that finds the island free and nothing waiting runs all that lies downstream; otherwise the entry waits in the
+//! inbox, for the thread that holds the island to process before it leaves. So there is a single writer, and every entry has
+//! its place in one order.
+//!
+//! No thread blocks on the island's own lock: it is only ever tried. Threads that need an island which is held (a caller that
+//! waits for an answer, a publisher that waits for room) wait on a condition with a limit, so that an estimator that hangs
+//! keeps nobody waiting for ever.
 
 mod inbox;
 mod inside;
 #[cfg(all(test, loom))]
 mod model;
 
-use self::inbox::{Inbox, Pending, Taken};
+use self::inbox::{Entry, Inbox, Pending, Taken};
 use self::inside::{Inside, Within};
-use super::{IslandDeclaration, WorkerDeclaration};
-use crate::journal::{Event, Journal};
-use crate::run::StopSignal;
+use super::environment::Environment;
+use super::{NodeEntry, Turn};
+use crate::declaration::{IslandDeclaration, WorkerDeclaration};
+use crate::journal::Event;
+use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::fmt;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[cfg(loom)]
 use loom::sync::{
     Condvar, Mutex, MutexGuard,
     atomic::{AtomicBool, AtomicUsize, Ordering, fence},
 };
+use std::sync::atomic::{AtomicI64, AtomicU32, AtomicU64};
 #[cfg(not(loom))]
 use std::sync::{
     Condvar, Mutex, MutexGuard,
@@ -34,51 +44,75 @@ use std::sync::{
 use std::sync::{PoisonError, TryLockError};
 
 /// What `robot!` implements for its wiring.
-pub trait Sea {
-    /// Where the robot's journal is written, if it is.
-    fn journal(&self) -> Option<&Journal>;
+pub trait IslandWiring {
+    /// What all islands share.
+    fn environment(&self) -> &Environment;
 }
 
 /// What `robot!` implements for each island. That all may go to other threads is asked of the whole wiring: of each it
 /// would be proven again wherever the island is named.
-pub trait Shore: Sized {
+pub trait IslandState: Sized {
     /// The robot's wiring.
-    type Wiring: Sea;
-    /// What may be left in the inbox: a variant for each publisher outside that feeds it, and "something is due".
+    type Wiring: IslandWiring;
+    /// The messages that may wait in the inbox: a variant for each publisher outside that feeds the island.
     type Message;
     /// Messages that the inbox holds.
     const CAPACITY: usize = 1024;
-    /// It, as declared.
+    /// The island as declared.
     const DECLARATION: IslandDeclaration;
 
-    /// Runs all that lies downstream of a message that arrived at `now`.
-    fn deliver(&mut self, wiring: &Self::Wiring, message: &Self::Message, now: MonotonicTime);
-    /// Runs whatever is due: timers, ticks, restarts, losses.
-    fn wake(&mut self, wiring: &Self::Wiring, now: MonotonicTime);
-    /// Counts a message that did not fit in the inbox, wherever it would have gone.
+    /// Runs all that lies downstream of a message.
+    fn deliver(&mut self, wiring: &Self::Wiring, message: &Self::Message, turn: &Turn<'_>);
+    /// Does what is due: timers, ticks, restarts.
+    fn wake(&mut self, wiring: &Self::Wiring, turn: &Turn<'_>);
+    /// Hands an entry to the estimator of that number.
+    fn handle(&mut self, wiring: &Self::Wiring, estimator: usize, entry: NodeEntry, turn: &Turn<'_>);
+    /// Calls `each` with the numbers of its estimators, in order.
+    fn estimators() -> &'static [usize];
+    /// In a replay: makes its estimators.
+    fn begin_replay(&mut self);
+    /// In a replay: publishes what one of its estimators emitted in reply to a request that the journal does not hold; false
+    /// if no estimator of this island has such a publisher.
+    fn emit(&mut self, wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, turn: &Turn<'_>) -> bool;
+    /// Counts a message that did not fit in the inbox, for each estimator it would have reached.
     fn dropped(wiring: &Self::Wiring, message: &Self::Message);
-    /// Stops its estimators.
-    fn terminate(&mut self);
 }
 
-/// How long a publisher waits for room in a full inbox.
+/// How long a publisher waits for room in a full inbox before it takes the holder to hang.
 const LONGEST_WAIT: Duration = Duration::from_millis(500);
 
-/// An island behind its lock.
-pub struct Island<S: Shore> {
+/// How long a caller waits for an island.
+const LONGEST_CALL: Duration = Duration::from_secs(5);
+
+/// Of what is no part of the model.
+const RELAXED: std::sync::atomic::Ordering = std::sync::atomic::Ordering::Relaxed;
+
+/// An island behind its entry.
+pub struct Island<S: IslandState> {
     state: Mutex<S>,
     inbox: Mutex<Inbox<Keyed<S::Message>>>,
-    /// What the inbox holds: the one word that the holder looks at before it goes.
+    /// What the inbox holds: the one word that the holder looks at before it leaves.
     pending: AtomicUsize,
     /// Callers that wait for the island, and publishers that wait for room in its inbox.
     waiting: AtomicUsize,
-    /// A publisher has waited for room in vain: the holder hangs, until it takes the next message.
+    /// A publisher has waited for room in vain: the holder hangs, until it takes the next entry.
     hangs: AtomicBool,
+    /// Tells the worker that an entry has come.
     arrived: Condvar,
-    /// Whether a thread of its own serves it.
+    /// Tells those who wait that an entry was taken, or that the island is free.
+    moved: Condvar,
+    /// Whether a worker serves it.
     served: AtomicBool,
-    /// Whether a journal says when its messages are delivered.
+    /// Whether a journal says when its entries are processed.
     replayed: AtomicBool,
+    /// Entries processed, for the report of an island that hangs.
+    turns: AtomicU64,
+    /// The estimator whose callback ran last.
+    running: AtomicU32,
+    /// The time of the last entry.
+    entered_nanos: AtomicI64,
+    /// Its estimators have stopped.
+    has_retired: AtomicBool,
 }
 
 /// What a message is known by: which of the island's publishers it is from, and the number of its line in the journal, if
@@ -97,11 +131,19 @@ struct Keyed<M> {
     message: M,
 }
 
-/// An island that the calling thread holds.
-pub type Held<'a, S> = Within<MutexGuard<'a, S>>;
+/// Why a call was not made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum CallError {
+    /// The calling thread is inside an island of the same robot, and would wait for itself.
+    Inside,
+    /// Another thread has held the island for too long.
+    Busy,
+}
 
-impl<S: Shore> Island<S> {
-    /// An island that nobody runs yet.
+type Held<'a, S> = Within<MutexGuard<'a, S>>;
+
+impl<S: IslandState> Island<S> {
+    /// An island that is not running yet.
     pub fn new(state: S) -> Self {
         Self {
             state: Mutex::new(state),
@@ -110,35 +152,83 @@ impl<S: Shore> Island<S> {
             waiting: AtomicUsize::new(0),
             hangs: AtomicBool::new(false),
             arrived: Condvar::new(),
+            moved: Condvar::new(),
             served: AtomicBool::new(false),
             replayed: AtomicBool::new(false),
+            turns: AtomicU64::new(0),
+            running: AtomicU32::new(u32::MAX),
+            entered_nanos: AtomicI64::new(0),
+            has_retired: AtomicBool::new(false),
         }
     }
 
-    /// Runs `direct` if the island is free; else leaves `message` in the inbox.
+    /// Runs `direct` if the island is free and nothing waits; otherwise leaves `message` in the inbox.
     #[inline]
     pub fn enter(
         &self,
         wiring: &S::Wiring,
         now: MonotonicTime,
         key: Key,
-        direct: impl FnOnce(&mut S),
+        direct: impl FnOnce(&mut S, &Turn<'_>),
         message: impl FnOnce() -> S::Message,
     ) {
         if self.pending.load(Ordering::Relaxed) == 0
             && !self.served.load(Ordering::Relaxed)
-            && let Some(mut state) = self.try_lock()
+            && let Some(mut state) = self.try_hold(wiring)
         {
-            Self::write(wiring, now, key);
-            direct(&mut state);
+            self.process(wiring, now, || deliver::<S>(key), |turn| direct(&mut state, turn));
             return self.leave(wiring, state);
         }
-        self.post(wiring, now, Keyed { key, message: message() });
+        self.enqueue(wiring, now, Keyed { key, message: message() });
     }
 
-    /// Leaves a message in the inbox and sees to it that somebody delivers it.
+    /// Processes one entry: writes its line, runs it, and writes how long measured callbacks took.
+    #[inline]
+    fn process<T>(
+        &self,
+        wiring: &S::Wiring,
+        now: MonotonicTime,
+        line: impl FnOnce() -> Event,
+        run: impl FnOnce(&Turn<'_>) -> T,
+    ) -> T {
+        let environment = wiring.environment();
+        let Some(journal) = environment.journal() else { return self.process_line(wiring, now, None, run) };
+        let wall_offset_nanos = environment.clock().wall_offset_nanos();
+        let line = journal.write(now, wall_offset_nanos, line());
+        self.process_line(wiring, now, Some((line, wall_offset_nanos)), run)
+    }
+
+    /// The same for an entry whose line was written already, by a writer who saw that offset of the wall clock.
+    #[inline]
+    fn process_line<T>(
+        &self,
+        wiring: &S::Wiring,
+        now: MonotonicTime,
+        line: Option<(u64, i64)>,
+        run: impl FnOnce(&Turn<'_>) -> T,
+    ) -> T {
+        let environment = wiring.environment();
+        let wall_offset_nanos = match line {
+            Some((_, offset)) => offset,
+            None => environment.clock().wall_offset_nanos(),
+        };
+        let turn = Turn::new(environment, S::DECLARATION.number, now, wall_offset_nanos, &self.running);
+        // One writer at a time: plain stores instead of atomic additions. These are for the report of a turn that hangs.
+        self.entered_nanos.store(now.as_nanos(), RELAXED);
+        self.turns.store(self.turns.load(RELAXED).wrapping_add(1), RELAXED);
+        let result = run(&turn);
+        if S::DECLARATION.is_measured
+            && let Some((cause, _)) = line
+            && let Some(journal) = environment.journal()
+        {
+            journal.write(now, wall_offset_nanos, Event::Measured { cause, callbacks: turn.take_measured() });
+        }
+        result
+    }
+
+    /// Leaves a message in the inbox and makes sure that a thread processes it.
     #[cold]
-    fn post(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
+    fn enqueue(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
         let mut inbox = self.inbox();
         // Room is made once, at the first message that has to wait.
         inbox.reserve(S::CAPACITY);
@@ -147,301 +237,456 @@ impl<S: Shore> Island<S> {
         }
         while !inbox.has_room(S::CAPACITY) && !self.served.load(Ordering::Relaxed) {
             drop(inbox);
-            let has_waited = self.wait_for_room();
+            let may_have_room = self.wait_for_room(wiring);
             self.attend(wiring);
             inbox = self.inbox();
-            // Else somebody else may have taken the room that there was.
-            if !has_waited {
+            // Otherwise another publisher may have taken the room that there was.
+            if !may_have_room {
                 break;
             }
         }
-        let dropped = if inbox.has_room(S::CAPACITY) { None } else { inbox.pop() };
+        let dropped = if inbox.has_room(S::CAPACITY) { None } else { inbox.pop_message() };
+        if let Some(dropped) = &dropped
+            && let Some(journal) = wiring.environment().journal()
+        {
+            let Key { entry, line } = dropped.key;
+            let event = Event::Drop { island: S::DECLARATION.number, entry, message: line };
+            journal.write(now, wiring.environment().clock().wall_offset_nanos(), event);
+        }
         inbox.push(now, message);
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         drop(inbox);
         if let Some(dropped) = dropped {
-            if let Some(journal) = wiring.journal() {
-                let Key { entry, line } = dropped.key;
-                journal.write(now, Event::Drop { island: S::DECLARATION.number, entry, message: line });
-            }
             S::dropped(wiring, &dropped.message);
+            crate::fault::discard(dropped);
         }
         self.attend(wiring);
     }
 
-    /// Somebody runs the island and delivers as fast as he can: whoever floods it meanwhile waits for him, but not for one
-    /// that hangs, nor for himself. True once there may be room.
-    fn wait_for_room(&self) -> bool {
-        if self.hangs.load(Ordering::Relaxed) || Inside::is_here() {
+    /// Back-pressure: waits until the holder drains the inbox. Returns `false` at once if the holder hangs or if this thread
+    /// is inside an island of this robot.
+    fn wait_for_room(&self, wiring: &S::Wiring) -> bool {
+        if self.hangs.load(Ordering::Relaxed) || Inside::is_here(wiring.environment().bit()) {
             return false;
         }
-        self.waiting.fetch_add(1, Ordering::Relaxed);
-        let has_room = || Pending(self.pending.load(Ordering::Relaxed)).has_room(S::CAPACITY);
-        let in_time = inside::until(LONGEST_WAIT, || has_room() || self.is_free());
+        self.waiting.fetch_add(1, Ordering::SeqCst);
+        let has_room = |pending: usize| Pending(pending).has_room(S::CAPACITY);
+        let in_time = self.wait(LONGEST_WAIT, || has_room(self.pending.load(Ordering::Relaxed)) || self.is_free());
         if !in_time {
             self.hangs.store(true, Ordering::Relaxed);
         }
-        // Before it attends to the inbox: see `drain`.
-        self.waiting.fetch_sub(1, Ordering::Relaxed);
+        // Before this thread attends to the inbox: see `drain`.
+        self.waiting.fetch_sub(1, Ordering::SeqCst);
         in_time
     }
 
-    fn wake_up(&self, wiring: &S::Wiring, now: MonotonicTime) {
+    /// Waits until `holds`, `longest` at most; whether it does.
+    #[cfg(not(loom))]
+    fn wait(&self, longest: Duration, holds: impl Fn() -> bool) -> bool {
+        // How long a change may go unnoticed that nobody could tell of, since it came before this thread began to wait.
+        const STEP: Duration = Duration::from_millis(1);
+        let start = Instant::now();
+        loop {
+            if holds() {
+                return true;
+            }
+            let Some(left) = longest.checked_sub(start.elapsed()).filter(|left| !left.is_zero()) else {
+                return false;
+            };
+            let inbox = self.inbox();
+            drop(self.moved.wait_timeout(inbox, left.min(STEP)));
+        }
+    }
+
+    /// A model has no time: others go on once.
+    #[cfg(loom)]
+    fn wait(&self, _: Duration, holds: impl Fn() -> bool) -> bool {
+        loom::thread::yield_now();
+        holds()
+    }
+
+    /// Adds a control entry.
+    fn post_with(&self, wiring: &S::Wiring, add: impl FnOnce(&mut Inbox<Keyed<S::Message>>)) {
         if self.replayed.load(Ordering::Relaxed) {
             return;
         }
         {
             let mut inbox = self.inbox();
-            inbox.wake(now);
+            add(&mut inbox);
             self.pending.store(inbox.pending().0, Ordering::Relaxed);
         }
-        self.attend(wiring);
+        if self.served.load(Ordering::Relaxed) {
+            self.arrived.notify_one();
+        } else {
+            wiring.environment().schedule_drain(S::DECLARATION.number);
+        }
     }
 
-    /// Behind a message in the inbox: its own thread is told, or it is delivered here, unless somebody holds the island.
-    /// He looks at the inbox after he has let go; the fences make sure that one of the two sees the other.
+    /// After an entry was added: the worker is told, or the island is drained here unless another thread holds it. That one
+    /// looks at the inbox after it has let go; the fences make sure that one of the two sees the other.
     fn attend(&self, wiring: &S::Wiring) {
+        fence(Ordering::SeqCst);
         if self.served.load(Ordering::Relaxed) {
             self.arrived.notify_one();
             return;
         }
-        fence(Ordering::SeqCst);
-        if let Some(state) = self.try_lock() {
+        if let Some(state) = self.try_hold(wiring) {
             self.leave(wiring, state);
         }
     }
 
-    /// Delivers what has come into the inbox meanwhile, and lets go.
+    /// Lets go, and processes what has come into the inbox meanwhile.
     #[inline]
-    pub fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
+    fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
         drop(state);
         fence(Ordering::SeqCst);
-        if self.pending.load(Ordering::Relaxed) != 0 {
+        if self.pending.load(Ordering::Relaxed) != 0 || self.waiting.load(Ordering::Relaxed) != 0 {
             self.drain(wiring);
         }
     }
 
-    /// Once it has delivered as much as an inbox holds, it lets those who wait go on in its place: they attend to the inbox
-    /// after they have ceased to wait, and the fences make sure that one of the two sees the other.
+    /// Once it has processed as much as an inbox holds, this thread lets those who wait go on in its place: they attend to
+    /// the inbox after they have ceased to wait, and the fences make sure that one of the two sees the other.
     #[cold]
     fn drain(&self, wiring: &S::Wiring) {
-        let mut delivered = 0;
         if self.replayed.load(Ordering::Relaxed) {
             return;
         }
-        while self.pending.load(Ordering::Relaxed) != 0 {
-            let Some(mut state) = self.try_lock() else { return };
-            while !self.gives_way(delivered)
-                && let Some(taken) = self.take()
-            {
-                Self::run(&mut state, wiring, taken);
-                delivered += 1;
+        let mut processed = 0;
+        while self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed) {
+            let Some(mut state) = self.try_hold(wiring) else { return };
+            while !self.gives_way(processed) && self.process_next(&mut state, wiring) {
+                processed += 1;
             }
             drop(state);
             fence(Ordering::SeqCst);
-            if self.gives_way(delivered) {
-                return;
+            if self.gives_way(processed) {
+                break;
             }
+        }
+        self.tell_waiting();
+    }
+
+    fn tell_waiting(&self) {
+        if self.waiting.load(Ordering::SeqCst) != 0 {
+            drop(self.inbox());
+            self.moved.notify_all();
         }
     }
 
-    fn gives_way(&self, delivered: usize) -> bool {
-        delivered >= S::CAPACITY && self.waiting.load(Ordering::Relaxed) != 0
+    fn gives_way(&self, processed: usize) -> bool {
+        processed >= S::CAPACITY && self.waiting.load(Ordering::Relaxed) != 0
     }
 
-    fn run(state: &mut S, wiring: &S::Wiring, taken: Taken<Keyed<S::Message>>) {
-        match taken {
-            Taken::Message(now, Keyed { key, message }) => {
-                Self::write(wiring, now, key);
-                state.deliver(wiring, &message, now);
-            }
-            Taken::Wake(now) => {
-                if let Some(journal) = wiring.journal() {
-                    journal.write(now, Event::Wake { island: S::DECLARATION.number });
-                }
-                state.wake(wiring, now);
-            }
-        }
-    }
-
-    /// Writes into the journal, if there is one, what is delivered now; the island is held.
-    #[inline]
-    fn write(wiring: &S::Wiring, now: MonotonicTime, key: Key) {
-        if let Some(journal) = wiring.journal() {
-            journal
-                .write(now, Event::Deliver { island: S::DECLARATION.number, entry: key.entry, message: key.line });
-        }
-    }
-
-    fn take(&self) -> Option<Taken<Keyed<S::Message>>> {
+    /// Takes the next entry and processes it; false if there is none.
+    fn process_next(&self, state: &mut S, wiring: &S::Wiring) -> bool {
+        let environment = wiring.environment();
         let mut inbox = self.inbox();
-        let taken = inbox.take();
+        let Some(taken) = inbox.take() else { return false };
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         self.hangs.store(false, Ordering::Relaxed);
-        taken
+        // Under the inbox's lock, so that the line of a message which is dropped meanwhile follows.
+        let (now, line) = match &taken {
+            Taken::Retire(now) => (*now, Event::Retire { island: S::DECLARATION.number }),
+            Taken::Entry(now, entry) => (*now, line_of::<S>(entry)),
+        };
+        let line = environment.journal().map(|journal| {
+            let offset = environment.clock().wall_offset_nanos();
+            (journal.write(now, offset, line), offset)
+        });
+        drop(inbox);
+        self.tell_waiting();
+        let retires = matches!(taken, Taken::Retire(_));
+        self.process_line(wiring, now, line, |turn| match taken {
+            Taken::Retire(_) => for_all(state, wiring, turn, || NodeEntry::Retire),
+            Taken::Entry(_, Entry::Message(Keyed { message, .. })) => {
+                state.deliver(wiring, &message, turn);
+                crate::fault::discard(message);
+            }
+            Taken::Entry(_, Entry::Wake) => state.wake(wiring, turn),
+            Taken::Entry(_, Entry::Start) => for_all(state, wiring, turn, || NodeEntry::Start),
+            Taken::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
+        });
+        if retires {
+            // What still waits is counted, and in the journal, before the last report is made.
+            let mut processed = 0;
+            while processed < S::CAPACITY && self.process_next(state, wiring) {
+                processed += 1;
+            }
+            self.has_retired.store(true, Ordering::SeqCst);
+            environment.note_retired();
+        }
+        true
     }
 
-    /// Runs `call` once the island is free, then what has come meanwhile; none after `timeout`, and none if the caller has
-    /// been called by an estimator's message himself: he could wait for ever.
-    pub fn with<T>(
+    /// Calls `call` once the island is free and what waited before has been processed, then processes what has come
+    /// meanwhile.
+    ///
+    /// `line` is written before, in a journal.
+    pub(crate) fn call<T>(
         &self,
         wiring: &S::Wiring,
-        timeout: Option<Duration>,
-        call: impl FnOnce(&mut S) -> T,
-    ) -> Option<T> {
-        let mut state = match timeout {
-            None => self.hold()?,
-            Some(timeout) => self.lock_within(timeout)?,
-        };
-        let result = call(&mut state);
+        now: MonotonicTime,
+        line: Event,
+        call: impl FnOnce(&mut S, &Turn<'_>) -> T,
+    ) -> Result<T, CallError> {
+        if Inside::is_here(wiring.environment().bit()) {
+            return Err(CallError::Inside);
+        }
+        let Some(mut state) = self.hold(wiring, LONGEST_CALL) else { return Err(CallError::Busy) };
+        let mut processed = 0;
+        while processed < S::CAPACITY && self.process_next(&mut state, wiring) {
+            processed += 1;
+        }
+        let result = self.process(wiring, now, || line, |turn| call(&mut state, turn));
         self.leave(wiring, state);
-        Some(result)
+        Ok(result)
     }
 
-    /// Takes the island once it is free; `None` on a thread that is inside one. [`Self::leave`] gives it back.
-    pub fn hold(&self) -> Option<Held<'_, S>> {
-        if Inside::is_here() {
-            return None;
+    /// Takes the island once it is free, within `longest`.
+    fn hold(&self, wiring: &S::Wiring, longest: Duration) -> Option<Held<'_, S>> {
+        if let Some(state) = self.try_hold(wiring) {
+            return Some(state);
         }
-        self.waiting.fetch_add(1, Ordering::Relaxed);
-        let state = Within::new(unpoisoned(self.state.lock()));
-        self.waiting.fetch_sub(1, Ordering::Relaxed);
-        Some(state)
-    }
-
-    fn lock_within(&self, timeout: Duration) -> Option<Held<'_, S>> {
-        let timeout = if Inside::is_here() { Duration::ZERO } else { timeout };
-        let start = std::time::Instant::now();
-        loop {
-            if let Some(state) = self.try_lock() {
-                return Some(state);
-            }
-            if start.elapsed() >= timeout {
-                return None;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        self.waiting.fetch_add(1, Ordering::SeqCst);
+        let held = std::cell::Cell::new(None);
+        self.wait(longest, || {
+            held.set(self.try_hold(wiring));
+            let is_held = held.take();
+            let found = is_held.is_some();
+            held.set(is_held);
+            found
+        });
+        self.waiting.fetch_sub(1, Ordering::SeqCst);
+        held.take()
     }
 
     #[inline]
-    fn try_lock(&self) -> Option<Held<'_, S>> {
-        match self.state.try_lock() {
-            Ok(state) => Some(Within::new(state)),
-            Err(TryLockError::Poisoned(poisoned)) => Some(Within::new(poisoned.into_inner())),
-            Err(TryLockError::WouldBlock) => None,
-        }
+    fn try_hold(&self, wiring: &S::Wiring) -> Option<Held<'_, S>> {
+        let state = match self.state.try_lock() {
+            Ok(state) => state,
+            // A panic inside is a component's, and was caught and reported there.
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return None,
+        };
+        Some(Within::new(state, wiring.environment().bit()))
     }
 
     fn is_free(&self) -> bool {
-        self.try_lock().is_some()
+        !matches!(self.state.try_lock(), Err(TryLockError::WouldBlock))
     }
 
     fn inbox(&self) -> MutexGuard<'_, Inbox<Keyed<S::Message>>> {
-        unpoisoned(self.inbox.lock())
+        self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn deliver<S: IslandState>(key: Key) -> Event {
+    Event::Deliver { island: S::DECLARATION.number, entry: key.entry, message: key.line }
+}
+
+fn line_of<S: IslandState>(entry: &Entry<Keyed<S::Message>>) -> Event {
+    match entry {
+        Entry::Message(message) => deliver::<S>(message.key),
+        Entry::Wake => Event::Wake { island: S::DECLARATION.number },
+        Entry::Start => Event::Start { island: S::DECLARATION.number },
+        Entry::Node(estimator, entry) => entry.line(*estimator, S::DECLARATION.number),
+    }
+}
+
+fn for_all<S: IslandState>(state: &mut S, wiring: &S::Wiring, turn: &Turn<'_>, entry: impl Fn() -> NodeEntry) {
+    for estimator in S::estimators() {
+        state.handle(wiring, *estimator, entry(), turn);
     }
 }
 
 /// What all islands of a robot with the wiring `W` have in common.
 pub trait AnyIsland<W> {
-    /// The path of its first estimator.
-    fn name(&self) -> &'static str;
+    /// The island as declared.
+    fn declaration(&self) -> IslandDeclaration;
+    /// The numbers of its estimators.
+    fn estimators(&self) -> &'static [usize];
     /// Something may be due.
     fn wake(&self, wiring: &W, now: MonotonicTime);
-    /// How its own thread runs, if it has one.
+    /// Adds an entry for an estimator.
+    fn post(&self, wiring: &W, now: MonotonicTime, estimator: usize, entry: NodeEntry);
+    /// Has its estimators start.
+    fn start(&self, wiring: &W, now: MonotonicTime);
+    /// Has its estimators stop, before anything else that waits.
+    fn retire(&self, wiring: &W, now: MonotonicTime);
+    /// Processes what waits, unless another thread does.
+    fn drain(&self, wiring: &W);
+    /// How its worker runs, if it has one.
     fn worker(&self) -> Option<WorkerDeclaration>;
-    /// From now on a thread of its own serves it, see [`Self::serve`].
-    fn give_to_thread(&self);
-    /// Delivers what comes, on the calling thread, until the robot stops.
-    fn serve(&self, wiring: &W, stop: &StopSignal);
-    /// From now on messages wait until [`Self::replay`] delivers them.
-    fn begin_replay(&self);
-    /// Delivers the first message of that key; false if there is none.
-    fn replay(&self, wiring: &W, key: Key, now: MonotonicTime) -> bool;
-    /// Drops the first message of that key; false if there is none.
-    fn replay_drop(&self, wiring: &W, key: Key) -> bool;
-    /// Does what is due.
-    fn replay_wake(&self, wiring: &W, now: MonotonicTime);
-    /// Stops its estimators once they are free; false if they are still busy after `timeout`.
-    fn terminate(&self, wiring: &W, timeout: Duration) -> bool;
+    /// From now on a worker serves it, see [`Self::serve`].
+    fn give_to_worker(&self);
+    /// Processes what comes, on the calling thread, until its estimators have stopped.
+    fn serve(&self, wiring: &W);
+    /// Entries processed, and the estimator whose callback ran last; none if no thread holds it now.
+    fn busy(&self) -> Option<(u64, usize)>;
+    /// The time of the last entry.
+    fn entered_at(&self) -> MonotonicTime;
+    /// Whether the calling thread is inside an island of this robot, and must not wait for one.
+    fn is_inside(&self, wiring: &W) -> bool;
+    /// Whether its estimators have stopped.
+    fn has_retired(&self) -> bool;
+    /// From now on entries are processed when [`Self::replay`] says so.
+    fn begin_replay(&self, wiring: &W);
+    /// Processes an entry of a journal; false if there is none that matches.
+    fn replay(&self, wiring: &W, now: MonotonicTime, entry: Replayed<'_>) -> bool;
+}
+
+/// An entry of an island in a journal.
+#[derive(Debug)]
+pub enum Replayed<'a> {
+    /// The first message of that key.
+    Deliver(Key),
+    /// The first message of that key was dropped.
+    Drop(Key),
+    /// Something was due.
+    Wake,
+    /// The estimators start.
+    Start,
+    /// The estimators stop.
+    Retire,
+    /// An entry for an estimator.
+    Node(usize, NodeEntry),
+    /// What an estimator emitted in reply to a request that the journal does not hold, at that publisher.
+    Emission(usize, &'a DynamicMessage),
 }
 
 #[cfg(not(loom))]
-impl<S: Shore> AnyIsland<S::Wiring> for Island<S> {
-    fn name(&self) -> &'static str {
-        S::DECLARATION.name
+impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
+    fn declaration(&self) -> IslandDeclaration {
+        S::DECLARATION
+    }
+
+    fn estimators(&self) -> &'static [usize] {
+        S::estimators()
     }
 
     fn wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
-        self.wake_up(wiring, now);
+        self.post_with(wiring, |inbox| inbox.wake(now));
+    }
+
+    fn post(&self, wiring: &S::Wiring, now: MonotonicTime, estimator: usize, entry: NodeEntry) {
+        self.post_with(wiring, |inbox| inbox.post(now, estimator, entry));
+    }
+
+    fn start(&self, wiring: &S::Wiring, now: MonotonicTime) {
+        self.post_with(wiring, |inbox| inbox.start(now));
+    }
+
+    fn retire(&self, wiring: &S::Wiring, now: MonotonicTime) {
+        self.post_with(wiring, |inbox| inbox.retire(now));
+    }
+
+    fn drain(&self, wiring: &S::Wiring) {
+        if !self.served.load(Ordering::Relaxed) {
+            Self::drain(self, wiring);
+        }
     }
 
     fn worker(&self) -> Option<WorkerDeclaration> {
         S::DECLARATION.worker
     }
 
-    fn give_to_thread(&self) {
+    fn give_to_worker(&self) {
         self.inbox().reserve(S::CAPACITY);
         self.served.store(true, Ordering::SeqCst);
     }
 
-    fn serve(&self, wiring: &S::Wiring, stop: &StopSignal) {
-        while !stop.is_set() {
-            let inbox = self.inbox();
-            if inbox.pending() == Pending::NOTHING {
-                // Told when a message comes; the time is for `stop`.
-                drop(unpoisoned(self.arrived.wait_timeout(inbox, Duration::from_millis(50))));
-            } else {
-                drop(inbox);
+    fn serve(&self, wiring: &S::Wiring) {
+        loop {
+            let mut inbox = self.inbox();
+            while inbox.pending() == Pending::NOTHING {
+                inbox = self.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
             }
-            let mut state = Within::new(unpoisoned(self.state.lock()));
-            while !stop.is_set()
-                && let Some(taken) = self.take()
-            {
-                Self::run(&mut state, wiring, taken);
-                if self.waiting.load(Ordering::Relaxed) != 0 {
-                    break;
-                }
-            }
+            let is_last = inbox.retires();
+            drop(inbox);
+            // A caller may hold the island; it tells when it is done.
+            let Some(mut state) = self.hold(wiring, Duration::MAX) else { continue };
+            while self.process_next(&mut state, wiring) && self.waiting.load(Ordering::Relaxed) == 0 {}
             drop(state);
-            // A lock is not fair, and this thread would be faster than those who have to be woken.
-            inside::until(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
+            if is_last {
+                break;
+            }
+            if self.waiting.load(Ordering::SeqCst) != 0 {
+                self.tell_waiting();
+                // A lock is not fair, and this thread would be faster than those that have to be woken.
+                self.wait(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
+            }
         }
         self.served.store(false, Ordering::SeqCst);
+        // A publisher that still saw the worker left its message to it: the fences make sure that one of the two sees the
+        // other. What came after the estimators had stopped is counted.
+        fence(Ordering::SeqCst);
+        Self::drain(self, wiring);
     }
 
-    fn begin_replay(&self) {
+    fn busy(&self) -> Option<(u64, usize)> {
+        (!self.is_free()).then(|| (self.turns.load(RELAXED), self.running.load(RELAXED) as usize))
+    }
+
+    fn entered_at(&self) -> MonotonicTime {
+        MonotonicTime::from_nanos(self.entered_nanos.load(RELAXED))
+    }
+
+    fn is_inside(&self, wiring: &S::Wiring) -> bool {
+        Inside::is_here(wiring.environment().bit())
+    }
+
+    fn has_retired(&self) -> bool {
+        self.has_retired.load(Ordering::SeqCst)
+    }
+
+    fn begin_replay(&self, wiring: &S::Wiring) {
         self.replayed.store(true, Ordering::Relaxed);
-        // Whoever publishes finds it taken.
+        // So that publishers never enter directly.
         self.pending.store(usize::MAX, Ordering::Relaxed);
+        if let Some(mut state) = self.try_hold(wiring) {
+            state.begin_replay();
+        }
     }
 
-    fn replay(&self, wiring: &S::Wiring, key: Key, now: MonotonicTime) -> bool {
-        let Some(waiting) = self.inbox().take_first(|waiting| waiting.key == key) else { return false };
-        Within::new(unpoisoned(self.state.lock())).deliver(wiring, &waiting.message, now);
-        true
-    }
-
-    fn replay_drop(&self, wiring: &S::Wiring, key: Key) -> bool {
-        let Some(waiting) = self.inbox().take_first(|waiting| waiting.key == key) else { return false };
-        S::dropped(wiring, &waiting.message);
-        true
-    }
-
-    fn replay_wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
-        Within::new(unpoisoned(self.state.lock())).wake(wiring, now);
-    }
-
-    fn terminate(&self, wiring: &S::Wiring, timeout: Duration) -> bool {
-        self.with(wiring, Some(timeout), S::terminate).is_some()
+    fn replay(&self, wiring: &S::Wiring, now: MonotonicTime, entry: Replayed<'_>) -> bool {
+        let message = match &entry {
+            Replayed::Deliver(key) | Replayed::Drop(key) => {
+                match self.inbox().take_message(|waiting| waiting.key == *key) {
+                    Some(keyed) => Some(keyed.message),
+                    None => return false,
+                }
+            }
+            _ => None,
+        };
+        let Some(mut state) = self.try_hold(wiring) else { return false };
+        self.process_line(wiring, now, None, |turn| {
+            match entry {
+                Replayed::Deliver(_) => {
+                    if let Some(message) = &message {
+                        state.deliver(wiring, message, turn);
+                    }
+                }
+                Replayed::Drop(_) => {
+                    if let Some(message) = &message {
+                        S::dropped(wiring, message);
+                    }
+                }
+                Replayed::Wake => state.wake(wiring, turn),
+                Replayed::Start => for_all(&mut *state, wiring, turn, || NodeEntry::Start),
+                Replayed::Retire => {
+                    for_all(&mut *state, wiring, turn, || NodeEntry::Retire);
+                    self.has_retired.store(true, Ordering::SeqCst);
+                }
+                Replayed::Node(estimator, entry) => state.handle(wiring, estimator, entry, turn),
+                Replayed::Emission(publisher, message) => return state.emit(wiring, publisher, message, turn),
+            }
+            true
+        })
     }
 }
 
-fn unpoisoned<G>(result: Result<G, PoisonError<G>>) -> G {
-    // A panic inside is a component's, and was caught and reported there.
-    result.unwrap_or_else(PoisonError::into_inner)
-}
-
-impl<S: Shore> fmt::Debug for Island<S> {
+impl<S: IslandState> fmt::Debug for Island<S> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Island").field("pending", &self.pending).finish_non_exhaustive()
     }

@@ -3,56 +3,55 @@
 mod recovery;
 mod requests;
 
-use self::recovery::Restart;
-use self::requests::Cast;
 use super::admission::Admission;
+use super::backlog::Backlog;
+use super::counters::SAMPLED;
+use super::environment::{BindTarget, Environment, Mode};
 use super::health::{Event, Health};
-use super::shared::SharedNode;
+use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
-use super::{DropReason, EstimatorDeclaration, HealthReason, HealthState, HealthTransition, InputDeclaration};
-use crate::component::{Context, Estimator, Fault, InputAt, Inputs, Reply, Request, SyncMiss};
-use crate::control::Binding;
+use super::turn::Turn;
+use super::{DropReason, HealthReport, Report};
+use crate::component::Request;
+use crate::component::{Binding, Context, Estimator, InputAt, Inputs, Reply, SyncMiss};
+use crate::declaration::{EstimatorDeclaration, InputDeclaration, ParameterValues};
+use crate::event::{HealthReason, HealthState, HealthTransition};
+use crate::fault::{Failed, Fault, caught};
+use crate::lifecycle::{AsEstimator, Recipe, Slot};
 use crate::message::{Stamp, Stamped};
-use crate::run::{Failed, Startup, caught, retire};
-use crate::time::{Clock, MonotonicTime};
+use crate::telemetry::TelemetryEvent;
+use crate::time::MonotonicTime;
 use std::fmt;
 
-/// One estimator with its fan-in, its health and its timers. Its island's lock sees to it that one thread at a time is in
-/// here.
+/// One estimator with its fan-in, its health and its timers. Its island sees to it that one thread at a time is in here.
 pub struct Node<E: Estimator> {
     declaration: &'static EstimatorDeclaration,
     template: Stamp,
-    clock: Clock,
     shared: SharedNode,
-    startup: Startup,
-    /// None while it does not run.
-    estimator: Option<E>,
+    environment: Environment,
+    slot: Slot<AsEstimator<E>>,
     cache: <E::Input as Inputs>::Cache,
+    make_cache: fn() -> <E::Input as Inputs>::Cache,
     admission: Admission,
+    backlog: Backlog<E>,
     health: Health,
-    /// When the last input was let in.
-    last_input: MonotonicTime,
+    /// How often it was lost, as far as it knows.
+    epoch: u32,
+    /// Whether its last run was good.
+    was_good: bool,
     timers: Timers,
     /// When its island is woken for it, or before.
     scheduled: Option<MonotonicTime>,
     /// How often in a row it has gone on with its work.
     continued: u32,
-    /// What it asked for in `init`, until the run begins.
+    /// What it asked for in its first `init`, until it starts.
     requested: Vec<Request>,
-    has_begun: bool,
-    restart: Restart,
-    recipe: Recipe<E>,
+    /// The values of parameters as it was last told.
+    parameters: ParameterValues,
 }
 
 /// How often in a row it may go on with its work before it is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
-
-/// What it is made of, at the start and at every restart.
-struct Recipe<E: Estimator> {
-    options: E::Options,
-    binding: Binding<E::Options>,
-    cache: fn() -> <E::Input as Inputs>::Cache,
-}
 
 /// What became of a message.
 enum Handled<O> {
@@ -64,7 +63,7 @@ enum Handled<O> {
 
 /// What [`Node::turn`] has done.
 #[derive(Debug)]
-pub enum Turn {
+pub enum Next {
     /// Nothing is due.
     Idle,
     /// Something was, and emitted nothing.
@@ -74,72 +73,91 @@ pub enum Turn {
 }
 
 impl<E: Estimator> Node<E> {
-    /// Makes the estimator; what keeps it from starting is in `startup`. `cache` makes the slots of its inputs, and
-    /// `binding` puts parameters into its options.
+    /// Makes the estimator; what keeps it from starting is kept in `environment`. `make_cache` makes the slots of its inputs,
+    /// and `binding` puts parameters into its options. In a replay it is made when the journal begins.
     pub fn new(
         number: usize,
         options: &E::Options,
         binding: Binding<E::Options>,
-        cache: fn() -> <E::Input as Inputs>::Cache,
-        startup: &Startup,
+        make_cache: fn() -> <E::Input as Inputs>::Cache,
+        environment: &Environment,
     ) -> Self {
-        let shared = startup.node(number);
+        let shared = environment.node(number);
         let declaration = shared.declaration();
-        let now = startup.clock().now();
-        let context = Context::new(startup.robot(), declaration, now);
-        let made = startup.make(declaration.path, options, binding, |options| E::init(options, &context));
-        startup.bind_node(&shared, options, binding);
-        if let Err(reason) = &made {
-            shared.set_stopped(Some(reason.clone()));
-        }
-        Self {
+        environment.add_fact(format!("options of {}: {options:?}", declaration.path));
+        environment.bind(declaration.path, options, binding, BindTarget::Estimator(number));
+        let mut node = Self {
             declaration,
-            template: Stamp { frame: declaration.frame, origin: startup.origin(), ..Stamp::default() },
-            clock: startup.clock().clone(),
+            template: Stamp { frame: declaration.frame, origin: environment.origin(), ..Stamp::default() },
             shared,
-            startup: startup.clone(),
-            estimator: made.ok(),
-            cache: cache(),
+            environment: environment.clone(),
+            slot: Slot::new(Recipe::new(options, binding), environment.supervision()),
+            cache: make_cache(),
+            make_cache,
             admission: Admission::new(declaration.inputs.len()),
+            backlog: Backlog::new(),
             health: Health::default(),
-            last_input: now,
+            epoch: 0,
+            was_good: false,
             timers: Timers::default(),
             scheduled: None,
             continued: 0,
-            requested: context.into_requests(),
-            has_begun: false,
-            restart: Restart::default(),
-            recipe: Recipe { options: options.clone(), binding, cache },
+            requested: Vec::new(),
+            parameters: environment.overseer().parameters(),
+        };
+        if environment.mode() != Mode::Replay {
+            node.make_first(environment.start());
         }
+        node
     }
 
-    /// Takes a message of the declared input number `input`, which is the algorithm's field `I`, that arrived at `now`. If
-    /// it is the driver and all is well, the estimator runs; the stamp of what it put into `emitted`, if anything.
+    /// Takes a message of the declared input number `input`, which is the algorithm's field `I`. If it is the driver and all
+    /// is well, the estimator runs; the stamp of what it put into `emitted`, if anything.
     #[inline]
     pub fn receive<const I: usize>(
         &mut self,
         input: usize,
         message: &Stamped<<E::Input as InputAt<I>>::Payload>,
-        now: MonotonicTime,
+        turn: &Turn<'_>,
+        emitted: &mut Option<E::Output>,
+    ) -> Option<Stamp>
+    where
+        E::Input: InputAt<I>,
+    {
+        self.shared.counters().inputs.get(input)?.received.increment();
+        if turn.is_observed() {
+            self.tell_input(input, message.stamp(), turn);
+        }
+        if self.slot.is_running() && self.backlog.is_empty() {
+            return self.take_in::<I>(input, message, turn, emitted);
+        }
+        self.keep::<I>(input, message);
+        None
+    }
+
+    /// The same for a message that was counted.
+    #[inline]
+    pub(super) fn take_in<const I: usize>(
+        &mut self,
+        input: usize,
+        message: &Stamped<<E::Input as InputAt<I>>::Payload>,
+        turn: &Turn<'_>,
         emitted: &mut Option<E::Output>,
     ) -> Option<Stamp>
     where
         E::Input: InputAt<I>,
     {
         let declared = self.declaration.inputs.get(input)?;
+        let AsEstimator(running) = self.slot.running()?;
+        let (admission, cache) = (&mut self.admission, &mut self.cache);
         let counters = self.shared.counters();
-        counters.inputs[input].received.increment();
-        let Some(running) = &mut self.estimator else {
-            counters.drop(input, DropReason::Stopped);
-            return None;
-        };
-        let (admission, cache, clock) = (&mut self.admission, &mut self.cache, &self.clock);
         let budget = self.declaration.health.latency_budget_nanos;
-        let mut start = MonotonicTime::ZERO;
+        let mut start = None;
+        turn.enter(self.shared.number() as u32);
         // All of the user's code at once: the payload's, the cache's clone and the estimator. After a panic the
         // estimator is dropped, so that nothing sees what was left half done.
         let handled = caught(|| {
-            if let Err(reason) = admission.admit(input, message, now) {
+            if let Err(reason) = admission.admit(input, message, turn.now()) {
                 return Ok(Handled::Refused(reason));
             }
             if !declared.driver {
@@ -152,49 +170,39 @@ impl<E: Estimator> Node<E> {
                 Ok(view) => view,
                 Err(miss) => return Ok(Handled::Missed(miss)),
             };
-            counters.dispatched.increment();
-            if budget.is_some() {
-                start = clock.now();
+            let dispatched = counters.dispatched.increment();
+            if budget.is_some() || dispatched.is_multiple_of(SAMPLED) {
+                start = Some(turn.begin_measure());
             }
             running.handle_input(view).map(Handled::Ran)
         });
         match handled {
             Ok(Handled::Ran(reply)) => {
-                self.arrived(declared, now);
-                let mut bad = match budget {
-                    Some(budget) => {
-                        let (bad, end) = self.overrun(budget, start);
-                        if let Some(age) = &self.shared.counters().inputs[input].age {
-                            age.add(end.nanos_since(message.monotonic_time).max(0) as u64);
-                        }
-                        bad
-                    }
-                    None => None,
-                };
+                if self.declaration.health.lost_after_nanos.is_some() {
+                    self.shared.set_last_run(turn.now());
+                }
+                let mut bad =
+                    start.and_then(|start| self.measure(start, Some((input, message.monotonic_time)), turn));
                 if let Some(limit) = declared.stale_after_nanos
-                    && now.nanos_since(message.monotonic_time) > limit
+                    && turn.now().nanos_since(message.monotonic_time) > limit
                 {
                     bad = bad.or(Some(HealthReason::StaleInput));
                 }
-                let stamp =
-                    Stamp { monotonic_time: message.monotonic_time, wall_time: message.wall_time, ..self.template };
-                self.complete(reply, bad, declared.source, stamp, now, emitted)
+                let Stamped { monotonic_time, wall_time, .. } = *message;
+                let stamp = Stamp { monotonic_time, wall_time, ..self.template };
+                self.complete(reply, bad, Some(declared.source), stamp, turn, emitted)
             }
-            Ok(Handled::Stored) => {
-                self.arrived(declared, now);
-                None
-            }
+            Ok(Handled::Stored) => None,
             Ok(Handled::Refused(reason)) => {
                 self.refuse(declared, reason, message.monotonic_time.as_nanos());
                 None
             }
             Ok(Handled::Missed(miss)) => {
-                self.arrived(declared, now);
-                self.miss(miss, now);
+                self.miss(miss, turn);
                 None
             }
             Err(failed) => {
-                self.fail(failed, now);
+                self.fail(failed, turn);
                 None
             }
         }
@@ -207,115 +215,100 @@ impl<E: Estimator> Node<E> {
     }
 
     /// Does one thing that is due, if any is.
-    pub fn turn(&mut self, now: MonotonicTime, emitted: &mut Option<E::Output>) -> Turn {
-        self.begin(now);
-        if self.shared.take_restart() {
-            self.leave_for_restart(now);
+    pub fn turn(&mut self, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
+        // An estimator that is woken says when to be woken next.
+        self.scheduled = None;
+        if self.slot.restart_at().is_some_and(|at| at <= turn.now()) {
+            self.restart(turn);
+            return Next::Quiet;
         }
-        if self.estimator.is_none() {
-            if self.restart.at.is_some_and(|at| at <= now) {
-                self.make_anew(now);
-                return Turn::Quiet;
-            }
+        if !self.slot.is_running() {
             self.schedule();
-            return Turn::Idle;
+            return Next::Idle;
         }
         if let Some(step) = self.timers.continue_with.take() {
-            return self.go_on(step, now, emitted);
+            return self.go_on(step, turn, emitted);
         }
         self.continued = 0;
-        if self.shared.take_changed_options() {
-            self.change_options(now);
-            return Turn::Quiet;
+        if let Some(deliver) = self.backlog.pop() {
+            return deliver(self, turn, emitted).map_or(Next::Quiet, Next::Emitted);
         }
-        if let Some(cast) = self.shared.take_cast() {
-            return match cast.downcast::<Cast<E>>() {
-                Ok(cast) => self.run(now, emitted, *cast),
-                Err(_) => Turn::Quiet,
-            };
-        }
-        if self.lost_at().is_some_and(|at| at <= now) {
-            let source = self.declaration.inputs.iter().find(|input| input.driver);
-            self.judge(Event::Silence, source.map_or("", |input| input.source), now);
-            return Turn::Quiet;
-        }
-        if let Some(info) = self.timers.take(now) {
-            return self.run(now, emitted, |estimator| estimator.handle_info(info));
+        if let Some(info) = self.timers.take(turn.now()) {
+            return self.run(turn, emitted, |estimator| estimator.handle_info(info));
         }
         self.schedule();
-        Turn::Idle
+        Next::Idle
     }
 
-    /// Lets the estimator clean up and drops it; messages that still come are counted as dropped.
-    pub fn terminate(&mut self) {
-        self.restart.at = None;
-        self.shared.refuse_casts();
-        if let Some(fault) = self.estimator.take().and_then(|estimator| retire(estimator, false, E::terminate)) {
-            self.startup.fault(self.declaration.path, &fault);
-            self.shared.set_stopped(Some(fault.to_string()));
-        }
-    }
-
-    fn go_on(&mut self, step: u32, now: MonotonicTime, emitted: &mut Option<E::Output>) -> Turn {
+    fn go_on(&mut self, step: u32, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
         self.continued += 1;
         if self.continued <= STUCK_AFTER {
-            return self.run(now, emitted, |estimator| estimator.handle_continue(step));
+            return self.run(turn, emitted, |estimator| estimator.handle_continue(step));
         }
         self.continued = 0;
+        let now = turn.now();
         let message =
             format!("it asked {STUCK_AFTER} times in a row to go on at {now}, and nothing else could happen");
-        self.fail(Failed { fault: Fault::permanent(message), panicked: false }, now);
-        Turn::Quiet
+        self.fail(Failed::from(Fault::permanent(message)), turn);
+        Next::Quiet
     }
 
-    /// Any callback but `handle_input`.
+    /// Any callback but `handle_input`. It can degrade the estimator, and is no completion that counts for a recovery.
     fn run(
         &mut self,
-        now: MonotonicTime,
+        turn: &Turn<'_>,
         emitted: &mut Option<E::Output>,
         callback: impl FnOnce(&mut E) -> Result<Reply<E::Output>, Fault>,
-    ) -> Turn {
-        let Some(running) = &mut self.estimator else { return Turn::Quiet };
-        let start = self.clock.now();
+    ) -> Next {
+        let Some(AsEstimator(running)) = self.slot.running() else { return Next::Quiet };
+        turn.enter(self.shared.number() as u32);
+        let is_measured = self.declaration.health.latency_budget_nanos.is_some();
+        let start = is_measured.then(|| turn.begin_measure());
         match caught(|| callback(running)) {
             Ok(reply) => {
-                let bad = self.declaration.health.latency_budget_nanos;
-                let bad = bad.and_then(|budget| self.overrun(budget, start).0);
-                let stamp = Stamp { monotonic_time: now, wall_time: self.clock.wall_at(now), ..self.template };
-                let path = self.declaration.path;
-                self.complete(reply, bad, path, stamp, now, emitted).map_or(Turn::Quiet, Turn::Emitted)
+                let bad = start.and_then(|start| self.measure(start, None, turn));
+                let now = turn.now();
+                let stamp = Stamp { monotonic_time: now, wall_time: turn.wall_at(now), ..self.template };
+                self.complete(reply, bad, None, stamp, turn, emitted).map_or(Next::Quiet, Next::Emitted)
             }
             Err(failed) => {
-                self.fail(failed, now);
-                Turn::Quiet
+                turn.no_emission();
+                self.fail(failed, turn);
+                Next::Quiet
             }
         }
     }
 
+    /// `source` is the driver's publisher after a run on its message.
     #[inline]
     fn complete(
         &mut self,
         reply: Reply<E::Output>,
         bad: Option<HealthReason>,
-        source: &'static str,
+        source: Option<&'static str>,
         stamp: Stamp,
-        now: MonotonicTime,
+        turn: &Turn<'_>,
         emitted: &mut Option<E::Output>,
     ) -> Option<Stamp> {
         let Reply { output, diverged, request } = reply;
         self.timers.happened();
         if let Some(request) = request {
-            self.timers.request(request, now);
+            self.timers.request(request, turn.now());
             self.schedule();
         }
         if bad.is_some() || diverged.is_some() || self.health.state != HealthState::Healthy {
-            self.assess(bad, diverged, source, now);
+            self.assess(bad, diverged, source, turn.now());
+        } else if source.is_some() {
+            self.was_good = true;
         }
         *emitted = output;
-        emitted.is_some().then(|| {
-            self.shared.counters().emitted.increment();
-            stamp
-        })
+        if emitted.is_none() {
+            turn.no_emission();
+            return None;
+        }
+        self.shared.counters().emitted.increment();
+        turn.begin_emission(self.declaration);
+        Some(stamp)
     }
 
     #[cold]
@@ -323,7 +316,7 @@ impl<E: Estimator> Node<E> {
         &mut self,
         bad: Option<HealthReason>,
         diverged: Option<&'static str>,
-        source: &'static str,
+        source: Option<&'static str>,
         now: MonotonicTime,
     ) {
         if let Some(reason) = diverged {
@@ -331,44 +324,59 @@ impl<E: Estimator> Node<E> {
             tracing::debug!(estimator = self.declaration.path, reason, "diverged");
         }
         let bad = bad.or(diverged.map(|_| HealthReason::Diverged));
-        self.judge(bad.map_or(Event::Good, Event::Bad), source, now);
+        let path = source.unwrap_or(self.declaration.path);
+        if source.is_some() {
+            self.was_good = bad.is_none();
+            self.judge(Event::Run, path, now);
+        }
+        match bad {
+            Some(reason) => self.judge(Event::Bad(reason), path, now),
+            None if source.is_some() => self.judge(Event::Good, path, now),
+            None => {}
+        }
     }
 
-    /// Measures a callback that has a budget; the reason if it took longer, and when it was over.
-    fn overrun(&self, budget_nanos: i64, start: MonotonicTime) -> (Option<HealthReason>, MonotonicTime) {
-        let mut end = self.clock.now();
-        if self.clock.is_virtual() {
-            end = end.plus_nanos(self.shared.pretended_latency_nanos());
+    /// Measures a callback that began at `start`; the reason if it took longer than its budget. `driver` is the input that
+    /// it was called with, and the message's stamp.
+    fn measure(
+        &mut self,
+        start: MonotonicTime,
+        driver: Option<(usize, MonotonicTime)>,
+        turn: &Turn<'_>,
+    ) -> Option<HealthReason> {
+        let budget = self.declaration.health.latency_budget_nanos;
+        let (end, nanos) = if self.environment.mode() == Mode::Real {
+            let end = turn.read_clock();
+            (end, end.nanos_since(start))
+        } else {
+            let is_replayed = self.environment.mode() == Mode::Replay && budget.is_some();
+            let nanos = self.shared.virtual_latency_nanos(is_replayed);
+            (start.plus_nanos(nanos), nanos)
+        };
+        let counters = self.shared.counters();
+        counters.latency.add(nanos.max(0) as u64);
+        if let Some((input, stamp)) = driver
+            && let Some(age) = counters.inputs.get(input).and_then(|input| input.age.as_ref())
+        {
+            age.add(end.nanos_since(stamp).max(0) as u64);
         }
-        let elapsed = end.nanos_since(start);
-        self.shared.counters().latency.add(elapsed.max(0) as u64);
-        if elapsed <= budget_nanos {
-            return (None, end);
+        if let Some(telemetry) = self.environment.telemetry() {
+            let duration = std::time::Duration::from_nanos(nanos.max(0) as u64);
+            let event = TelemetryEvent::Latency { estimator: self.declaration.path, duration };
+            telemetry.tell(self.environment.origin().robot, &event);
         }
-        if let Some(journal) = self.startup.journal() {
-            journal.overrun(start, self.shared.number());
-        }
-        (Some(HealthReason::LatencyOverrun), end)
-    }
-
-    /// An input was let in.
-    #[inline]
-    fn arrived(&mut self, input: &InputDeclaration, now: MonotonicTime) {
-        self.last_input = now;
-        if self.health.state == HealthState::Lost {
-            self.judge(Event::Input, input.source, now);
-            self.schedule();
-        }
+        let budget = budget?;
+        turn.keep(self.shared.number(), nanos);
+        (nanos > budget).then_some(HealthReason::LatencyOverrun)
     }
 
     #[cold]
     fn judge(&mut self, event: Event, source: &'static str, time: MonotonicTime) {
         let from = self.health.state;
         let Some((to, reason)) = self.health.on(event, self.declaration.health.recover_after) else { return };
-        self.shared.set_health(to);
-        self.shared.counters().transitions.increment();
         let transition = HealthTransition { estimator: self.declaration.path, source, from, to, reason, time };
-        self.startup.health_changed(transition, self.declaration.health.command(from, to));
+        let report = HealthReport { transition, epoch: self.epoch };
+        self.environment.overseer().report(self.shared.number(), Report::Health(report));
     }
 
     #[cold]
@@ -376,57 +384,78 @@ impl<E: Estimator> Node<E> {
         self.shared.counters().drop(input.index, reason);
         let (estimator, input, reason) = (self.declaration.path, input.name, reason.name());
         tracing::debug!(estimator, input, reason, time_nanos, "message dropped");
+        self.tell_drop(input, reason);
     }
 
     #[cold]
-    fn miss(&mut self, miss: SyncMiss, now: MonotonicTime) {
+    fn miss(&mut self, miss: SyncMiss, turn: &Turn<'_>) {
         self.shared.counters().drop(miss.input, DropReason::SyncMiss);
         let Some(input) = self.declaration.inputs.get(miss.input) else { return };
         let (age_nanos, tolerance_nanos) = (miss.age_nanos, input.tolerance_nanos);
         let estimator = self.declaration.path;
         tracing::debug!(estimator, input = input.name, age_nanos, tolerance_nanos, "dispatch dropped for sync");
-        self.judge(Event::Bad(HealthReason::SyncMiss), input.source, now);
+        self.tell_drop(input.name, DropReason::SyncMiss.name());
+        self.judge(Event::Bad(HealthReason::SyncMiss), input.source, turn.now());
     }
 
-    /// The first turn: time may have been set to a recording's after it was made.
-    fn begin(&mut self, now: MonotonicTime) {
-        if !self.has_begun {
-            self.has_begun = true;
-            self.last_input = now;
-            for request in std::mem::take(&mut self.requested) {
-                self.timers.request(request, now);
+    #[cold]
+    fn tell_input(&self, input: usize, stamp: Stamp, turn: &Turn<'_>) {
+        if let Some(telemetry) = turn.environment().telemetry()
+            && let Some(input) = self.declaration.inputs.get(input)
+        {
+            let event = TelemetryEvent::Input { estimator: self.declaration.path, input: input.name, stamp };
+            telemetry.tell(self.environment.origin().robot, &event);
+        }
+    }
+
+    #[cold]
+    fn tell_drop(&self, input: &'static str, reason: &'static str) {
+        if let Some(telemetry) = self.environment.telemetry() {
+            let event = TelemetryEvent::Dropped { estimator: self.declaration.path, input, reason };
+            telemetry.tell(self.environment.origin().robot, &event);
+        }
+    }
+
+    /// Keeps a message for after the restart, or counts it as dropped if there will be none.
+    #[cold]
+    fn keep<const I: usize>(&mut self, input: usize, message: &Stamped<<E::Input as InputAt<I>>::Payload>)
+    where
+        E::Input: InputAt<I>,
+    {
+        let is_kept = self.slot.is_running() || self.slot.restart_at().is_some();
+        if !is_kept {
+            self.shared.counters().drop(input, DropReason::Stopped);
+            return;
+        }
+        let kept = caught(|| Ok(self.backlog.push::<I>(input, message)));
+        match kept {
+            Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
+            Ok(None) => {}
+            // The payload's `clone` panicked: it cannot be kept.
+            Err(failed) => {
+                self.shared.counters().drop(input, DropReason::Stopped);
+                self.report_failure(&failed);
             }
         }
-        // Whoever is woken says anew when to be woken next.
-        self.scheduled = None;
-    }
-
-    fn lost_at(&self) -> Option<MonotonicTime> {
-        let after = self.declaration.health.lost_after_nanos?;
-        (self.health.state != HealthState::Lost).then(|| self.last_input.plus_nanos(after))
     }
 
     /// Has the island woken when something is due next.
     fn schedule(&mut self) {
-        let next = match &self.estimator {
-            Some(_) => self.timers.next().into_iter().chain(self.lost_at()).min(),
-            None => self.restart.at,
-        };
+        let next = if self.slot.is_running() { self.timers.next() } else { self.slot.restart_at() };
         if let Some(next) = next
             && self.scheduled.is_none_or(|scheduled| next < scheduled)
         {
             self.scheduled = Some(next);
-            self.startup.agenda().wake_at(next, self.declaration.island);
+            self.environment.agenda().wake_at(next, self.declaration.island);
         }
     }
-}
 
-impl<E: Estimator> Drop for Node<E> {
-    /// Of a robot that did not start.
-    fn drop(&mut self) {
-        if let Some(estimator) = self.estimator.take() {
-            let _ = retire(estimator, false, E::terminate);
-        }
+    fn set_stopped(&self, reason: Option<(String, bool)>) {
+        self.shared.set_stopped(reason.map(|(reason, for_good)| Stopped { reason, for_good }));
+    }
+
+    fn context(&self, now: MonotonicTime) -> Context {
+        Context::new(self.environment.origin().robot, self.declaration, now)
     }
 }
 

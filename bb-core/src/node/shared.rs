@@ -1,17 +1,15 @@
-//! What can be asked of an estimator, and left for it, while it runs on whatever thread.
+//! The part of a running estimator that other threads may read while it runs.
 
 use super::counters::Counters;
-use super::{EstimatorDeclaration, EstimatorStatistics, HealthState};
-use crate::component::Fault;
-use std::any::Any;
+use super::{EstimatorStatistics, HealthState};
+use crate::declaration::EstimatorDeclaration;
+use crate::event::HealthState as State;
+use crate::time::MonotonicTime;
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// One-way requests that wait for an estimator; one more is refused.
-const MAX_CASTS: usize = 1024;
-
-/// The part of a running estimator that is outside its island's lock.
+/// Counters, health as published, and why it does not run. Clones are the same.
 #[derive(Clone, Debug)]
 pub(crate) struct SharedNode(Arc<Inner>);
 
@@ -20,17 +18,25 @@ struct Inner {
     number: usize,
     declaration: &'static EstimatorDeclaration,
     counters: Counters,
+    /// As the control state last published it.
     health: AtomicU8,
-    /// Why it does not run, if it does not.
-    stopped: Mutex<Option<String>>,
-    /// None once the robot has stopped.
-    casts: Mutex<Option<VecDeque<Box<dyn Any + Send>>>>,
-    /// A parameter that its options are bound to has changed.
-    options_changed: AtomicBool,
-    /// Its supervisor starts it anew, though it has not failed.
-    restart: AtomicBool,
+    /// When the message came on which the last run was completed: for the watchdog.
+    last_run_nanos: AtomicI64,
+    stopped: Mutex<Option<Stopped>>,
+    /// One-way requests that wait.
+    casts: AtomicU32,
     /// How long its callbacks pretend to take on virtual time.
     pretended_latency_nanos: AtomicI64,
+    /// How long they took, in a replay.
+    replayed_latencies: Mutex<VecDeque<i64>>,
+}
+
+/// Why it does not run.
+#[derive(Clone, Debug)]
+pub(crate) struct Stopped {
+    pub(crate) reason: String,
+    /// It is not restarted.
+    pub(crate) for_good: bool,
 }
 
 impl SharedNode {
@@ -40,16 +46,16 @@ impl SharedNode {
             declaration,
             counters: Counters::new(declaration),
             health: AtomicU8::new(0),
+            last_run_nanos: AtomicI64::new(0),
             stopped: Mutex::new(None),
-            casts: Mutex::new(Some(VecDeque::new())),
-            options_changed: AtomicBool::new(false),
-            restart: AtomicBool::new(false),
+            casts: AtomicU32::new(0),
             pretended_latency_nanos: AtomicI64::new(0),
+            replayed_latencies: Mutex::default(),
         }))
     }
 
     #[inline]
-    pub(super) fn counters(&self) -> &Counters {
+    pub(crate) fn counters(&self) -> &Counters {
         &self.0.counters
     }
 
@@ -68,71 +74,68 @@ impl SharedNode {
     }
 
     pub(crate) fn statistics(&self) -> EstimatorStatistics {
-        self.0.counters.statistics(self.0.declaration, self.health(), lock(&self.0.stopped).clone())
+        let stopped = lock(&self.0.stopped).clone().map(|stopped| stopped.reason);
+        self.0.counters.statistics(self.0.declaration, self.health(), stopped)
     }
 
     pub(crate) fn health(&self) -> HealthState {
-        HealthState::from_index(self.0.health.load(Ordering::Relaxed))
+        State::from_index(self.0.health.load(Ordering::Relaxed))
     }
 
-    pub(super) fn set_health(&self, state: HealthState) {
+    pub(crate) fn set_health(&self, state: HealthState) {
         self.0.health.store(state as u8, Ordering::Relaxed);
     }
 
-    pub(super) fn stopped(&self) -> Option<String> {
+    pub(crate) fn count_transition(&self) {
+        self.0.counters.transitions.increment();
+    }
+
+    #[inline]
+    pub(crate) fn last_run(&self) -> MonotonicTime {
+        MonotonicTime::from_nanos(self.0.last_run_nanos.load(Ordering::Acquire))
+    }
+
+    #[inline]
+    pub(crate) fn set_last_run(&self, time: MonotonicTime) {
+        self.0.last_run_nanos.store(time.as_nanos(), Ordering::Release);
+    }
+
+    pub(crate) fn stopped(&self) -> Option<Stopped> {
         lock(&self.0.stopped).clone()
     }
 
-    pub(super) fn set_stopped(&self, reason: Option<String>) {
-        *lock(&self.0.stopped) = reason;
+    pub(super) fn set_stopped(&self, stopped: Option<Stopped>) {
+        *lock(&self.0.stopped) = stopped;
     }
 
-    /// Leaves a one-way request; or says why not.
-    pub(crate) fn leave_cast(&self, cast: Box<dyn Any + Send>) -> Result<(), Fault> {
-        let path = self.0.declaration.path;
-        match lock(&self.0.casts).as_mut() {
-            None => Err(Fault::new(format!("{path} does not run any more"))),
-            Some(casts) if casts.len() >= MAX_CASTS => {
-                Err(Fault::new(format!("too many requests wait for {path}")))
-            }
-            Some(casts) => {
-                casts.push_back(cast);
-                Ok(())
-            }
-        }
+    /// Takes one of so many places for one-way requests; false if there is none left.
+    pub(crate) fn begin_cast(&self, most: u32) -> bool {
+        let taken = self
+            .0
+            .casts
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |casts| (casts < most).then_some(casts + 1));
+        taken.is_ok()
     }
 
-    pub(super) fn take_cast(&self) -> Option<Box<dyn Any + Send>> {
-        lock(&self.0.casts).as_mut()?.pop_front()
-    }
-
-    /// Takes no requests any more; those that wait are dropped.
-    pub(super) fn refuse_casts(&self) {
-        let casts = lock(&self.0.casts).take();
-        drop(casts);
-    }
-
-    pub(crate) fn change_options(&self) {
-        self.0.options_changed.store(true, Ordering::Release);
-    }
-
-    pub(super) fn take_changed_options(&self) -> bool {
-        self.0.options_changed.load(Ordering::Relaxed) && self.0.options_changed.swap(false, Ordering::AcqRel)
-    }
-
-    pub(crate) fn restart(&self) {
-        self.0.restart.store(true, Ordering::Release);
-    }
-
-    pub(super) fn take_restart(&self) -> bool {
-        self.0.restart.load(Ordering::Relaxed) && self.0.restart.swap(false, Ordering::AcqRel)
+    pub(super) fn end_cast(&self) {
+        // In a replay nobody has taken a place.
+        let _ = self.0.casts.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |casts| casts.checked_sub(1));
     }
 
     pub(crate) fn pretend_latency(&self, nanos: i64) {
         self.0.pretended_latency_nanos.store(nanos, Ordering::Relaxed);
     }
 
-    pub(super) fn pretended_latency_nanos(&self) -> i64 {
+    /// The callback about to be measured takes so long in a replay.
+    pub(crate) fn replay_latency(&self, nanos: i64) {
+        lock(&self.0.replayed_latencies).push_back(nanos);
+    }
+
+    /// How long a callback took on virtual time.
+    pub(super) fn virtual_latency_nanos(&self, is_replay: bool) -> i64 {
+        if is_replay {
+            return lock(&self.0.replayed_latencies).pop_front().unwrap_or(0);
+        }
         self.0.pretended_latency_nanos.load(Ordering::Relaxed)
     }
 }

@@ -2,7 +2,8 @@
 
 use super::queue::Queue;
 use super::unmatched::{Unmatched, unmatched};
-use super::{AnyTopic, Overflow, Payloads, Select};
+use super::{AnyTopic, Overflow, Payloads, Registry, Select};
+use crate::fault::Fault;
 use crate::message::codec::{encode, encode_as_ros, is_exact_as_ros, to_json};
 use crate::message::{Payload, Schema, Stamp, Stamped};
 use std::any::Any;
@@ -28,6 +29,7 @@ trait AnyMessage: Send + Sync {
     fn ros_schema(&self) -> Option<Schema>;
     fn is_exact_as_ros(&self) -> bool;
     fn to_json(&self) -> String;
+    fn topic(&self, path: &str, registry: &Registry) -> Result<Arc<dyn AnyTopic>, Fault>;
 }
 
 impl<T: Payload> AnyMessage for Stamped<T> {
@@ -61,11 +63,19 @@ impl<T: Payload> AnyMessage for Stamped<T> {
     fn to_json(&self) -> String {
         to_json(self)
     }
+    fn topic(&self, path: &str, registry: &Registry) -> Result<Arc<dyn AnyTopic>, Fault> {
+        Ok(registry.topic::<T>(path)?)
+    }
 }
 
 impl DynamicMessage {
     pub(crate) fn new<T: Payload>(path: &'static str, message: &Stamped<T>) -> Self {
         Self { path, message: Arc::new(message.clone()) }
+    }
+
+    /// The topic at its path, made at run time for its payload.
+    pub(crate) fn topic(&self, registry: &Registry) -> Result<Arc<dyn AnyTopic>, Fault> {
+        self.message.topic(self.path, registry)
     }
 
     /// The path it was published at.

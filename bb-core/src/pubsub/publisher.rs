@@ -1,6 +1,6 @@
 //! Publishing at a path that the robot does not declare.
 
-use super::{AnyTopic as _, Topic};
+use super::{AnyTopic as _, DynamicMessage, Topic};
 use crate::message::{Payload, Stamp, Stamped};
 use std::fmt;
 use std::sync::Arc;
@@ -9,22 +9,43 @@ use std::sync::Arc;
 /// Clones publish at the same path. The path remains when the last of them is dropped.
 pub struct Publisher<T> {
     topic: Arc<Topic<T>>,
-    stamp: Arc<dyn Fn() -> Stamp + Send + Sync>,
+    gate: Arc<dyn Gate>,
+}
+
+/// What stands between a publisher and its topic.
+pub(crate) trait Gate: Send + Sync {
+    /// The stamp of a payload that is published now; none once the publisher may not act any more.
+    fn stamp(&self) -> Option<Stamp>;
+    /// Whether messages are to be shown to [`Self::note`].
+    fn is_noted(&self) -> bool;
+    /// A message is about to be published.
+    fn note(&self, message: DynamicMessage);
 }
 
 impl<T: Payload> Publisher<T> {
-    /// `stamp` gives the stamp of a payload that is published now.
-    pub(crate) fn new(topic: Arc<Topic<T>>, stamp: impl Fn() -> Stamp + Send + Sync + 'static) -> Self {
-        Self { topic, stamp: Arc::new(stamp) }
+    pub(crate) fn new(topic: Arc<Topic<T>>, gate: Arc<dyn Gate>) -> Self {
+        Self { topic, gate }
     }
 
-    /// Publishes a payload measured now, in no frame. In a command, now is the time at which commands proceed.
+    /// Publishes a payload measured now, in no frame. Once the command that made this publisher has ended, nothing is
+    /// published any more.
     pub fn publish(&self, payload: T) {
-        self.topic.publish(&(self.stamp)().message(payload));
+        if let Some(stamp) = self.gate.stamp() {
+            self.hand_out(&stamp.message(payload));
+        }
     }
 
     /// Publishes a message with the stamp that it has: one that comes from elsewhere and is passed on.
     pub fn forward(&self, message: &Stamped<T>) {
+        if self.gate.stamp().is_some() {
+            self.hand_out(message);
+        }
+    }
+
+    fn hand_out(&self, message: &Stamped<T>) {
+        if self.gate.is_noted() {
+            self.gate.note(DynamicMessage::new(self.topic.path(), message));
+        }
         self.topic.publish(message);
     }
 
@@ -36,7 +57,7 @@ impl<T: Payload> Publisher<T> {
 
 impl<T> Clone for Publisher<T> {
     fn clone(&self) -> Self {
-        Self { topic: Arc::clone(&self.topic), stamp: Arc::clone(&self.stamp) }
+        Self { topic: Arc::clone(&self.topic), gate: Arc::clone(&self.gate) }
     }
 }
 

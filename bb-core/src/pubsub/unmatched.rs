@@ -1,7 +1,7 @@
 //! What a subscription asks for and nothing publishes.
 
-use super::nearest::{nearest, nearest_path};
 use super::{AnyTopic, Payloads, Select};
+use crate::message::nearest::{nearest, nearest_path};
 use std::collections::BTreeSet;
 use std::fmt;
 

@@ -1,215 +1,278 @@
 //! A running actuator: whether it may move, and what becomes of it when it fails.
 
-use super::supervision::{Failures, Supervisor};
-use super::{Failed, Startup, caught, retire};
-use crate::component::{Actuator, ActuatorContext, Then};
-use crate::control::{Binding, Safety};
+use super::source::Assembly;
+use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Permit};
+use crate::control::{ComponentOrder, Control};
+use crate::declaration::ActuatorDeclaration;
+use crate::event::Safety;
+use crate::fault::{Failed, Fault, caught};
+use crate::journal::{Event, Recorded};
+use crate::lifecycle::{AfterFault, AsActuator, Recipe, Slot};
 use crate::message::{Finite, Frame, Payload, Stamp};
-use crate::pubsub::{AnyTopic, Topic};
+use crate::node::{BindTarget, Environment, Mode};
+use crate::pubsub::{AnyTopic, DynamicMessage, Topic, Wakers};
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
+use std::task::{Wake, Waker};
 use std::time::{Duration, Instant};
-
-/// An actuator as declared.
-#[derive(Clone, Copy, Debug)]
-pub struct ActuatorDeclaration {
-    /// Its path: `actuator/base_link/pan/servo`.
-    pub path: &'static str,
-    /// The joint that it moves, which is the frame of its commands.
-    pub joint: &'static str,
-    /// The number of its supervisor.
-    pub supervisor: Supervisor,
-}
 
 /// An actuator in the wiring.
 pub struct ActuatorNode<A: Actuator>(Arc<Inner<A>>);
 
 struct Inner<A: Actuator> {
+    this: Weak<Self>,
+    number: usize,
     declaration: &'static ActuatorDeclaration,
     context: ActuatorContext,
-    options: Mutex<A::Options>,
-    binding: Binding<A::Options>,
-    options_changed: AtomicBool,
-    startup: Startup,
+    environment: Environment,
+    control: Control,
     topic: Topic<A::Command>,
+    /// What its supervisor and parameters tell it.
+    orders: Mutex<Vec<Order>>,
+    /// Held while its code runs: nothing that must not wait for user code takes it.
     state: Mutex<State<A>>,
 }
 
-struct State<A> {
-    /// None while it does not run.
-    actuator: Option<A>,
-    restart_at: Option<MonotonicTime>,
-    failures: Failures,
+struct State<A: Actuator> {
+    slot: Slot<AsActuator<A>>,
+    /// It has failed, and could not be made safe then.
+    is_unsafe: bool,
 }
 
-/// Why an actuator has not done what it was told.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ActuatorError {
-    /// The robot is not armed.
-    NotArmed(Safety),
-    /// The command holds a NaN or an infinity.
-    NonFinite,
-    /// It does not run: it has failed, and waits for its restart.
-    Stopped,
-    /// It has failed at this command.
-    Failed(String),
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    Options,
+    Restart,
+    GiveUp,
 }
-
-impl fmt::Display for ActuatorError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotArmed(safety) => write!(f, "the robot is not armed ({safety})"),
-            Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
-            Self::Stopped => f.write_str("the actuator has failed and does not run"),
-            Self::Failed(message) => write!(f, "the actuator failed: {message}"),
-        }
-    }
-}
-
-impl std::error::Error for ActuatorError {}
 
 impl<A: Actuator> ActuatorNode<A> {
-    /// Makes the actuator; what keeps it from starting is in `startup`.
+    /// Makes the actuator; what keeps the robot from starting is kept in `assembly`.
     pub fn new(
+        number: usize,
         declaration: &'static ActuatorDeclaration,
         options: &A::Options,
         binding: Binding<A::Options>,
-        startup: &Startup,
+        assembly: &Assembly,
     ) -> Self {
-        let context = ActuatorContext {
-            robot: startup.robot(),
-            path: declaration.path,
-            joint: declaration.joint,
-            clock: startup.clock().clone(),
-        };
+        let context = ActuatorContext::new(declaration, Arc::clone(&assembly.host.0));
+        let environment = assembly.environment.clone();
+        let control = assembly.control.clone();
+        let mut slot = Slot::new(Recipe::new(options, binding), environment.supervision());
         // A journal does not move anything.
-        let made = if startup.is_replay() {
-            Err("a journal is replayed".into())
-        } else {
-            startup.make(declaration.path, options, binding, |options| A::init(options, &context))
-        };
-        let state = State { actuator: made.ok(), restart_at: None, failures: Failures::default() };
-        let inner = Arc::new(Inner {
+        if environment.mode() != Mode::Replay {
+            let parameters = control.parameters();
+            let _ = environment
+                .make(declaration.path, || slot.make(&context, &parameters).map_err(|failed| failed.fault));
+        }
+        let inner = Arc::new_cyclic(|this| Inner {
+            this: Weak::clone(this),
+            number,
             declaration,
             context,
-            options: Mutex::new(options.clone()),
-            binding,
-            options_changed: AtomicBool::new(false),
-            startup: startup.clone(),
+            environment,
+            control,
             topic: Topic::new(declaration.path),
-            state: Mutex::new(state),
+            orders: Mutex::default(),
+            state: Mutex::new(State { slot, is_unsafe: false }),
         });
-        // Weak, since the startup that keeps these is kept by the actuator.
-        let (told, disarmed) = (Arc::downgrade(&inner), Arc::downgrade(&inner));
-        startup.bind(declaration.path, options, binding, move || {
-            if let Some(inner) = told.upgrade() {
-                inner.options_changed.store(true, Ordering::Release);
-            }
+        // Weak, since the control state that keeps these is kept by the actuator.
+        let told = Arc::downgrade(&inner);
+        let target = BindTarget::Other(Box::new(move || Inner::tell(&told, Order::Options)));
+        assembly.environment.bind(declaration.path, options, binding, target);
+        let told = Arc::downgrade(&inner);
+        assembly.control.look_after(declaration.path, declaration.supervisor, move |order| {
+            Inner::tell(
+                &told,
+                match order {
+                    ComponentOrder::Restart => Order::Restart,
+                    ComponentOrder::GiveUp => Order::GiveUp,
+                },
+            );
         });
-        let disarm = move || match disarmed.upgrade() {
-            Some(inner) => lock(&inner.state).actuator.as_mut().map_or(Ok(()), A::disarm),
-            None => Ok(()),
-        };
-        startup.control.on_disarm(declaration.path, Arc::new(disarm));
+        let disarmed = Arc::downgrade(&inner);
+        let disarm = move || disarmed.upgrade().map_or(Ok(()), |inner| inner.disarm());
+        assembly.control.on_disarm_always(declaration.path, Arc::new(disarm));
         Self(inner)
     }
 
-    /// Where its commands are seen.
+    /// Where its commands are published.
     pub fn topic(&self) -> &Topic<A::Command> {
         &self.0.topic
     }
 
-    /// Has it do what it is told.
+    /// Has it carry out a command of a caller outside.
     ///
     /// # Errors
     /// See [`ActuatorError`].
     pub fn send(&self, command: A::Command) -> Result<(), ActuatorError> {
-        self.0.accept(command)
+        self.0.accept(command, &Permit::UNLIMITED)
     }
 }
 
-/// That commands of type `T` can be sent to it.
-pub(super) trait Accepts<T>: Send + Sync {
-    fn accept(&self, command: T) -> Result<(), ActuatorError>;
-}
-
 impl<A: Actuator> Accepts<A::Command> for Inner<A> {
-    fn accept(&self, command: A::Command) -> Result<(), ActuatorError> {
+    fn accept(&self, command: A::Command, permit: &Permit) -> Result<(), ActuatorError> {
         if !command.is_finite() {
             return Err(ActuatorError::NonFinite);
         }
-        let clock = self.startup.clock();
-        let now = clock.now();
-        let stamp = Stamp {
-            monotonic_time: now,
-            wall_time: clock.wall_at(now),
-            frame: Frame::new(self.declaration.joint),
-            origin: self.startup.origin(),
-        };
-        let message = stamp.message(command);
-        {
-            let mut state = lock(&self.state);
-            // Under the lock that disarming takes as well: nothing moves once that has come back.
-            let safety = self.startup.control.safety();
-            if safety != Safety::Armed {
-                return Err(ActuatorError::NotArmed(safety));
-            }
-            self.make_anew(&mut state, now);
-            let Some(actuator) = &mut state.actuator else { return Err(ActuatorError::Stopped) };
-            let done = caught(|| {
-                if self.options_changed.swap(false, Ordering::AcqRel) {
-                    let options = self.startup.bound(&*lock(&self.options), self.binding)?;
-                    actuator.handle_options(options, &self.context)?;
-                }
-                actuator.handle_command(&message)
-            });
-            if let Err(failed) = done {
-                let text = failed.fault.to_string();
-                self.fail(&mut state, failed, now);
-                return Err(ActuatorError::Failed(text));
-            }
+        if let Some(journal) = self.environment.journal() {
+            journal.wait_for_room();
         }
-        self.topic.publish(&message);
-        Ok(())
+        let mut wakers = Wakers::default();
+        let done = self.carry_out(command, permit, &mut wakers);
+        wakers.run();
+        done
     }
 }
 
 impl<A: Actuator> Inner<A> {
-    /// If it has failed and the time has come.
-    fn make_anew(&self, state: &mut State<A>, now: MonotonicTime) {
-        if state.actuator.is_some() || state.restart_at.is_none_or(|at| at > now) {
-            return;
+    fn carry_out(&self, command: A::Command, permit: &Permit, wakers: &mut Wakers) -> Result<(), ActuatorError> {
+        let mut state = lock(&self.state);
+        self.obey(&mut state);
+        // Under the lock that disarming takes as well: nothing moves once that has returned.
+        let safety = self.control.safety_now();
+        if safety != Safety::Armed {
+            return Err(ActuatorError::NotArmed(safety));
         }
-        state.restart_at = None;
-        let options = self.startup.bound(&*lock(&self.options), self.binding);
-        let made = match options {
-            Ok(options) => caught(|| A::init(options, &self.context)),
-            Err(fault) => Err(Failed { fault, panicked: false }),
+        if !permit.is_valid() {
+            return Err(ActuatorError::Cancelled);
+        }
+        let clock = self.environment.clock();
+        let now = clock.now();
+        self.restart_if_due(&mut state, now);
+        let Some(AsActuator(actuator)) = state.slot.running() else { return Err(ActuatorError::Stopped) };
+        let stamp = Stamp {
+            monotonic_time: now,
+            wall_time: clock.wall_at(now),
+            frame: Frame::new(self.declaration.joint),
+            origin: self.environment.origin(),
         };
-        match made {
-            Ok(actuator) => state.actuator = Some(actuator),
-            Err(failed) => self.fail(state, failed, now),
+        let message = stamp.message(command);
+        if let Err(failed) = caught(|| actuator.handle_command(&message)) {
+            let text = failed.fault.to_string();
+            self.fail(&mut state, &failed, now);
+            return Err(ActuatorError::Failed(text));
+        }
+        if let Some(journal) = self.environment.journal() {
+            let message = Recorded::Message(DynamicMessage::new(self.declaration.path, &message));
+            journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
+        }
+        // Under the lock, in the order in which commands are carried out.
+        self.topic.publish_deferred(&message, wakers);
+        Ok(())
+    }
+
+    /// Told by the control state, which must not wait for the actuator's code.
+    fn tell(this: &Weak<Self>, order: Order) {
+        let Some(inner) = this.upgrade() else { return };
+        let mut orders = lock(&inner.orders);
+        if !orders.contains(&order) {
+            orders.push(order);
+        }
+        drop(orders);
+        match inner.environment.mode() {
+            Mode::Real => {
+                let pool = inner.environment.pool().clone();
+                pool.submit(move || inner.obey(&mut lock(&inner.state)));
+            }
+            Mode::Virtual => {
+                let now = inner.environment.clock().now();
+                inner.control.wake_at(now, Waker::from(Arc::new(Due(Weak::clone(this)))));
+            }
+            Mode::Replay => {}
         }
     }
 
-    fn fail(&self, state: &mut State<A>, Failed { fault, panicked }: Failed, now: MonotonicTime) {
-        self.startup.fault(self.declaration.path, &fault);
-        if let Some(mut actuator) = state.actuator.take() {
-            // After a panic too: hardware that may still move is worse than a second panic, which is caught.
-            if let Err(failed) = caught(|| actuator.disarm()) {
-                self.startup.fault(self.declaration.path, &failed.fault);
+    fn obey(&self, state: &mut State<A>) {
+        let orders = std::mem::take(&mut *lock(&self.orders));
+        for order in orders {
+            let now = self.environment.clock().now();
+            match order {
+                Order::Options => {
+                    let parameters = self.control.parameters();
+                    match self.control.replacing_hooks(self.declaration.path, false, || {
+                        state.slot.change(&self.context, &parameters)
+                    }) {
+                        Ok(true) => {}
+                        Ok(false) => self.remake(state, now),
+                        Err(failed) => self.fail(state, &failed, now),
+                    }
+                }
+                Order::Restart if state.slot.is_running() => self.remake(state, now),
+                Order::Restart => {}
+                Order::GiveUp => state.slot.give_up(),
             }
-            let _ = retire(actuator, panicked, A::terminate);
         }
-        if fault.then != Then::Restart {
-            return;
+    }
+
+    /// Makes it safe, and makes it again.
+    fn remake(&self, state: &mut State<A>, now: MonotonicTime) {
+        self.make_safe(state);
+        self.make(state, now);
+    }
+
+    fn make(&self, state: &mut State<A>, now: MonotonicTime) {
+        let parameters = self.control.parameters();
+        let (path, slot) = (self.declaration.path, &mut state.slot);
+        match self.control.replacing_hooks(path, true, || slot.make(&self.context, &parameters)) {
+            Ok(()) => {
+                tracing::info!(component = self.declaration.path, "restarted");
+                state.is_unsafe = false;
+            }
+            Err(failed) => self.fail(state, &failed, now),
         }
-        let ActuatorDeclaration { supervisor, path, .. } = *self.declaration;
-        state.restart_at = self.startup.failed(&mut state.failures, supervisor, path, now, true);
+    }
+
+    fn restart_if_due(&self, state: &mut State<A>, now: MonotonicTime) {
+        if state.slot.restart_at().is_some_and(|at| at <= now) {
+            self.make(state, now);
+        }
+    }
+
+    /// After a panic too: hardware that may still move is worse than a second panic, which is caught.
+    fn make_safe(&self, state: &mut State<A>) {
+        let Some(AsActuator(actuator)) = state.slot.running() else { return };
+        if let Err(failed) = caught(|| actuator.disarm()) {
+            state.is_unsafe = true;
+            let message = format!("it has failed and could not be made safe: {}", failed.fault);
+            self.control.hardware_error(self.declaration.path, message);
+        }
+    }
+
+    fn fail(&self, state: &mut State<A>, failed: &Failed, now: MonotonicTime) {
+        let ActuatorDeclaration { path, supervisor, .. } = *self.declaration;
+        self.control.component_failed(path, supervisor, failed.fault.to_string(), failed.panicked);
+        self.make_safe(state);
+        if let AfterFault::RestartAt(at) = state.slot.fail(failed, now) {
+            self.control.wake_at(at, Waker::from(Arc::new(Due(Weak::clone(&self.this)))));
+        }
+    }
+
+    /// The disarm callback.
+    fn disarm(&self) -> Result<(), Fault> {
+        let mut state = lock(&self.state);
+        if let Some(AsActuator(actuator)) = state.slot.running() {
+            return actuator.disarm();
+        }
+        if state.is_unsafe {
+            return Err(Fault::new("it has failed, could not be made safe then, and cannot be reached"));
+        }
+        Ok(())
+    }
+}
+
+/// Its backoff is over.
+struct Due<A: Actuator>(Weak<Inner<A>>);
+
+impl<A: Actuator> Wake for Due<A> {
+    fn wake(self: Arc<Self>) {
+        if let Some(inner) = self.0.upgrade() {
+            let mut state = lock(&inner.state);
+            inner.obey(&mut state);
+            inner.restart_if_due(&mut state, inner.environment.clock().now());
+        }
     }
 }
 
@@ -219,11 +282,14 @@ pub trait AnyActuator {
     fn path(&self) -> &'static str;
     /// The name of the type of its commands.
     fn command_name(&self) -> &'static str;
-    /// Where its commands are seen.
+    /// Where its commands are published.
     fn any_topic(&self) -> &dyn AnyTopic;
-    /// What takes its commands, for whoever knows their type.
+    /// An `Arc<dyn Accepts<T>>`, where `T` is the type of its commands.
     #[doc(hidden)]
     fn accepts(&self) -> Box<dyn Any>;
+    /// In a replay: publishes a command that it carried out; false if that is of another type.
+    #[doc(hidden)]
+    fn replay(&self, message: &DynamicMessage) -> bool;
     /// Stops it once it is free; false if it is still busy after `timeout`.
     #[doc(hidden)]
     fn terminate(&self, timeout: Duration) -> bool;
@@ -247,23 +313,19 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
         Box::new(accepts)
     }
 
+    fn replay(&self, message: &DynamicMessage) -> bool {
+        message.downcast::<A::Command>().map(|message| self.0.topic.publish(message)).is_some()
+    }
+
     fn terminate(&self, timeout: Duration) -> bool {
         let Some(mut state) = lock_within(&self.0.state, timeout) else { return false };
-        state.restart_at = None;
-        if let Some(fault) = state.actuator.take().and_then(|actuator| retire(actuator, false, A::terminate)) {
-            self.0.startup.fault(self.0.declaration.path, &fault);
+        let fault = state.slot.retire();
+        state.slot.stop();
+        drop(state);
+        if let Some(fault) = fault {
+            self.0.control.note_fault(self.0.declaration.path, fault.to_string());
         }
         true
-    }
-}
-
-impl<A: Actuator> Drop for Inner<A> {
-    /// Of a robot that did not start.
-    fn drop(&mut self) {
-        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
-        if let Some(actuator) = state.actuator.take() {
-            let _ = retire(actuator, false, A::terminate);
-        }
     }
 }
 

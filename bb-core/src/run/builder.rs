@@ -1,22 +1,29 @@
 //! A robot before it starts.
 
-use super::bus::Wired;
+use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
+use super::host::{RobotHost, WiredIslands};
 use super::machine::Machine;
-use super::{Replay, Robot, Running, Simulation, Source, StartError, Startup, Supervision};
-use crate::component::Fault;
-use crate::control::{
-    Control, Declared, ParameterError, ParameterType, ParameterValue, ParameterValues, SystemTopics,
-};
-use crate::journal::{Entry, Journal, JournalLine};
+use super::source::Assembly;
+use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
+use crate::component::{Fault, Host};
+use crate::control::{Control, Declared, Parts, SystemTopics};
+use crate::declaration::{ParameterError, ParameterType, ParameterValues};
+use crate::event::ParameterValue;
+use crate::journal::{Entry, Event, Journal, Sink};
+use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
+use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
+use crate::schedule::Agenda;
+use crate::telemetry::{Telemetry, TelemetryEvent};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
-use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// The wiring with its estimators, and the sensors that feed it.
-type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
+pub(super) type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
 
 /// A robot that is assembled and not yet started: options may still be changed, and a subscription made here misses
 /// nothing.
@@ -26,12 +33,12 @@ pub struct Builder<R: Robot> {
     system: Arc<SystemTopics>,
     parameters: Vec<ParameterValue>,
     supervision: Supervision,
-    journal: Option<Journal>,
+    journal: Option<Sink>,
+    telemetry: Telemetry,
+    node: &'static str,
 }
 
 impl<R: Robot> Builder<R> {
-    const ORIGIN: Origin = Origin { robot: R::NAME, node: "local" };
-
     pub(super) fn new() -> Self {
         let topics = R::topics();
         let mut system = SystemTopics::new(declared::<R>());
@@ -45,6 +52,8 @@ impl<R: Robot> Builder<R> {
             parameters: R::PARAMETERS.iter().map(|parameter| parameter.default.into()).collect(),
             supervision: Supervision::default(),
             journal: None,
+            telemetry: Telemetry::default(),
+            node: "local",
         }
     }
 
@@ -73,25 +82,39 @@ impl<R: Robot> Builder<R> {
         Ok(())
     }
 
-    /// How patiently components that fail are started anew.
+    /// How components that fail are restarted.
     pub fn supervision(&mut self) -> &mut Supervision {
         &mut self.supervision
     }
 
-    /// Has all that comes in from outside written to `sink`, enough to run the robot again: see
-    /// [`journal`](crate::journal).
-    pub fn journal(&mut self, sink: impl Fn(Entry) + Send + Sync + 'static) {
-        self.journal = Some(Journal::new(Arc::new(sink)));
+    /// Names the machine or process that runs the robot: the `node` of its messages' origin. `local` unless it is set.
+    pub fn node(&mut self, name: &'static str) -> &mut Self {
+        self.node = name;
+        self
     }
 
-    /// Has the same published at `journal`, for a recorder: give its subscription room, since a journal of which lines were
-    /// lost cannot be replayed beyond them.
+    /// Has every processed entry handed to `sink`, enough to run the robot again: see [`journal`](crate::journal). The sink is
+    /// called on a thread of its own, on virtual time on the caller's. One that is slow makes sensors and other outside
+    /// producers wait; one that hangs for 2 s ends the journal, which is reported.
+    pub fn journal(&mut self, sink: impl Fn(Entry) + Send + Sync + 'static) {
+        self.journal = Some(Arc::new(sink));
+    }
+
+    /// Has the journal published at `journal`, for a recorder: give its subscription room, since a journal of which lines
+    /// were lost cannot be replayed beyond them.
     pub fn publish_journal(&mut self) {
         let system = Arc::clone(&self.system);
+        let origin = Origin { robot: R::NAME, node: self.node };
         self.journal(move |entry| {
-            let stamp = Stamp { monotonic_time: entry.time, origin: Self::ORIGIN, ..Stamp::default() };
-            system.journal.publish(&stamp.message(JournalLine::from(&entry)));
+            let stamp = Stamp { monotonic_time: entry.time, origin, ..Stamp::default() };
+            system.journal.publish(&stamp.message(entry));
         });
+    }
+
+    /// Attaches a handler of telemetry, which gets the robot's name with every event: inputs, outputs, latencies and drops on
+    /// the thread that runs the estimator, so it must be quick; transitions and faults on a thread apart.
+    pub fn telemetry(&mut self, handler: impl Fn(&'static str, &TelemetryEvent) + Send + Sync + 'static) {
+        self.telemetry.add(Arc::new(handler));
     }
 
     /// Subscribes, with room for 1024 messages.
@@ -104,8 +127,8 @@ impl<R: Robot> Builder<R> {
         publisher.topic(&self.topics, &self.system).subscribe(overflow)
     }
 
-    /// Subscribes to messages of any payload, by path; with names of payload types, to those only. (Commands to
-    /// actuators can be subscribed to once the robot runs.)
+    /// Subscribes to messages of any payload, by path; with names of payload types, to those only. (Commands to actuators can
+    /// be subscribed to once the robot runs.)
     pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
@@ -121,7 +144,7 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
     pub fn start(self) -> Result<Running<R>, StartError> {
-        let (machine, sources) = self.assemble(Clock::real(), false)?;
+        let (machine, sources) = self.assemble(Clock::real(), Mode::Real)?;
         Running::start(machine, sources)
     }
 
@@ -131,52 +154,121 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// Names the component that cannot start; those that had started are stopped in order.
     pub fn simulate(self) -> Result<Simulation<R>, StartError> {
-        let (machine, sources) = self.assemble(Clock::virtual_at(MonotonicTime::ZERO), false)?;
+        let (machine, sources) = self.assemble(Clock::virtual_at(MonotonicTime::ZERO), Mode::Virtual)?;
         Ok(Simulation::new(machine, sources))
     }
 
-    /// Prepares a robot to be run again from a journal, on virtual time and without sensors, services and actuators. Options
-    /// must be as they were.
+    /// Prepares a robot to be run again from a journal, on virtual time and without sensors, services, actuators and the code
+    /// of commands. Options of estimators must be as they were.
     ///
     /// # Errors
     /// Names the component that cannot start.
     pub fn replay(self) -> Result<Replay<R>, StartError> {
-        let (machine, _) = self.assemble(Clock::virtual_at(MonotonicTime::from_nanos(i64::MIN)), true)?;
+        let (machine, _) = self.assemble(Clock::virtual_at(MonotonicTime::from_nanos(i64::MIN)), Mode::Replay)?;
         Ok(Replay::new(machine))
     }
 
     /// Dropping what has started stops it in order.
-    fn assemble(self, clock: Clock, is_replay: bool) -> Result<Assembled<R>, StartError> {
-        let origin = Self::ORIGIN;
-        let commands = R::commands(&self.options);
-        let parameters = ParameterValues::new(self.parameters);
-        let journal = self.journal.filter(|_| !is_replay);
-        let control = Control::new(
-            declared::<R>(),
-            self.system,
-            clock.clone(),
+    fn assemble(self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
+        let origin = Origin { robot: R::NAME, node: self.node };
+        let journal = self.journal.filter(|_| mode != Mode::Replay);
+        let journal = journal.map(|sink| Journal::new(sink, clock.wall_offset_nanos()));
+        let telemetry = (!self.telemetry.is_empty()).then_some(self.telemetry);
+        let nodes: Box<[SharedNode]> =
+            R::ESTIMATORS.iter().enumerate().map(|(number, declared)| SharedNode::new(number, declared)).collect();
+        let control = Control::new(Parts {
+            declared: declared::<R>(),
+            mode,
+            topics: self.system,
+            clock: clock.clone(),
             origin,
-            commands,
-            parameters,
-            journal.clone(),
-        );
+            commands: R::commands(&self.options),
+            parameters: ParameterValues::new(self.parameters),
+            supervision: self.supervision,
+            nodes: nodes.clone(),
+            journal: journal.clone(),
+            telemetry: telemetry.clone(),
+        });
         if let Err((path, message)) = control.check_commands() {
             return Err(StartError::component(path, Fault::new(message)));
         }
-        let startup = Startup::new::<R>(clock, origin, control, self.supervision).with_journal(journal);
-        let startup = if is_replay { startup.for_replay() } else { startup };
-        let wiring = Arc::new(R::wire(self.topics, &self.options, &startup));
-        startup.set_directory(Arc::new(Wired::<R>(Arc::downgrade(&wiring))));
-        let sources = if is_replay { Vec::new() } else { R::sources(&wiring, &self.options, &startup) };
-        match startup.refusal() {
-            Some(error) => Err(error),
-            None => Ok((Machine { wiring, startup }, sources)),
+        let start = clock.now();
+        let parts = EnvironmentParts {
+            mode,
+            origin,
+            overseer: Arc::new(control.clone()),
+            supervision: self.supervision,
+            agenda: Agenda::new(control.bell().clone()),
+            pool: control.pool().clone(),
+            journal: journal.clone(),
+            telemetry,
+            start,
+            clock: clock.clone(),
+        };
+        let environment = Environment::new(parts, nodes);
+        let place = Arc::new(OnceLock::new());
+        let host: Arc<dyn Host> = Arc::new(RobotHost::<R> {
+            control: control.clone(),
+            journal: journal.clone(),
+            wiring: Arc::clone(&place),
+        });
+        control.set_host(Arc::clone(&host));
+        control.set_islands(Box::new(WiredIslands::<R>(Arc::clone(&place))));
+        let drained = Arc::clone(&place);
+        environment.set_drain(move |island| {
+            let wiring: Option<Arc<R::Wiring>> = drained.get().and_then(std::sync::Weak::upgrade);
+            if let (Some(wiring), Some(find)) = (wiring, R::ISLANDS.get(island)) {
+                find(&wiring).drain(&wiring);
+            }
+        });
+        let facts = describe::<R>(&self.topics, &control);
+        let assembly = Assembly {
+            environment: environment.clone(),
+            control: control.clone(),
+            host: HostHandle(Arc::clone(&host)),
+        };
+        let wiring = Arc::new(R::wire(self.topics, &self.options, &assembly));
+        // It is set once.
+        let _ = place.set(Arc::downgrade(&wiring));
+        let is_replay = mode == Mode::Replay;
+        let sources = if is_replay { Vec::new() } else { R::sources(&wiring, &self.options, &assembly) };
+        if let Some(refusal) = environment.take_refusal() {
+            return Err(StartError::component(refusal.path, refusal.fault));
         }
+        if let Some(journal) = &journal {
+            let declaration = facts.iter().cloned().chain(environment.facts()).collect();
+            let wall_offset_nanos = clock.wall_offset_nanos();
+            let begin = Event::Begin { declaration, wall_offset_nanos, is_virtual: mode == Mode::Virtual };
+            journal.write(start, wall_offset_nanos, begin);
+            if mode == Mode::Real {
+                journal.start().map_err(|error| StartError::component("journal", Fault::from(error)))?;
+            }
+        }
+        for fact in facts {
+            environment.add_declared_fact(fact);
+        }
+        let shared = sources.iter().map(|source| source.shared()).collect();
+        let machine = Machine {
+            wiring,
+            environment,
+            control,
+            host,
+            sources: Mutex::new(shared),
+            has_ended: AtomicBool::new(false),
+        };
+        Ok((machine, sources))
     }
 }
 
 fn declared<R: Robot>() -> Declared {
-    Declared { states: R::STATES, categories: R::CATEGORIES, commands: R::COMMANDS, parameters: R::PARAMETERS }
+    Declared {
+        topology: R::TOPOLOGY,
+        states: R::STATES,
+        categories: R::CATEGORIES,
+        commands: R::COMMANDS,
+        parameters: R::PARAMETERS,
+        estimators: R::ESTIMATORS,
+    }
 }
 
 impl<R: Robot> fmt::Debug for Builder<R> {

@@ -1,14 +1,14 @@
 //! Typed names of what a robot declares; `robot!` generates one per publisher, at its path.
 
-use super::{ActuatorNode, Robot};
-use crate::component::{Actuator, Bridge, Controller, Estimator, Sensor};
-use crate::control::{
-    Command, CommandEvent, ParameterChange, ParameterType, SafetyError, SafetyTransition, StateTransition,
-    SystemTopics,
+use super::{ActuatorNode, Robot, Visit, Visitable};
+use crate::component::{Actuator, Command, Estimator, Sensor, Service};
+use crate::control::SystemTopics;
+use crate::declaration::ParameterType;
+use crate::event::{
+    CommandEvent, ComponentFault, HealthTransition, ParameterChange, SafetyError, SafetyTransition, StateTransition,
 };
 use crate::journal::JournalLine;
 use crate::message::{Frame, Payload, Stamp, Stamped};
-use crate::node::{HealthTransition, Node};
 use crate::pubsub::Topic;
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -94,7 +94,7 @@ handle! {
 }
 
 handle! {
-    /// Names an estimator of several outputs of the robot `R`; each [`OutputHandle`] stands below it.
+    /// Names an estimator of several outputs of the robot `R`; each has an [`OutputHandle`] below it.
     EstimatorOfSeveralHandle<E: Estimator> {
         number: usize,
         options: OptionsOf<R, E::Options>,
@@ -103,13 +103,13 @@ handle! {
 }
 
 macro_rules! service_handle {
-    ($(#[$doc:meta])* $name:ident, $service:ident) => {
+    ($(#[$doc:meta])* $name:ident) => {
         handle! {
             $(#[$doc])*
-            $name<S: $service> { topic: TopicOf<R, S::Output>, options: OptionsOf<R, S::Options> }
+            $name<S: Service> { topic: TopicOf<R, S::Output>, options: OptionsOf<R, S::Options> }
         }
 
-        impl<R: Robot, S: $service> Publisher<R> for $name<R, S> {
+        impl<R: Robot, S: Service> Publisher<R> for $name<R, S> {
             type Payload = S::Output;
             fn path(self) -> &'static str {
                 self.path
@@ -119,7 +119,7 @@ macro_rules! service_handle {
             }
         }
 
-        impl<R: Robot, S: $service> Configurable<R> for $name<R, S> {
+        impl<R: Robot, S: Service> Configurable<R> for $name<R, S> {
             type Options = S::Options;
             fn options(self, options: &mut R::Options) -> &mut S::Options {
                 (self.options)(options)
@@ -130,12 +130,12 @@ macro_rules! service_handle {
 
 service_handle! {
     /// Names a controller of the robot `R`.
-    ControllerHandle, Controller
+    ControllerHandle
 }
 
 service_handle! {
     /// Names a bridge of the robot `R`.
-    BridgeHandle, Bridge
+    BridgeHandle
 }
 
 handle! {
@@ -231,6 +231,8 @@ system_topic! {
     SafetyState at "safety" publishes SafetyTransition, safety;
     /// Names the journal, if it is published.
     JournalLines at "journal" publishes JournalLine, journal;
+    /// Names what has failed.
+    Faults at "fault" publishes ComponentFault, fault;
     /// Names what leads to the safety state `error`.
     SafetyErrors at "safety/error" publishes SafetyError, safety_error;
 }
@@ -275,37 +277,6 @@ impl<R: Robot, T: Payload> Publisher<R> for OutputHandle<R, T> {
     fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<T> {
         (self.topic)(topics)
     }
-}
-
-/// What is called with an estimator, and the slot for what it emits.
-type Call<'a, E> = dyn FnMut(&mut Node<E>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + 'a;
-
-/// What is called with an estimator once that is free. A type of its own, which rustc checks once, not in every function
-/// that it is given to.
-#[allow(missing_debug_implementations)]
-pub struct Visit<'a, E: Estimator>(&'a mut Call<'a, E>);
-
-impl<'a, E: Estimator> Visit<'a, E> {
-    pub(super) fn new(call: &'a mut Call<'a, E>) -> Self {
-        Self(call)
-    }
-
-    /// The stamp of what it has emitted, if it has.
-    pub fn call(self, node: &mut Node<E>, emitted: &mut Option<E::Output>) -> Option<Stamp> {
-        (self.0)(node, emitted)
-    }
-}
-
-/// What answers requests: the handle of an estimator.
-pub trait Visitable<R: Robot>: Copy {
-    /// The estimator.
-    type Estimator: Estimator;
-    /// Its number.
-    #[doc(hidden)]
-    fn number(self) -> usize;
-    /// Calls `visit` with it once it is free.
-    #[doc(hidden)]
-    fn visit(self, wiring: &R::Wiring, now: MonotonicTime, visit: Visit<'_, Self::Estimator>);
 }
 
 macro_rules! visitable {

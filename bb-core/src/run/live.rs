@@ -1,10 +1,13 @@
 //! What can be asked and told of a robot that runs, whoever drives it.
 
-use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher, Visitable};
+use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::machine::Machine;
+use super::visit::Visitable;
 use super::{ActuatorError, Bus, Report, Robot, SensorHandle};
-use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
-use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal, Safety};
+use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Sensor};
+use crate::control::Execution;
+use crate::declaration::{ParameterError, ParameterType};
+use crate::event::{Refusal, Safety};
 use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
@@ -23,7 +26,7 @@ impl<R: Robot> Clone for Live<R> {
 impl<R: Robot> Live<R> {
     /// Its clock.
     pub fn clock(&self) -> &Clock {
-        &self.0.startup.clock
+        self.0.environment.clock()
     }
 
     /// Subscribes from now on, with room for 1024 messages.
@@ -48,7 +51,7 @@ impl<R: Robot> Live<R> {
 
     /// Topics, actuators, parameters and states, by path: for code that does not know this robot's type.
     pub fn bus(&self) -> Bus {
-        self.0.startup.bus()
+        self.0.bus()
     }
 
     /// Asks an estimator, and waits for its answer. What it emits beside is published as always.
@@ -64,7 +67,7 @@ impl<R: Robot> Live<R> {
     where
         V::Estimator: HandleCall<Q>,
     {
-        self.0.call(estimator, request)
+        self.settled(|machine| machine.call(estimator, request))
     }
 
     /// Tells an estimator something. It takes it when it is free; nobody waits.
@@ -75,7 +78,12 @@ impl<R: Robot> Live<R> {
     where
         V::Estimator: HandleCast<Q>,
     {
-        self.0.cast(estimator, request)
+        self.settled(|machine| {
+            machine.cast(estimator, request)?;
+            // On virtual time nobody else would take it before the simulation goes on.
+            machine.environment.drain_posted();
+            Ok(())
+        })
     }
 
     /// Starts a command.
@@ -87,7 +95,7 @@ impl<R: Robot> Live<R> {
         command: CommandHandle<R, C>,
         arguments: C::Arguments,
     ) -> Result<Execution<C::Output>, Refusal> {
-        self.0.command(command, arguments)
+        self.settled(|machine| machine.command(command, arguments))
     }
 
     /// Sends a command to an actuator; it has been carried out when this returns.
@@ -99,7 +107,7 @@ impl<R: Robot> Live<R> {
         actuator: ActuatorHandle<R, A>,
         command: A::Command,
     ) -> Result<(), ActuatorError> {
-        self.0.actuate(actuator, command)
+        self.settled(|machine| machine.actuate(actuator, command))
     }
 
     /// The value of a parameter.
@@ -116,34 +124,34 @@ impl<R: Robot> Live<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        self.0.set_parameter(parameter, value)
+        self.settled(|machine| machine.set_parameter(parameter, value))
     }
 
     /// The operational state: `disarmed`, `idle`, `executing`, or a declared one.
     pub fn state(&self) -> &'static str {
-        self.0.startup.control.state()
+        self.0.control.state()
     }
 
     /// The safety state.
     pub fn safety(&self) -> Safety {
-        self.0.startup.control.safety()
+        self.0.control.safety()
     }
 
     /// Arms the robot, as a command would; true if it is armed now. In `error` it stays disarmed.
     pub fn arm(&self) -> bool {
-        self.0.startup.control.arm(self.clock().now())
+        self.settled(|machine| machine.control.arm())
     }
 
     /// Disarms the robot: commands are cancelled, and whoever owns hardware makes it safe, within 5 s. True if all could;
     /// else the safety state is `error`.
     pub fn disarm(&self) -> bool {
-        self.0.startup.control.disarm(false, self.clock().now())
+        self.settled(|machine| machine.control.disarm(false))
     }
 
     /// Leads out of the safety state `error`, even if something still cannot be made safe: whoever calls it has seen to
     /// that.
     pub fn force_disarm(&self) -> bool {
-        self.0.startup.control.disarm(true, self.clock().now())
+        self.settled(|machine| machine.control.disarm(true))
     }
 
     /// What it has done so far.
@@ -154,7 +162,7 @@ impl<R: Robot> Live<R> {
     /// Publishes as if `sensor` had measured `payload` at `time`; all estimators downstream run before this returns, but
     /// those that are busy on another thread or have one of their own.
     pub fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
-        self.0.publish(sensor, time, payload);
+        self.settled(|machine| machine.publish(sensor, time, payload));
     }
 
     /// A handle of its own, for another thread.
@@ -162,11 +170,27 @@ impl<R: Robot> Live<R> {
         self.clone()
     }
 
-    /// Tells sensors, services and commands to stop, as `stop` of [`Running`](super::Running) does; nobody waits for them.
+    /// Disarms the robot, cancels its commands, and tells sensors and services to stop as soon as it is safe; nobody waits.
     pub fn request_stop(&self) {
-        self.0.startup.stop.set();
-        self.0.startup.agenda().interrupt();
-        self.0.startup.control.ring();
+        self.settled(|machine| machine.control.begin_stop());
+    }
+
+    /// Has Ctrl-C, and on Unix the signals `SIGTERM` and `SIGHUP`, call [`Self::request_stop`]: the robot is disarmed before
+    /// anything else, whatever hangs. [`Running::wait`](super::Running::wait) returns then. A process has one such handler.
+    ///
+    /// # Errors
+    /// The process has a handler already, or the system refuses one.
+    #[cfg(feature = "signals")]
+    pub fn stop_on_signals(&self) -> std::io::Result<()> {
+        let live = self.clone();
+        ctrlc::set_handler(move || live.request_stop()).map_err(std::io::Error::other)
+    }
+
+    /// Does something from outside; on virtual time the journal's sink then gets its lines.
+    fn settled<T>(&self, call: impl FnOnce(&Machine<R>) -> T) -> T {
+        let result = call(&self.0);
+        self.0.settle();
+        result
     }
 }
 

@@ -1,24 +1,38 @@
-//! What real and simulated runs share: the wiring, and what can be asked of it.
+//! What all runs share: the wiring, and what can be asked of it.
 
-use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher, Visit, Visitable};
-use super::{ActuatorError, Report, Robot, SensorHandle, Startup};
-use crate::component::{Actuator, Fault, HandleCall, HandleCast, Sensor};
-use crate::control::{Command, Execution, ParameterError, ParameterType, Refusal};
+use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
+use super::source::SharedSource;
+use super::visit::{Visit, Visitable};
+use super::{ActuatorError, Report, Robot, SensorHandle};
+use crate::component::{Actuator, Bus, Command, Fault, HandleCall, HandleCast, Host, Permit, RequestCodec, Sensor};
+use crate::control::{Control, Execution};
+use crate::declaration::{ParameterError, ParameterType};
+use crate::event::Refusal;
+use crate::journal::RequestKind;
 use crate::message::Stamp;
-use crate::node::{AnyIsland, Node};
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
+use crate::node::{AnyIsland, CallError, Environment, Node, NodeEntry, Replayed, Turn, know_calls, know_casts};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::MonotonicTime;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 pub(super) struct Machine<R: Robot> {
     pub(super) wiring: Arc<R::Wiring>,
-    pub(super) startup: Startup,
+    pub(super) environment: Environment,
+    pub(super) control: Control,
+    pub(super) host: Arc<dyn Host>,
+    pub(super) sources: Mutex<Vec<SharedSource>>,
+    /// The threads of the robot have nothing left to do.
+    pub(super) has_ended: AtomicBool,
 }
+
+/// One-way requests that may wait for an estimator; one more is refused.
+const MOST_CASTS: u32 = 1024;
 
 impl<R: Robot> Machine<R> {
     pub(super) fn subscribe<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
-        publisher.topic(R::wired_topics(&self.wiring), self.startup.control.topics()).subscribe(overflow)
+        publisher.topic(R::wired_topics(&self.wiring), self.control.topics()).subscribe(overflow)
     }
 
     pub(super) fn subscribe_any<'a>(
@@ -27,25 +41,28 @@ impl<R: Robot> Machine<R> {
         payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
-        self.registry().subscribe(&self.topics(), select, &payloads.into(), overflow)
+        self.control.topics().registry.subscribe(&self.topics(), select, &payloads.into(), overflow)
     }
 
-    fn registry(&self) -> &Registry {
-        &self.startup.control.topics().registry
-    }
-
-    /// All but those made at run time.
-    fn topics(&self) -> Vec<&dyn AnyTopic> {
+    pub(super) fn topics(&self) -> Vec<&dyn AnyTopic> {
         let actuators = R::all_actuators(&self.wiring).into_iter().map(|actuator| actuator.any_topic());
         let robot = R::all_topics(R::wired_topics(&self.wiring)).into_iter().chain(actuators);
-        robot.chain(self.startup.control.topics().all()).collect()
+        robot.chain(self.control.topics().all()).collect()
+    }
+
+    pub(super) fn bus(&self) -> Bus {
+        Bus::new(Arc::clone(&self.host), Permit::UNLIMITED)
     }
 
     pub(super) fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
-        let wall_time = self.startup.clock.wall_at(time);
-        let origin = self.startup.origin;
-        let stamp = Stamp { monotonic_time: time, wall_time, origin, ..Stamp::default() };
-        sensor.publish(&self.wiring, stamp, payload, self.startup.clock.now());
+        let clock = self.environment.clock();
+        let stamp = Stamp {
+            monotonic_time: time,
+            wall_time: clock.wall_at(time),
+            origin: self.environment.origin(),
+            ..Stamp::default()
+        };
+        sensor.publish(&self.wiring, stamp, payload, clock.now());
     }
 
     pub(super) fn call<V: Visitable<R>, Q>(
@@ -56,20 +73,30 @@ impl<R: Robot> Machine<R> {
     where
         V::Estimator: HandleCall<Q>,
     {
-        let (mut request, mut response) = (Some(request), None);
-        let now = self.startup.clock.now();
-        let mut visit = |node: &mut Node<V::Estimator>, emitted: &mut Option<_>| {
-            let (answer, stamp) = node.call(request.take()?, now, emitted);
+        know_calls::<V::Estimator, Q>();
+        let recorded = RequestCodec::record(RequestKind::Call, <V::Estimator as HandleCall<Q>>::RECORD, &request);
+        let is_unrecorded = recorded.bytes.is_none();
+        let mut request = Some(request);
+        let mut response = None;
+        let mut error = None;
+        let mut call = |node: &mut Node<V::Estimator>, turn: &Turn<'_>, emitted: &mut Option<_>| {
+            let (answer, stamp) = node.call(request.take()?, is_unrecorded, turn, emitted);
             response = Some(answer);
             stamp
         };
-        estimator.visit(&self.wiring, now, Visit::new(&mut visit));
+        let now = self.environment.clock().now();
+        let number = estimator.number();
+        let visit = Visit { estimator: number, request: recorded, call: &mut call, error: &mut error };
+        estimator.visit(&self.wiring, now, visit);
+        let path = self.environment.node(estimator.number()).declaration().path;
         response.unwrap_or_else(|| {
-            let path = self.startup.node(estimator.number()).declaration().path;
-            Err(Fault::new(format!(
-                "{path} cannot be asked by code that an estimator's message has woken, which would wait for itself: use \
-                 `cast`, or another thread"
-            )))
+            Err(Fault::new(match error {
+                Some(CallError::Busy) => format!("{path} has been busy for 5 s and has not answered"),
+                _ => format!(
+                    "{path} cannot be asked by code that an estimator's message has woken, which would wait for \
+                     itself: use `cast`, or another thread"
+                ),
+            }))
         })
     }
 
@@ -77,10 +104,22 @@ impl<R: Robot> Machine<R> {
     where
         V::Estimator: HandleCast<Q>,
     {
-        let node = self.startup.node(estimator.number());
-        node.leave_cast(Node::<V::Estimator>::cast(request))?;
+        know_casts::<V::Estimator, Q>();
+        let node = self.environment.node(estimator.number());
+        let path = node.declaration().path;
+        if let Some(stopped) = node.stopped().filter(|stopped| stopped.for_good) {
+            return Err(Fault::new(format!("{path} does not run any more: {}", stopped.reason)));
+        }
+        if self.has_ended.load(Ordering::Acquire) {
+            return Err(Fault::new(format!("{path} does not run any more")));
+        }
+        if !node.begin_cast(MOST_CASTS) {
+            return Err(Fault::new(format!("too many requests wait for {path}")));
+        }
+        let (request, handle) = Node::<V::Estimator>::cast(request);
+        let entry = NodeEntry::Cast { request, handle: Some(handle) };
         if let Some(island) = self.island(node.declaration().island) {
-            island.wake(&self.wiring, self.startup.clock.now());
+            island.post(&self.wiring, self.environment.clock().now(), estimator.number(), entry);
         }
         Ok(())
     }
@@ -90,7 +129,7 @@ impl<R: Robot> Machine<R> {
         command: CommandHandle<R, C>,
         arguments: C::Arguments,
     ) -> Result<Execution<C::Output>, Refusal> {
-        self.startup.control.execute(command.number(), Box::new(arguments), self.startup.clock.now())
+        self.control.execute(command.number(), Box::new(arguments))
     }
 
     pub(super) fn actuate<A: Actuator>(
@@ -102,7 +141,7 @@ impl<R: Robot> Machine<R> {
     }
 
     pub(super) fn parameter<T: ParameterType>(&self, parameter: ParameterHandle<R, T>) -> T {
-        self.startup.control.parameters().get(parameter.number())
+        self.control.parameters().get(parameter.number())
     }
 
     pub(super) fn set_parameter<T: ParameterType>(
@@ -110,63 +149,115 @@ impl<R: Robot> Machine<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        let setter = self.startup.control.setter();
-        self.startup.control.set_parameter(parameter.number(), value.into_value(), setter)
+        self.control.set_parameter(parameter.number(), value.into_value(), &Permit::UNLIMITED)
     }
 
-    /// Wakes the estimators of an island.
-    pub(super) fn wake(&self, island: usize, now: MonotonicTime) {
-        if let Some(island) = self.island(island) {
-            island.wake(&self.wiring, now);
-        }
+    pub(super) fn islands(&self) -> impl Iterator<Item = &dyn AnyIsland<R::Wiring>> {
+        R::ISLANDS.iter().map(|find| find(&self.wiring))
     }
 
     pub(super) fn island(&self, number: usize) -> Option<&dyn AnyIsland<R::Wiring>> {
         R::ISLANDS.get(number).map(|find| find(&self.wiring))
     }
 
+    /// Has all estimators start.
+    pub(super) fn start_islands(&self, now: MonotonicTime) {
+        for island in self.islands() {
+            island.start(&self.wiring, now);
+        }
+    }
+
+    /// Has all estimators stop; those that are busy until `deadline` are left behind, and reported.
+    pub(super) fn retire_islands(&self, deadline: Instant) {
+        let now = self.environment.clock().now();
+        for island in self.islands() {
+            island.retire(&self.wiring, now);
+        }
+        self.environment.drain_posted();
+        self.environment.wait_for_retired(R::ISLANDS.len(), deadline);
+        for island in self.islands().filter(|island| !island.has_retired()) {
+            let path = self.path_of_busy(island);
+            let since = self.environment.clock().now().duration_since(island.entered_at());
+            self.fault(
+                path,
+                format!("did not return when the robot stopped; its code was entered {since:.1?} ago"),
+            );
+        }
+    }
+
+    /// On virtual time: has all estimators stop, in order. The journal's line of the stop implies it.
+    pub(super) fn retire_quietly(&self) {
+        let now = self.environment.clock().now();
+        for island in self.islands() {
+            island.replay(&self.wiring, now, Replayed::Retire);
+        }
+    }
+
+    /// The estimator whose callback an island runs.
+    pub(super) fn path_of_busy(&self, island: &dyn AnyIsland<R::Wiring>) -> &'static str {
+        let running = island.busy().and_then(|(_, estimator)| R::ESTIMATORS.get(estimator));
+        running.map_or(island.declaration().name, |estimator| estimator.path)
+    }
+
+    pub(super) fn terminate_actuators(&self, deadline: Instant) {
+        let left = || deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
+        for actuator in R::all_actuators(&self.wiring) {
+            if !actuator.terminate(left()) {
+                let message = "did not come back from its command, or from disarming, in time";
+                self.fault(actuator.path(), message.to_owned());
+            }
+        }
+    }
+
+    /// Tells subscribers that no more will come, and ends the journal.
+    pub(super) fn end(&self) {
+        for topic in self.topics() {
+            if topic.path() != "journal" {
+                topic.close();
+            }
+        }
+        if let Some(journal) = self.environment.journal()
+            && !journal.close(Duration::from_secs(1))
+        {
+            self.fault("journal", "its sink hung, and it ends before the run".to_owned());
+        }
+        self.control.topics().journal.close();
+        self.control.topics().registry.close();
+        self.has_ended.store(true, Ordering::Release);
+        self.control.bell().ring();
+        self.control.pool().close();
+    }
+
+    /// On virtual time, after something was done from outside: hands lines of the journal to its sink.
+    pub(super) fn settle(&self) {
+        if self.control.is_virtual()
+            && let Some(journal) = self.environment.journal()
+        {
+            journal.flush();
+        }
+    }
+
     pub(super) fn report(&self) -> Report {
-        let mut topics: Vec<_> = self.topics().iter().map(|topic| topic.statistics()).collect();
-        topics.extend(self.registry().topics().iter().map(|topic| topic.statistics()));
-        let estimators: Vec<_> = self.startup.nodes().iter().map(|node| node.statistics()).collect();
-        let (faults, all_faults) = self.startup.faults.all();
+        let topics = self.topics();
+        let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
+        let made = self.control.topics().registry.topics();
+        let made = made.iter().map(|topic| topic.statistics());
+        let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
+        let (faults, all_faults) = self.control.faults();
         Report {
-            topics,
+            topics: topics.iter().map(|topic| topic.statistics()).chain(made).collect(),
             estimators,
-            commands: self.startup.control.statistics(),
-            state: self.startup.control.state(),
-            safety: self.startup.control.safety(),
+            sources: sources.iter().map(SharedSource::statistics).collect(),
+            commands: self.control.statistics(),
+            state: self.control.state(),
+            safety: self.control.safety(),
             faults,
             all_faults,
         }
     }
 
-    /// Cancels commands and disarms, tells the subscribers that no more will come, and stops the estimators and actuators.
-    /// What is still busy `within` so long after that is left behind and reported as a fault.
-    pub(super) fn terminate(&self, within: Duration) {
-        for path in self.startup.control.stop(self.startup.clock.now()) {
-            self.fault(path, "did not come back when the robot stopped");
-        }
-        let deadline = Instant::now() + within;
-        let left = || deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
-        for topic in self.topics() {
-            topic.close();
-        }
-        self.registry().close();
-        for island in (0..R::ISLANDS.len()).filter_map(|number| self.island(number)) {
-            if !island.terminate(&self.wiring, left()) {
-                self.fault(island.name(), "did not come back from its input in time");
-            }
-        }
-        for actuator in R::all_actuators(&self.wiring) {
-            if !actuator.terminate(left()) {
-                self.fault(actuator.path(), "did not come back from its command, or from disarming, in time");
-            }
-        }
-    }
-
-    /// What a fault's list says of a component that did not come back.
-    pub(super) fn fault(&self, path: &'static str, message: &str) {
-        self.startup.faults.add(path, message.into());
+    /// Keeps what is wrong with a component that did not come back.
+    pub(super) fn fault(&self, path: &'static str, message: String) {
+        self.control.note_fault(path, message);
     }
 }

@@ -1,22 +1,34 @@
 //! A run from a journal.
 
+use super::describe::difference;
 use super::machine::Machine;
+use super::visit::Visitable;
 use super::{Live, Report, Robot};
-use crate::control::{SafetyError, Setter};
-use crate::journal::{Entry, Event};
-use crate::node::Key;
-use std::collections::HashMap;
+use crate::component::{HandleCall, HandleCast};
+use crate::declaration::ParameterValues;
+use crate::journal::{Callback, Entry, Event, Publishers, Recorded, Request, decoded};
+use crate::node::{Key, NodeEntry, Replayed, know_calls, know_casts};
+use crate::pubsub::{AnyTopic, DynamicMessage};
+use crate::time::MonotonicTime;
+use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
-use std::time::Duration;
 
-/// A robot that is run again from its journal, on the caller's thread. Whoever subscribes gets what was published then,
-/// bit for bit.
+/// A robot that is run again from its journal, on the caller's thread. Subscribers get what was published then.
 pub struct Replay<R: Robot> {
     live: Live<R>,
-    /// The number of the last line.
+    /// Lines that were not played yet: the line of a measured turn waits for the one that says how long its callbacks took.
+    waiting: VecDeque<Entry>,
+    measured: HashMap<u64, Vec<Callback>>,
+    /// The number of the last line that was handed over.
     last: u64,
+    has_begun: bool,
+    is_virtual: bool,
+    /// The line before had the robot disarmed, which on virtual time succeeds at once unless the next line says otherwise.
+    is_disarmed_at_once: bool,
+    /// The last request of each island that the journal does not hold, by line and type.
+    unrecorded: HashMap<usize, (u64, String)>,
 }
 
 /// Why a journal cannot be replayed.
@@ -30,106 +42,377 @@ pub struct ReplayError {
 
 impl<R: Robot> Replay<R> {
     pub(super) fn new(machine: Machine<R>) -> Self {
-        (0..R::ISLANDS.len()).filter_map(|number| machine.island(number)).for_each(|island| island.begin_replay());
-        Self { live: Live(Arc::new(machine)), last: 0 }
+        Self {
+            live: Live(Arc::new(machine)),
+            waiting: VecDeque::new(),
+            measured: HashMap::new(),
+            last: 0,
+            has_begun: false,
+            is_virtual: false,
+            is_disarmed_at_once: false,
+            unrecorded: HashMap::new(),
+        }
     }
 
-    /// Replays lines, in the order of their numbers. A journal may be handed over in parts; a callback that took too long
-    /// does so again if its line and the one that says so are in the same part.
+    /// Replays lines, in the order of their numbers. A journal may be handed over in parts: the last lines of a part wait for
+    /// the next one, or for [`Self::stop`], where it depends on the lines that follow how they go.
     ///
     /// # Errors
-    /// The first line that does not fit this robot; it was made by another one, or lines are missing.
+    /// The first line that does not fit: the journal is of another robot, lines are missing, or an algorithm is not
+    /// deterministic.
     pub fn play(&mut self, mut entries: Vec<Entry>) -> Result<(), ReplayError> {
         entries.sort_by_key(|entry| entry.number);
-        let mut overruns: HashMap<u64, Vec<usize>> = HashMap::new();
-        let mut answers: HashMap<u64, Vec<SafetyError>> = HashMap::new();
-        for entry in &entries {
-            match &entry.event {
-                Event::Overrun { cause, estimator } => overruns.entry(*cause).or_default().push(*estimator),
-                Event::Unsafe { cause, errors } => drop(answers.insert(*cause, errors.clone())),
-                _ => {}
-            }
-        }
         for entry in entries {
-            let slow = overruns.get(&entry.number).map_or(&[][..], Vec::as_slice);
             let line = entry.number;
             if line != self.last + 1 {
                 let message = format!("it follows line {}; the lines between are missing", self.last);
+                // What came before is played all the same.
+                self.advance(true)?;
                 return Err(ReplayError { line, message });
             }
             self.last = line;
-            self.live.0.startup.control.replay_answer(answers.remove(&line));
-            self.line(entry, slow).map_err(|message| ReplayError { line, message: message.to_owned() })?;
+            if let Event::Measured { cause, callbacks } = &entry.event {
+                self.measured.insert(*cause, callbacks.clone());
+            }
+            self.waiting.push_back(entry);
         }
-        Ok(())
+        self.advance(false)
     }
 
-    /// Stops it, and gives the last report.
-    pub fn stop(self) -> Report {
-        self.live.0.terminate(Duration::ZERO);
+    /// Lets calls of type `Q` to an estimator be made again. Needed for journals of another process; requests that this
+    /// process has made itself are known.
+    pub fn know_calls<V: Visitable<R>, Q>(&self, _: V)
+    where
+        V::Estimator: HandleCall<Q>,
+    {
+        know_calls::<V::Estimator, Q>();
+    }
+
+    /// The same for one-way requests.
+    pub fn know_casts<V: Visitable<R>, Q>(&self, _: V)
+    where
+        V::Estimator: HandleCast<Q>,
+    {
+        know_casts::<V::Estimator, Q>();
+    }
+
+    /// Plays what waits, stops the robot, and gives the last report. What does not fit is among its faults.
+    pub fn stop(mut self) -> Report {
+        if let Err(error) = self.advance(true) {
+            self.live.0.fault("journal", error.to_string());
+        }
+        let machine = &self.live.0;
+        machine.control.replay_stop();
+        if machine.control.is_disarming() {
+            machine.control.disarmed(Vec::new());
+        }
+        self.retire();
+        machine.end();
         self.live.report()
     }
 
-    fn line(&self, entry: Entry, slow: &[usize]) -> Result<(), &'static str> {
-        const MISSING: &str = "no such message waits: it is of another robot, or lines are missing";
-        let Entry { number, time, event } = entry;
+    /// Stops the estimators that still run, in order.
+    fn retire(&self) {
         let machine = &self.live.0;
-        let startup = &machine.startup;
-        startup.clock.advance_to(time);
-        let island = |number| machine.island(number).ok_or("the robot has no such island");
-        match event {
-            Event::Message { publisher, message } => {
-                let feed = R::FEEDS.get(publisher).copied().flatten().ok_or("the robot has no such sensor")?;
-                startup.replay_line(number);
-                if !feed(&machine.wiring, &message, time) {
-                    return Err("the sensor has another payload");
-                }
-            }
-            Event::Deliver { island: number, entry, message } => {
-                let island = island(number)?;
-                let key = Key { entry, line: message };
-                if !self.slowly(slow, || island.replay(&machine.wiring, key, time)) {
-                    return Err(MISSING);
-                }
-            }
-            Event::Drop { island: number, entry, message } => {
-                if !island(number)?.replay_drop(&machine.wiring, Key { entry, line: message }) {
-                    return Err(MISSING);
-                }
-            }
-            Event::Wake { island: number } => {
-                let island = island(number)?;
-                self.slowly(slow, || island.replay_wake(&machine.wiring, time));
-            }
-            Event::Failed { supervisor, path } => {
-                let verdict = startup.supervisors().failed(supervisor, time);
-                startup.carry_out(verdict, path, time);
-            }
-            // What was refused then is refused again.
-            Event::Parameter { parameter, value } => {
-                let _ = startup.control.set_parameter(parameter, value, Setter::Outside(time));
-            }
-            Event::Command { command } => startup.control.replay(command, time),
-            Event::Drive { health, given_up } => startup.control.replay_drive(time, &health, &given_up),
-            Event::Arm => drop(startup.control.arm(time)),
-            Event::Disarm { force } => drop(startup.control.disarm(force, time)),
-            Event::Stop => drop(startup.control.stop(time)),
-            Event::Overrun { .. } | Event::Unsafe { .. } => {}
+        let now = machine.environment.clock().now();
+        for island in machine.islands().filter(|island| !island.has_retired()) {
+            island.replay(&machine.wiring, now, Replayed::Retire);
         }
-        // The journal says when islands wake.
-        while startup.agenda().take(crate::time::MonotonicTime::MAX).is_some() {}
+    }
+
+    fn advance(&mut self, to_the_end: bool) -> Result<(), ReplayError> {
+        while let Some(entry) = self.waiting.front() {
+            if !to_the_end && self.is_open(entry) {
+                return Ok(());
+            }
+            let Some(entry) = self.waiting.pop_front() else { return Ok(()) };
+            let line = entry.number;
+            self.line(entry).map_err(|message| ReplayError { line, message })?;
+        }
         Ok(())
     }
 
-    /// Has some estimators overrun their budgets meanwhile.
-    fn slowly<T>(&self, estimators: &[usize], call: impl FnOnce() -> T) -> T {
-        let pretend = |nanos| {
-            estimators.iter().for_each(|number| self.live.0.startup.node(*number).pretend_latency(nanos));
+    /// Whether it is not known yet how long the callbacks of a line took, or what was emitted in reply to a request.
+    fn is_open(&self, entry: &Entry) -> bool {
+        let Some(number) = self.island_of(&entry.event) else { return false };
+        if let Event::Request { request: Request { bytes: None, .. }, .. } = &entry.event
+            && self.next_of(number, 1).is_none()
+        {
+            return true;
+        }
+        let island = self.live.0.island(number);
+        let is_measured = island.is_some_and(|island| island.declaration().is_measured);
+        is_measured && !self.measured.contains_key(&entry.number)
+    }
+
+    /// The next line, of those that wait from `first` on, that an island processed or wrote while it did.
+    fn next_of(&self, island: usize, first: usize) -> Option<usize> {
+        let is_of_island = |event: &Event| match event {
+            Event::Output { island: other, .. } => *other == island,
+            Event::Emission { publisher, .. } => self.emitter(*publisher).is_some_and(|(_, other)| other == island),
+            other => self.island_of(other) == Some(island),
         };
-        pretend(i64::MAX / 2);
-        let result = call();
-        pretend(0);
-        result
+        (first..self.waiting.len()).find(|&index| is_of_island(&self.waiting[index].event))
+    }
+
+    /// The estimator that a publisher belongs to, and its island.
+    fn emitter(&self, publisher: usize) -> Option<(usize, usize)> {
+        let path = self.path_of(publisher);
+        let number = R::ESTIMATORS.iter().position(|declared| declared.outputs.contains(&path))?;
+        Some((number, R::ESTIMATORS[number].island))
+    }
+
+    /// The island that processes a line.
+    fn island_of(&self, event: &Event) -> Option<usize> {
+        match event {
+            Event::Deliver { island, .. }
+            | Event::Start { island }
+            | Event::Wake { island }
+            | Event::Retire { island } => Some(*island),
+            Event::Options { estimator, .. }
+            | Event::Restart { estimator }
+            | Event::GiveUp { estimator }
+            | Event::Silence { estimator, .. }
+            | Event::Request { estimator, .. } => R::ESTIMATORS.get(*estimator).map(|declared| declared.island),
+            _ => None,
+        }
+    }
+
+    fn line(&mut self, entry: Entry) -> Result<(), String> {
+        let Entry { number, time, event } = entry;
+        if !self.has_begun {
+            return self.begin(time, event);
+        }
+        let machine = Arc::clone(&self.live.0);
+        let control = &machine.control;
+        if std::mem::take(&mut self.is_disarmed_at_once) && !matches!(event, Event::Disarmed { .. }) {
+            control.disarmed(Vec::new());
+        }
+        machine.environment.clock().set_to(time);
+        for Callback { estimator, nanos } in self.measured.remove(&number).unwrap_or_default() {
+            machine.environment.node(estimator).replay_latency(nanos);
+        }
+        match event {
+            Event::Begin { .. } => return Err("the journal begins again".to_owned()),
+            Event::WallClock { offset_nanos } => machine.environment.clock().set_wall_offset_nanos(offset_nanos),
+            Event::Message { publisher, message } => {
+                let feed = R::FEEDS.get(publisher).copied().flatten().ok_or("the robot has no such sensor")?;
+                let message = self.message(publisher, message)?;
+                machine.environment.set_replayed_line(number);
+                if !feed(&machine.wiring, &message, time) {
+                    return Err("the sensor has another payload".to_owned());
+                }
+            }
+            Event::Own { path, message } => self.publish_own(path, message)?,
+            Event::Actuated { actuator, message } => self.actuated(actuator, message)?,
+            Event::Deliver { island, entry, message } => {
+                self.island(island, time, Replayed::Deliver(Key { entry, line: message }))?;
+            }
+            Event::Drop { island, entry, message } => {
+                self.island(island, time, Replayed::Drop(Key { entry, line: message }))?;
+            }
+            Event::Start { island } => self.island(island, time, Replayed::Start)?,
+            Event::Wake { island } => self.island(island, time, Replayed::Wake)?,
+            Event::Retire { island } => self.island(island, time, Replayed::Retire)?,
+            Event::Options { estimator, values } => {
+                self.node(estimator, time, NodeEntry::Options(ParameterValues::new(values)))?;
+            }
+            Event::Restart { estimator } => self.node(estimator, time, NodeEntry::Restart)?,
+            Event::GiveUp { estimator } => self.node(estimator, time, NodeEntry::GiveUp)?,
+            Event::Silence { estimator, epoch, last_run } => {
+                self.node(estimator, time, NodeEntry::Silence { epoch, last_run })?;
+            }
+            Event::Request { estimator, request } => self.request(number, estimator, time, request)?,
+            Event::Measured { .. } => {}
+            Event::Output { island, publisher, checksum } => self.compare(island, publisher, checksum)?,
+            Event::Emission { publisher, is_first, message } => self.emit(publisher, is_first, time, message)?,
+            Event::Report { estimator } => {
+                let is_told = control.replay_report(estimator)
+                    || (self.is_virtual && control.is_stopping() && {
+                        // On virtual time the stop implies that estimators are retired, in order; this one failed at that.
+                        self.retire();
+                        control.replay_report(estimator)
+                    });
+                if !is_told {
+                    let path = R::ESTIMATORS.get(estimator).map_or("?", |declared| declared.path);
+                    return Err(format!(
+                        "`{path}` reported a change of health or a failure then, and does not now"
+                    ));
+                }
+            }
+            Event::Lost { estimator, last_run } => control.replay_lost(estimator, last_run),
+            Event::Failed { path, supervisor, message, panicked } => {
+                control.component_failed(path, supervisor, message, panicked);
+            }
+            Event::HardwareError { path, message } => control.hardware_error(path, message),
+            Event::Parameter { parameter, value } => control.replay_parameter(parameter, value),
+            Event::Command { command } => control.replay_command(command),
+            Event::Ended { execution, end } => control.replay_end(execution, end),
+            Event::Cancel { execution } => control.cancel(execution),
+            Event::Timeout { execution } => control.timed_out(execution),
+            Event::Gone { execution } => control.gone(execution),
+            Event::Arm => drop(control.arm()),
+            Event::Disarm { force } => {
+                control.replay_disarm(force);
+                self.is_disarmed_at_once = self.is_virtual && control.is_disarming();
+            }
+            Event::Disarmed { errors } => control.disarmed(errors),
+            Event::ArmTimeout => control.arm_timeout(),
+            Event::Stop => {
+                control.replay_stop();
+                self.is_disarmed_at_once = self.is_virtual && control.is_disarming();
+            }
+        }
+        // The journal says when islands wake.
+        while machine.environment.agenda().take(MonotonicTime::MAX).is_some() {}
+        Ok(())
+    }
+
+    fn begin(&mut self, time: MonotonicTime, event: Event) -> Result<(), String> {
+        let Event::Begin { declaration, wall_offset_nanos, is_virtual } = event else {
+            return Err("a journal begins with a description of the robot, and this one does not".to_owned());
+        };
+        let machine = &self.live.0;
+        if let Some(difference) = difference(&declaration, &machine.environment.all_facts()) {
+            return Err(difference);
+        }
+        self.has_begun = true;
+        self.is_virtual = is_virtual;
+        machine.environment.clock().set_to(time);
+        machine.environment.clock().set_wall_offset_nanos(wall_offset_nanos);
+        machine.islands().for_each(|island| island.begin_replay(&machine.wiring));
+        match machine.environment.take_refusal() {
+            Some(refusal) => Err(format!("{} cannot start: {}", refusal.path, refusal.fault)),
+            None => Ok(()),
+        }
+    }
+
+    fn island(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
+        let machine = &self.live.0;
+        // A message may be dropped while a turn lasts, before its outputs.
+        let is_turn = !matches!(entry, Replayed::Drop(_));
+        if is_turn && let Some((publisher, _)) = machine.environment.replayed().take(number) {
+            let path = self.path_of(publisher);
+            return Err(format!("`{path}` emits a message more than it did{}", self.hint(number)));
+        }
+        self.go_on(number, time, entry)
+    }
+
+    /// The same for an entry that belongs to the turn before.
+    fn go_on(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
+        let machine = &self.live.0;
+        let island = machine.island(number).ok_or("the robot has no such island")?;
+        if island.replay(&machine.wiring, time, entry) {
+            return Ok(());
+        }
+        Err("no such message waits: it is of another robot, or lines are missing".to_owned())
+    }
+
+    fn node(&self, estimator: usize, time: MonotonicTime, entry: NodeEntry) -> Result<(), String> {
+        let declared = R::ESTIMATORS.get(estimator).ok_or("the robot has no such estimator")?;
+        self.island(declared.island, time, Replayed::Node(estimator, entry))
+    }
+
+    fn request(
+        &mut self,
+        line: u64,
+        estimator: usize,
+        time: MonotonicTime,
+        request: Request,
+    ) -> Result<(), String> {
+        let declared = R::ESTIMATORS.get(estimator).ok_or("the robot has no such estimator")?;
+        if request.bytes.is_none() {
+            self.unrecorded.insert(declared.island, (line, request.name.clone()));
+            // What it emitted comes before whatever else was due in that turn.
+            let mut has_emitted = false;
+            while let Some(next) = self.next_of(declared.island, 0)
+                && matches!(self.waiting[next].event, Event::Emission { .. })
+                && let Some(entry) = self.waiting.remove(next)
+                && let Event::Emission { publisher, is_first, message } = entry.event
+            {
+                self.emit(publisher, is_first, entry.time, message)?;
+                has_emitted = true;
+            }
+            if has_emitted {
+                let entry = NodeEntry::Cast { request, handle: None };
+                return self.go_on(declared.island, time, Replayed::Node(estimator, entry));
+            }
+        }
+        self.island(declared.island, time, Replayed::Node(estimator, NodeEntry::Cast { request, handle: None }))
+    }
+
+    /// Holds an output against what it was.
+    fn compare(&self, island: usize, publisher: usize, checksum: u64) -> Result<(), String> {
+        let path = self.path_of(publisher);
+        match self.live.0.environment.replayed().take(island) {
+            Some(again) if again == (publisher, checksum) => Ok(()),
+            Some((other, _)) if other == publisher => Err(format!(
+                "`{path}` emits another message than it did: the algorithm is not deterministic{}",
+                self.hint(island)
+            )),
+            Some((other, _)) => {
+                let other = self.path_of(other);
+                Err(format!("`{path}` emitted a message then, and `{other}` does now{}", self.hint(island)))
+            }
+            None => Err(format!("`{path}` emitted a message then, and does not now{}", self.hint(island))),
+        }
+    }
+
+    /// What may explain a difference.
+    fn hint(&self, island: usize) -> String {
+        let Some((line, name)) = self.unrecorded.get(&island) else { return String::new() };
+        format!(
+            "; or the request of type `{name}` in line {line} has changed it, which the journal does not hold: set \
+             `RECORD` for it"
+        )
+    }
+
+    /// What an estimator emitted in reply to a request that the journal does not hold.
+    fn emit(&self, publisher: usize, is_first: bool, time: MonotonicTime, message: Recorded) -> Result<(), String> {
+        let message = self.message(publisher, message)?;
+        let (number, island) = self.emitter(publisher).ok_or("the robot has no such publisher")?;
+        if is_first {
+            self.live.0.environment.node(number).counters().emitted.increment();
+        }
+        self.island(island, time, Replayed::Emission(publisher, &message))?;
+        // It is as it was.
+        let _ = self.live.0.environment.replayed().take(island);
+        Ok(())
+    }
+
+    fn actuated(&self, number: usize, message: Recorded) -> Result<(), String> {
+        let actuators = R::all_actuators(&self.live.0.wiring);
+        let actuator = actuators.get(number).ok_or("the robot has no such actuator")?;
+        let message = decoded(actuator.any_topic(), message).map_err(|error| error.to_string())?;
+        if actuator.replay(&message) { Ok(()) } else { Err("the actuator takes other commands".to_owned()) }
+    }
+
+    fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
+        let registry = &self.live.0.control.topics().registry;
+        let topics = registry.topics();
+        let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
+            (Some(topic), _) => Arc::clone(topic),
+            (None, Recorded::Message(message)) => message.topic(registry).map_err(|error| error.to_string())?,
+            (None, Recorded::Bytes(_)) => {
+                return Err(format!(
+                    "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
+                     publisher there first, `replay.bus().publisher::<T>(\"{path}\")`"
+                ));
+            }
+        };
+        let message = decoded(&*topic, message).map_err(|error| error.to_string())?;
+        if topic.publish_dynamic(&message) { Ok(()) } else { Err(format!("`{path}` has another payload")) }
+    }
+
+    fn message(&self, publisher: usize, message: Recorded) -> Result<DynamicMessage, String> {
+        let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
+        let topic = topics.get(publisher).ok_or("the robot has no such publisher")?;
+        decoded(*topic, message).map_err(|error| error.to_string())
+    }
+
+    fn path_of(&self, publisher: usize) -> &'static str {
+        let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
+        topics.get(publisher).map_or("?", |topic| topic.path())
     }
 }
 
@@ -153,3 +436,15 @@ impl fmt::Display for ReplayError {
 }
 
 impl std::error::Error for ReplayError {}
+
+impl<R: Robot> Publishers for R {
+    type Topics = R::Topics;
+
+    fn make_topics() -> R::Topics {
+        R::topics()
+    }
+
+    fn list_topics(topics: &R::Topics) -> Vec<&dyn AnyTopic> {
+        R::all_topics(topics)
+    }
+}

@@ -1,7 +1,8 @@
 //! What a run has done: what was published where, and what was dropped and why.
 
-use super::ComponentFault;
-use crate::control::{CommandStatistics, Safety};
+use super::SourceStatistics;
+use crate::control::CommandStatistics;
+use crate::event::{ComponentFault, Safety};
 use crate::node::{DropReason, EstimatorStatistics};
 use crate::pubsub::TopicStatistics;
 use std::fmt;
@@ -14,13 +15,15 @@ pub struct Report {
     pub topics: Vec<TopicStatistics>,
     /// Every estimator.
     pub estimators: Vec<EstimatorStatistics>,
+    /// Every sensor and service.
+    pub sources: Vec<SourceStatistics>,
     /// Every command.
     pub commands: Vec<CommandStatistics>,
     /// The operational state.
     pub state: &'static str,
     /// The safety state.
     pub safety: Safety,
-    /// Components that have failed: the first 256 faults.
+    /// Components that have failed: the newest 256 faults, in order.
     pub faults: Vec<ComponentFault>,
     /// How many faults there were.
     pub all_faults: u64,
@@ -40,7 +43,7 @@ impl Report {
     /// This report, if no component has failed.
     ///
     /// # Errors
-    /// The first fault.
+    /// The first fault that is kept.
     pub fn ok(self) -> Result<Self, ComponentFault> {
         match self.faults.first() {
             Some(fault) => Err(fault.clone()),
@@ -74,6 +77,9 @@ impl fmt::Display for Report {
         for estimator in self.estimators.iter().filter(|estimator| estimator.transitions > 0) {
             let (path, health, transitions) = (estimator.path, estimator.health, estimator.transitions);
             writeln!(f, "{path}: {health} after {transitions} changes of health, {} restarts", estimator.restarts)?;
+        }
+        for source in self.sources.iter().filter(|source| source.skipped > 0) {
+            writeln!(f, "{}: {} readings, {} skipped", source.path, source.readings, source.skipped)?;
         }
         for command in &self.commands {
             if let Some(refusal) = &command.last_refusal {

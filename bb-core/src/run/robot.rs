@@ -1,11 +1,15 @@
 //! What `robot!` implements.
 
-use super::{ActuatorDeclaration, AnyActuator, Builder, SensorDeclaration, Source, Startup};
-use crate::control::{CategoryDeclaration, CommandDeclaration, ParameterDeclaration, Prepared};
-use crate::node::{AnyIsland, EstimatorDeclaration};
+use super::{AnyActuator, Assembly, Builder, Source};
+use crate::control::Prepared;
+use crate::declaration::{
+    ActuatorDeclaration, CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, SensorDeclaration, graph,
+};
+use crate::event::CategoryDeclaration;
+use crate::node::AnyIsland;
 use crate::pubsub::{AnyTopic, DynamicMessage};
 use crate::time::MonotonicTime;
-use crate::topology::{GraphFormat, Topology, graph};
+use crate::topology::{GraphFormat, Topology};
 use std::sync::Arc;
 
 /// Finds an island in a wiring.
@@ -58,12 +62,12 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn options() -> Self::Options;
     #[doc(hidden)]
     fn topics() -> Self::Topics;
-    /// Starts all estimators; what cannot start is in `startup`.
+    /// Starts all estimators; what cannot start is kept in `assembly`.
     #[doc(hidden)]
-    fn wire(topics: Self::Topics, options: &Self::Options, startup: &Startup) -> Self::Wiring;
-    /// Starts all sensors; what cannot start is in `startup`.
+    fn wire(topics: Self::Topics, options: &Self::Options, assembly: &Assembly) -> Self::Wiring;
+    /// Starts all sensors; what cannot start is kept in `assembly`.
     #[doc(hidden)]
-    fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, startup: &Startup) -> Vec<Box<dyn Source>>;
+    fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, assembly: &Assembly) -> Vec<Box<dyn Source>>;
     #[doc(hidden)]
     fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
     #[doc(hidden)]

@@ -6,6 +6,7 @@ use super::{Live, Report, Robot, Source, StartError};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// A robot that runs in real time. Dropping it stops it.
@@ -13,53 +14,78 @@ pub struct Running<R: Robot> {
     live: Live<R>,
     /// Of sensors and services.
     sources: Vec<Thread>,
-    /// Of workers, of what is due, and of commands.
-    servers: Vec<Thread>,
 }
 
-/// How long sensors, and then estimators, may take to come back after the robot was told to stop.
+/// How long user code may take to return after the robot was told to stop.
 const STOP_WITHIN: Duration = Duration::from_secs(5);
+
+/// How long it may take at least, once disarm callbacks have used up their time.
+const GRACE: Duration = Duration::from_millis(500);
 
 impl<R: Robot> Running<R> {
     pub(super) fn start(machine: Machine<R>, sources: Vec<Box<dyn Source>>) -> Result<Self, StartError> {
-        let mut running = Self { live: Live(Arc::new(machine)), sources: Vec::new(), servers: Vec::new() };
+        let mut running = Self { live: Live(Arc::new(machine)), sources: Vec::new() };
+        let machine = Arc::clone(&running.live.0);
+        machine.control.pool().start();
         // What goes wrong here drops what runs already, which stops it in order.
-        threads::serve(&running.live.0, &mut running.servers)?;
-        let now = running.clock().now();
-        (0..R::ISLANDS.len()).for_each(|island| running.live.0.startup.agenda().wake_at(now, island));
+        threads::serve(&machine)?;
+        let now = machine.environment.clock().now();
+        machine.control.begin_watch(now);
+        // Before any message can come: what `init` asked for comes first.
+        machine.start_islands(now);
         for source in sources {
-            running.sources.push(threads::source(source, &running.live.0.startup)?);
+            running.sources.push(threads::source(source, &machine)?);
         }
         Ok(running)
     }
 
-    /// Waits until every sensor and service has finished: for recordings, and simulated sensors that end.
+    /// Waits until every sensor and service has finished: for recordings, simulated sensors that end, and
+    /// [`Live::request_stop`].
     pub fn wait(&mut self) {
         for (path, thread) in std::mem::take(&mut self.sources) {
             if let Err(message) = threads::join(thread, None) {
-                self.live.0.fault(path, message);
+                self.live.0.fault(path, message.to_owned());
             }
         }
     }
 
-    /// Cancels commands and disarms, tells the subscribers, stops sensors, then estimators and actuators, and gives the
-    /// last report. What does not come back from its code, first of all sensors and then of all estimators, within 5 s is
-    /// left behind and reported as a fault.
+    /// Disarms the robot and cancels commands, at once and whatever hangs; then stops sensors and services, then estimators
+    /// and actuators; tells the subscribers, and gives the last report. Code that has not returned 5 s after the call is left
+    /// behind and reported as a fault.
     pub fn stop(mut self) -> Report {
         self.shut_down();
         self.live.0.report()
     }
 
     fn shut_down(&mut self) {
-        self.live.request_stop();
-        let deadline = Instant::now() + STOP_WITHIN;
-        for (path, thread) in std::mem::take(&mut self.sources).into_iter().chain(std::mem::take(&mut self.servers))
-        {
+        let machine = Arc::clone(&self.live.0);
+        if machine.has_ended.load(Ordering::Acquire) {
+            return;
+        }
+        let start = Instant::now();
+        machine.control.begin_stop();
+        machine.control.wait_until_disarmed();
+        let mut deadline = (start + STOP_WITHIN).max(Instant::now() + GRACE);
+        if machine.islands().any(|island| island.is_inside(&machine.wiring)) {
+            // An estimator's message has woken the caller: its island cannot stop before this returns.
+            deadline = Instant::now() + GRACE;
+        }
+        for (path, thread) in std::mem::take(&mut self.sources) {
             if let Err(message) = threads::join(thread, Some(deadline)) {
-                self.live.0.fault(path, message);
+                let sources = machine.sources.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                let entered =
+                    sources.iter().find(|source| source.path() == path).and_then(|source| source.entered_at());
+                drop(sources);
+                let since = threads::since(entered, machine.environment.clock().now());
+                machine.fault(path, format!("{message}{since}"));
             }
         }
-        self.live.0.terminate(STOP_WITHIN);
+        machine.retire_islands(deadline);
+        for path in machine.control.lingering() {
+            machine.fault(path, "did not come back when the robot stopped".to_owned());
+        }
+        machine.terminate_actuators(deadline);
+        machine.end();
     }
 }
 

@@ -1,7 +1,7 @@
 //! A run on virtual time, driven by its caller.
 
-use super::handle::Visitable;
 use super::machine::Machine;
+use super::visit::Visitable;
 use super::{Live, Report, Robot, SensorHandle, Source};
 use crate::component::Sensor;
 use crate::time::MonotonicTime;
@@ -10,11 +10,12 @@ use std::collections::BinaryHeap;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// A robot on virtual time. Sensors are read in the order of their due times (equal ones in the order of their
 /// declaration), on the caller's thread, as fast as the machine can, so that every run gives the same outputs. What else is
-/// due at the same time, timers and then commands, comes after them.
+/// due at the same time comes after them: timers, then the watchdog, then commands, then their time limits.
 pub struct Simulation<R: Robot> {
     live: Live<R>,
     sources: Vec<Box<dyn Source>>,
@@ -26,21 +27,27 @@ pub struct Simulation<R: Robot> {
 enum Kind {
     Source,
     Timer,
+    Watch,
     Command,
+    Limit,
 }
 
 impl<R: Robot> Simulation<R> {
     pub(super) fn new(machine: Machine<R>, mut sources: Vec<Box<dyn Source>>) -> Self {
         // A recording starts when it was made, and everything else with it.
-        if let Some(first) = sources.iter().filter_map(|source| source.starts_at()).min() {
-            machine.startup.clock.advance_to(first);
+        if let Some(first) = sources.iter_mut().filter_map(|source| source.starts_at()).min() {
+            machine.environment.clock().advance_to(first);
         }
-        let now = machine.startup.clock.now();
-        (0..R::ISLANDS.len()).for_each(|island| machine.wake(island, now));
+        let now = machine.environment.clock().now();
+        machine.control.begin_watch(now);
+        machine.start_islands(now);
+        machine.environment.drain_posted();
         sources.iter_mut().for_each(|source| source.begin());
         let due = sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
         let due = due.collect();
-        Self { live: Live(Arc::new(machine)), sources, due }
+        let simulation = Self { live: Live(Arc::new(machine)), sources, due };
+        simulation.live.0.settle();
+        simulation
     }
 
     /// When the next sensor is due; none once all have finished.
@@ -51,6 +58,7 @@ impl<R: Robot> Simulation<R> {
     /// Moves time on to the next sensor that is due and reads it, with whatever else is due before; false once all
     /// sensors have finished.
     pub fn step(&mut self) -> bool {
+        self.catch_up();
         loop {
             match self.next() {
                 Some((time, Kind::Source)) => {
@@ -65,10 +73,12 @@ impl<R: Robot> Simulation<R> {
 
     /// Runs everything that is due up to `time`, and moves time there.
     pub fn run_until(&mut self, time: MonotonicTime) {
+        self.catch_up();
         while let Some((due, kind)) = self.next().filter(|(due, _)| *due <= time) {
             self.fire(due, kind);
         }
         self.clock().advance_to(time);
+        self.live.0.settle();
     }
 
     /// Runs for `duration` of virtual time.
@@ -87,14 +97,15 @@ impl<R: Robot> Simulation<R> {
     /// message is late.
     pub fn publish<S: Sensor>(&mut self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
         self.run_until(time);
-        self.live.0.publish(sensor, time, payload);
+        self.live.publish(sensor, time, payload);
+        self.catch_up();
     }
 
     /// Has the callbacks of an estimator take so long from now on, as far as its `latency_budget` is concerned: on virtual
     /// time nothing takes time by itself.
     pub fn pretend_latency<V: Visitable<R>>(&self, estimator: V, latency: Duration) {
         let nanos = i64::try_from(latency.as_nanos()).unwrap_or(i64::MAX);
-        self.live.0.startup.node(estimator.number()).pretend_latency(nanos);
+        self.live.0.environment.node(estimator.number()).pretend_latency(nanos);
     }
 
     /// Stops sensors, then estimators, tells the subscribers, and gives the last report.
@@ -106,17 +117,22 @@ impl<R: Robot> Simulation<R> {
     /// What is due next, and when; what is over already is due now.
     fn next(&self) -> Option<(MonotonicTime, Kind)> {
         let now = self.clock().now();
+        let machine = &self.live.0;
+        let control = &machine.control;
         let source = self.next_due().map(|time| (time, Kind::Source));
-        let timer = self.live.0.startup.agenda().next().map(|time| (time.max(now), Kind::Timer));
-        let control = &self.live.0.startup.control;
-        let command = if control.is_quiet() { None } else { control.next_due(now) };
-        let command = command.map(|time| (time.max(now), Kind::Command));
-        source.into_iter().chain(timer).chain(command).min()
+        let at = |time: Option<MonotonicTime>, kind| time.map(|time| (time.max(now), kind));
+        let timer = at(machine.environment.agenda().next(), Kind::Timer);
+        let watch = at(control.next_watch(), Kind::Watch);
+        let command = if control.has_ready() { Some(now) } else { control.next_sleeper() };
+        let command = at(command, Kind::Command);
+        let limit = at(control.next_limit(), Kind::Limit);
+        [source, timer, watch, command, limit].into_iter().flatten().min()
     }
 
     fn fire(&mut self, time: MonotonicTime, kind: Kind) {
         self.clock().advance_to(time);
         let now = self.clock().now();
+        let machine = Arc::clone(&self.live.0);
         match kind {
             Kind::Source => {
                 let Some(Reverse((_, index))) = self.due.pop() else { return };
@@ -127,22 +143,62 @@ impl<R: Robot> Simulation<R> {
                 }
             }
             Kind::Timer => {
-                if let Some(island) = self.live.0.startup.agenda().take(now) {
-                    self.live.0.wake(island, now);
+                if let Some(number) = machine.environment.agenda().take(now)
+                    && let Some(island) = machine.island(number)
+                {
+                    island.wake(&machine.wiring, now);
                 }
             }
-            Kind::Command => self.live.0.startup.control.drive(now),
+            Kind::Watch => drop(machine.control.check_watch(now)),
+            Kind::Command => {
+                while machine.control.wake_sleepers(now) {}
+                machine.control.poll_ready();
+            }
+            Kind::Limit => drop(machine.control.check_limits(now)),
         }
+        self.catch_up();
+    }
+
+    /// Does what follows at once: entries that were posted, disarm callbacks, and orders to sensors.
+    fn catch_up(&mut self) {
+        let machine = &self.live.0;
+        machine.environment.drain_posted();
+        while machine.control.run_pending_hooks() {
+            machine.environment.drain_posted();
+        }
+        if machine.control.take_orders() {
+            self.obey();
+        }
+        self.live.0.settle();
+    }
+
+    /// Has sensors carry out what they were told, at once.
+    fn obey(&mut self) {
+        for source in &mut self.sources {
+            source.obey();
+        }
+        let due =
+            self.sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
+        self.due = due.collect();
     }
 
     fn shut_down(&mut self) {
-        self.live.0.startup.stop.set();
+        let machine = Arc::clone(&self.live.0);
+        if machine.has_ended.load(Ordering::Acquire) {
+            return;
+        }
+        self.catch_up();
+        machine.control.begin_stop();
+        machine.control.stop_signal().set();
         self.due.clear();
         for mut source in self.sources.drain(..) {
             source.terminate();
         }
         // One thread runs all of this, so that nothing can be busy elsewhere.
-        self.live.0.terminate(Duration::ZERO);
+        machine.retire_quietly();
+        machine.terminate_actuators(std::time::Instant::now());
+        machine.settle();
+        machine.end();
     }
 }
 

@@ -1,30 +1,33 @@
 //! What is called at a rate, or whenever it wants to be: sensors, controllers, bridges. When each is called, what becomes
 //! of what it gives, and of itself when it fails.
 
-use super::periodic::Periodic;
-use super::supervision::{Failures, Supervisor};
-use super::{Failed, Robot, Startup, caught, retire};
-use crate::component::{Fault, Next, Then};
-use crate::control::Binding;
-use crate::message::{Frame, Stamp, Stamped};
-use crate::time::MonotonicTime;
-use crate::topology::Transform;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use super::Robot;
+use crate::component::{Binding, Next};
+use crate::control::{ComponentOrder, Control};
+use crate::declaration::SensorDeclaration;
+use crate::fault::{Failed, Fault, Then, caught};
+use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
+use crate::message::{Stamp, Stamped};
+use crate::node::{BindTarget, Environment};
+use crate::time::{Clock, MonotonicTime};
+use std::fmt;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::Thread;
 
-/// A sensor, a controller or a bridge as declared.
-#[derive(Clone, Copy, Debug)]
-pub struct SensorDeclaration {
-    /// Its path: `sensor/base_link/imu`.
-    pub path: &'static str,
-    /// The frame of what it publishes.
-    pub frame: Frame,
-    /// Nanoseconds between two readings, if it has a `rate`.
-    pub period_nanos: Option<i64>,
-    /// Takes points from its frame to the root link's, if only fixed joints lie between.
-    pub root_from_frame: Option<Transform>,
-    /// The number of its supervisor.
-    pub supervisor: Supervisor,
+/// What components are made with.
+#[derive(Clone, Debug)]
+pub struct Assembly {
+    pub(super) environment: Environment,
+    pub(super) control: Control,
+    pub(super) host: HostHandle,
+}
+
+impl Assembly {
+    /// What all islands share.
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
 }
 
 /// A running sensor or service, whatever its type.
@@ -32,15 +35,136 @@ pub trait Source: Send {
     /// Its path.
     fn path(&self) -> &'static str;
     /// When it wants to be read first, if it says so.
-    fn starts_at(&self) -> Option<MonotonicTime>;
+    fn starts_at(&mut self) -> Option<MonotonicTime>;
     /// Lets it begin: it is due at once, or when it wants to be.
     fn begin(&mut self);
-    /// When it is to be read next, or started anew; none before it has begun and once it has finished.
+    /// When it is to be read next, or restarted; none before it has begun and once it has finished.
     fn due(&self) -> Option<MonotonicTime>;
+    /// Carries out what it was told by its supervisor or by a parameter.
+    fn obey(&mut self);
     /// Reads it and publishes the reading; all estimators downstream run before this returns.
     fn fire(&mut self);
     /// Closes the device.
     fn terminate(&mut self);
+    /// What others tell it and ask of it.
+    #[doc(hidden)]
+    fn shared(&self) -> SharedSource;
+}
+
+/// The part of a source that other threads reach. Clones are the same.
+#[derive(Clone, Debug)]
+pub struct SharedSource(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    path: &'static str,
+    inbox: Mutex<Inbox>,
+    readings: AtomicU64,
+    skipped: AtomicU64,
+    restarts: AtomicU64,
+    /// When its code was entered; the earliest instant if it is not inside.
+    entered_nanos: AtomicI64,
+    stopped: Mutex<Option<String>>,
+}
+
+#[derive(Debug, Default)]
+struct Inbox {
+    /// Each kind at most once.
+    orders: Vec<Order>,
+    thread: Option<Thread>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    Options,
+    Restart,
+    GiveUp,
+}
+
+/// What a sensor or a service has done since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SourceStatistics {
+    /// Its path.
+    pub path: &'static str,
+    /// How often it was read.
+    pub readings: u64,
+    /// Readings at its rate that it missed because it, or what lies downstream, took too long.
+    pub skipped: u64,
+    /// How often it was restarted.
+    pub restarts: u64,
+    /// Why it does not run, if it does not.
+    pub stopped: Option<String>,
+}
+
+/// No code of the source runs.
+const OUTSIDE: i64 = i64::MIN;
+
+impl SharedSource {
+    fn new(path: &'static str) -> Self {
+        Self(Arc::new(Shared {
+            path,
+            inbox: Mutex::default(),
+            readings: AtomicU64::new(0),
+            skipped: AtomicU64::new(0),
+            restarts: AtomicU64::new(0),
+            entered_nanos: AtomicI64::new(OUTSIDE),
+            stopped: Mutex::default(),
+        }))
+    }
+
+    fn tell(&self, order: Order) {
+        let mut inbox = lock(&self.0.inbox);
+        if !inbox.orders.contains(&order) {
+            inbox.orders.push(order);
+        }
+        if let Some(thread) = &inbox.thread {
+            thread.unpark();
+        }
+    }
+
+    fn take_orders(&self) -> Vec<Order> {
+        std::mem::take(&mut lock(&self.0.inbox).orders)
+    }
+
+    /// The calling thread reads it from now on.
+    pub(super) fn adopt(&self) {
+        lock(&self.0.inbox).thread = Some(std::thread::current());
+    }
+
+    pub(super) fn path(&self) -> &'static str {
+        self.0.path
+    }
+
+    /// When its code was entered, if it is inside.
+    pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
+        let nanos = self.0.entered_nanos.load(Ordering::Acquire);
+        (nanos != OUTSIDE).then(|| MonotonicTime::from_nanos(nanos))
+    }
+
+    fn enter(&self, clock: &Clock) -> Entered<'_> {
+        self.0.entered_nanos.store(clock.now().as_nanos(), Ordering::Release);
+        Entered(self)
+    }
+
+    pub(super) fn statistics(&self) -> SourceStatistics {
+        SourceStatistics {
+            path: self.0.path,
+            readings: self.0.readings.load(Ordering::Relaxed),
+            skipped: self.0.skipped.load(Ordering::Relaxed),
+            restarts: self.0.restarts.load(Ordering::Relaxed),
+            stopped: lock(&self.0.stopped).clone(),
+        }
+    }
+}
+
+/// The source's code runs as long as this lives.
+struct Entered<'a>(&'a SharedSource);
+
+impl Drop for Entered<'_> {
+    fn drop(&mut self) {
+        self.0.0.entered_nanos.store(OUTSIDE, Ordering::Release);
+    }
 }
 
 /// Beyond it a real sensor's next reading is a mistake: a day.
@@ -50,27 +174,23 @@ const FARTHEST_NANOS: i64 = 86_400_000_000_000;
 const STUCK_AFTER: u32 = 1_000_000;
 
 struct Running<R: Robot, S: Periodic, P> {
-    /// None while it does not run.
-    component: Option<S>,
+    slot: Slot<S>,
     context: S::Context,
     declaration: &'static SensorDeclaration,
-    options: S::Options,
-    binding: Binding<S::Options>,
-    startup: Startup,
+    control: Control,
+    environment: Environment,
     wiring: Arc<R::Wiring>,
     publish: P,
+    shared: SharedSource,
     due: Option<MonotonicTime>,
     at_one_instant: u32,
-    failures: Failures,
-    restart: Arc<AtomicBool>,
-    options_changed: Arc<AtomicBool>,
 }
 
-impl Startup {
+impl Assembly {
     /// Makes a sensor or a service and adds it to `sources`; its readings go to `publish`.
     ///
     /// The wiring comes beside the function instead of in a closure: that it may go to another thread is known of every
-    /// robot, and need not be proven anew for each of its sensors.
+    /// robot, and need not be proven again for each of its sensors.
     pub fn source<R: Robot, S: Periodic>(
         &self,
         declaration: &'static SensorDeclaration,
@@ -80,26 +200,45 @@ impl Startup {
         publish: impl Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send + 'static,
         sources: &mut Vec<Box<dyn Source>>,
     ) {
-        let context = S::context(declaration, self);
-        let made = self.make(declaration.path, options, binding, |options| S::init(options, &context));
-        let Ok(component) = made else { return };
-        let options_changed = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&options_changed);
-        self.bind(declaration.path, options, binding, move || flag.store(true, Ordering::Release));
+        let context = S::context(declaration, self.host.clone());
+        let mut slot = Slot::<S>::new(Recipe::new(options, binding), self.environment.supervision());
+        let parameters = self.control.parameters();
+        let made = self
+            .environment
+            .make(declaration.path, || slot.make(&context, &parameters).map_err(|failed| failed.fault));
+        if made.is_err() {
+            return;
+        }
+        let shared = SharedSource::new(declaration.path);
+        let tell = {
+            let (told, control) = (shared.clone(), self.control.downgrade());
+            move |order| {
+                told.tell(order);
+                if let Some(control) = control.upgrade() {
+                    control.note_order();
+                }
+            }
+        };
+        let told = tell.clone();
+        let target = BindTarget::Other(Box::new(move || told(Order::Options)));
+        self.environment.bind(declaration.path, options, binding, target);
+        self.control.look_after(declaration.path, declaration.supervisor, move |order| {
+            tell(match order {
+                ComponentOrder::Restart => Order::Restart,
+                ComponentOrder::GiveUp => Order::GiveUp,
+            });
+        });
         sources.push(Box::new(Running::<R, S, _> {
-            component: Some(component),
+            slot,
             context,
             declaration,
-            options: options.clone(),
-            binding,
-            startup: self.clone(),
+            control: self.control.clone(),
+            environment: self.environment.clone(),
             wiring: Arc::clone(wiring),
             publish,
+            shared,
             due: None,
             at_one_instant: 0,
-            failures: Failures::default(),
-            restart: self.look_after(declaration.supervisor),
-            options_changed,
         }));
     }
 }
@@ -110,26 +249,27 @@ where
     S: Periodic,
     P: Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send,
 {
+    fn clock(&self) -> &Clock {
+        self.environment.clock()
+    }
+
     /// Reads it once, publishes what it gave, and says when to read it next.
     fn read(&mut self, due: MonotonicTime) -> Result<Option<MonotonicTime>, Fault> {
-        if self.options_changed.load(Ordering::Relaxed) && self.options_changed.swap(false, Ordering::AcqRel) {
-            let options = self.startup.bound(&self.options, self.binding)?;
-            if let Some(component) = &mut self.component {
-                let path = self.declaration.path;
-                let change = || component.handle_options(options, &self.context);
-                self.startup.control.replacing_hooks(path, false, change)?;
-            }
-        }
-        let Some(component) = &mut self.component else { return Ok(None) };
-        let mut reading = component.read(self.startup.clock.now())?;
-        let now = self.startup.clock.now();
+        let now = self.clock().now();
+        let Some(component) = self.slot.running() else { return Ok(None) };
+        self.shared.0.readings.fetch_add(1, Ordering::Relaxed);
+        let mut reading = {
+            let _entered = self.shared.enter(self.environment.clock());
+            component.read(now)?
+        };
+        let now = self.clock().now();
         if let Some(payload) = reading.payload.take() {
             let monotonic_time = reading.time.unwrap_or(now);
             let stamp = Stamp {
                 monotonic_time,
-                wall_time: self.startup.clock.wall_at(monotonic_time),
+                wall_time: self.clock().wall_at(monotonic_time),
                 frame: self.declaration.frame,
-                origin: self.startup.origin,
+                origin: self.environment.origin(),
             };
             (self.publish)(&self.wiring, &stamp.message(payload), now);
         }
@@ -143,7 +283,7 @@ where
         due: MonotonicTime,
         now: MonotonicTime,
     ) -> Result<Option<MonotonicTime>, Fault> {
-        let is_virtual = self.startup.clock.is_virtual();
+        let is_virtual = self.clock().is_virtual();
         let next = match (next, self.declaration.period_nanos) {
             (Next::Never, _) | (Next::At(MonotonicTime::MAX), _) => return Ok(None),
             (Next::At(time), _) if !is_virtual && time.nanos_since(now) > FARTHEST_NANOS => {
@@ -153,7 +293,11 @@ where
                 )));
             }
             (Next::At(time), _) => time.max(due),
-            (Next::AtRate, Some(period)) => next_on_grid(due, period, now),
+            (Next::AtRate, Some(period)) => {
+                let (next, skipped) = next_on_grid(due, period, now);
+                self.shared.0.skipped.fetch_add(skipped, Ordering::Relaxed);
+                next
+            }
             (Next::AtRate, None) if !is_virtual => now,
             (Next::AtRate, None) => {
                 return Err(Fault::permanent(
@@ -169,53 +313,64 @@ where
         Ok(Some(next))
     }
 
-    fn fail(&mut self, Failed { fault, panicked }: Failed) {
-        self.startup.fault(self.declaration.path, &fault);
-        self.retire(panicked);
-        if fault.then != Then::Restart {
+    fn fail(&mut self, failed: Failed) {
+        let SensorDeclaration { path, supervisor, .. } = *self.declaration;
+        let message = failed.fault.to_string();
+        *lock(&self.shared.0.stopped) = Some(message.clone());
+        self.due = match self.slot.fail(&failed, self.environment.clock().now()) {
+            AfterFault::RestartAt(at) => Some(at),
+            AfterFault::Stopped => None,
+        };
+        if failed.fault.then == Then::Skip {
+            tracing::info!(component = path, message, "left out");
             return;
         }
-        let now = self.startup.clock.now();
-        let SensorDeclaration { supervisor, path, .. } = *self.declaration;
-        self.due = self.startup.failed(&mut self.failures, supervisor, path, now, true);
-        // The verdict may have flagged this one as well, which starts anew already.
-        self.restart.store(false, Ordering::Release);
+        self.control.component_failed(path, supervisor, message, failed.panicked);
     }
 
-    fn make_anew(&mut self) {
-        let made = self.startup.bound(&self.options, self.binding);
-        let made = match made {
-            Ok(options) => {
-                let make = || caught(|| S::init(options, &self.context));
-                self.startup.control.replacing_hooks(self.declaration.path, true, make)
-            }
-            Err(fault) => Err(Failed { fault, panicked: false }),
+    /// Makes it again; its first reading is due at once.
+    fn restart(&mut self) {
+        let path = self.declaration.path;
+        let parameters = self.control.parameters();
+        let (control, slot, context) = (&self.control, &mut self.slot, &self.context);
+        let made = {
+            let _entered = self.shared.enter(self.environment.clock());
+            control.replacing_hooks(path, true, || slot.make(context, &parameters))
         };
         match made {
-            Ok(component) => {
-                tracing::info!(component = self.declaration.path, "started anew");
-                self.component = Some(component);
+            Ok(()) => {
+                tracing::info!(component = path, "restarted");
+                self.shared.0.restarts.fetch_add(1, Ordering::Relaxed);
+                *lock(&self.shared.0.stopped) = None;
                 self.begin();
             }
             Err(failed) => self.fail(failed),
         }
     }
 
-    /// Closes the device and drops the component.
-    fn retire(&mut self, panicked: bool) {
-        self.due = None;
-        if let Some(fault) = self.component.take().and_then(|component| retire(component, panicked, S::terminate)) {
-            self.startup.fault(self.declaration.path, &fault);
+    fn change_options(&mut self) {
+        let parameters = self.control.parameters();
+        let (control, slot, context) = (&self.control, &mut self.slot, &self.context);
+        let changed = {
+            let _entered = self.shared.enter(self.environment.clock());
+            control.replacing_hooks(self.declaration.path, false, || slot.change(context, &parameters))
+        };
+        match changed {
+            Ok(true) => {}
+            Ok(false) => self.restart(),
+            Err(failed) => self.fail(failed),
         }
     }
 }
 
-/// The first time after `due` that is a whole number of periods later and not yet over: a sensor that has fallen behind
-/// skips what it has missed and keeps its phase.
-fn next_on_grid(due: MonotonicTime, period: i64, now: MonotonicTime) -> MonotonicTime {
-    let missed = now.nanos_since(due).max(0) / period.max(1);
+/// The first time after `due` that is a whole number of periods later and not yet over, and how many were missed: a sensor
+/// that has fallen behind skips these and keeps its phase.
+fn next_on_grid(due: MonotonicTime, period: i64, now: MonotonicTime) -> (MonotonicTime, u64) {
+    let period = period.max(1);
+    let missed = now.nanos_since(due).max(0) / period;
     let next = due.plus_nanos(period.saturating_mul(missed.max(1)));
-    if next < now { next.plus_nanos(period) } else { next }
+    let next = if next < now { next.plus_nanos(period) } else { next };
+    (next, (next.nanos_since(due) / period - 1).max(0).unsigned_abs())
 }
 
 impl<R, S, P> Source for Running<R, S, P>
@@ -228,15 +383,26 @@ where
         self.declaration.path
     }
 
-    fn starts_at(&self) -> Option<MonotonicTime> {
-        self.component.as_ref().and_then(S::starts_at)
+    fn starts_at(&mut self) -> Option<MonotonicTime> {
+        let component = self.slot.running()?;
+        match caught(|| Ok(component.starts_at())) {
+            Ok(time) => time,
+            Err(failed) => {
+                self.fail(failed);
+                None
+            }
+        }
     }
 
     fn begin(&mut self) {
-        let now = self.startup.clock.now();
-        match self.next_due(Next::At(self.starts_at().unwrap_or(now)), MonotonicTime::from_nanos(i64::MIN), now) {
+        let now = self.clock().now();
+        let first = self.starts_at().unwrap_or(now);
+        if !self.slot.is_running() {
+            return;
+        }
+        match self.next_due(Next::At(first), MonotonicTime::from_nanos(i64::MIN), now) {
             Ok(due) => self.due = due,
-            Err(fault) => self.fail(Failed { fault, panicked: false }),
+            Err(fault) => self.fail(Failed::from(fault)),
         }
     }
 
@@ -244,13 +410,31 @@ where
         self.due
     }
 
-    fn fire(&mut self) {
-        let Some(due) = self.due else { return };
-        if self.component.is_some() && self.restart.swap(false, Ordering::AcqRel) {
-            self.retire(false);
+    fn obey(&mut self) {
+        for order in self.shared.take_orders() {
+            match order {
+                Order::Options => self.change_options(),
+                Order::Restart => {
+                    if self.slot.restart(self.clock().now()) {
+                        self.restart();
+                    }
+                }
+                Order::GiveUp => {
+                    self.slot.give_up();
+                    self.due = None;
+                }
+            }
         }
-        if self.component.is_none() {
-            return self.make_anew();
+    }
+
+    fn fire(&mut self) {
+        self.obey();
+        let Some(due) = self.due else { return };
+        if let Some(at) = self.slot.restart_at() {
+            if at <= self.clock().now() {
+                self.restart();
+            }
+            return;
         }
         match caught(|| self.read(due)) {
             Ok(next) => self.due = next,
@@ -259,16 +443,28 @@ where
     }
 
     fn terminate(&mut self) {
-        self.retire(false);
+        self.due = None;
+        let fault = {
+            let _entered = self.shared.enter(self.environment.clock());
+            self.slot.retire()
+        };
+        if let Some(fault) = fault {
+            self.control.note_fault(self.declaration.path, fault.to_string());
+        }
+    }
+
+    fn shared(&self) -> SharedSource {
+        self.shared.clone()
     }
 }
 
-impl<R: Robot, S: Periodic, P> Drop for Running<R, S, P> {
-    /// Of a robot that did not start.
-    fn drop(&mut self) {
-        if let Some(component) = self.component.take() {
-            let _ = retire(component, false, S::terminate);
-        }
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl fmt::Debug for dyn Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Source").field(&self.path()).finish()
     }
 }
 
@@ -277,12 +473,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_late_sensor_keeps_its_phase() {
+    fn a_late_sensor_keeps_its_phase_and_counts_what_it_skipped() {
         let next = |due, now| {
             let at = MonotonicTime::from_nanos;
-            next_on_grid(at(due), 10, at(now)).as_nanos()
+            let (next, skipped) = next_on_grid(at(due), 10, at(now));
+            (next.as_nanos(), skipped)
         };
-        assert_eq!([next(0, 0), next(0, 3), next(0, 10), next(0, 11), next(0, 145)], [10, 10, 10, 20, 150]);
-        assert_eq!(next(i64::MAX - 1, i64::MAX), i64::MAX);
+        assert_eq!([next(0, 0), next(0, 3), next(0, 10), next(0, 11)], [(10, 0), (10, 0), (10, 0), (20, 1)]);
+        assert_eq!(next(0, 145), (150, 14));
+        assert_eq!(next(i64::MAX - 1, i64::MAX).0, i64::MAX);
     }
 }

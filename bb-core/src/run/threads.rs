@@ -1,10 +1,13 @@
 //! The threads of a robot that runs in real time: one for each sensor and service, one for each estimator with
-//! `runs_on: worker`, one for what is due, one for commands.
+//! `runs_on: worker`, and one that keeps time. The pool's threads run the rest.
 
 use super::machine::Machine;
-use super::{Robot, Source, StartError, Startup, caught};
+use super::timekeeper::keep_time;
+use super::{Robot, Source, StartError};
 use crate::component::Fault;
-use crate::node::WorkerDeclaration;
+use crate::declaration::WorkerDeclaration;
+use crate::fault::guarded;
+use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -12,47 +15,60 @@ use std::time::{Duration, Instant};
 /// A thread, by the path of what it runs.
 pub(super) type Thread = (&'static str, JoinHandle<()>);
 
-/// The longest sleep of a thread that waits for what is due.
-const LONGEST_WAIT: Duration = Duration::from_millis(200);
-
-/// The threads that run until the robot stops, as far as they could be started.
-pub(super) fn serve<R: Robot>(machine: &Arc<Machine<R>>, threads: &mut Vec<Thread>) -> Result<(), StartError> {
+/// Starts the threads that run until the robot stops.
+pub(super) fn serve<R: Robot>(machine: &Arc<Machine<R>>) -> Result<(), StartError> {
     for number in 0..R::ISLANDS.len() {
         let Some(island) = machine.island(number) else { continue };
         let Some(worker) = island.worker() else { continue };
-        let (name, served) = (island.name(), Arc::clone(machine));
-        island.give_to_thread();
-        threads.push(spawn(name, move || {
+        let name = island.declaration().name;
+        let served = Arc::clone(machine);
+        island.give_to_worker();
+        spawn(name, move || {
             if let Err(message) = set_up(worker) {
                 tracing::warn!(estimator = name, message, "its thread runs as any other");
+                served.fault(name, format!("its thread runs as any other: {message}"));
             }
-            while !served.startup.stop.is_set()
-                && let Some(island) = served.island(number)
-            {
-                survive(&served.startup, name, || island.serve(&served.wiring, &served.startup.stop));
+            while let Some(island) = served.island(number).filter(|island| !island.has_retired()) {
+                survive(&served, name, || island.serve(&served.wiring));
             }
-        })?);
+        })?;
     }
-    let served = Arc::clone(machine);
-    threads.push(spawn("agenda", move || wake_what_is_due(&served))?);
-    let served = Arc::clone(machine);
-    threads.push(spawn("commands", move || drive_commands(&served.startup))?);
+    let kept = Arc::clone(machine);
+    spawn("timekeeper", move || keep_time(&kept))?;
     Ok(())
 }
 
-pub(super) fn source(mut source: Box<dyn Source>, startup: &Startup) -> Result<Thread, StartError> {
-    let startup = startup.clone();
+pub(super) fn source<R: Robot>(
+    mut source: Box<dyn Source>,
+    machine: &Arc<Machine<R>>,
+) -> Result<Thread, StartError> {
+    let environment = machine.environment.clone();
+    let stop = machine.control.stop_signal().clone();
+    let control = machine.control.clone();
     spawn(source.path(), move || {
-        source.begin();
-        while let Some(due) = source.due() {
-            let wait = due.duration_since(startup.clock.now());
-            if !wait.is_zero() {
-                startup.stop.sleep(wait);
+        source.shared().adopt();
+        stop.register();
+        let path = source.path();
+        let read = guarded(|| {
+            source.begin();
+            while let Some(due) = source.due() {
+                let wait = due.duration_since(environment.clock().now());
+                if !wait.is_zero() {
+                    stop.sleep(wait);
+                }
+                if stop.is_set() {
+                    break;
+                }
+                if due <= environment.clock().now() {
+                    source.fire();
+                } else {
+                    // It was woken before its time: it is told something.
+                    source.obey();
+                }
             }
-            if startup.stop.is_set() {
-                break;
-            }
-            source.fire();
+        });
+        if let Err(fault) = read {
+            control.note_fault(path, fault.to_string());
         }
         source.terminate();
     })
@@ -74,6 +90,12 @@ pub(super) fn join(thread: JoinHandle<()>, deadline: Option<Instant>) -> Result<
     thread.join().map_err(|_| "its thread panicked")
 }
 
+/// What is known of a source that did not come back.
+pub(super) fn since(entered_at: Option<MonotonicTime>, now: MonotonicTime) -> String {
+    let entered = entered_at.map(|at| format!("; its code was entered {:.1?} ago", now.duration_since(at)));
+    entered.unwrap_or_default()
+}
+
 fn spawn(path: &'static str, run: impl FnOnce() + Send + 'static) -> Result<Thread, StartError> {
     let thread = std::thread::Builder::new().name(path.to_owned());
     match thread.spawn(run) {
@@ -82,40 +104,10 @@ fn spawn(path: &'static str, run: impl FnOnce() + Send + 'static) -> Result<Thre
     }
 }
 
-fn wake_what_is_due<R: Robot>(machine: &Machine<R>) {
-    let Startup { clock, stop, .. } = &machine.startup;
-    let agenda = machine.startup.agenda();
-    while !stop.is_set() {
-        let now = clock.now();
-        match agenda.take(now) {
-            Some(number) => {
-                let path = machine.island(number).map_or("agenda", |island| island.name());
-                survive(&machine.startup, path, || machine.wake(number, now));
-            }
-            None => agenda.wait(clock, LONGEST_WAIT),
-        }
-    }
-}
-
-fn drive_commands(startup: &Startup) {
-    while !startup.stop.is_set() {
-        let now = startup.clock.now();
-        survive(startup, "commands", || startup.control.drive(now));
-        let wait = startup.control.next_due(now).map_or(LONGEST_WAIT, |next| next.duration_since(now));
-        startup.control.wait(wait.min(LONGEST_WAIT));
-    }
-    // Those that came back late are ended.
-    survive(startup, "commands", || startup.control.drive(startup.clock.now()));
-}
-
 /// A panic that no component has caught, in the code of a payload say, must not end a thread that serves others.
-fn survive(startup: &Startup, path: &'static str, run: impl FnOnce()) {
-    let survived = caught(|| {
-        run();
-        Ok(())
-    });
-    if let Err(failed) = survived {
-        startup.fault(path, &failed.fault);
+fn survive<R: Robot>(machine: &Machine<R>, path: &'static str, run: impl FnOnce()) {
+    if let Err(fault) = guarded(run) {
+        machine.fault(path, fault.to_string());
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::stub;
 use crate::component::{
-    Actuator, ActuatorContext, Bridge, Context, Controller, Estimator, Fault, InputAt, InputField, Inputs,
-    NoOptions, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, ServiceContext, Slot, SyncMiss,
+    Actuator, ActuatorContext, Command, CommandContext, Context, Estimator, Fault, InputAt, InputField, Inputs,
+    NoArguments, NoOptions, Outcome, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, Service,
+    ServiceContext, Slot, SyncMiss,
 };
-use crate::control::{Command, CommandContext, NoArguments, Outcome};
 use crate::message::codec::{Reader, Shape, Writer};
 use crate::message::{DecodeError, Field, Finite, Payload, Stamped};
 use crate::time::MonotonicTime;
@@ -98,21 +98,7 @@ impl Actuator for Unknown {
 }
 
 #[diagnostic::do_not_recommend]
-impl Controller for Unknown {
-    type Options = NoOptions;
-    type Output = Self;
-
-    fn init(_: NoOptions, _: &ServiceContext) -> Result<Self, Fault> {
-        stub()
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Self>, Fault> {
-        stub()
-    }
-}
-
-#[diagnostic::do_not_recommend]
-impl Bridge for Unknown {
+impl Service for Unknown {
     type Options = NoOptions;
     type Output = Self;
 

@@ -80,7 +80,6 @@ impl Clock {
     /// Measures the offset of a real clock again. The new offset, if it differs from the current one by more than 1 ms:
     /// the machine's date was set. One caller gets it.
     // The thread of the timers calls it, at most once a second.
-    #[allow(dead_code)]
     pub(crate) fn refresh_wall(&self) -> Option<i64> {
         match self.kind {
             Kind::Real(zero) => self.follow_wall(median_wall_offset(|| read_both(zero))),
@@ -90,10 +89,17 @@ impl Clock {
 
     /// Sets the offset of a virtual clock; a real one measures its own.
     // A replay calls it, with what the journal says.
-    #[allow(dead_code)]
     pub(crate) fn set_wall_offset_nanos(&self, nanos: i64) {
         if self.is_virtual() {
             self.wall_offset_nanos.store(nanos, Ordering::Relaxed);
+        }
+    }
+
+    /// Sets a virtual clock to `time`, which may be earlier: lines of a journal that different threads wrote have times that
+    /// differ by a little from the order of the lines.
+    pub(crate) fn set_to(&self, time: MonotonicTime) {
+        if let Kind::Virtual(nanos) = &self.kind {
+            nanos.store(time.as_nanos(), Ordering::Release);
         }
     }
 

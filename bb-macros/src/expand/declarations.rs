@@ -91,7 +91,8 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: usize) 
             let limit = nanos(limit.value);
             quote!(#limit)
         }));
-        let frame_from_input = transform(robot.route(robot.mount_of(*source), mount).transform);
+        let route = robot.route(robot.mount_of(*source), mount);
+        let frame_from_input = option(route.moving.is_empty().then(|| transform(route.transform)));
         input_declaration(index, &name, &path, driver, optional, [&tolerance, &stale], &frame_from_input)
     });
     let inputs = nested.into_iter().chain(declared);
@@ -182,7 +183,7 @@ pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
 fn nested_input(estimator: &[String]) -> TokenStream {
     let sensor = estimator.split_last().map_or(&[][..], |(_, sensor)| sensor);
     let name = sensor.last().cloned().unwrap_or_default();
-    let identity = quote!(::bb_core::__private::Transform::IDENTITY);
+    let identity = option(Some(quote!(::bb_core::__private::Transform::IDENTITY)));
     input_declaration(0, &name, &path_text(sensor), true, false, [&option(None), &option(None)], &identity)
 }
 

@@ -1,7 +1,7 @@
 //! The parts of a robot that are declared by a type of the user's, numbered through.
 
 use crate::model::{ActuatorId, CommandId, EstimatorId, Robot, SensorId, ServiceId};
-use crate::parse::{Component, ServiceKind};
+use crate::parse::Component;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{format_ident, quote};
 
@@ -50,15 +50,12 @@ impl Part {
     }
 
     /// The trait that its type implements, and the constant of `bb_core::stub::Probe` that says so.
-    pub(super) fn contract(self, robot: &Robot) -> (TokenStream, TokenStream) {
+    pub(super) fn contract(self) -> (TokenStream, TokenStream) {
         match self {
             Self::Sensor(_) => (quote!(::bb_core::Sensor), quote!(IS_SENSOR)),
             Self::Estimator(_) => (quote!(::bb_core::Estimator), quote!(IS_ESTIMATOR)),
             Self::Actuator(_) => (quote!(::bb_core::Actuator), quote!(IS_ACTUATOR)),
-            Self::Service(id) => match robot.services.get(id).map(|service| service.kind) {
-                Some(ServiceKind::Bridge) => (quote!(::bb_core::Bridge), quote!(IS_BRIDGE)),
-                Some(ServiceKind::Controller) | None => (quote!(::bb_core::Controller), quote!(IS_CONTROLLER)),
-            },
+            Self::Service(_) => (quote!(::bb_core::Service), quote!(IS_SERVICE)),
             Self::Command(_) => (quote!(::bb_core::Command), quote!(IS_COMMAND)),
         }
     }

@@ -6,7 +6,6 @@ use super::types::Types;
 use super::wiring::{index_name, start_function, topic};
 use super::{control, order};
 use crate::model::PublisherId;
-use crate::parse::ServiceKind;
 use crate::verify::Verified;
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
@@ -29,7 +28,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
         quote! {
             fn #function(
                 options: &__Options,
-                startup: &::bb_core::__private::Startup,
+                assembly: &::bb_core::__private::Assembly,
             ) -> ::bb_core::__private::Node<#kind> {
                 ::bb_core::__private::Node::<#kind>::new(
                     #id,
@@ -40,7 +39,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                         #(#declared)*
                         cache
                     },
-                    startup,
+                    assembly.environment(),
                 )
             }
         }
@@ -49,11 +48,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
         source(&types, Part::Sensor(id), sensor.publisher, quote!(AsSensor), quote!(&__SENSORS[#id]))
     });
     let services = robot.services.iter().enumerate().map(|(id, service)| {
-        let wrapper = match service.kind {
-            ServiceKind::Controller => quote!(AsController),
-            ServiceKind::Bridge => quote!(AsBridge),
-        };
-        source(&types, Part::Service(id), service.publisher, wrapper, quote!(&__SERVICES[#id]))
+        source(&types, Part::Service(id), service.publisher, quote!(AsService), quote!(&__SERVICES[#id]))
     });
     let sources = sensors.chain(services);
     let functions: TokenStream = starts.chain(sources).collect();
@@ -67,17 +62,17 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             fn #group(
                 wiring: &::bb_core::__private::Arc<__Wiring>,
                 options: &__Options,
-                startup: &::bb_core::__private::Startup,
+                assembly: &::bb_core::__private::Assembly,
                 sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
             ) {
-                #(#functions(wiring, options, startup, sources);)*
+                #(#functions(wiring, options, assembly, sources);)*
             }
         }
     });
     let functions: TokenStream = functions.into_iter().chain(groups.flatten()).collect();
     let open_sources = (0..order.len().div_ceil(16)).map(|number| {
         let group = format_ident!("__open_group_{number}");
-        quote!(#group(wiring, options, startup, &mut sources);)
+        quote!(#group(wiring, options, assembly, &mut sources);)
     });
     let states = control::states(robot);
     let commands = (0..robot.commands.len()).map(|id| {
@@ -114,19 +109,19 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                 __new_topics()
             }
 
-            fn wire(topics: __Topics, options: &__Options, startup: &::bb_core::__private::Startup) -> __Wiring {
+            fn wire(topics: __Topics, options: &__Options, assembly: &::bb_core::__private::Assembly) -> __Wiring {
                 __Wiring {
                     topics,
-                    islands: __new_islands(options, startup),
-                    actuators: __new_actuators(options, startup),
-                    startup: ::core::clone::Clone::clone(startup),
+                    islands: __new_islands(options, assembly),
+                    actuators: __new_actuators(options, assembly),
+                    environment: ::core::clone::Clone::clone(assembly.environment()),
                 }
             }
 
             fn sources(
                 wiring: &::bb_core::__private::Arc<__Wiring>,
                 options: &__Options,
-                startup: &::bb_core::__private::Startup,
+                assembly: &::bb_core::__private::Assembly,
             ) -> ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>> {
                 let mut sources = ::std::vec::Vec::new();
                 #(#open_sources)*
@@ -166,10 +161,10 @@ fn source(
         fn #function(
             wiring: &::bb_core::__private::Arc<__Wiring>,
             options: &__Options,
-            startup: &::bb_core::__private::Startup,
+            assembly: &::bb_core::__private::Assembly,
             sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
         ) {
-            startup.source::<#robot, ::bb_core::__private::#wrapper<#kind>>(
+            assembly.source::<#robot, ::bb_core::__private::#wrapper<#kind>>(
                 #declaration,
                 &options.#options,
                 #binding,

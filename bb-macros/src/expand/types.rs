@@ -15,7 +15,7 @@ use quote::quote;
 pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
     let aliases = Part::all(robot).filter_map(|part| {
         let kind = &part.component(robot)?.kind;
-        let (alias, given, (_, is_known)) = (part.alias(name), part.given(name), part.contract(robot));
+        let (alias, given, (_, is_known)) = (part.alias(name), part.given(name), part.contract());
         Some(quote! {
             #[doc(hidden)]
             #[allow(non_camel_case_types, dead_code)]
@@ -102,7 +102,7 @@ impl<'a> Types<'a> {
     }
 
     fn options_of(&self, part: Part, kind: TokenStream) -> TokenStream {
-        let (contract, _) = part.contract(self.robot);
+        let (contract, _) = part.contract();
         self.at(part, quote!(<#kind as #contract>::Options))
     }
 
@@ -155,7 +155,7 @@ impl<'a> Types<'a> {
     }
 
     fn output(&self, part: Part) -> TokenStream {
-        let (kind, (contract, _)) = (self.part(part), part.contract(self.robot));
+        let (kind, (contract, _)) = (self.part(part), part.contract());
         self.at(part, quote!(<#kind as #contract>::Output))
     }
 

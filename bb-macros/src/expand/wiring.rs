@@ -3,17 +3,17 @@
 //! ```text
 //! fn p0(&self, message: &Stamped<Imu>, now: MonotonicTime) {   // sensor::base::imu
 //!     self.topics.g0.p0.publish(message);
-//!     self.islands.g0.i0.enter(self, now, |island| self.p0_i0(island, message, now), || …);
+//!     self.islands.g0.i0.enter(self, now, key, |island, turn| self.p0_i0(island, message, turn), || …);
 //! }
-//! fn p0_i0(&self, island: &mut __Island0, message: &Stamped<Imu>, now: MonotonicTime) {
+//! fn p0_i0(&self, island: &mut __Island0, message: &Stamped<Imu>, turn: &Turn) {
 //!     let mut emitted = None;
-//!     if let Some(stamp) = island.n0.receive::<…>(0, feed(message), now, &mut emitted) {
-//!         self.e0(island, &mut emitted, stamp, now);
+//!     if let Some(stamp) = island.n0.receive::<…>(0, feed(message), turn, &mut emitted) {
+//!         self.e0(island, &mut emitted, stamp, turn);
 //!     }
-//!     if island.n0.is_unfinished() { self.t0(island, now); }
+//!     if island.n0.is_unfinished() { self.t0(island, turn); }
 //! }
-//! fn e0(&self, island: &mut __Island0, emitted: &mut Option<Orientation>, stamp: Stamp, now: MonotonicTime) {
-//!     if let Some(payload) = take(emitted) { self.p1(island, &stamp.message(payload), now); }
+//! fn e0(&self, island: &mut __Island0, emitted: &mut Option<Orientation>, stamp: Stamp, turn: &Turn) {
+//!     if let Some(payload) = take(emitted) { self.p1(island, &stamp.message(payload), turn); }
 //! }
 //! ```
 
@@ -33,7 +33,9 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
     let robot = verified.robot;
     let types = Types::new(robot, verified.name, 0);
     let consumers = consumers(verified);
-    let (mut indices, mut functions, mut shores) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+    let mut indices = TokenStream::new();
+    let mut functions = TokenStream::new();
+    let mut states = TokenStream::new();
     let mut topics = Vec::new();
     for (id, publisher) in robot.publishers.iter().enumerate() {
         let (payload, path) = (types.payload(id), path_text(&publisher.path));
@@ -59,19 +61,19 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
         let name = island_struct(number);
         let nodes = islands.all.get(number).into_iter().flat_map(|island| &island.estimators).map(|id| {
             let (node, start) = (node(*id), start_function(*id));
-            quote!(#node: #start(options, startup),)
+            quote!(#node: #start(options, assembly),)
         });
         places.push(Field {
             name: island(number),
             kind: quote!(::bb_core::__private::Island<#name>),
             value: quote!(::bb_core::__private::Island::new(#name { #(#nodes)* })),
         });
-        shores.extend(shore(&types, islands, number, &consumers));
+        states.extend(island_state(&types, islands, number, &consumers));
     }
     let topic_structs = group::structs("__Topics", "__new_topics", &topics, &quote!(), &quote!());
-    let parameters = quote!(options: &__Options, startup: &::bb_core::__private::Startup);
+    let parameters = quote!(options: &__Options, assembly: &::bb_core::__private::Assembly);
     let island_structs =
-        group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, startup));
+        group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, assembly));
     let list_topics =
         group::list("__Topics", "__list_topics", &topics, &quote!(dyn ::bb_core::__private::AnyTopic));
     let finders = (0..islands.all.len()).map(|number| {
@@ -86,21 +88,21 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
             topics: __Topics,
             islands: __Islands,
             actuators: __Actuators,
-            startup: ::bb_core::__private::Startup,
+            environment: ::bb_core::__private::Environment,
         }
         #topic_structs
         #island_structs
         #actuators
         #list_topics
         #indices
-        #shores
+        #states
         #feeds
         static __ISLANDS: [::bb_core::__private::IslandOf<__Wiring>; #count] = [#(#finders),*];
 
-        impl ::bb_core::__private::Sea for __Wiring {
+        impl ::bb_core::__private::IslandWiring for __Wiring {
             #[inline]
-            fn journal(&self) -> ::core::option::Option<&::bb_core::__private::Journal> {
-                self.startup.journal()
+            fn environment(&self) -> &::bb_core::__private::Environment {
+                &self.environment
             }
         }
 
@@ -138,12 +140,12 @@ fn actuators(types: &Types<'_>) -> TokenStream {
             Field {
                 name: part.name(),
                 kind: quote!(#node<#kind>),
-                value: quote!(#node::<#kind>::new(&__ACTUATORS[#id], &options.#options, #binding, startup)),
+                value: quote!(#node::<#kind>::new(#id, &__ACTUATORS[#id], &options.#options, #binding, assembly)),
             }
         })
         .collect();
-    let parameters = quote!(options: &__Options, startup: &::bb_core::__private::Startup);
-    let arguments = quote!(options, startup);
+    let parameters = quote!(options: &__Options, assembly: &::bb_core::__private::Assembly);
+    let arguments = quote!(options, assembly);
     let structs = group::structs("__Actuators", "__new_actuators", &fields, &parameters, &arguments);
     let object = quote!(dyn ::bb_core::__private::AnyActuator);
     let list = group::list("__Actuators", "__list_actuators", &fields, &object);
@@ -199,12 +201,11 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
         _ => None,
     };
     let path = types.path_of_publisher(id);
-    let write = own.is_none().then(|| quote!(let line = self.startup.write(#id, #path, message, now);));
-    let line = if own.is_some() { quote!(0) } else { quote!(line) };
-    let publish = if own.is_some() { quote!(publish_alone) } else { quote!(publish) };
     let message = quote!(message: &::bb_core::__private::Stamped<#payload>);
-    let now = quote!(now: ::bb_core::__private::MonotonicTime);
+    let turn = quote!(turn: &::bb_core::__private::Turn<'_>);
     let mut functions = TokenStream::new();
+    // What other islands take of an estimator came at the time of the turn in which it was emitted.
+    let (now, line) = if own.is_some() { (quote!(turn.now()), quote!(0)) } else { (quote!(now), quote!(line)) };
     let calls: Vec<TokenStream> = visits(consumers, islands)
         .iter()
         .map(|Visit { island, runs, consumers }| {
@@ -212,10 +213,10 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
             let receive = consumers.iter().map(|consumer| receive(types, &payload, consumer));
             functions.extend(quote! {
                 #[inline]
-                fn #deliver(&self, island: &mut #kind, #message, #now) { #(#receive)* }
+                fn #deliver(&self, island: &mut #kind, #message, #turn) { #(#receive)* }
             });
             if own == Some(*island) {
-                return quote!(self.#deliver(island, message, now););
+                return quote!(self.#deliver(island, message, turn););
             }
             let (place, kind) = (group::path(*island, &self::island(*island)), message_enum(*island));
             let variant = variant(id, *runs);
@@ -223,30 +224,39 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
             quote! {
                 self.islands.#place.enter(
                     self,
-                    now,
+                    #now,
                     ::bb_core::__private::Key { entry: #entry, line: #line },
-                    |island| self.#deliver(island, message, now),
+                    |island, turn| self.#deliver(island, message, turn),
                     || #kind::#variant(::core::clone::Clone::clone(message)),
                 );
             }
         })
         .collect();
-    let island = own.map(|own| {
-        let kind = island_struct(own);
-        quote!(island: &mut #kind,)
-    });
-    quote! {
-        #[inline]
-        fn #name(&self, #island #message, #now) {
-            #write
-            self.topics.#topic.#publish(message);
-            #(#calls)*
+    let function = match own {
+        Some(own) => {
+            let kind = island_struct(own);
+            quote! {
+                #[inline]
+                fn #name(&self, island: &mut #kind, #message, #turn) {
+                    turn.emits(#id, #path, message);
+                    self.topics.#topic.publish_alone(message);
+                    #(#calls)*
+                }
+            }
         }
-        #functions
-    }
+        None => quote! {
+            #[inline]
+            fn #name(&self, #message, now: ::bb_core::__private::MonotonicTime) {
+                let line = self.environment.write(#id, #path, message, now);
+                self.topics.#topic.publish(message);
+                #(#calls)*
+            }
+        },
+    };
+    quote!(#function #functions)
 }
 
-/// The consumers of a publisher that stand in one island and are reached in one go: first what islands keep for later,
+/// The consumers of a publisher that belong to one island and are reached in one go: first what islands keep for later,
 /// then what runs.
 struct Visit<'a> {
     island: IslandId,
@@ -279,12 +289,12 @@ fn receive(types: &Types<'_>, payload: &TokenStream, consumer: &Consumer) -> Tok
     quote! {
         let mut emitted = ::core::option::Option::None;
         if let ::core::option::Option::Some(stamp) =
-            island.#node.receive::<{ #index }>(#number, #feed, now, &mut emitted)
+            island.#node.receive::<{ #index }>(#number, #feed, turn, &mut emitted)
         {
-            self.#emit(island, &mut emitted, stamp, now);
+            self.#emit(island, &mut emitted, stamp, turn);
         }
         if island.#node.is_unfinished() {
-            self.#turn(island, now);
+            self.#turn(island, turn);
         }
     }
 }
@@ -307,7 +317,7 @@ fn emitted(
         let take = types.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::take));
         Some(quote! {
             if let ::core::option::Option::Some(payload) = #take(emitted) {
-                self.#publish(island, &stamp.message(payload), now);
+                self.#publish(island, &stamp.message(payload), turn);
             }
         })
     });
@@ -318,30 +328,45 @@ fn emitted(
             island: &mut #island,
             emitted: &mut ::core::option::Option<#emitted>,
             stamp: ::bb_core::__private::Stamp,
-            now: ::bb_core::__private::MonotonicTime,
+            turn: &::bb_core::__private::Turn<'_>,
         ) {
             #(#outputs)*
         }
     }
 }
 
-/// `fn t0`: does all that is due in an estimator; `fn v0`: lets a caller reach it.
+/// `fn t0`: does all that is due in an estimator; `fn h0`: hands it an entry; `fn v0`: lets a caller reach it.
 fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
     let number = islands.of.get(id).copied().unwrap_or(0);
     let (island, place) = (island_struct(number), group::path(number, &self::island(number)));
     let (node, emit, turn, visit) = (node(id), emit_function(id), turn_function(id), visit_function(id));
+    let handle = handle_function(id);
     let kind = types.estimator(id);
     quote! {
         #[cold]
-        fn #turn(&self, island: &mut #island, now: ::bb_core::__private::MonotonicTime) {
+        fn #turn(&self, island: &mut #island, turn: &::bb_core::__private::Turn<'_>) {
             loop {
                 let mut emitted = ::core::option::Option::None;
-                match island.#node.turn(now, &mut emitted) {
-                    ::bb_core::__private::Turn::Idle => return,
-                    ::bb_core::__private::Turn::Quiet => {}
-                    ::bb_core::__private::Turn::Emitted(stamp) => self.#emit(island, &mut emitted, stamp, now),
+                match island.#node.turn(turn, &mut emitted) {
+                    ::bb_core::__private::Next::Idle => return,
+                    ::bb_core::__private::Next::Quiet => {}
+                    ::bb_core::__private::Next::Emitted(stamp) => self.#emit(island, &mut emitted, stamp, turn),
                 }
             }
+        }
+
+        #[cold]
+        fn #handle(
+            &self,
+            island: &mut #island,
+            entry: ::bb_core::__private::NodeEntry,
+            turn: &::bb_core::__private::Turn<'_>,
+        ) {
+            let mut emitted = ::core::option::Option::None;
+            if let ::bb_core::__private::Next::Emitted(stamp) = island.#node.handle(entry, turn, &mut emitted) {
+                self.#emit(island, &mut emitted, stamp, turn);
+            }
+            self.#turn(island, turn);
         }
 
         #[cold]
@@ -350,76 +375,131 @@ fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
             now: ::bb_core::__private::MonotonicTime,
             visit: ::bb_core::__private::Visit<'_, #kind>,
         ) {
-            if let ::core::option::Option::Some(mut island) = self.islands.#place.hold() {
-                let mut emitted = ::core::option::Option::None;
-                if let ::core::option::Option::Some(stamp) = visit.call(&mut island.#node, &mut emitted) {
-                    self.#emit(&mut island, &mut emitted, stamp, now);
-                }
-                self.#turn(&mut island, now);
-                self.islands.#place.leave(self, island);
-            }
+            visit.enter(
+                &self.islands.#place,
+                self,
+                now,
+                |island| &mut island.#node,
+                |island, emitted, stamp, turn| self.#emit(island, emitted, stamp, turn),
+                |island, turn| self.#turn(island, turn),
+            );
         }
     }
 }
 
-/// The struct of an island, what may be left in its inbox, and how that is delivered.
-fn shore(types: &Types<'_>, islands: &Islands, number: IslandId, consumers: &[Vec<Consumer>]) -> TokenStream {
+/// The struct of an island, the messages that may wait for it, and how entries are processed.
+fn island_state(
+    types: &Types<'_>,
+    islands: &Islands,
+    number: IslandId,
+    consumers: &[Vec<Consumer>],
+) -> TokenStream {
     let Some(island) = islands.all.get(number) else { return TokenStream::new() };
     let (name, message) = (island_struct(number), message_enum(number));
     let fields = island.estimators.iter().map(|id| {
         let (node, kind) = (node(*id), types.estimator(*id));
         quote!(#node: ::bb_core::__private::Node<#kind>,)
     });
-    let (mut variants, mut deliveries, mut drops) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+    let mut variants = TokenStream::new();
+    let mut deliveries = TokenStream::new();
+    let mut drops = TokenStream::new();
+    let mut emissions = TokenStream::new();
     for (publisher, consumers) in consumers.iter().enumerate() {
         let is_inside = match types.from(publisher) {
             Some(From::Estimator(id, _)) => islands.of.get(id) == Some(&number),
             _ => false,
         };
-        let visits = visits(consumers, islands);
-        for visit in visits.iter().filter(|visit| visit.island == number && !is_inside) {
+        if is_inside {
+            let (publish, payload) = (topic(publisher), types.payload(publisher));
+            emissions.extend(quote! {
+                #publisher => match message.downcast::<#payload>() {
+                    ::core::option::Option::Some(message) => wiring.#publish(self, message, turn),
+                    ::core::option::Option::None => return false,
+                },
+            });
+            continue;
+        }
+        for visit in visits(consumers, islands).iter().filter(|visit| visit.island == number) {
             let (variant, payload) = (variant(publisher, visit.runs), types.payload(publisher));
             let deliver = deliver_function(publisher, number, visit.runs);
             let counts = visit.consumers.iter().map(|Consumer { estimator, input, .. }| {
                 let input = input.unwrap_or(0);
-                quote!(wiring.startup.overflow(#estimator, #input);)
+                quote!(wiring.environment.overflow(#estimator, #input);)
             });
             variants.extend(quote!(#variant(::bb_core::__private::Stamped<#payload>),));
-            deliveries.extend(quote!(#message::#variant(message) => wiring.#deliver(self, message, now),));
+            deliveries.extend(quote!(#message::#variant(message) => wiring.#deliver(self, message, turn),));
             drops.extend(quote!(#message::#variant(_) => { #(#counts)* }));
         }
     }
     let turns = island.estimators.iter().map(|id| turn_function(*id));
-    let terminated = island.estimators.iter().map(|id| node(*id));
+    let handles = island.estimators.iter().map(|id| {
+        let handle = handle_function(*id);
+        quote!(#id => wiring.#handle(self, entry, turn),)
+    });
+    let made = island.estimators.iter().map(|id| node(*id));
     let first = island.estimators.first();
     let path = first.map_or(String::new(), |id| types.path_of_estimator(*id));
     let worker = first.map_or_else(TokenStream::new, |id| super::declarations::worker(types.model(), *id));
+    let numbers = &island.estimators;
+    let is_measured = island.estimators.iter().any(|id| {
+        let estimator = types.model().estimators.get(*id);
+        estimator.is_some_and(|estimator| estimator.health.latency_budget_s.is_some())
+    });
     quote! {
         pub struct #name { #(#fields)* }
 
         #[allow(non_camel_case_types, clippy::large_enum_variant)]
         pub enum #message { #variants }
 
-        impl ::bb_core::__private::Shore for #name {
+        impl ::bb_core::__private::IslandState for #name {
             type Wiring = __Wiring;
             type Message = #message;
-            const DECLARATION: ::bb_core::__private::IslandDeclaration =
-                ::bb_core::__private::IslandDeclaration { number: #number, name: #path, worker: #worker };
+            const DECLARATION: ::bb_core::__private::IslandDeclaration = ::bb_core::__private::IslandDeclaration {
+                number: #number,
+                name: #path,
+                worker: #worker,
+                is_measured: #is_measured,
+            };
 
-            fn deliver(&mut self, wiring: &__Wiring, message: &#message, now: ::bb_core::__private::MonotonicTime) {
+            fn deliver(&mut self, wiring: &__Wiring, message: &#message, turn: &::bb_core::__private::Turn<'_>) {
                 match message { #deliveries }
             }
 
-            fn wake(&mut self, wiring: &__Wiring, now: ::bb_core::__private::MonotonicTime) {
-                #(wiring.#turns(self, now);)*
+            fn wake(&mut self, wiring: &__Wiring, turn: &::bb_core::__private::Turn<'_>) {
+                #(wiring.#turns(self, turn);)*
+            }
+
+            fn handle(
+                &mut self,
+                wiring: &__Wiring,
+                estimator: usize,
+                entry: ::bb_core::__private::NodeEntry,
+                turn: &::bb_core::__private::Turn<'_>,
+            ) {
+                match estimator { #(#handles)* _ => {} }
+            }
+
+            fn estimators() -> &'static [usize] {
+                &[#(#numbers),*]
+            }
+
+            fn begin_replay(&mut self) {
+                #(self.#made.begin_replay();)*
+            }
+
+            fn emit(
+                &mut self,
+                wiring: &__Wiring,
+                publisher: usize,
+                message: &::bb_core::__private::DynamicMessage,
+                turn: &::bb_core::__private::Turn<'_>,
+            ) -> bool {
+                match publisher { #emissions _ => return false }
+                true
             }
 
             fn dropped(wiring: &__Wiring, message: &#message) {
                 match message { #drops }
-            }
-
-            fn terminate(&mut self) {
-                #(self.#terminated.terminate();)*
             }
         }
     }
@@ -450,6 +530,11 @@ fn emit_function(id: EstimatorId) -> Ident {
 
 fn turn_function(id: EstimatorId) -> Ident {
     format_ident!("t{id}")
+}
+
+/// The function that hands an entry to an estimator.
+fn handle_function(id: EstimatorId) -> Ident {
+    format_ident!("h{id}")
 }
 
 /// The function through which a caller reaches an estimator.

@@ -27,7 +27,7 @@ impl DecodeError {
         self
     }
 
-    pub(super) fn at_index(mut self, index: usize) -> Self {
+    pub(crate) fn at_index(mut self, index: usize) -> Self {
         self.0.path.enter_index(index);
         self
     }

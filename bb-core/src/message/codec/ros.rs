@@ -1,5 +1,5 @@
 //! Messages in the layout that ROS has for them, so that viewers and other tools know them. The payloads are those of
-//! [`payload`](crate::payload).
+//! [`payload`](crate::payload), which says how each is written.
 //!
 //! | payload | message | what it does not keep |
 //! |---|---|---|
@@ -93,15 +93,12 @@ macro_rules! ros_message {
     };
 }
 
-mod covariance;
-mod geometry;
-mod nav;
-mod number;
-mod sensor;
 mod standard;
 #[cfg(test)]
 mod tests;
-mod trajectory;
+
+pub(crate) use ros_message;
+pub(crate) use standard::DurationMessage;
 
 pub use standard::{Header, Text, Time, TransformStamped, TransformsMessage};
 

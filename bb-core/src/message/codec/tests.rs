@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::Payload;
-use crate::control::{CommandEvent, CommandPhase, ParameterChange, ParameterValue, Refusal};
+use crate::event::HealthTransition;
+use crate::event::{CommandEvent, CommandPhase, ParameterChange, ParameterValue, Refusal};
 use crate::message::{Frame, Origin, Stamp, Stamped};
-use crate::node::HealthTransition;
 use crate::payload::{Imu, JointState, Marg, Odometry, Orientation, Pose};
 use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{
@@ -220,16 +220,16 @@ proptest! {
 fn events_are_read_back() {
     let refusal = Refusal {
         command: "stop",
-        reason: crate::control::RefusalReason::Busy,
+        reason: crate::event::RefusalReason::Busy,
         state: "idle",
-        category: crate::control::CategoryDeclaration { name: "motion", concurrency: 1 },
+        category: crate::event::CategoryDeclaration { name: "motion", concurrency: 1 },
     };
     let health = HealthTransition {
         estimator: "estimator/base/pose",
         source: "sensor/base/imu",
-        from: crate::node::HealthState::Lost,
-        to: crate::node::HealthState::Degraded,
-        reason: crate::node::HealthReason::Recovered,
+        from: crate::event::HealthState::Lost,
+        to: crate::event::HealthState::Degraded,
+        reason: crate::event::HealthReason::Recovered,
         time: MonotonicTime::from_nanos(5),
     };
     for phase in [

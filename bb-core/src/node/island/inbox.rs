@@ -1,100 +1,171 @@
-//! What waits for an island that somebody holds.
+//! What waits for an island that another thread holds.
 
+use crate::declaration::ParameterValues;
+use crate::node::NodeEntry;
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 
-/// Messages, and that something may be due, in the order in which they came.
+/// An entry, and when it came.
+pub(super) type Dated<M> = (MonotonicTime, Entry<M>);
+
+/// What can wait.
+pub(super) enum Entry<M> {
+    /// A message.
+    Message(M),
+    /// Something is due.
+    Wake,
+    /// All estimators start.
+    Start,
+    /// For the estimator of that number.
+    Node(usize, NodeEntry),
+}
+
+/// Entries in the order in which they came.
+///
+/// Messages are bounded by the island's capacity. The rest is bounded by its nature, as at most so much waits of each kind:
+/// two wakes, one request to start, to be restarted, to be given up or to be lost per estimator, the one-way requests that
+/// an estimator may have, and a few changes of options.
 pub(super) struct Inbox<M> {
-    messages: VecDeque<(MonotonicTime, M)>,
-    /// The first wake keeps its place, however many messages and wakes follow; of those that follow one is kept, behind
-    /// all messages. So a flood does not hold up what is due, nor does what is due overtake a message that came before.
-    wakes: [Option<Wake>; 2],
+    entries: VecDeque<Dated<M>>,
+    messages: usize,
+    wakes: u8,
+    /// The estimators are to stop before anything else that waits.
+    retires: Option<MonotonicTime>,
 }
 
-/// Something may be due since `time`.
-#[derive(Clone, Copy)]
-struct Wake {
-    time: MonotonicTime,
-    /// Messages that came before.
-    behind: usize,
-}
+/// Wakes that wait: the first keeps its place, so that a flood of messages does not hold up what is due; one behind it is for
+/// what becomes due meanwhile. What a wake finds later still, the island's agenda asks for again.
+const MOST_WAKES: u8 = 2;
 
-/// What is taken from an inbox.
-pub(super) enum Taken<M> {
-    Message(MonotonicTime, M),
-    Wake(MonotonicTime),
-}
+/// Changes of options that wait for one estimator; the next one replaces the last of these.
+const MOST_OPTIONS: usize = 16;
 
-/// What an inbox holds, as one word: four times the messages, and the wakes.
-#[derive(Clone, Copy, PartialEq, Eq)]
+/// What an inbox holds, as one word: messages in the upper part, everything else in the lower.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Pending(pub(super) usize);
+
+const SHIFT: u32 = usize::BITS / 2;
 
 impl Pending {
     pub(super) const NOTHING: Self = Self(0);
 
     pub(super) fn has_room(self, capacity: usize) -> bool {
-        self.0 / 4 < capacity
+        self.0 >> SHIFT < capacity
     }
 }
 
 impl<M> Inbox<M> {
     pub(super) fn new() -> Self {
-        Self { messages: VecDeque::new(), wakes: [None; 2] }
+        Self { entries: VecDeque::new(), messages: 0, wakes: 0, retires: None }
     }
 
     /// Makes room for as many messages as it may hold.
     pub(super) fn reserve(&mut self, capacity: usize) {
-        if self.messages.capacity() == 0 {
-            self.messages.reserve_exact(capacity);
+        if self.entries.capacity() == 0 {
+            self.entries.reserve_exact(capacity);
         }
     }
 
     pub(super) fn pending(&self) -> Pending {
-        Pending(4 * self.messages.len() + self.wakes.iter().flatten().count())
+        let others = self.entries.len() - self.messages + usize::from(self.retires.is_some());
+        Pending((self.messages << SHIFT) | others)
     }
 
     pub(super) fn has_room(&self, capacity: usize) -> bool {
-        self.messages.len() < capacity
+        self.messages < capacity
     }
 
     pub(super) fn push(&mut self, now: MonotonicTime, message: M) {
-        self.messages.push_back((now, message));
+        self.messages += 1;
+        self.entries.push_back((now, Entry::Message(message)));
     }
 
     /// Takes the oldest message, which makes room for another.
-    pub(super) fn pop(&mut self) -> Option<M> {
-        self.next().map(|(_, message)| message)
-    }
-
-    pub(super) fn wake(&mut self, now: MonotonicTime) {
-        let wake = Some(Wake { time: now, behind: self.messages.len() });
-        match &mut self.wakes {
-            [first @ None, _] => *first = wake,
-            [Some(_), second] => *second = wake,
-        }
+    pub(super) fn pop_message(&mut self) -> Option<M> {
+        self.take_message(|_| true)
     }
 
     /// Takes the first message of which `is_wanted` holds.
-    pub(super) fn take_first(&mut self, is_wanted: impl Fn(&M) -> bool) -> Option<M> {
-        let position = self.messages.iter().position(|(_, message)| is_wanted(message))?;
-        self.messages.remove(position).map(|(_, message)| message)
+    pub(super) fn take_message(&mut self, is_wanted: impl Fn(&M) -> bool) -> Option<M> {
+        let position = self.entries.iter().position(|(_, entry)| match entry {
+            Entry::Message(message) => is_wanted(message),
+            _ => false,
+        })?;
+        match self.entries.remove(position) {
+            Some((_, Entry::Message(message))) => {
+                self.messages -= 1;
+                Some(message)
+            }
+            _ => None,
+        }
+    }
+
+    pub(super) fn wake(&mut self, now: MonotonicTime) {
+        if self.wakes < MOST_WAKES {
+            self.wakes += 1;
+            self.entries.push_back((now, Entry::Wake));
+        }
+    }
+
+    pub(super) fn start(&mut self, now: MonotonicTime) {
+        self.entries.push_back((now, Entry::Start));
+    }
+
+    pub(super) fn retire(&mut self, now: MonotonicTime) {
+        self.retires = Some(now);
+    }
+
+    /// Whether the estimators are to stop.
+    pub(super) fn retires(&self) -> bool {
+        self.retires.is_some()
+    }
+
+    /// Adds an entry for an estimator.
+    pub(super) fn post(&mut self, now: MonotonicTime, estimator: usize, entry: NodeEntry) {
+        let is_same = |other: &Entry<M>| match (other, &entry) {
+            (Entry::Node(number, NodeEntry::Restart), NodeEntry::Restart)
+            | (Entry::Node(number, NodeEntry::GiveUp), NodeEntry::GiveUp) => *number == estimator,
+            _ => false,
+        };
+        if self.entries.iter().any(|(_, other)| is_same(other)) {
+            return;
+        }
+        if let NodeEntry::Options(values) = &entry
+            && let Some(last) = self.last_of_many_options(estimator)
+        {
+            *last = values.clone();
+            return;
+        }
+        self.entries.push_back((now, Entry::Node(estimator, entry)));
+    }
+
+    fn last_of_many_options(&mut self, estimator: usize) -> Option<&mut ParameterValues> {
+        let mut waiting = self.entries.iter_mut().rev().filter_map(|(_, entry)| match entry {
+            Entry::Node(number, NodeEntry::Options(values)) if *number == estimator => Some(values),
+            _ => None,
+        });
+        let last = waiting.next()?;
+        (waiting.count() + 1 >= MOST_OPTIONS).then_some(last)
     }
 
     pub(super) fn take(&mut self) -> Option<Taken<M>> {
-        if let [Some(Wake { time, behind: 0 }), second] = self.wakes {
-            self.wakes = [second, None];
-            return Some(Taken::Wake(time));
+        if let Some(now) = self.retires.take() {
+            return Some(Taken::Retire(now));
         }
-        self.next().map(|(now, message)| Taken::Message(now, message))
+        let (now, entry) = self.entries.pop_front()?;
+        match entry {
+            Entry::Message(_) => self.messages -= 1,
+            Entry::Wake => self.wakes -= 1,
+            Entry::Start | Entry::Node(..) => {}
+        }
+        Some(Taken::Entry(now, entry))
     }
+}
 
-    fn next(&mut self) -> Option<(MonotonicTime, M)> {
-        let next = self.messages.pop_front()?;
-        for wake in self.wakes.iter_mut().flatten() {
-            wake.behind = wake.behind.saturating_sub(1);
-        }
-        Some(next)
-    }
+/// What is taken from an inbox.
+pub(super) enum Taken<M> {
+    Entry(MonotonicTime, Entry<M>),
+    Retire(MonotonicTime),
 }
 
 #[cfg(all(test, not(loom)))]
@@ -107,37 +178,41 @@ mod tests {
 
     fn taken(inbox: &mut Inbox<char>) -> String {
         let text = |taken: Taken<char>| match taken {
-            Taken::Message(_, message) => message.to_string(),
-            Taken::Wake(time) => time.as_nanos().to_string(),
+            Taken::Entry(_, Entry::Message(message)) => message.to_string(),
+            Taken::Entry(time, Entry::Wake) => time.as_nanos().to_string(),
+            Taken::Entry(_, Entry::Start) => "S".to_owned(),
+            Taken::Entry(_, Entry::Node(number, entry)) => format!("[{number} {entry:?}]"),
+            Taken::Retire(_) => "R".to_owned(),
         };
         std::iter::from_fn(|| inbox.take()).map(text).collect()
     }
 
     #[test]
-    fn what_is_due_keeps_its_place_among_the_messages() {
+    fn everything_keeps_its_place_but_the_end() {
         let mut inbox = Inbox::new();
+        inbox.start(at(0));
         inbox.push(at(0), 'a');
         inbox.wake(at(1));
         inbox.push(at(2), 'b');
+        inbox.post(at(2), 7, NodeEntry::Restart);
+        inbox.post(at(2), 7, NodeEntry::Restart);
         inbox.wake(at(3));
         inbox.push(at(4), 'c');
         inbox.wake(at(5));
-        inbox.push(at(6), 'd');
-        assert_eq!(inbox.pop(), Some('a'), "one is dropped to make room");
-        assert_eq!(taken(&mut inbox), "1bc5d", "of those behind the first the last is kept");
+        assert_eq!(inbox.pop_message(), Some('a'), "one is dropped to make room");
+        assert!(!inbox.has_room(2) && inbox.has_room(3) && inbox.pending().has_room(3));
+        inbox.retire(at(6));
+        assert_eq!(taken(&mut inbox), "RS1b[7 Restart]3c");
         assert!(inbox.pending() == Pending::NOTHING);
     }
 
     #[test]
-    fn a_flood_of_messages_and_wakes_does_not_hold_up_what_is_due() {
-        let mut inbox = Inbox::new();
-        let mut woken = 0;
-        for round in 0..1000 {
-            inbox.push(at(round), 'x');
-            inbox.push(at(round), 'x');
-            inbox.wake(at(round));
-            woken += usize::from(matches!(inbox.take(), Some(Taken::Wake(_))));
+    fn options_that_nobody_takes_do_not_grow_for_ever() {
+        let mut inbox = Inbox::<char>::new();
+        for _ in 0..1000 {
+            inbox.post(at(0), 1, NodeEntry::Options(ParameterValues::new(vec![])));
+            inbox.post(at(0), 2, NodeEntry::Options(ParameterValues::new(vec![])));
         }
-        assert!(woken > 5, "it was woken {woken} times");
+        assert_eq!(inbox.pending().0, 2 * MOST_OPTIONS);
     }
 }

@@ -1,43 +1,48 @@
-//! Which threads are inside an island: code that they call there must not wait for one.
+//! Which robots' islands a thread is inside: code that they call must not wait for an island of the same robot.
 
 use std::cell::Cell;
 use std::fmt;
 use std::ops::{Deref, DerefMut};
-use std::time::Duration;
 
 #[cfg(not(loom))]
 thread_local! {
-    static DEPTH: Cell<usize> = const { Cell::new(0) };
+    static INSIDE: Cell<u64> = const { Cell::new(0) };
 }
 #[cfg(loom)]
 loom::thread_local! {
-    static DEPTH: Cell<usize> = Cell::new(0);
+    static INSIDE: Cell<u64> = Cell::new(0);
 }
 
-/// The calling thread is inside an island as long as this lives.
-pub(super) struct Inside(());
+/// The calling thread is inside an island of a robot as long as this lives. Each robot has one of 64 bits; robots that share
+/// one are told to use another thread where they would not have to.
+pub(super) struct Inside {
+    before: u64,
+}
 
 impl Inside {
     #[inline]
-    fn new() -> Self {
-        DEPTH.with(|depth| depth.set(depth.get() + 1));
-        Self(())
+    fn new(bit: u64) -> Self {
+        INSIDE.with(|inside| {
+            let before = inside.get();
+            inside.set(before | bit);
+            Self { before }
+        })
     }
 
-    pub(super) fn is_here() -> bool {
-        DEPTH.with(|depth| depth.get() > 0)
+    pub(super) fn is_here(bit: u64) -> bool {
+        INSIDE.with(|inside| inside.get() & bit != 0)
     }
 }
 
 impl Drop for Inside {
     #[inline]
     fn drop(&mut self) {
-        DEPTH.with(|depth| depth.set(depth.get() - 1));
+        INSIDE.with(|inside| inside.set(self.before));
     }
 }
 
 /// An island that the calling thread holds, by the guard `G`.
-pub struct Within<G> {
+pub(super) struct Within<G> {
     guard: G,
     _inside: Inside,
 }
@@ -50,8 +55,8 @@ impl<G> fmt::Debug for Within<G> {
 
 impl<G> Within<G> {
     #[inline]
-    pub(super) fn new(guard: G) -> Self {
-        Self { guard, _inside: Inside::new() }
+    pub(super) fn new(guard: G, bit: u64) -> Self {
+        Self { guard, _inside: Inside::new(bit) }
     }
 }
 
@@ -68,26 +73,4 @@ impl<G: DerefMut> DerefMut for Within<G> {
     fn deref_mut(&mut self) -> &mut G::Target {
         &mut self.guard
     }
-}
-
-/// Waits until `holds`, `longest` at most; whether it does.
-#[cfg(not(loom))]
-pub(super) fn until(longest: Duration, holds: impl Fn() -> bool) -> bool {
-    let start = std::time::Instant::now();
-    loop {
-        if holds() {
-            return true;
-        }
-        if start.elapsed() >= longest {
-            return false;
-        }
-        std::thread::yield_now();
-    }
-}
-
-/// A model has no time: others go on once.
-#[cfg(loom)]
-pub(super) fn until(_: Duration, holds: impl Fn() -> bool) -> bool {
-    loom::thread::yield_now();
-    holds()
 }

@@ -1,12 +1,18 @@
 //! Every order in which threads can meet at an island, by a model checker: `RUSTFLAGS="--cfg loom"`.
 //!
-//! In each, every message is delivered or counted as dropped, the order of each publisher is kept, and nothing stays in
-//! the inbox: nobody misses to be told. That one thread at a time is inside is the lock's own type. (The checker's locks order
-//! more than real ones do: what the fences are for, they say where they stand.)
+//! In each, every message is delivered or counted as dropped, the order of each publisher is kept, entries of control take
+//! effect, and nothing stays in the inbox. That one thread at a time is inside follows from the lock's type. (The checker's
+//! locks order more than real ones do: the comments at the fences say what the fences are for.)
 
-use super::{Island, IslandDeclaration, Key, Sea, Shore};
-use crate::journal::Journal;
-use crate::time::MonotonicTime;
+use super::{Island, IslandDeclaration, IslandState, IslandWiring, Key};
+use crate::declaration::ParameterValues;
+use crate::journal::Event;
+use crate::lifecycle::Supervision;
+use crate::message::Origin;
+use crate::node::{BindTarget, Check, Environment, EnvironmentParts, Mode, NodeEntry, Overseer, Report, Turn};
+use crate::pubsub::DynamicMessage;
+use crate::schedule::{Agenda, Bell, Pool};
+use crate::time::{Clock, MonotonicTime};
 use loom::sync::Arc;
 use loom::sync::atomic::{AtomicUsize, Ordering};
 use loom::thread;
@@ -18,6 +24,8 @@ struct Seen<const CAPACITY: usize> {
     last: [usize; 2],
     messages: usize,
     wakes: usize,
+    restarts: usize,
+    has_retired: bool,
 }
 
 /// A publisher, and the number of its message, from 1.
@@ -33,91 +41,191 @@ impl<const CAPACITY: usize> Seen<CAPACITY> {
     }
 }
 
-impl Sea for AtomicUsize {
-    fn journal(&self) -> Option<&Journal> {
-        None
+/// A robot without anything but the island.
+struct Wiring {
+    environment: Environment,
+    dropped: AtomicUsize,
+}
+
+impl IslandWiring for Wiring {
+    fn environment(&self) -> &Environment {
+        &self.environment
     }
 }
 
-impl<const CAPACITY: usize> Shore for Seen<CAPACITY> {
-    /// Counts what was dropped.
-    type Wiring = AtomicUsize;
+/// Nothing is reported and nothing bound.
+struct Nobody;
+
+impl Overseer for Nobody {
+    fn report(&self, _: usize, _: Report) {}
+
+    fn bind(&self, _: &'static str, _: &'static [usize], _: Check, _: BindTarget) {}
+
+    fn parameters(&self) -> ParameterValues {
+        ParameterValues::new(vec![])
+    }
+}
+
+/// Virtual time: an entry of control is only noted, and the thread that posts it drains the island as the pool would.
+fn environment() -> Environment {
+    let parts = EnvironmentParts {
+        mode: Mode::Virtual,
+        clock: Clock::virtual_at(NOW),
+        origin: Origin::default(),
+        overseer: std::sync::Arc::new(Nobody),
+        supervision: Supervision::default(),
+        agenda: Agenda::new(Bell::default()),
+        pool: Pool::new(|| {}),
+        journal: None,
+        telemetry: None,
+        start: NOW,
+    };
+    Environment::new(parts, Box::default())
+}
+
+impl<const CAPACITY: usize> IslandState for Seen<CAPACITY> {
+    type Wiring = Wiring;
     type Message = Message;
     const CAPACITY: usize = CAPACITY;
-    const DECLARATION: IslandDeclaration = IslandDeclaration { number: 0, name: "model", worker: None };
+    const DECLARATION: IslandDeclaration =
+        IslandDeclaration { number: 0, name: "model", worker: None, is_measured: false };
 
-    fn deliver(&mut self, _: &AtomicUsize, message: &Message, _: MonotonicTime) {
+    fn deliver(&mut self, _: &Wiring, message: &Message, _: &Turn<'_>) {
         self.see(*message);
     }
 
-    fn wake(&mut self, _: &AtomicUsize, _: MonotonicTime) {
+    fn wake(&mut self, _: &Wiring, _: &Turn<'_>) {
         self.wakes += 1;
     }
 
-    fn dropped(dropped: &AtomicUsize, _: &Message) {
-        dropped.fetch_add(1, Ordering::Relaxed);
+    fn handle(&mut self, _: &Wiring, _: usize, entry: NodeEntry, _: &Turn<'_>) {
+        match entry {
+            NodeEntry::Restart => self.restarts += 1,
+            NodeEntry::Retire => self.has_retired = true,
+            _ => {}
+        }
     }
 
-    fn terminate(&mut self) {}
+    fn estimators() -> &'static [usize] {
+        &[0]
+    }
+
+    fn begin_replay(&mut self) {}
+
+    fn emit(&mut self, _: &Wiring, _: usize, _: &DynamicMessage, _: &Turn<'_>) -> bool {
+        false
+    }
+
+    fn dropped(wiring: &Wiring, _: &Message) {
+        wiring.dropped.fetch_add(1, Ordering::Relaxed);
+    }
 }
 
 const KEY: Key = Key { entry: 0, line: 0 };
 
 /// What a thread does.
-type Thread<const CAPACITY: usize> = fn(&Island<Seen<CAPACITY>>, &AtomicUsize);
+type Thread<const CAPACITY: usize> = fn(&Island<Seen<CAPACITY>>, &Wiring);
 
-fn publish<const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, dropped: &AtomicUsize, message: Message) {
-    island.enter(dropped, NOW, KEY, |seen| seen.see(message), || message);
+fn publish<const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring, message: Message) {
+    island.enter(wiring, NOW, KEY, |seen, _| seen.see(message), || message);
 }
 
-fn publish_twice<const PUBLISHER: usize, const CAPACITY: usize>(
-    island: &Island<Seen<CAPACITY>>,
-    dropped: &AtomicUsize,
+fn publish_twice<const PUBLISHER: usize, const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring) {
+    publish(island, wiring, (PUBLISHER, 1));
+    publish(island, wiring, (PUBLISHER, 2));
+}
+
+/// Runs the threads in all orders, of those with that many preemptions at most.
+fn check<const CAPACITY: usize, const THREADS: usize>(
+    preemptions: usize,
+    threads: [Thread<CAPACITY>; THREADS],
+    holds: fn(&Seen<CAPACITY>, usize),
 ) {
-    publish(island, dropped, (PUBLISHER, 1));
-    publish(island, dropped, (PUBLISHER, 2));
+    let mut checker = loom::model::Builder::new();
+    checker.preemption_bound = Some(preemptions);
+    checker.check(move || {
+        let wiring = Wiring { environment: environment(), dropped: AtomicUsize::new(0) };
+        let shared = Arc::new((Island::new(Seen::<CAPACITY>::default()), wiring));
+        let spawned: Vec<_> = threads[1..]
+            .iter()
+            .map(|&run| {
+                let shared = Arc::clone(&shared);
+                thread::spawn(move || run(&shared.0, &shared.1))
+            })
+            .collect();
+        threads[0](&shared.0, &shared.1);
+        spawned.into_iter().for_each(|thread| thread.join().expect("it does not panic"));
+        let (island, wiring) = &*shared;
+        assert_eq!(island.pending.load(Ordering::Relaxed), 0, "an entry was left behind");
+        assert_eq!(island.waiting.load(Ordering::Relaxed), 0);
+        holds(&island.state.lock().expect("nobody panicked"), wiring.dropped.load(Ordering::Relaxed));
+    });
 }
 
-/// Runs two threads in all orders, of those with three preemptions at most.
-fn check<const CAPACITY: usize>(threads: [Thread<CAPACITY>; 2], messages: usize, is_woken: bool) {
-    let mut checker = loom::model::Builder::new();
-    checker.preemption_bound = Some(3);
-    checker.check(move || {
-        let shared = Arc::new((Island::new(Seen::<CAPACITY>::default()), AtomicUsize::new(0)));
-        let [first, second] = threads;
-        let beside = Arc::clone(&shared);
-        let spawned = thread::spawn(move || second(&beside.0, &beside.1));
-        first(&shared.0, &shared.1);
-        spawned.join().expect("it does not panic");
-        let (island, dropped) = &*shared;
-        assert_eq!(island.pending.load(Ordering::Relaxed), 0, "somebody was not told");
-        let seen = island.state.lock().expect("nobody panicked");
-        assert_eq!(seen.messages + dropped.load(Ordering::Relaxed), messages, "something was lost uncounted");
-        assert_eq!(seen.wakes > 0, is_woken);
-    });
+/// Every message was delivered or counted.
+fn all<const MESSAGES: usize, const CAPACITY: usize>(seen: &Seen<CAPACITY>, dropped: usize) {
+    assert_eq!(seen.messages + dropped, MESSAGES, "something was lost uncounted");
+}
+
+/// An entry of control, drained as the pool would.
+fn post<const CAPACITY: usize>(
+    island: &Island<Seen<CAPACITY>>,
+    wiring: &Wiring,
+    add: impl FnOnce(&mut super::Inbox<super::Keyed<Message>>),
+) {
+    island.post_with(wiring, add);
+    island.drain(wiring);
 }
 
 #[test]
 fn two_publishers() {
-    check::<4>([publish_twice::<0, 4>, publish_twice::<1, 4>], 4, false);
+    check::<4, 2>(3, [publish_twice::<0, 4>, publish_twice::<1, 4>], |seen, dropped| {
+        all::<4, 4>(seen, dropped);
+        assert_eq!(dropped, 0);
+    });
 }
 
 #[test]
 fn two_publishers_and_an_inbox_that_is_full() {
-    check::<1>([publish_twice::<0, 1>, publish_twice::<1, 1>], 4, false);
+    check::<1, 2>(3, [publish_twice::<0, 1>, publish_twice::<1, 1>], all::<4, 1>);
 }
 
 #[test]
 fn a_publisher_and_what_is_due() {
-    let due: Thread<4> = |island, dropped| (0..2).for_each(|_| island.wake_up(dropped, NOW));
-    check([publish_twice::<0, 4>, due], 2, true);
+    let due: Thread<4> = |island, wiring| (0..2).for_each(|_| post(island, wiring, |inbox| inbox.wake(NOW)));
+    check::<4, 2>(3, [publish_twice::<0, 4>, due], |seen, dropped| {
+        all::<2, 4>(seen, dropped);
+        assert_eq!(seen.wakes, 2);
+    });
 }
 
 #[test]
 fn a_publisher_and_a_caller() {
-    let calls: Thread<1> = |island, dropped| {
-        assert!(island.with(dropped, None, |_| ()).is_some());
-        publish(island, dropped, (1, 1));
+    let calls: Thread<1> = |island, wiring| {
+        let line = Event::Wake { island: 0 };
+        // In the model, a caller may tire of waiting before the publisher is done.
+        let _ = island.call(wiring, NOW, line, |_, _| ());
+        publish(island, wiring, (1, 1));
     };
-    check([publish_twice::<0, 1>, calls], 3, false);
+    check::<1, 2>(3, [publish_twice::<0, 1>, calls], all::<3, 1>);
+}
+
+/// Restarts are never lost, and never done more often than they are asked for.
+#[test]
+fn two_publishers_and_a_restart() {
+    let restarts: Thread<4> = |island, wiring| post(island, wiring, |inbox| inbox.post(NOW, 0, NodeEntry::Restart));
+    check::<4, 3>(2, [publish_twice::<0, 4>, publish_twice::<1, 4>, restarts], |seen, dropped| {
+        all::<4, 4>(seen, dropped);
+        assert_eq!(seen.restarts, 1);
+    });
+}
+
+/// The end comes once, whatever else waits.
+#[test]
+fn a_publisher_and_the_end() {
+    let ends: Thread<4> = |island, wiring| post(island, wiring, |inbox| inbox.retire(NOW));
+    check::<4, 2>(3, [publish_twice::<0, 4>, ends], |seen, dropped| {
+        all::<2, 4>(seen, dropped);
+        assert!(seen.has_retired);
+    });
 }

@@ -1,73 +1,116 @@
-//! An estimator that has failed: what its supervisor says, and how it is made anew.
+//! How an estimator is made, how it fails, and how it is restarted.
 
-use super::{Node, Recipe};
-use crate::component::{Context, Estimator, Then};
+use super::{Context, Node};
+use crate::component::Estimator;
+use crate::event::HealthReason;
+use crate::fault::Failed;
+use crate::lifecycle::AfterFault;
+use crate::node::admission::Admission;
 use crate::node::health::Event;
 use crate::node::timers::Timers;
-use crate::node::{EstimatorDeclaration, HealthReason};
-use crate::run::{Failed, Failures, caught, retire};
+use crate::node::turn::Turn;
+use crate::node::{DropReason, Report};
 use crate::time::MonotonicTime;
 
-/// What is known of its failures.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Restart {
-    /// When it is made anew, if it is.
-    pub(super) at: Option<MonotonicTime>,
-    failures: Failures,
-}
-
 impl<E: Estimator> Node<E> {
-    #[cold]
-    pub(super) fn fail(&mut self, Failed { fault, panicked }: Failed, now: MonotonicTime) {
-        self.startup.fault(self.declaration.path, &fault);
-        self.shared.set_stopped(Some(fault.to_string()));
-        if let Some(estimator) = self.estimator.take() {
-            // What goes wrong from here on follows from the fault that is known.
-            let _ = retire(estimator, panicked, E::terminate);
-        }
-        self.judge(Event::Bad(HealthReason::Restarted), self.declaration.path, now);
-        if fault.then == Then::Restart {
-            self.plan_restart(now);
+    /// Makes it for the first time. What keeps the robot from starting is kept in the environment.
+    pub(super) fn make_first(&mut self, now: MonotonicTime) {
+        let context = self.context(now);
+        self.shared.set_last_run(now);
+        let (slot, parameters) = (&mut self.slot, &self.parameters);
+        let made = self
+            .environment
+            .make(self.declaration.path, || slot.make(&context, parameters).map_err(|failed| failed.fault));
+        match made {
+            Ok(()) => self.requested = context.into_requests(),
+            Err(skipped) => {
+                self.slot.stop();
+                let reason = skipped.unwrap_or_else(|| "the robot does not start".to_owned());
+                self.set_stopped(Some((reason, true)));
+            }
         }
     }
 
-    /// Asks its supervisor.
-    pub(super) fn plan_restart(&mut self, now: MonotonicTime) {
-        let EstimatorDeclaration { supervisor, path, .. } = *self.declaration;
-        self.restart.at = self.startup.failed(&mut self.restart.failures, supervisor, path, now, false);
+    /// Takes note that it is not there, if it was left out.
+    pub(super) fn begin(&mut self, turn: &Turn<'_>) {
+        self.shared.set_last_run(turn.now());
+        for request in std::mem::take(&mut self.requested) {
+            self.timers.request(request, turn.now());
+        }
+    }
+
+    #[cold]
+    pub(super) fn fail(&mut self, failed: Failed, turn: &Turn<'_>) {
+        self.report_failure(&failed);
+        let after = self.slot.fail(&failed, turn.now());
+        let for_good = after == AfterFault::Stopped;
+        self.set_stopped(Some((failed.fault.to_string(), for_good)));
+        let reason = if for_good { HealthReason::Stopped } else { HealthReason::Restarted };
+        if for_good {
+            self.drop_backlog();
+        }
+        self.judge(Event::Bad(reason), self.declaration.path, turn.now());
         self.schedule();
     }
 
-    /// Its supervisor starts it anew, though it has not failed.
-    pub(super) fn leave_for_restart(&mut self, now: MonotonicTime) {
-        if let Some(estimator) = self.estimator.take() {
-            let _ = retire(estimator, false, E::terminate);
-            self.restart.at = Some(now);
+    pub(super) fn report_failure(&self, failed: &Failed) {
+        let Failed { fault, panicked } = failed;
+        let report = Report::Failed { message: fault.to_string(), panicked: *panicked };
+        self.environment.overseer().report(self.shared.number(), report);
+    }
+
+    /// Its backoff is over, or it is restarted from above.
+    pub(super) fn restart(&mut self, turn: &Turn<'_>) {
+        let context = self.context(turn.now());
+        match self.slot.make(&context, &self.parameters) {
+            Ok(()) => self.refresh(context, turn.now()),
+            Err(failed) => self.fail(failed, turn),
         }
     }
 
-    #[cold]
-    pub(super) fn make_anew(&mut self, now: MonotonicTime) {
-        let Recipe { options, binding, cache } = &self.recipe;
-        let context = Context::new(self.startup.robot(), self.declaration, now);
-        let options = self.startup.bound(options, *binding);
-        let made = options.and_then(|options| caught(|| E::init(options, &context)).map_err(|failed| failed.fault));
-        self.restart.at = None;
-        match made {
-            Ok(estimator) => {
-                self.estimator = Some(estimator);
-                self.cache = cache();
-                self.timers = Timers::default();
-                self.last_input = now;
-                self.shared.counters().restarts.increment();
-                self.shared.set_stopped(None);
-                tracing::info!(estimator = self.declaration.path, "started anew");
+    /// Its supervisor restarts it, though it has not failed.
+    pub(super) fn restart_from_above(&mut self, turn: &Turn<'_>) {
+        if self.slot.restart(turn.now()) {
+            self.judge(Event::Bad(HealthReason::Restarted), self.declaration.path, turn.now());
+        }
+    }
+
+    /// New values of parameters.
+    pub(super) fn change_options(&mut self, turn: &Turn<'_>) {
+        let context = self.context(turn.now());
+        match self.slot.change(&context, &self.parameters) {
+            Ok(true) => {
                 for request in context.into_requests() {
-                    self.timers.request(request, now);
+                    self.timers.request(request, turn.now());
                 }
                 self.schedule();
             }
-            Err(fault) => self.fail(Failed { fault, panicked: false }, now),
+            Ok(false) => {
+                self.restart_from_above(turn);
+                self.restart(turn);
+            }
+            Err(failed) => self.fail(failed, turn),
         }
+    }
+
+    /// Everything is fresh but the backlog and the health.
+    fn refresh(&mut self, context: Context, now: MonotonicTime) {
+        self.cache = (self.make_cache)();
+        self.admission = Admission::new(self.declaration.inputs.len());
+        self.timers = Timers::default();
+        self.continued = 0;
+        self.shared.counters().restarts.increment();
+        self.set_stopped(None);
+        tracing::info!(estimator = self.declaration.path, "restarted");
+        for request in context.into_requests() {
+            self.timers.request(request, now);
+        }
+        self.schedule();
+    }
+
+    /// It stops for good: what waits is counted as dropped.
+    pub(super) fn drop_backlog(&mut self) {
+        let counters = self.shared.counters();
+        self.backlog.clear().for_each(|input| counters.drop(input, DropReason::Stopped));
     }
 }

@@ -1,70 +1,130 @@
-//! Requests to an estimator from outside the dataflow: calls, casts, new options.
+//! Entries for an estimator beside messages.
 
-use super::{Node, Turn};
-use crate::component::{Context, Estimator, Fault, HandleCall, HandleCast, Reply};
+use super::{Next, Node, Turn};
+use crate::component::RequestCodec;
+use crate::component::{Estimator, HandleCall, HandleCast, Reply};
+use crate::fault::Fault;
+use crate::journal::{Request, RequestKind};
 use crate::message::Stamp;
-use crate::run::{Failed, caught};
-use crate::time::MonotonicTime;
+use crate::node::entry::NodeEntry;
+use crate::node::health::Event as HealthEvent;
+use crate::node::requests::{Cast, find};
 use std::any::Any;
 
-/// A one-way request, as it waits.
-pub(super) type Cast<E> = Box<dyn FnOnce(&mut E) -> Result<Reply<<E as Estimator>::Output>, Fault> + Send>;
-
 impl<E: Estimator> Node<E> {
+    /// Handles an entry; what is due afterwards is for [`Self::turn`].
+    pub fn handle(&mut self, entry: NodeEntry, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
+        match entry {
+            NodeEntry::Start => self.begin(turn),
+            NodeEntry::Options(values) => {
+                self.parameters = values;
+                self.change_options(turn);
+            }
+            NodeEntry::Restart => self.restart_from_above(turn),
+            NodeEntry::GiveUp => {
+                self.slot.give_up();
+                if self.slot.restart_at().is_none() && !self.slot.is_running() {
+                    self.drop_backlog();
+                    if let Some(stopped) = self.shared.stopped() {
+                        self.set_stopped(Some((stopped.reason, true)));
+                    }
+                }
+            }
+            NodeEntry::Silence { epoch, last_run } => {
+                self.epoch = epoch;
+                // The control state has published it.
+                let _ = self.health.on(HealthEvent::Silence, self.declaration.health.recover_after);
+                if self.shared.last_run() > last_run {
+                    let source = self.declaration.driver().map_or(self.declaration.path, |driver| driver.source);
+                    self.judge(HealthEvent::Run, source, turn.now());
+                    if self.was_good {
+                        self.judge(HealthEvent::Good, source, turn.now());
+                    }
+                }
+            }
+            NodeEntry::Cast { request, handle } => {
+                self.shared.end_cast();
+                let handle = match handle {
+                    Some(handle) => handle.downcast::<Cast<E>>().ok().map(|handle| *handle),
+                    None => Self::replayed(&request),
+                };
+                // That something happened to it ends its timeout, whatever it was.
+                let handle = handle.unwrap_or_else(|| Box::new(|_| Ok(Reply::none())));
+                let declaration = self.declaration;
+                return self.run(turn, emitted, |estimator| {
+                    if request.bytes.is_none() {
+                        turn.set_unrecorded(declaration);
+                    }
+                    handle(estimator)
+                });
+            }
+            NodeEntry::Retire => {
+                if let Some(fault) = self.slot.retire() {
+                    let failed = crate::fault::Failed::from(fault);
+                    self.report_failure(&failed);
+                    self.set_stopped(Some((failed.fault.to_string(), true)));
+                }
+                self.slot.stop();
+                self.drop_backlog();
+            }
+        }
+        Next::Quiet
+    }
+
+    /// A request of a journal, if this process knows how to make it again.
+    fn replayed(request: &Request) -> Option<Cast<E>> {
+        let handle = find::<E>(request.kind, &request.name)?;
+        let bytes = request.bytes.clone()?;
+        Some(Box::new(move |estimator| handle(estimator, &bytes)))
+    }
+
+    /// In a replay: makes it, as the journal begins.
+    pub fn begin_replay(&mut self) {
+        self.make_first(self.environment.clock().now());
+    }
+
     /// Answers a request; the stamp of what it put into `emitted`, if anything.
     pub(crate) fn call<Q>(
         &mut self,
         request: Q,
-        now: MonotonicTime,
+        is_unrecorded: bool,
+        turn: &Turn<'_>,
         emitted: &mut Option<E::Output>,
     ) -> (Result<E::Response, Fault>, Option<Stamp>)
     where
         E: HandleCall<Q>,
     {
         let mut response = Err(Fault::new(format!("{} does not run", self.declaration.path)));
-        if self.estimator.is_none() {
+        if !self.slot.is_running() {
             return (response, None);
         }
-        let turn = self.run(now, emitted, |estimator| {
+        let declaration = self.declaration;
+        let next = self.run(turn, emitted, |estimator| {
+            if is_unrecorded {
+                turn.set_unrecorded(declaration);
+            }
             let (answer, reply) = estimator.handle_call(request)?;
             response = Ok(answer);
             Ok(reply)
         });
-        match turn {
-            Turn::Emitted(stamp) => (response, Some(stamp)),
-            Turn::Idle | Turn::Quiet if self.estimator.is_none() => {
-                let (path, reason) = (self.declaration.path, self.shared.stopped().unwrap_or_default());
+        match next {
+            Next::Emitted(stamp) => (response, Some(stamp)),
+            Next::Idle | Next::Quiet if !self.slot.is_running() => {
+                let (path, reason) = (self.declaration.path, self.shared.stopped().map(|stopped| stopped.reason));
+                let reason = reason.unwrap_or_default();
                 (Err(Fault::new(format!("{path} failed at this call: {reason}"))), None)
             }
-            Turn::Idle | Turn::Quiet => (response, None),
+            Next::Idle | Next::Quiet => (response, None),
         }
     }
 
-    /// A one-way request of type `Q`, as it is left for [`Self::turn`].
-    pub(crate) fn cast<Q: Send + 'static>(request: Q) -> Box<dyn Any + Send>
+    /// A one-way request of type `Q`, as it waits, with what the journal holds of it.
+    pub(crate) fn cast<Q: Send + 'static>(request: Q) -> (Request, Box<dyn Any + Send>)
     where
         E: HandleCast<Q>,
     {
+        let recorded = RequestCodec::record(RequestKind::Cast, <E as HandleCast<Q>>::RECORD, &request);
         let cast: Cast<E> = Box::new(|estimator| estimator.handle_cast(request));
-        Box::new(cast)
-    }
-
-    pub(super) fn change_options(&mut self, now: MonotonicTime) {
-        let Some(estimator) = &mut self.estimator else { return };
-        let context = Context::new(self.startup.robot(), self.declaration, now);
-        let options = self.startup.bound(&self.recipe.options, self.recipe.binding);
-        let changed = match options {
-            Ok(options) => caught(|| estimator.handle_options(options, &context)),
-            Err(fault) => Err(Failed { fault, panicked: false }),
-        };
-        match changed {
-            Ok(()) => {
-                for request in context.into_requests() {
-                    self.timers.request(request, now);
-                }
-                self.schedule();
-            }
-            Err(failed) => self.fail(failed, now),
-        }
+        (recorded, Box::new(cast))
     }
 }

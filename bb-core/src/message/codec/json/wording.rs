@@ -2,8 +2,8 @@
 
 use super::write::text;
 use super::{Form, JsonError};
-use crate::check::nearest;
 use crate::message::codec::{FieldShape, Shape};
+use crate::message::nearest::nearest;
 use serde_json::value::RawValue;
 use std::fmt;
 
@@ -19,7 +19,7 @@ pub(super) fn unknown(fields: &[FieldShape], name: String) -> JsonError {
 
 pub(super) fn did_you_mean(names: &[&str], name: &str) -> String {
     let near = names.iter().find(|near| near.eq_ignore_ascii_case(name)).copied();
-    let near = near.or_else(|| nearest(names, name).and_then(|index| names.get(index).copied()));
+    let near = near.or_else(|| nearest(name, names.iter().copied()));
     near.map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 

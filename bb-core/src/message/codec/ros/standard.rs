@@ -5,8 +5,7 @@ use crate::message::codec::intern::intern;
 use crate::message::codec::{DecodeError, Field, Reader, Writer};
 use crate::message::{Finite, Stamped};
 use crate::time::WallTime;
-use crate::topology::{JointKind, Topology};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 use std::time::Duration;
 
 const NANOS_PER_SECOND: i64 = 1_000_000_000;
@@ -42,14 +41,14 @@ impl Time {
 /// `builtin_interfaces/msg/Duration`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 #[payload(name = "builtin_interfaces/Duration")]
-pub(super) struct DurationMessage {
+pub(crate) struct DurationMessage {
     sec: i32,
     nanosec: u32,
 }
 
 impl DurationMessage {
     /// The duration, or the longest that 31 bits of seconds hold.
-    pub(super) fn of(duration: Duration) -> Self {
+    pub(crate) fn of(duration: Duration) -> Self {
         match i32::try_from(duration.as_secs()) {
             Ok(sec) => Self { sec, nanosec: duration.subsec_nanos() },
             Err(_) => Self { sec: i32::MAX, nanosec: 999_999_999 },
@@ -60,7 +59,7 @@ impl DurationMessage {
     ///
     /// # Errors
     /// It is negative.
-    pub(super) fn duration(self) -> Result<Duration, DecodeError> {
+    pub(crate) fn duration(self) -> Result<Duration, DecodeError> {
         let seconds = u64::try_from(self.sec).map_err(|_| {
             DecodeError::new(0, "a duration that is not negative", self.sec.to_string()).within("sec")
         })?;
@@ -129,33 +128,6 @@ pub struct TransformStamped {
 pub struct TransformsMessage {
     /// One per frame.
     pub transforms: Vec<TransformStamped>,
-}
-
-impl TransformsMessage {
-    /// Where the links and joints of a robot are when every joint is at rest: the frame of a joint in that of the link it
-    /// is mounted on, and that of the link it carries in the joint's. What a joint that moves carries is placed as if
-    /// it were at rest.
-    pub fn at_rest(topology: &Topology, time: WallTime) -> Self {
-        let stamp = Time::of(time);
-        let name = |link: usize| topology.links.get(link).map_or("", |link| link.name);
-        let mut transforms = Vec::new();
-        for joint in topology.joints {
-            let at_joint = joint.parent_from_joint.isometry();
-            let mut place = |parent: &str, child: &str, transform: Isometry3<f64>| {
-                let header = Header { stamp, frame_id: parent.to_owned() };
-                transforms.push(TransformStamped { header, child_frame_id: child.to_owned(), transform });
-            };
-            // A fixed joint carries the link itself; nothing is measured in its frame.
-            if joint.kind == JointKind::Fixed || joint.name == name(joint.child) {
-                place(name(joint.parent), name(joint.child), at_joint);
-            } else {
-                place(name(joint.parent), joint.name, at_joint);
-                let unmoved = Isometry3::from_parts(Vector3::zeros().into(), UnitQuaternion::identity());
-                place(joint.name, name(joint.child), unmoved);
-            }
-        }
-        Self { transforms }
-    }
 }
 
 const _: () = {

@@ -1,0 +1,290 @@
+//! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
+
+use super::host::Host;
+use super::{Accepts, ActuatorError, Fault, Permit};
+use crate::declaration::ParameterError;
+use crate::event::{ParameterValue, Safety};
+use crate::message::codec::Shape;
+use crate::message::nearest::nearest_path;
+use crate::message::{Payload, Stamp};
+use crate::pubsub::{
+    AnyTopic, DynamicMessage, DynamicSubscription, Gate, Overflow, Payloads, Publisher, Select,
+    SubscriberStatistics, Subscription, Topic, unmatched_at,
+};
+use crate::time::Clock;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Topics, actuators, parameters, commands and states, by path. Clones are the same.
+#[derive(Clone)]
+pub struct Bus {
+    host: Arc<dyn Host>,
+    permit: Permit,
+}
+
+/// A command as tools see it.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct CommandInfo {
+    /// Its path: `command/go`.
+    pub path: &'static str,
+    /// What its arguments are made of.
+    pub arguments: Shape,
+    /// What its result is made of.
+    pub output: Shape,
+    /// The states in which it may start; none: as its role has it.
+    pub allowed_states: Option<&'static [&'static str]>,
+    /// Its category.
+    pub category: &'static str,
+    /// How long it may take.
+    pub timeout: Option<Duration>,
+}
+
+impl Bus {
+    pub(crate) fn new(host: Arc<dyn Host>, permit: Permit) -> Self {
+        Self { host, permit }
+    }
+
+    /// Subscribes to what is published at `path`.
+    ///
+    /// # Errors
+    /// Nothing is published there, or another payload; the nearest path is named.
+    pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
+        let subscribed = self.with_topics(|topics| {
+            let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
+                return Err(unmatched_at(path, topics, self.host.registry().declared()).into());
+            };
+            let typed = topic.as_any().downcast_ref::<Topic<T>>().ok_or_else(|| {
+                Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))
+            })?;
+            Ok(typed.subscribe(overflow))
+        });
+        subscribed.unwrap_or_else(|| Err(Fault::new("the robot is gone")))
+    }
+
+    /// Subscribes to messages of any payload; with names of payload types, to those only.
+    pub fn subscribe_any<'a>(
+        &self,
+        select: Select<'_>,
+        payloads: impl Into<Payloads<'a>>,
+        overflow: Overflow,
+    ) -> DynamicSubscription {
+        let payloads = payloads.into();
+        let mut subscribed = None;
+        self.host.with_topics(&mut |topics| {
+            subscribed = Some(self.host.registry().subscribe(topics, select, &payloads, overflow));
+        });
+        subscribed.unwrap_or_else(|| DynamicSubscription::new([], select, payloads, overflow))
+    }
+
+    /// A publisher at a path of the caller's own, such as `mission/progress`: names of letters, digits, `_`, `-` and `.` with
+    /// `/` between them. Those who subscribed to everything, or to a subtree with this path, receive what it publishes
+    /// without doing anything. A second publisher at the same path shares it.
+    ///
+    /// Paths are for names that recur: a robot has at most 1024 of them, of which those that nobody uses any more make room.
+    ///
+    /// # Errors
+    /// The path is that of a declared publisher or of a topic that every robot has, it has another payload already, it is
+    /// malformed, too many are in use, the robot has stopped, or the command whose bus this is has ended.
+    pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
+        self.check_permit()?;
+        let topic = self.host.registry().topic(path)?;
+        Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), permit: self.permit.clone() })))
+    }
+
+    /// All paths that are published at.
+    pub fn paths(&self) -> Vec<&'static str> {
+        self.with_topics(|topics| topics.iter().map(|topic| topic.path()).collect()).unwrap_or_default()
+    }
+
+    /// The subscribers at `path`; empty where nothing is published.
+    pub fn subscribers(&self, path: &str) -> Vec<SubscriberStatistics> {
+        self.with_topics(|topics| {
+            topics.iter().find(|topic| topic.path() == path).map_or_else(Vec::new, |topic| topic.subscribers())
+        })
+        .unwrap_or_default()
+    }
+
+    /// The actuator at `path`, which takes commands of type `T`.
+    ///
+    /// # Errors
+    /// No actuator is there, or one that takes other commands.
+    pub fn actuator<T: Payload>(&self, path: &str) -> Result<ActuatorLink<T>, Fault> {
+        let Some((takes, accepts)) = self.host.actuator(path) else {
+            let near = nearest_path(path, self.host.actuators());
+            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            return Err(Fault::new(format!("no actuator is at `{path}`{hint}")));
+        };
+        match accepts.downcast::<Arc<dyn Accepts<T>>>() {
+            Ok(accepts) => Ok(ActuatorLink { accepts: *accepts, permit: self.permit.clone() }),
+            Err(_) => Err(Fault::new(format!("`{path}` takes commands of type `{takes}`, not `{}`", T::NAME))),
+        }
+    }
+
+    /// The paths of all actuators.
+    pub fn actuators(&self) -> Vec<&'static str> {
+        self.host.actuators()
+    }
+
+    /// The value of the parameter at `path`.
+    pub fn parameter(&self, path: &str) -> Option<ParameterValue> {
+        self.host.parameter(path)
+    }
+
+    /// Sets the parameter at `path`.
+    ///
+    /// # Errors
+    /// What was expected, or that the command whose bus this is has been cancelled.
+    pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
+        self.host.set_parameter(path, value.into(), &self.permit)
+    }
+
+    /// All commands, with the shapes of their arguments and results.
+    pub fn commands(&self) -> Vec<CommandInfo> {
+        self.host.commands()
+    }
+
+    /// Starts the command at `path` with arguments from JSON; an empty text stands for the default arguments.
+    ///
+    /// # Errors
+    /// There is no such command, the arguments do not fit its shape, or it is refused.
+    pub fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault> {
+        self.check_permit()?;
+        self.host.start_command(path, arguments)
+    }
+
+    /// The operational state.
+    pub fn state(&self) -> &'static str {
+        self.host.state()
+    }
+
+    /// The safety state.
+    pub fn safety(&self) -> Safety {
+        self.host.safety()
+    }
+
+    /// Arms the robot; true if it is armed now. See [`Live::arm`](crate::Live::arm).
+    pub fn arm(&self) -> bool {
+        self.permit.is_valid() && self.host.arm()
+    }
+
+    /// Disarms the robot; true if everything could be made safe. See [`Live::disarm`](crate::Live::disarm).
+    pub fn disarm(&self) -> bool {
+        self.host.disarm()
+    }
+
+    /// The clock of the run.
+    pub fn clock(&self) -> &Clock {
+        self.host.clock()
+    }
+
+    fn check_permit(&self) -> Result<(), Fault> {
+        if self.permit.is_valid() {
+            return Ok(());
+        }
+        Err(Fault::new("the command that asks for this has ended or was cancelled"))
+    }
+
+    /// All topics; none if the robot is gone.
+    fn with_topics<T>(&self, call: impl FnOnce(&[&dyn AnyTopic]) -> T) -> Option<T> {
+        let made = self.host.registry().topics();
+        let mut call = Some(call);
+        let mut result = None;
+        self.host.with_topics(&mut |topics| {
+            let all: Vec<&dyn AnyTopic> = topics.iter().copied().chain(made.iter().map(|topic| &**topic)).collect();
+            result = call.take().map(|call| call(&all));
+        });
+        result
+    }
+}
+
+/// Publishing at a path of one's own.
+struct OwnPath {
+    host: Arc<dyn Host>,
+    permit: Permit,
+}
+
+impl Gate for OwnPath {
+    fn stamp(&self) -> Option<Stamp> {
+        let clock = self.host.clock();
+        let monotonic_time = clock.now();
+        let wall_time = clock.wall_at(monotonic_time);
+        let stamp = Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() };
+        self.permit.is_valid().then_some(stamp)
+    }
+
+    fn is_noted(&self) -> bool {
+        self.host.is_journaled()
+    }
+
+    fn note(&self, message: DynamicMessage) {
+        self.host.note_own(message);
+    }
+}
+
+impl fmt::Debug for Bus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bus").finish_non_exhaustive()
+    }
+}
+
+/// Sends commands of type `T` to one actuator.
+pub struct ActuatorLink<T: Payload> {
+    accepts: Arc<dyn Accepts<T>>,
+    permit: Permit,
+}
+
+impl<T: Payload> ActuatorLink<T> {
+    /// Sends a command; it has been carried out when this returns.
+    ///
+    /// # Errors
+    /// The robot is not armed, the command holds a NaN, the actuator has failed, or the command that obtained this link has
+    /// ended.
+    pub fn send(&self, command: T) -> Result<(), ActuatorError> {
+        self.accepts.accept(command, &self.permit)
+    }
+}
+
+impl<T: Payload> fmt::Debug for ActuatorLink<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ActuatorLink").finish_non_exhaustive()
+    }
+}
+
+/// A command that was started by path. Dropping it lets the command run on.
+pub struct DynamicExecution(Box<dyn AnyExecution>);
+
+/// An execution whose result is given as JSON.
+pub(crate) trait AnyExecution: Send {
+    fn try_result(&self) -> Option<Result<String, Fault>>;
+    fn wait_timeout(&self, timeout: Duration) -> Option<Result<String, Fault>>;
+    fn cancel(&self);
+}
+
+impl DynamicExecution {
+    pub(crate) fn new(execution: impl AnyExecution + 'static) -> Self {
+        Self(Box::new(execution))
+    }
+
+    /// The result as JSON, if the command has ended and nobody has taken it yet.
+    pub fn try_result(&self) -> Option<Result<String, Fault>> {
+        self.0.try_result()
+    }
+
+    /// Waits for the result as JSON, `timeout` at most; none after that.
+    pub fn wait_timeout(&self, timeout: Duration) -> Option<Result<String, Fault>> {
+        self.0.wait_timeout(timeout)
+    }
+
+    /// Cancels the command.
+    pub fn cancel(&self) {
+        self.0.cancel();
+    }
+}
+
+impl fmt::Debug for DynamicExecution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DynamicExecution").finish_non_exhaustive()
+    }
+}

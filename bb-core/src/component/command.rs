@@ -1,0 +1,226 @@
+//! The contract of a command.
+
+use super::host::Host;
+use super::{Bus, Fault, NoOptions, Options, Permit};
+use crate::Payload;
+use crate::declaration::{ParameterError, Role};
+use crate::event::{HealthTransition, ParameterValue};
+use crate::message::Field;
+use crate::schedule::{Alarm, Sleeper};
+use crate::time::MonotonicTime;
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+/// A short task that a robot is told to do: arm, stop, move to a place.
+///
+/// It is an `async` function on the robot's own clock: [`CommandContext::sleep`] takes virtual time on a robot that is
+/// simulated. It may await anything else too. A command is cancelled by dropping its future, so undo in a `Drop` what must
+/// be undone. From the moment it is cancelled, what it has obtained through its context refuses to act, even if its code
+/// blocks and has not noticed yet.
+///
+/// Commands are the world outside as far as a journal is concerned: it holds what they did and how they ended, and a replay
+/// does not run them.
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// /// Waits until the robot has come to rest, then declares it degraded.
+/// #[derive(Debug)]
+/// pub struct SlowDown;
+///
+/// impl Command for SlowDown {
+///     type Options = NoOptions;
+///     type Arguments = NoArguments;
+///     type Output = ();
+///
+///     async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+///         context.sleep(Duration::from_millis(200)).await;
+///         Ok(Outcome::done(()).next_state("degraded"))
+///     }
+/// }
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a command",
+    label = "cannot be declared in `commands`",
+    note = "implement `bb_core::Command` for it"
+)]
+pub trait Command: Sized + Send + 'static {
+    /// What `Name(…)` in `robot!` fills.
+    type Options: Options;
+    /// What its caller gives; derive [`Payload`] for it, so that tools can start the command with arguments from JSON. A
+    /// command that a health transition starts gets the default.
+    type Arguments: Field + Default + Send + 'static;
+    /// Its result.
+    type Output: Field + Send + 'static;
+
+    /// Whether it arms or disarms the robot.
+    const ROLE: Role = Role::Plain;
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// Why it has failed; reported to the caller and on its topic.
+    fn run(
+        options: Self::Options,
+        arguments: Self::Arguments,
+        context: CommandContext,
+    ) -> impl Future<Output = Result<Outcome<Self::Output>, Fault>> + Send;
+}
+
+/// For commands without arguments.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub struct NoArguments;
+
+/// How a command has ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[must_use]
+pub struct Outcome<T> {
+    pub(crate) value: T,
+    pub(crate) next_state: Option<&'static str>,
+}
+
+impl<T> Outcome<T> {
+    /// Ends with that value; the robot goes back to the state it was in.
+    pub fn done(value: T) -> Self {
+        Self { value, next_state: None }
+    }
+
+    /// Names the state that follows: `idle` or a declared one. Another name fails the command.
+    pub fn next_state(mut self, state: &'static str) -> Self {
+        self.next_state = Some(state);
+        self
+    }
+
+    /// The value.
+    pub fn value(&self) -> &T {
+        &self.value
+    }
+}
+
+/// What a running command is given, and what it may do.
+#[derive(Clone, Debug)]
+pub struct CommandContext {
+    pub(crate) name: &'static str,
+    pub(crate) health: Option<HealthTransition>,
+    pub(crate) host: Arc<dyn Host>,
+    pub(crate) sleeper: Sleeper,
+    pub(crate) permit: Permit,
+}
+
+impl CommandContext {
+    /// The name it was declared under.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The health transition that started it, if one did: estimator, reason, source, previous and new state.
+    pub fn health(&self) -> Option<&HealthTransition> {
+        self.health.as_ref()
+    }
+
+    /// The time now.
+    pub fn now(&self) -> MonotonicTime {
+        self.host.clock().now()
+    }
+
+    /// Waits on the robot's clock.
+    pub fn sleep(&self, duration: Duration) -> Sleep {
+        Sleep {
+            until: self.now() + duration,
+            host: Arc::clone(&self.host),
+            sleeper: self.sleeper.clone(),
+            alarm: None,
+        }
+    }
+
+    /// Whether it was cancelled or has timed out: what it sends is refused from then on. A command that blocks its thread
+    /// asks now and then.
+    pub fn is_cancelled(&self) -> bool {
+        !self.permit.is_valid()
+    }
+
+    /// The operational state.
+    pub fn state(&self) -> &'static str {
+        self.host.state()
+    }
+
+    /// Topics, actuators, parameters and commands, by path.
+    pub fn bus(&self) -> Bus {
+        Bus::new(Arc::clone(&self.host), self.permit.clone())
+    }
+
+    /// The value of the parameter at `path`: `param/imu/beta`.
+    pub fn parameter(&self, path: &str) -> Option<ParameterValue> {
+        self.host.parameter(path)
+    }
+
+    /// Sets the parameter at `path`.
+    ///
+    /// # Errors
+    /// What was expected, or that the command has been cancelled.
+    pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
+        self.host.set_parameter(path, value.into(), &self.permit)
+    }
+}
+
+/// The future of [`CommandContext::sleep`].
+#[derive(Debug)]
+pub struct Sleep {
+    until: MonotonicTime,
+    host: Arc<dyn Host>,
+    sleeper: Sleeper,
+    alarm: Option<Alarm>,
+}
+
+impl Future for Sleep {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        if self.host.clock().now() >= self.until {
+            return Poll::Ready(());
+        }
+        self.alarm = Some(self.sleeper.wake_at(self.until, self.alarm, context.waker().clone()));
+        Poll::Pending
+    }
+}
+
+impl Drop for Sleep {
+    fn drop(&mut self) {
+        if let Some(alarm) = self.alarm {
+            self.sleeper.forget(alarm);
+        }
+    }
+}
+
+/// Arms the robot.
+#[derive(Debug)]
+pub struct Arm;
+
+impl Command for Arm {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+    const ROLE: Role = Role::Arming;
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Disarms the robot.
+#[derive(Debug)]
+pub struct Disarm;
+
+impl Command for Disarm {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+    const ROLE: Role = Role::Disarming;
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        Ok(Outcome::done(()))
+    }
+}

@@ -1,0 +1,49 @@
+//! The robot as its components see it.
+
+use super::{Fault, Permit};
+use crate::component::bus::{CommandInfo, DynamicExecution};
+use crate::declaration::ParameterError;
+use crate::event::{ParameterValue, Safety};
+use crate::message::Origin;
+use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
+use crate::time::Clock;
+use std::any::Any;
+use std::fmt;
+use std::sync::Arc;
+
+/// Makes hardware safe.
+pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
+
+/// What components reach of the robot that runs them; the runtime implements it.
+pub(crate) trait Host: Send + Sync {
+    fn origin(&self) -> Origin;
+    fn clock(&self) -> &Clock;
+    fn is_stopping(&self) -> bool;
+    fn on_disarm(&self, path: &'static str, hook: DisarmHook);
+    fn hardware_error(&self, path: &'static str, message: String);
+    fn state(&self) -> &'static str;
+    fn safety(&self) -> Safety;
+    fn arm(&self) -> bool;
+    fn disarm(&self) -> bool;
+    fn parameter(&self, path: &str) -> Option<ParameterValue>;
+    fn set_parameter(&self, path: &str, value: ParameterValue, permit: &Permit) -> Result<(), ParameterError>;
+    /// The declared topics.
+    fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic]));
+    /// The topics that are made at run time.
+    fn registry(&self) -> &Registry;
+    /// Whether there is a journal.
+    fn is_journaled(&self) -> bool;
+    /// A message is published at a path of one's own.
+    fn note_own(&self, message: DynamicMessage);
+    /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.
+    fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
+    fn actuators(&self) -> Vec<&'static str>;
+    fn commands(&self) -> Vec<CommandInfo>;
+    fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault>;
+}
+
+impl fmt::Debug for dyn Host {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Host").field(&self.origin().robot).finish()
+    }
+}

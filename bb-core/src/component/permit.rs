@@ -1,0 +1,29 @@
+//! Whether the handles of a command still work.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Given to a command with its context and revoked when it ends or is cancelled. What it has obtained through that context
+/// refuses to act from then on, even if the command's code still runs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Permit(Option<Arc<AtomicBool>>);
+
+impl Permit {
+    /// Of a component, whose handles always work.
+    pub(crate) const UNLIMITED: Self = Self(None);
+
+    /// Of one execution of a command.
+    pub(crate) fn revocable() -> Self {
+        Self(Some(Arc::new(AtomicBool::new(true))))
+    }
+
+    pub(crate) fn revoke(&self) {
+        if let Some(is_valid) = &self.0 {
+            is_valid.store(false, Ordering::SeqCst);
+        }
+    }
+
+    pub(crate) fn is_valid(&self) -> bool {
+        self.0.as_ref().is_none_or(|is_valid| is_valid.load(Ordering::SeqCst))
+    }
+}

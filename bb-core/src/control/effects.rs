@@ -1,0 +1,237 @@
+//! What follows from an entry of the control state and is user code: it runs without the lock, and where it harms nobody.
+
+use super::execution::CommandError;
+use super::execution::Slot;
+use super::hooks;
+use super::system::{Control, KEPT_FAULTS, Wired};
+use super::task::{Task, Value};
+use crate::component::DisarmHook;
+use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
+use crate::fault::{discard, wake};
+use crate::node::Mode;
+use crate::pubsub::Wakers;
+use crate::telemetry::TelemetryEvent;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// See the [module](self).
+#[derive(Default)]
+pub(super) struct Effects {
+    pub(super) wakers: Wakers,
+    pub(super) logs: Vec<Log>,
+    /// Commands to begin.
+    pub(super) begun: Vec<Arc<Task>>,
+    /// Commands whose futures are to be dropped.
+    pub(super) cancelled: Vec<Arc<Task>>,
+    pub(super) results: Vec<(Arc<Slot>, Result<Value, CommandError>)>,
+    pub(super) hooks: Option<(u64, Vec<(&'static str, DisarmHook)>)>,
+    pub(super) dropped: Vec<Value>,
+    /// Owners of the wiring, which may be the last.
+    pub(super) wired: Vec<Wired>,
+}
+
+/// What loggers and handlers of telemetry are told.
+#[derive(Clone, Debug)]
+pub(super) enum Log {
+    Health(HealthTransition),
+    Safety { from: Safety, to: Safety },
+    State { from: &'static str, to: &'static str, command: Option<&'static str> },
+    SafetyError(SafetyError),
+    Fault(ComponentFault),
+    Refused(Refusal),
+}
+
+/// Lines for loggers, in order. Loggers are user code, and may block: one thread of the pool at a time is in them.
+#[derive(Default)]
+pub(super) struct Reporter(Mutex<Reports>);
+
+#[derive(Default)]
+struct Reports {
+    logs: VecDeque<Log>,
+    is_running: bool,
+    skipped: u64,
+}
+
+/// Lines that wait for a logger that blocks; beyond, new ones are counted and dropped.
+const MOST_LOGS: usize = 4096;
+
+impl Effects {
+    pub(super) fn log(&mut self, log: Log) {
+        self.logs.push(log);
+    }
+
+    pub(super) fn run(self, control: &Control) {
+        let Self { wakers, logs, begun, cancelled, results, hooks, dropped, wired } = self;
+        // First of all: hardware.
+        if let Some((generation, hooks)) = hooks {
+            control.run_hooks(generation, hooks);
+        }
+        let mut wakers_of_results = Vec::new();
+        let mut dropped = dropped;
+        for (slot, result) in results {
+            let (waker, late) = slot.set(result);
+            wakers_of_results.extend(waker);
+            dropped.extend(late);
+        }
+        drop(wired);
+        let has_code = !wakers.is_empty() || !wakers_of_results.is_empty() || !dropped.is_empty();
+        let code = move || {
+            wakers.run();
+            wakers_of_results.into_iter().for_each(wake);
+            dropped.into_iter().for_each(discard);
+        };
+        match control.0.mode {
+            Mode::Real if has_code => control.0.pool.submit(code),
+            Mode::Real => {}
+            Mode::Virtual | Mode::Replay => code(),
+        }
+        if !logs.is_empty() {
+            control.report(logs);
+        }
+        for task in cancelled {
+            task.cancel();
+        }
+        for task in begun {
+            task.schedule();
+        }
+    }
+}
+
+impl Control {
+    /// Has a command polled.
+    pub(super) fn run_task(&self, task: Arc<Task>) {
+        match self.0.mode {
+            Mode::Real => self.0.pool.submit(move || task.run()),
+            Mode::Virtual | Mode::Replay => lock(&self.0.ready).push_back(task),
+        }
+    }
+
+    /// Runs disarm callbacks, each on a thread of its own; on virtual time they wait for [`Self::run_pending_hooks`].
+    fn run_hooks(&self, generation: u64, all: Vec<(&'static str, DisarmHook)>) {
+        if self.0.mode != Mode::Real {
+            lock(&self.0.pending_hooks).push_back(all);
+            return;
+        }
+        if all.is_empty() {
+            return self.hook_returned(generation, None, None);
+        }
+        for (index, (path, hook)) in all.into_iter().enumerate() {
+            let control = self.clone();
+            let run = move || {
+                let error = hooks::run(path, &hook);
+                // The hook may be the last owner of what it captured.
+                discard(hook);
+                control.hook_returned(generation, Some(index), error);
+            };
+            let spawned = std::thread::Builder::new().name(format!("disarm {path}")).spawn(run);
+            if let Err(error) = spawned {
+                let error = SafetyError { path, message: format!("cannot be disarmed: {error}") };
+                self.hook_returned(generation, Some(index), Some(error));
+            }
+        }
+    }
+
+    /// On virtual time: runs the disarm callbacks that wait, in order, on the calling thread; true if there were any.
+    pub(crate) fn run_pending_hooks(&self) -> bool {
+        let Some(all) = lock(&self.0.pending_hooks).pop_front() else { return false };
+        let errors = all.into_iter().filter_map(|(path, hook)| {
+            let error = hooks::run(path, &hook);
+            discard(hook);
+            error
+        });
+        self.disarmed(errors.collect());
+        true
+    }
+
+    pub(super) fn keep_fault(&self, fault: ComponentFault) {
+        let mut faults = lock(&self.0.faults);
+        faults.count += 1;
+        if faults.newest.len() == KEPT_FAULTS {
+            faults.newest.pop_front();
+        }
+        faults.newest.push_back(fault);
+    }
+
+    fn report(&self, logs: Vec<Log>) {
+        let mut reports = lock(&self.0.reporter.0);
+        for log in logs {
+            if reports.logs.len() < MOST_LOGS {
+                reports.logs.push_back(log);
+            } else {
+                reports.skipped += 1;
+            }
+        }
+        if std::mem::replace(&mut reports.is_running, true) {
+            return;
+        }
+        drop(reports);
+        match self.0.mode {
+            Mode::Real => {
+                let control = self.clone();
+                self.0.pool.submit(move || control.write_logs());
+            }
+            Mode::Virtual | Mode::Replay => self.write_logs(),
+        }
+    }
+
+    fn write_logs(&self) {
+        loop {
+            let mut reports = lock(&self.0.reporter.0);
+            let Some(log) = reports.logs.pop_front() else {
+                reports.is_running = false;
+                return;
+            };
+            let skipped = std::mem::take(&mut reports.skipped);
+            drop(reports);
+            let written = crate::fault::guarded(|| {
+                if skipped > 0 {
+                    tracing::warn!(skipped, "lines of this log were dropped: the logger blocked");
+                }
+                write_log(&log);
+            });
+            if written.is_err() {
+                // A logger that panics cannot be told so.
+                continue;
+            }
+            if let Some(telemetry) = &self.0.telemetry {
+                let robot = self.0.origin.robot;
+                match log {
+                    Log::Health(transition) => telemetry.tell(robot, &TelemetryEvent::Transition(transition)),
+                    Log::Fault(fault) => telemetry.tell(robot, &TelemetryEvent::Fault(fault)),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+fn write_log(log: &Log) {
+    // A robot whose program installs no subscriber says on the terminal what has failed.
+    let is_plain = !tracing::dispatcher::has_been_set();
+    match log {
+        Log::Health(HealthTransition { estimator, source, from, to, reason, time }) => {
+            tracing::info!(estimator, source, %from, %to, %reason, %time, "health changed");
+        }
+        Log::Safety { from, to } => tracing::info!(%from, %to, "safety changed"),
+        Log::State { from, to, command } => tracing::info!(from, to, command, "state changed"),
+        Log::SafetyError(SafetyError { path, message }) => {
+            tracing::error!(component = path, message, "safety error");
+            if is_plain {
+                eprintln!("safety error at {path}: {message}");
+            }
+        }
+        Log::Fault(fault) => {
+            tracing::warn!(component = fault.path, fault = fault.message, "component failed");
+            if is_plain {
+                eprintln!("{fault}");
+            }
+        }
+        Log::Refused(refusal) => {
+            tracing::warn!(command = refusal.command, %refusal, "command refused");
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

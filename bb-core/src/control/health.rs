@@ -1,0 +1,222 @@
+//! What estimators and other components report: health, faults and panics; and the watchdog.
+
+use super::budgets::Verdict;
+use super::effects::Log;
+use super::step::Step;
+use super::system::{ComponentOrder, Control};
+use crate::declaration::ParameterValues;
+use crate::declaration::Supervisor;
+use crate::event::{HealthReason, HealthState, HealthTransition, SafetyError};
+use crate::journal::Event;
+use crate::node::{BindTarget, Check, HealthReport, Mode, NodeEntry, Overseer, Report};
+use crate::time::MonotonicTime;
+use std::sync::{Arc, MutexGuard, PoisonError};
+
+impl Overseer for Control {
+    fn report(&self, estimator: usize, report: Report) {
+        if self.0.mode == Mode::Replay {
+            self.reports().entry(estimator).or_default().push_back(report);
+            return;
+        }
+        self.process_report(estimator, report);
+    }
+
+    fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget) {
+        self.bind_to(path, parameters, Arc::new(check), target);
+    }
+
+    fn parameters(&self) -> ParameterValues {
+        Control::parameters(self)
+    }
+}
+
+impl Control {
+    fn reports(&self) -> MutexGuard<'_, std::collections::HashMap<usize, std::collections::VecDeque<Report>>> {
+        self.0.reports.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// In a replay: takes note of the first report of an estimator that waits; false if none does.
+    pub(crate) fn replay_report(&self, estimator: usize) -> bool {
+        let report = self.reports().get_mut(&estimator).and_then(std::collections::VecDeque::pop_front);
+        match report {
+            Some(report) => {
+                self.process_report(estimator, report);
+                true
+            }
+            None => false,
+        }
+    }
+
+    fn process_report(&self, estimator: usize, report: Report) {
+        let mut step = self.step();
+        step.line(Event::Report { estimator });
+        match report {
+            Report::Health(report) => step.health_changed(estimator, report),
+            Report::Failed { message, panicked } => {
+                if let Some(declared) = self.0.declared.estimators.get(estimator) {
+                    step.failed(declared.path, declared.supervisor, message, panicked, Some(estimator));
+                }
+            }
+        }
+        step.finish();
+    }
+
+    /// A sensor, a service or an actuator has failed.
+    pub(crate) fn component_failed(
+        &self,
+        path: &'static str,
+        supervisor: Supervisor,
+        message: String,
+        panicked: bool,
+    ) {
+        let mut step = self.step();
+        step.line(Event::Failed { path, supervisor, message: message.clone(), panicked });
+        step.failed(path, supervisor, message, panicked, None);
+        step.finish();
+    }
+
+    /// Something that no component did, or one that hangs: it is kept, published and logged, and nothing follows from it.
+    pub(crate) fn note_fault(&self, path: &'static str, message: String) {
+        let mut step = self.step();
+        step.publish_fault(path, message);
+        step.finish();
+    }
+
+    /// Watches all estimators from now on.
+    pub(crate) fn begin_watch(&self, now: MonotonicTime) {
+        for (number, declared) in self.0.declared.estimators.iter().enumerate() {
+            if let (Some(after), Some(node)) = (declared.health.lost_after_nanos, self.0.nodes.get(number)) {
+                node.set_last_run(now);
+                self.0.watch.set(number, now.plus_nanos(after));
+            }
+        }
+    }
+
+    /// Looks at the estimators whose time has come; true if there was any.
+    pub(crate) fn check_watch(&self, now: MonotonicTime) -> bool {
+        let Some((_, estimator)) = self.0.watch.take(now) else { return false };
+        let Some(due) = self.lost_at(estimator) else { return true };
+        if due > now {
+            self.0.watch.set(estimator, due);
+            return true;
+        }
+        let mut step = self.step();
+        let last_run = self.0.nodes.get(estimator).map_or(MonotonicTime::ZERO, |node| node.last_run());
+        step.line(Event::Lost { estimator, last_run });
+        step.lost(estimator, last_run);
+        step.finish();
+        true
+    }
+
+    /// In a replay: an estimator was lost.
+    pub(crate) fn replay_lost(&self, estimator: usize, last_run: MonotonicTime) {
+        let mut step = self.step();
+        step.lost(estimator, last_run);
+        step.finish();
+    }
+
+    fn lost_at(&self, estimator: usize) -> Option<MonotonicTime> {
+        let after = self.0.declared.estimators.get(estimator)?.health.lost_after_nanos?;
+        Some(self.0.nodes.get(estimator)?.last_run().plus_nanos(after))
+    }
+}
+
+impl Step<'_> {
+    fn health_changed(&mut self, estimator: usize, report: HealthReport) {
+        let HealthReport { transition, epoch } = report;
+        let Some(health) = self.state.health.get_mut(estimator) else { return };
+        if health.epoch != epoch {
+            // It was lost meanwhile, and does not know yet: what follows is told anew once it does.
+            return;
+        }
+        let was_lost = health.state == HealthState::Lost;
+        health.state = transition.to;
+        self.publish_health(estimator, transition);
+        if was_lost
+            && self.control.0.mode != Mode::Replay
+            && let Some(due) = self.control.lost_at(estimator)
+        {
+            self.control.0.watch.set(estimator, due);
+        }
+    }
+
+    fn lost(&mut self, estimator: usize, last_run: MonotonicTime) {
+        let Some(health) = self.state.health.get_mut(estimator) else { return };
+        if health.state == HealthState::Lost {
+            return;
+        }
+        health.epoch += 1;
+        let (from, epoch) = (health.state, health.epoch);
+        health.state = HealthState::Lost;
+        let Some(declared) = self.control.0.declared.estimators.get(estimator) else { return };
+        let source = declared.driver().map_or(declared.path, |driver| driver.source);
+        let reason = HealthReason::Lost;
+        let transition = HealthTransition {
+            estimator: declared.path,
+            source,
+            from,
+            to: HealthState::Lost,
+            reason,
+            time: self.now,
+        };
+        self.post(estimator, NodeEntry::Silence { epoch, last_run });
+        self.publish_health(estimator, transition);
+    }
+
+    fn publish_health(&mut self, estimator: usize, transition: HealthTransition) {
+        if let Some(node) = self.control.0.nodes.get(estimator) {
+            node.set_health(transition.to);
+            node.count_transition();
+        }
+        self.effects.log(Log::Health(transition));
+        self.publish(&self.control.0.topics.health, transition, transition.time);
+        let declared = self.control.0.declared.estimators.get(estimator);
+        let command = declared.and_then(|declared| declared.health.command(transition.from, transition.to));
+        if let Some(command) = command {
+            // A refusal is counted and published.
+            let _ = self.start(command, None, Some(transition));
+        }
+    }
+
+    /// A component has failed. A panic counts against its supervisor's budget.
+    fn failed(
+        &mut self,
+        path: &'static str,
+        supervisor: Supervisor,
+        message: String,
+        panicked: bool,
+        estimator: Option<usize>,
+    ) {
+        self.publish_fault(path, message);
+        if !panicked {
+            return;
+        }
+        let now = self.now;
+        match self.state.budgets.panicked(supervisor, now) {
+            Verdict::Restart => {}
+            Verdict::RestartAll(above) => {
+                for (number, declared) in self.control.0.declared.estimators.iter().enumerate() {
+                    if Some(number) != estimator && self.state.budgets.is_below(declared.supervisor, above) {
+                        self.post(number, NodeEntry::Restart);
+                    }
+                }
+                for component in &self.state.components {
+                    if component.path != path && self.state.budgets.is_below(component.supervisor, above) {
+                        (component.order)(ComponentOrder::Restart);
+                    }
+                }
+            }
+            Verdict::GiveUp => {
+                match estimator {
+                    Some(estimator) => self.post(estimator, NodeEntry::GiveUp),
+                    None => {
+                        let own = self.state.components.iter().filter(|component| component.path == path);
+                        own.for_each(|component| (component.order)(ComponentOrder::GiveUp));
+                    }
+                }
+                let message = "panicked too often, and is not restarted any more".to_owned();
+                self.hardware_error(SafetyError { path, message });
+            }
+        }
+    }
+}

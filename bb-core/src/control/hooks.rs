@@ -1,0 +1,66 @@
+//! Disarm callbacks: what makes hardware safe.
+
+use crate::component::DisarmHook;
+use crate::event::SafetyError;
+use crate::fault::{Fault, caught};
+use std::cell::Cell;
+
+/// The callbacks of all components, in the order in which they were registered.
+#[derive(Default)]
+pub(super) struct Hooks {
+    all: Vec<Hook>,
+    next: u64,
+}
+
+struct Hook {
+    path: &'static str,
+    number: u64,
+    /// It stays when the component is restarted.
+    is_kept: bool,
+    run: DisarmHook,
+}
+
+impl Hooks {
+    pub(super) fn add(&mut self, path: &'static str, run: DisarmHook, is_kept: bool) {
+        self.all.push(Hook { path, number: self.next, is_kept, run });
+        self.next += 1;
+    }
+
+    /// What is registered from now on has a number from this one on.
+    pub(super) fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// Whether the component at `path` has registered any from `number` on.
+    pub(super) fn any_since(&self, path: &str, number: u64) -> bool {
+        self.all.iter().any(|hook| hook.path == path && hook.number >= number)
+    }
+
+    /// Takes those of a component out that were registered before `number`, or since; to be dropped without a lock.
+    pub(super) fn take(&mut self, path: &str, number: u64, before: bool) -> Vec<DisarmHook> {
+        let taken =
+            self.all.extract_if(.., |hook| hook.path == path && !hook.is_kept && (hook.number < number) == before);
+        taken.map(|hook| hook.run).collect()
+    }
+
+    pub(super) fn all(&self) -> Vec<(&'static str, DisarmHook)> {
+        self.all.iter().map(|hook| (hook.path, DisarmHook::clone(&hook.run))).collect()
+    }
+}
+
+thread_local! {
+    /// The calling thread runs a disarm callback, which must not wait for the disarming that it is a part of.
+    static IS_INSIDE: Cell<bool> = const { Cell::new(false) };
+}
+
+pub(super) fn is_inside() -> bool {
+    IS_INSIDE.get()
+}
+
+/// Runs a disarm callback on the calling thread; what went wrong.
+pub(super) fn run(path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
+    let before = IS_INSIDE.replace(true);
+    let failed: Option<Fault> = caught(|| hook()).err().map(|failed| failed.fault);
+    IS_INSIDE.set(before);
+    failed.map(|fault| SafetyError { path, message: format!("disarming failed: {fault}") })
+}

@@ -1,0 +1,103 @@
+//! One entry of the control state.
+
+use super::effects::{Effects, Log};
+use super::machine::Machine;
+use super::system::{Control, State};
+use crate::event::{ComponentFault, SafetyError, SafetyTransition, StateTransition};
+use crate::journal::Event;
+use crate::message::{Payload, Stamp};
+use crate::node::{Mode, NodeEntry};
+use crate::pubsub::Topic;
+use crate::time::{MonotonicTime, WallTime};
+use std::sync::MutexGuard;
+use std::sync::atomic::Ordering;
+
+/// The processing of one entry: the lock, the entry's time, and what follows from it once the lock is released. No user code
+/// may be called while it lives.
+pub(super) struct Step<'a> {
+    pub(super) control: &'a Control,
+    pub(super) state: MutexGuard<'a, State>,
+    pub(super) now: MonotonicTime,
+    wall_offset_nanos: i64,
+    before: Machine,
+    pub(super) effects: Effects,
+}
+
+impl Control {
+    /// Enters the control state.
+    pub(super) fn step(&self) -> Step<'_> {
+        let state = self.lock();
+        // Under the lock, so that the times of lines are in their order.
+        let now = self.0.clock.now();
+        let wall_offset_nanos = self.0.clock.wall_offset_nanos();
+        let before = state.machine;
+        Step { control: self, state, now, wall_offset_nanos, before, effects: Effects::default() }
+    }
+}
+
+impl Step<'_> {
+    /// Writes the entry's line; its number, or 0 without a journal.
+    pub(super) fn line(&self, event: Event) -> u64 {
+        match &self.control.0.journal {
+            Some(journal) => journal.write(self.now, self.wall_offset_nanos, event),
+            None => 0,
+        }
+    }
+
+    /// Publishes on a system topic; subscribers are woken once the lock is released.
+    pub(super) fn publish<T: Payload>(&mut self, topic: &Topic<T>, payload: T, time: MonotonicTime) {
+        let wall_time = WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos));
+        let origin = self.control.0.origin;
+        let stamp = Stamp { monotonic_time: time, wall_time, origin, ..Stamp::default() };
+        topic.publish_deferred(&stamp.message(payload), &mut self.effects.wakers);
+    }
+
+    /// Publishes what has changed of safety and state since the step began or since the last time.
+    pub(super) fn publish_machine(&mut self, command: Option<&'static str>) {
+        let before = std::mem::replace(&mut self.before, self.state.machine);
+        let after = self.state.machine;
+        let topics = &self.control.0.topics;
+        if before.safety != after.safety {
+            self.control.0.safety.store(after.safety as u8, Ordering::SeqCst);
+            let (from, to) = (before.safety, after.safety);
+            self.effects.log(Log::Safety { from, to });
+            self.publish(&topics.safety, SafetyTransition { from, to }, self.now);
+        }
+        if before.state() != after.state() {
+            let (from, to) = (before.state(), after.state());
+            self.effects.log(Log::State { from, to, command });
+            self.publish(&topics.state, StateTransition { from, to, command }, self.now);
+        }
+    }
+
+    pub(super) fn publish_safety_error(&mut self, error: SafetyError) {
+        self.effects.log(Log::SafetyError(error.clone()));
+        self.publish(&self.control.0.topics.safety_error, error, self.now);
+    }
+
+    /// Keeps and publishes that a component has failed.
+    pub(super) fn publish_fault(&mut self, path: &'static str, message: String) {
+        let fault = ComponentFault { path, message };
+        self.control.keep_fault(fault.clone());
+        self.effects.log(Log::Fault(fault.clone()));
+        self.publish(&self.control.0.topics.fault, fault, self.now);
+    }
+
+    /// Adds an entry for an estimator. In a replay, the journal has it.
+    pub(super) fn post(&mut self, estimator: usize, entry: NodeEntry) {
+        if self.control.0.mode != Mode::Replay
+            && let Some(islands) = self.control.0.islands.get()
+        {
+            self.effects.wired.extend(islands.post(estimator, self.now, entry));
+        }
+    }
+
+    /// Releases the lock and has done what follows.
+    pub(super) fn finish(mut self) {
+        self.publish_machine(None);
+        let Self { control, state, effects, .. } = self;
+        drop(state);
+        control.0.changed.notify_all();
+        effects.run(control);
+    }
+}

@@ -1,0 +1,119 @@
+//! How the robot stops: it is disarmed first, whatever hangs.
+
+use super::arming::DISARM_WITHIN;
+use super::system::{Control, Limit};
+use crate::event::Safety;
+use crate::journal::Event;
+use crate::node::Mode;
+use crate::time::MonotonicTime;
+use std::time::Duration;
+
+impl Control {
+    /// Disarms the robot and cancels its commands, at once and without waiting; nothing is started any more. Sensors and
+    /// services are told to stop when the robot is safe, or the time for that is over.
+    pub(crate) fn begin_stop(&self) {
+        let mut step = self.step();
+        if step.state.is_stopping {
+            return;
+        }
+        let line = step.line(Event::Stop);
+        step.begin_stop(line);
+        step.finish();
+        if self.0.mode == Mode::Virtual {
+            while self.run_pending_hooks() {}
+            self.drop_cancelled();
+        }
+    }
+
+    /// In a replay: the robot was stopped.
+    pub(crate) fn replay_stop(&self) {
+        let mut step = self.step();
+        step.begin_stop(0);
+        step.finish();
+    }
+
+    pub(crate) fn is_stopping(&self) -> bool {
+        self.lock().is_stopping
+    }
+
+    /// Waits until the disarm callbacks have returned, or their time is over.
+    pub(crate) fn wait_until_disarmed(&self) {
+        if self.0.mode == Mode::Real {
+            self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| state.disarming.is_none());
+            // If even the thread that keeps time is gone.
+            let generation = self.lock().generation;
+            self.disarm_timeout(generation);
+            self.0.stop.set();
+        }
+    }
+
+    /// The paths of commands whose code has not returned.
+    pub(crate) fn lingering(&self) -> Vec<&'static str> {
+        let state = self.lock();
+        let inside = state
+            .executions
+            .iter()
+            .filter(|execution| execution.task.as_ref().is_some_and(|task| task.is_polled()));
+        inside
+            .filter_map(|execution| self.0.declared.commands.get(execution.command))
+            .map(|declared| declared.path)
+            .collect()
+    }
+
+    /// Does what is due of the time limits; true if anything was.
+    pub(crate) fn check_limits(&self, now: MonotonicTime) -> bool {
+        let Some((_, limit)) = self.0.limits.take(now) else { return false };
+        match limit {
+            Limit::Execution(id) => self.timed_out(id),
+            Limit::Arming => self.arm_timeout(),
+            Limit::Disarming(generation) => self.disarm_timeout(generation),
+        }
+        true
+    }
+
+    /// Wakes what sleeps until now: on the pool, or on virtual time here; true if anything did.
+    pub(crate) fn wake_sleepers(&self, now: MonotonicTime) -> bool {
+        let Some(waker) = self.0.sleeper.take(now) else { return false };
+        match self.0.mode {
+            Mode::Real => self.0.pool.submit(move || crate::fault::wake(waker)),
+            Mode::Virtual | Mode::Replay => crate::fault::wake(waker),
+        }
+        true
+    }
+
+    /// Has `waker` woken then.
+    pub(crate) fn wake_at(&self, time: MonotonicTime, waker: std::task::Waker) {
+        self.0.sleeper.wake_at(time, None, waker);
+    }
+
+    /// When the watchdog looks next.
+    pub(crate) fn next_watch(&self) -> Option<MonotonicTime> {
+        self.0.watch.next()
+    }
+
+    /// When a command is to be woken next.
+    pub(crate) fn next_sleeper(&self) -> Option<MonotonicTime> {
+        self.0.sleeper.next()
+    }
+
+    /// When a time limit is over next.
+    pub(crate) fn next_limit(&self) -> Option<MonotonicTime> {
+        self.0.limits.next()
+    }
+}
+
+impl super::step::Step<'_> {
+    fn begin_stop(&mut self, line: u64) {
+        self.state.is_stopping = true;
+        match self.state.machine.safety {
+            Safety::Armed => {
+                self.begin_disarming(None, None, false);
+                self.is_disarmed_at_once(line);
+            }
+            Safety::Disarmed | Safety::Error => self.control.0.stop.set(),
+            Safety::Disarming => {}
+        }
+        self.cancel_all(None);
+        self.publish_machine(None);
+    }
+}

@@ -1,0 +1,190 @@
+//! The future of one execution of a command: polled by the pool, or by the loop of a simulation.
+
+use super::system::WeakControl;
+use crate::component::Outcome;
+use crate::fault::{Fault, caught, discard};
+use crate::time::MonotonicTime;
+use std::any::Any;
+use std::fmt;
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Wake, Waker};
+
+/// The result of a command, whatever its type.
+pub(super) type Value = Box<dyn Any + Send>;
+pub(super) type Ended = Result<Outcome<Value>, Fault>;
+pub(super) type RunningFuture = Pin<Box<dyn Future<Output = Ended> + Send>>;
+/// Makes the future: user code too, which runs where the future is polled.
+pub(super) type Starter = Box<dyn FnOnce() -> Result<RunningFuture, Fault> + Send>;
+
+/// One execution's future.
+pub(super) struct Task {
+    id: u64,
+    control: WeakControl,
+    state: Mutex<State>,
+}
+
+struct State {
+    code: Code,
+    is_scheduled: bool,
+    is_woken: bool,
+    is_cancelled: bool,
+    /// When it was polled last, and how often at that instant.
+    polled: (MonotonicTime, u32),
+}
+
+enum Code {
+    New(Starter),
+    Future(RunningFuture),
+    /// A thread polls it.
+    Polled,
+    Done,
+}
+
+/// Polls at one instant of virtual time before a command is taken to be stuck.
+const STUCK_AFTER: u32 = 1_000_000;
+
+impl Task {
+    pub(super) fn new(id: u64, control: WeakControl, starter: Starter) -> Self {
+        let state = State {
+            code: Code::New(starter),
+            is_scheduled: false,
+            is_woken: false,
+            is_cancelled: false,
+            polled: (MonotonicTime::MAX, 0),
+        };
+        Self { id, control, state: Mutex::new(state) }
+    }
+
+    /// Has it polled.
+    pub(super) fn schedule(self: &Arc<Self>) {
+        let mut state = self.lock();
+        match state.code {
+            Code::Done => return,
+            Code::Polled => {
+                state.is_woken = true;
+                return;
+            }
+            _ if state.is_scheduled => return,
+            _ => state.is_scheduled = true,
+        }
+        drop(state);
+        if let Some(control) = self.control.upgrade() {
+            control.run_task(Arc::clone(self));
+        }
+    }
+
+    /// Its future is dropped as soon as its code gives way.
+    pub(super) fn cancel(self: &Arc<Self>) {
+        self.lock().is_cancelled = true;
+        self.schedule();
+    }
+
+    /// Polls it once. User code runs here: a panic fails the command.
+    pub(super) fn run(self: &Arc<Self>) {
+        let Some(control) = self.control.upgrade() else { return };
+        let mut state = self.lock();
+        state.is_scheduled = false;
+        let code = std::mem::replace(&mut state.code, Code::Polled);
+        let is_cancelled = state.is_cancelled;
+        drop(state);
+        let ended = match code {
+            // Another thread polls it, or it has ended: a wake that came late.
+            Code::Polled | Code::Done => {
+                let mut state = self.lock();
+                if matches!(code, Code::Done) {
+                    state.code = Code::Done;
+                }
+                return;
+            }
+            code if is_cancelled => {
+                match code {
+                    Code::New(starter) => discard(starter),
+                    Code::Future(future) => discard(future),
+                    Code::Polled | Code::Done => {}
+                }
+                self.lock().code = Code::Done;
+                return control.gone(self.id);
+            }
+            Code::New(starter) => match caught(starter) {
+                Ok(future) => self.poll(future),
+                Err(failed) => Some(Err(failed.fault)),
+            },
+            Code::Future(future) => self.poll(future),
+        };
+        match ended {
+            Some(ended) => {
+                self.lock().code = Code::Done;
+                control.ended(self.id, ended);
+            }
+            None => {
+                let mut state = self.lock();
+                let is_due = std::mem::take(&mut state.is_woken) || state.is_cancelled;
+                drop(state);
+                if let Some(fault) = self.is_stuck(control.clock().now(), control.is_virtual()) {
+                    let code = std::mem::replace(&mut self.lock().code, Code::Done);
+                    if let Code::Future(future) = code {
+                        discard(future);
+                    }
+                    return control.ended(self.id, Err(fault));
+                }
+                if is_due {
+                    self.schedule();
+                }
+            }
+        }
+    }
+
+    /// How it has ended, if it has; otherwise its future is kept.
+    fn poll(self: &Arc<Self>, mut future: RunningFuture) -> Option<Ended> {
+        let waker = Waker::from(Arc::clone(self));
+        let polled = caught(|| Ok(future.as_mut().poll(&mut Context::from_waker(&waker))));
+        let ended = match polled {
+            Ok(Poll::Pending) => {
+                self.lock().code = Code::Future(future);
+                return None;
+            }
+            Ok(Poll::Ready(ended)) => ended,
+            Err(failed) => Err(failed.fault),
+        };
+        discard(future);
+        Some(ended)
+    }
+
+    /// Why it is stuck, if it is.
+    fn is_stuck(&self, now: MonotonicTime, is_virtual: bool) -> Option<Fault> {
+        if !is_virtual {
+            return None;
+        }
+        let mut state = self.lock();
+        state.polled = if state.polled.0 == now { (now, state.polled.1 + 1) } else { (now, 1) };
+        (state.polled.1 >= STUCK_AFTER).then(|| {
+            Fault::new(format!(
+                "it woke itself {STUCK_AFTER} times at {now}, and virtual time cannot go on: await \
+                 `CommandContext::sleep` between two looks"
+            ))
+        })
+    }
+
+    /// Whether a thread is inside its code.
+    pub(super) fn is_polled(&self) -> bool {
+        matches!(self.lock().code, Code::Polled)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Wake for Task {
+    fn wake(self: Arc<Self>) {
+        self.schedule();
+    }
+}
+
+impl fmt::Debug for Task {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Task").field("id", &self.id).finish_non_exhaustive()
+    }
+}

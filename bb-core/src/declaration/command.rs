@@ -1,0 +1,64 @@
+//! Commands as declared.
+
+/// What a command does to the robot's safety when it succeeds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Role {
+    /// Nothing.
+    #[default]
+    Plain,
+    /// Arms the robot.
+    Arming,
+    /// Disarms the robot: all other commands are cancelled, and the disarm callbacks run.
+    Disarming,
+}
+
+/// A command as declared.
+#[derive(Clone, Copy, Debug)]
+pub struct CommandDeclaration {
+    /// Its name.
+    pub name: &'static str,
+    /// Its path: `command/stop`.
+    pub path: &'static str,
+    /// The states in which it may start; none: as its role has it.
+    pub allowed_states: Option<&'static [&'static str]>,
+    /// How long it may take.
+    pub timeout_nanos: Option<i64>,
+    /// The number of its category.
+    pub category: usize,
+    /// What it cancels when it starts.
+    pub cancel: Cancel,
+}
+
+/// What a command cancels when it starts.
+#[derive(Clone, Copy, Debug)]
+pub enum Cancel {
+    /// Nothing.
+    Nothing,
+    /// Every running command.
+    All,
+    /// The commands that run in these categories.
+    Categories(&'static [usize]),
+}
+
+impl Cancel {
+    pub(crate) fn includes(self, category: usize) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::All => true,
+            Self::Categories(categories) => categories.contains(&category),
+        }
+    }
+}
+
+impl CommandDeclaration {
+    /// Whether it may start in a state; by default, what arms starts `disarmed`, what disarms in every other state, and
+    /// the rest when the robot is `idle`.
+    pub(crate) fn allowed(&self, role: Role, state: &str) -> bool {
+        match (self.allowed_states, role) {
+            (Some(states), _) => states.contains(&state),
+            (None, Role::Plain) => state == "idle",
+            (None, Role::Arming) => state == "disarmed",
+            (None, Role::Disarming) => state != "disarmed",
+        }
+    }
+}

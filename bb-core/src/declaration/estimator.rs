@@ -1,0 +1,163 @@
+//! Estimators as declared: their inputs, their health, and the islands in which they run.
+
+use crate::event::HealthState;
+use crate::message::Frame;
+use crate::topology::Transform;
+
+/// An estimator as declared.
+#[derive(Clone, Copy, Debug)]
+pub struct EstimatorDeclaration {
+    /// Its path: `estimator/base_link/pose`.
+    pub path: &'static str,
+    /// The frame of what it publishes.
+    pub frame: Frame,
+    /// Its inputs, in the order of their declaration; a nested estimator's only one is its sensor.
+    pub inputs: &'static [InputDeclaration],
+    /// The paths it publishes at: one per declared output, or its own.
+    pub outputs: &'static [&'static str],
+    /// The number of the island that it runs in.
+    pub island: usize,
+    /// The number of its supervisor, see [`Supervisor`](super::Supervisor).
+    pub supervisor: usize,
+    /// What is declared of its health.
+    pub health: HealthDeclaration,
+    /// Whether it has a thread of its own.
+    pub worker: Option<WorkerDeclaration>,
+}
+
+impl EstimatorDeclaration {
+    /// The input whose arrival dispatches.
+    pub(crate) fn driver(&self) -> Option<&'static InputDeclaration> {
+        self.inputs.iter().find(|input| input.driver)
+    }
+
+    /// One with nothing declared.
+    pub(crate) const NONE: Self = Self {
+        path: "",
+        frame: Frame::NONE,
+        inputs: &[],
+        outputs: &[],
+        island: 0,
+        supervisor: 0,
+        health: HealthDeclaration::NONE,
+        worker: None,
+    };
+}
+
+/// The settings of an estimator's health.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HealthDeclaration {
+    /// How long a callback may take.
+    pub latency_budget_nanos: Option<i64>,
+    /// After how long without a run completed on a message of the driver it is lost.
+    pub lost_after_nanos: Option<i64>,
+    /// After how many good completions in a row it is healthy again: at least 1.
+    pub recover_after: u32,
+    /// The number of the command that is started when it degrades.
+    pub on_degraded: Option<usize>,
+    /// … when it is lost.
+    pub on_lost: Option<usize>,
+    /// … when it is healthy again.
+    pub on_recovered: Option<usize>,
+}
+
+impl HealthDeclaration {
+    /// Nothing declared.
+    pub const NONE: Self = Self {
+        latency_budget_nanos: None,
+        lost_after_nanos: None,
+        recover_after: 1,
+        on_degraded: None,
+        on_lost: None,
+        on_recovered: None,
+    };
+}
+
+impl Default for HealthDeclaration {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+/// An island of estimators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IslandDeclaration {
+    /// Its number.
+    pub number: usize,
+    /// The path of its first estimator.
+    pub name: &'static str,
+    /// How its own thread runs, if it has one.
+    pub worker: Option<WorkerDeclaration>,
+    /// Whether one of its estimators has a latency budget, so that callbacks are measured.
+    pub is_measured: bool,
+}
+
+/// `runs_on: worker`: how its thread runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WorkerDeclaration {
+    /// The real-time priority of its thread, 1 to 99.
+    pub priority: Option<u8>,
+    /// The core that it runs on.
+    pub core: Option<usize>,
+}
+
+/// One input as declared.
+#[derive(Clone, Copy, Debug)]
+pub struct InputDeclaration {
+    /// Its number among the declared inputs.
+    pub index: usize,
+    /// Its name.
+    pub name: &'static str,
+    /// The path of its publisher.
+    pub source: &'static str,
+    /// Whether its arrival dispatches.
+    pub driver: bool,
+    /// Whether the estimator is called without it when it is missing or too old.
+    pub optional: bool,
+    /// How much older than the driver it may be; none: any age will do.
+    pub tolerance_nanos: Option<i64>,
+    /// How old it may be when it arrives, by the clock; for the driver.
+    pub stale_after_nanos: Option<i64>,
+    /// Takes points from its frame to the output's; none if a moving joint lies between.
+    pub frame_from_input: Option<Transform>,
+}
+
+impl InputDeclaration {
+    /// Whether a message that is `age_nanos` older than the driver is too old. A newer one never is.
+    pub(crate) fn is_too_old(&self, age_nanos: i64) -> bool {
+        self.tolerance_nanos.is_some_and(|tolerance| age_nanos > tolerance)
+    }
+}
+
+impl HealthDeclaration {
+    /// The number of the command that a transition starts, if one is declared. `Lost` to `Degraded` starts none.
+    pub(crate) fn command(&self, from: HealthState, to: HealthState) -> Option<usize> {
+        match (from, to) {
+            (HealthState::Healthy, HealthState::Degraded) => self.on_degraded,
+            (_, HealthState::Lost) => self.on_lost,
+            (HealthState::Degraded, HealthState::Healthy) => self.on_recovered,
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use HealthState::{Degraded, Healthy, Lost};
+
+    #[test]
+    fn only_the_way_down_and_the_way_to_healthy_start_commands() {
+        let declaration = HealthDeclaration {
+            on_degraded: Some(0),
+            on_lost: Some(1),
+            on_recovered: Some(2),
+            ..Default::default()
+        };
+        let started = |from, to| declaration.command(from, to);
+        assert_eq!(started(Healthy, Degraded), Some(0));
+        assert_eq!(started(Lost, Degraded), None);
+        assert_eq!((started(Healthy, Lost), started(Degraded, Lost)), (Some(1), Some(1)));
+        assert_eq!(started(Degraded, Healthy), Some(2));
+    }
+}

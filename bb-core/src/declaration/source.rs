@@ -1,0 +1,33 @@
+//! Sensors, services and actuators as declared.
+
+use crate::message::Frame;
+use crate::topology::Transform;
+
+/// The number of a supervisor: 0 for the robot, then the links, then the joints, in the order of the topology.
+pub type Supervisor = usize;
+
+/// A sensor, a controller or a bridge as declared.
+#[derive(Clone, Copy, Debug)]
+pub struct SensorDeclaration {
+    /// Its path: `sensor/base_link/imu`.
+    pub path: &'static str,
+    /// The frame of what it publishes.
+    pub frame: Frame,
+    /// Nanoseconds between two readings, if it has a `rate`.
+    pub period_nanos: Option<i64>,
+    /// Takes points from its frame to the root link's, if only fixed joints lie between.
+    pub root_from_frame: Option<Transform>,
+    /// The number of its supervisor.
+    pub supervisor: Supervisor,
+}
+
+/// An actuator as declared.
+#[derive(Clone, Copy, Debug)]
+pub struct ActuatorDeclaration {
+    /// Its path: `actuator/base_link/pan/servo`.
+    pub path: &'static str,
+    /// The joint that it moves, which is the frame of its commands.
+    pub joint: &'static str,
+    /// The number of its supervisor.
+    pub supervisor: Supervisor,
+}

@@ -1,0 +1,98 @@
+//! Whether an estimator's output can be relied on, as it is published.
+
+use crate::Payload;
+use crate::time::MonotonicTime;
+use std::fmt;
+
+/// How far an estimator's output can be relied on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
+pub enum HealthState {
+    /// Its last completions were good.
+    #[default]
+    Healthy,
+    /// Something was bad, and not enough good completions have followed.
+    Degraded,
+    /// No run was completed on a message of the driver for `lost_after`.
+    Lost,
+}
+
+/// Why the health of an estimator has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
+#[non_exhaustive]
+pub enum HealthReason {
+    /// A callback took longer than `latency_budget`.
+    LatencyOverrun,
+    /// A dispatch was dropped: an input was missing or too old.
+    SyncMiss,
+    /// The driver's message was older than its `within` when it arrived.
+    StaleInput,
+    /// The algorithm reported that its estimate is not to be trusted.
+    Diverged,
+    /// It failed and is restarted, or was restarted by a supervisor or with new options.
+    Restarted,
+    /// It failed and stays stopped.
+    Stopped,
+    /// No run was completed on a message of the driver for `lost_after`.
+    Lost,
+    /// A run was completed again, or enough good completions followed.
+    Recovered,
+}
+
+/// A change of an estimator's health, as published and as commands get it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+pub struct HealthTransition {
+    /// The path of the estimator.
+    pub estimator: &'static str,
+    /// The path of the publisher whose message, or whose silence, was the cause.
+    pub source: &'static str,
+    /// What it was.
+    pub from: HealthState,
+    /// What it is.
+    pub to: HealthState,
+    /// Why.
+    pub reason: HealthReason,
+    /// When.
+    pub time: MonotonicTime,
+}
+
+impl HealthState {
+    pub(crate) fn from_index(index: u8) -> Self {
+        match index {
+            0 => Self::Healthy,
+            1 => Self::Degraded,
+            _ => Self::Lost,
+        }
+    }
+}
+
+impl fmt::Display for HealthState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Healthy => "healthy",
+            Self::Degraded => "degraded",
+            Self::Lost => "lost",
+        })
+    }
+}
+
+impl fmt::Display for HealthReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::LatencyOverrun => "latency overrun",
+            Self::SyncMiss => "sync miss",
+            Self::StaleInput => "stale input",
+            Self::Diverged => "diverged",
+            Self::Restarted => "restarted",
+            Self::Stopped => "stopped",
+            Self::Lost => "lost",
+            Self::Recovered => "recovered",
+        })
+    }
+}
+
+impl fmt::Display for HealthTransition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { estimator, source, from, to, reason, time } = self;
+        write!(f, "{time}: {estimator} {from} -> {to} ({reason}; {source})")
+    }
+}

@@ -1,0 +1,8 @@
+//! Why a component cannot start or go on, and how user code is called so that it harms nobody but itself.
+
+mod guard;
+mod value;
+
+pub(crate) use guard::{Failed, caught, discard, guarded, retire, wake};
+pub use value::Fault;
+pub(crate) use value::Then;

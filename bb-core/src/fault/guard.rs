@@ -1,0 +1,89 @@
+//! Calls user code: a panic in it becomes a value.
+
+use super::Fault;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::task::Waker;
+
+/// What user code did instead of what it was called for.
+pub(crate) struct Failed {
+    pub(crate) fault: Fault,
+    /// It panicked, and may have left anything half done.
+    pub(crate) panicked: bool,
+}
+
+impl From<Fault> for Failed {
+    fn from(fault: Fault) -> Self {
+        Self { fault, panicked: false }
+    }
+}
+
+/// Calls user code; a panic in it becomes a fault.
+#[inline]
+pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Failed> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(result) => result.map_err(Failed::from),
+        Err(panic) => Err(Failed { fault: of_panic(panic), panicked: true }),
+    }
+}
+
+/// The same for code that returns no fault.
+pub(crate) fn guarded(call: impl FnOnce()) -> Result<(), Fault> {
+    let called = caught(|| {
+        call();
+        Ok(())
+    });
+    called.map_err(|failed| failed.fault)
+}
+
+/// Drops a user's value; a panic in its `Drop` ends there.
+pub(crate) fn discard<T>(value: T) {
+    if let Err(fault) = guarded(|| drop(value)) {
+        tracing::error!(%fault, "a value panicked when it was dropped");
+    }
+}
+
+/// Wakes a task. A panic in a user's waker must not end the thread that wakes it.
+pub(crate) fn wake(waker: Waker) {
+    if let Err(fault) = guarded(|| waker.wake()) {
+        tracing::error!(%fault, "a waker failed");
+    }
+}
+
+/// Closes and drops a component; one that has panicked is dropped without being closed. Returns what went wrong.
+pub(crate) fn retire<C>(mut component: C, panicked: bool, close: impl FnOnce(&mut C)) -> Option<Fault> {
+    let closed = if panicked { Ok(()) } else { guarded(|| close(&mut component)) };
+    let dropped = guarded(|| drop(component));
+    closed.and(dropped).err()
+}
+
+#[cold]
+fn of_panic(panic: Box<dyn Any + Send>) -> Fault {
+    let message = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let message = message.or_else(|| panic.downcast_ref::<String>().cloned());
+    // The payload of a panic may itself panic when it is dropped, and so may the payload of that panic, which is leaked.
+    if let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(panic))) {
+        std::mem::forget(second);
+    }
+    Fault::new(format!("panicked: {}", message.as_deref().unwrap_or("no message")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Bomb;
+
+    impl Drop for Bomb {
+        fn drop(&mut self) {
+            std::panic::panic_any(Self);
+        }
+    }
+
+    #[test]
+    fn a_panic_whose_payload_panics_when_dropped_is_caught() {
+        let failed = caught::<()>(|| std::panic::panic_any(Bomb)).expect_err("it panics");
+        assert!(failed.panicked);
+        assert_eq!(failed.fault.to_string(), "panicked: no message");
+    }
+}

@@ -1,0 +1,315 @@
+//! The lines of a journal.
+
+use crate::Payload;
+use crate::event::{ParameterValue, SafetyError};
+use crate::message::codec::{Reader, Shape, Writer};
+use crate::message::{DecodeError, Field, Finite};
+use crate::pubsub::DynamicMessage;
+use crate::time::MonotonicTime;
+use std::sync::Arc;
+
+/// One line of a journal. It is a payload: [`Builder::publish_journal`](crate::Builder::publish_journal) publishes lines at
+/// `journal`.
+#[derive(Clone, Debug, Payload)]
+pub struct JournalLine {
+    /// Its number, from 1, without gaps.
+    pub number: u64,
+    /// The time of the robot's clock.
+    pub time: MonotonicTime,
+    /// What was processed.
+    pub event: Event,
+}
+
+/// The same, by the name that those use who hold many of them.
+pub type Entry = JournalLine;
+
+/// See [`Entry`]. Islands, estimators, publishers, actuators, commands and parameters are named by their numbers.
+#[derive(Clone, Debug, Payload)]
+#[non_exhaustive]
+pub enum Event {
+    /// The journal begins.
+    Begin {
+        /// The robot and its settings, one fact a line.
+        declaration: Vec<String>,
+        /// Wall time minus monotonic time, in nanoseconds.
+        wall_offset_nanos: i64,
+        /// Whether the run was on virtual time.
+        is_virtual: bool,
+    },
+    /// The wall clock was set; the next line is the first to see it.
+    WallClock {
+        /// Wall time minus monotonic time, in nanoseconds.
+        offset_nanos: i64,
+    },
+    /// A sensor or a service published, or other code for it.
+    Message {
+        /// The publisher.
+        publisher: usize,
+        /// What.
+        message: Recorded,
+    },
+    /// A command, a service or other code published at a path of its own.
+    Own {
+        /// The path.
+        path: &'static str,
+        /// What.
+        message: Recorded,
+    },
+    /// An actuator carried out a command.
+    Actuated {
+        /// The actuator.
+        actuator: usize,
+        /// The command.
+        message: Recorded,
+    },
+    /// An island took in a message.
+    Deliver {
+        /// The island.
+        island: usize,
+        /// Which of its publishers, as the island numbers them.
+        entry: usize,
+        /// The number of the message's line; 0 for one that another island has published.
+        message: u64,
+    },
+    /// A message did not fit in the inbox of an island.
+    Drop {
+        /// The island.
+        island: usize,
+        /// As in [`Event::Deliver`].
+        entry: usize,
+        /// As in [`Event::Deliver`].
+        message: u64,
+    },
+    /// The estimators of an island started.
+    Start {
+        /// The island.
+        island: usize,
+    },
+    /// An island did what was due.
+    Wake {
+        /// The island.
+        island: usize,
+    },
+    /// An estimator was given new parameters for its options.
+    Options {
+        /// The estimator.
+        estimator: usize,
+        /// The values of all parameters.
+        values: Vec<ParameterValue>,
+    },
+    /// An estimator was restarted from above.
+    Restart {
+        /// The estimator.
+        estimator: usize,
+    },
+    /// An estimator was given up by its supervisor.
+    GiveUp {
+        /// The estimator.
+        estimator: usize,
+    },
+    /// An estimator learnt that it is lost.
+    Silence {
+        /// The estimator.
+        estimator: usize,
+        /// How often it has been lost, this time included.
+        epoch: u32,
+        /// When a run on a message of its driver had last been completed.
+        last_run: MonotonicTime,
+    },
+    /// An estimator handled a request.
+    Request {
+        /// The estimator.
+        estimator: usize,
+        /// The request.
+        request: Request,
+    },
+    /// The estimators of an island stopped.
+    Retire {
+        /// The island.
+        island: usize,
+    },
+    /// How long the measured callbacks of a line took.
+    Measured {
+        /// The number of that line.
+        cause: u64,
+        /// Each, in order.
+        callbacks: Vec<Callback>,
+    },
+    /// An estimator emitted a message.
+    Output {
+        /// Its island.
+        island: usize,
+        /// The publisher.
+        publisher: usize,
+        /// Its checksum.
+        checksum: u64,
+    },
+    /// An estimator emitted a message in reply to a request that the journal does not hold.
+    Emission {
+        /// The publisher.
+        publisher: usize,
+        /// Whether it is the first one of the callback: the outputs of one callback count once.
+        is_first: bool,
+        /// The message.
+        message: Recorded,
+    },
+    /// A change of health, a fault or a panic that an estimator had reported was taken note of.
+    Report {
+        /// The estimator.
+        estimator: usize,
+    },
+    /// No run on a message of its driver had been completed for too long: the estimator is lost.
+    Lost {
+        /// The estimator.
+        estimator: usize,
+        /// When one had last been completed.
+        last_run: MonotonicTime,
+    },
+    /// A sensor, a service or an actuator failed.
+    Failed {
+        /// Its path.
+        path: &'static str,
+        /// Its supervisor.
+        supervisor: usize,
+        /// What happened.
+        message: String,
+        /// Whether it panicked.
+        panicked: bool,
+    },
+    /// Hardware was reported to be in a dangerous state.
+    HardwareError {
+        /// By which component.
+        path: &'static str,
+        /// What.
+        message: String,
+    },
+    /// A parameter was set.
+    Parameter {
+        /// The parameter.
+        parameter: usize,
+        /// Its new value.
+        value: ParameterValue,
+    },
+    /// A command was asked for.
+    Command {
+        /// The command.
+        command: usize,
+    },
+    /// The code of a command has ended.
+    Ended {
+        /// The number of the execution.
+        execution: u64,
+        /// How.
+        end: End,
+    },
+    /// A command was cancelled by its caller.
+    Cancel {
+        /// The number of the execution.
+        execution: u64,
+    },
+    /// A command took longer than its `timeout`.
+    Timeout {
+        /// The number of the execution.
+        execution: u64,
+    },
+    /// The code of a command that was cancelled, or took too long, has returned.
+    Gone {
+        /// The number of the execution.
+        execution: u64,
+    },
+    /// The robot was armed.
+    Arm,
+    /// The robot was disarmed.
+    Disarm {
+        /// Whatever its state.
+        force: bool,
+    },
+    /// The disarm callbacks have returned, or their time is over.
+    Disarmed {
+        /// What could not be made safe.
+        errors: Vec<SafetyError>,
+    },
+    /// Arming gave up waiting for cancelled commands.
+    ArmTimeout,
+    /// The robot was stopped.
+    Stop,
+}
+
+/// How long a callback took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+pub struct Callback {
+    /// The estimator.
+    pub estimator: usize,
+    /// Nanoseconds.
+    pub nanos: i64,
+}
+
+/// How the code of a command has ended.
+#[derive(Clone, Debug, PartialEq, Eq, Payload)]
+pub enum End {
+    /// It succeeded, and may have named the next state.
+    Succeeded {
+        /// That state.
+        next_state: Option<String>,
+    },
+    /// It failed, and why.
+    Failed {
+        /// Why.
+        message: String,
+    },
+}
+
+/// A request to an estimator.
+#[derive(Clone, Debug, PartialEq, Eq, Payload)]
+pub struct Request {
+    /// Whether somebody waits for the answer.
+    pub kind: RequestKind,
+    /// The name of its type.
+    pub name: String,
+    /// The request itself, if its type says how it is recorded.
+    pub bytes: Option<Vec<u8>>,
+}
+
+/// How a request is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+pub enum RequestKind {
+    /// With an answer: `HandleCall`.
+    Call,
+    /// One-way: `HandleCast`.
+    Cast,
+}
+
+/// A message in a journal: as it was, or as bytes that were read from a file.
+#[derive(Clone, Debug)]
+pub enum Recorded {
+    /// As it was published.
+    Message(DynamicMessage),
+    /// Its bytes.
+    Bytes(Arc<[u8]>),
+}
+
+impl Finite for Recorded {
+    /// A journal holds what came, NaN included.
+    fn is_finite(&self) -> bool {
+        true
+    }
+}
+
+impl Field for Recorded {
+    const SHAPE: Shape = <Vec<u8> as Field>::SHAPE;
+
+    fn write(&self, writer: &mut Writer<'_>) {
+        match self {
+            Self::Message(message) => {
+                let mut bytes = Vec::new();
+                message.encode(&mut bytes);
+                bytes.write(writer);
+            }
+            Self::Bytes(bytes) => bytes.to_vec().write(writer),
+        }
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        Ok(Self::Bytes(Vec::<u8>::read(reader)?.into()))
+    }
+}

@@ -1,0 +1,269 @@
+//! Numbers lines, and hands them to the sink on a thread of its own.
+
+use super::{Entry, Event};
+use crate::fault::guarded;
+use crate::time::MonotonicTime;
+use std::fmt;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Where lines go. It is called on a thread that runs nothing else, in the order of the lines' numbers.
+pub type Sink = Arc<dyn Fn(Entry) + Send + Sync>;
+
+/// Lines that wait for the sink before outside producers have to wait for it.
+const CAPACITY: usize = 1 << 16;
+
+/// How many lines wake the thread before its time.
+const BATCH: usize = 1 << 10;
+
+/// How often the thread looks.
+const PERIOD: Duration = Duration::from_millis(2);
+
+/// How long outside producers wait for a sink that hangs. Then the journal ends there: it never has a gap.
+const LONGEST_WAIT: Duration = Duration::from_secs(2);
+
+/// The writing end. Clones are the same journal.
+#[derive(Clone)]
+pub(crate) struct Journal(Arc<Inner>);
+
+struct Inner {
+    queue: Mutex<Queue>,
+    /// How many lines wait: read without the lock.
+    waiting: AtomicUsize,
+    arrived: Condvar,
+    room: Condvar,
+    sink: Sink,
+}
+
+struct Queue {
+    lines: Vec<Entry>,
+    /// Its room is used again.
+    spare: Vec<Entry>,
+    next: u64,
+    wall_offset_nanos: i64,
+    /// A thread hands lines to the sink.
+    is_draining: bool,
+    is_closed: bool,
+    /// The sink hung: no more lines are taken.
+    has_ended: bool,
+}
+
+impl Journal {
+    pub(crate) fn new(sink: Sink, wall_offset_nanos: i64) -> Self {
+        let queue = Queue {
+            lines: Vec::new(),
+            spare: Vec::new(),
+            next: 1,
+            wall_offset_nanos,
+            is_draining: false,
+            is_closed: false,
+            has_ended: false,
+        };
+        Self(Arc::new(Inner {
+            queue: Mutex::new(queue),
+            waiting: AtomicUsize::new(0),
+            arrived: Condvar::new(),
+            room: Condvar::new(),
+            sink,
+        }))
+    }
+
+    /// Writes a line of an entry that sees this offset of the wall clock; its number. Never waits for the sink.
+    pub(crate) fn write(&self, time: MonotonicTime, wall_offset_nanos: i64, event: Event) -> u64 {
+        let mut queue = self.0.lock();
+        if queue.is_closed || queue.has_ended {
+            return 0;
+        }
+        if queue.wall_offset_nanos != wall_offset_nanos {
+            queue.wall_offset_nanos = wall_offset_nanos;
+            queue.push(time, Event::WallClock { offset_nanos: wall_offset_nanos });
+        }
+        let number = queue.push(time, event);
+        let waiting = queue.lines.len();
+        drop(queue);
+        self.0.waiting.store(waiting, Ordering::Relaxed);
+        if waiting == BATCH {
+            self.0.arrived.notify_one();
+        }
+        number
+    }
+
+    /// Outside producers call this before they begin: it waits while the sink is too far behind.
+    #[inline]
+    pub(crate) fn wait_for_room(&self) {
+        if self.0.waiting.load(Ordering::Relaxed) >= CAPACITY {
+            self.0.wait_for_room();
+        }
+    }
+
+    /// Hands what waits to the sink on the calling thread, unless another thread does so already.
+    pub(crate) fn flush(&self) {
+        self.0.flush();
+    }
+
+    /// Starts the thread that hands lines to the sink until the journal is closed.
+    pub(crate) fn start(&self) -> std::io::Result<()> {
+        let inner = Arc::clone(&self.0);
+        std::thread::Builder::new().name("journal".into()).spawn(move || inner.work()).map(drop)
+    }
+
+    /// Takes no more lines and waits until the sink has what was written, `longest` at most; false if it does not.
+    pub(crate) fn close(&self, longest: Duration) -> bool {
+        self.0.lock().is_closed = true;
+        self.0.arrived.notify_all();
+        let deadline = Instant::now() + longest;
+        loop {
+            self.0.flush();
+            let queue = self.0.lock();
+            if queue.lines.is_empty() && !queue.is_draining {
+                return !queue.has_ended;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            drop(self.0.room.wait_timeout(queue, left));
+        }
+    }
+
+    /// The number of the last line.
+    pub(crate) fn last(&self) -> u64 {
+        self.0.lock().next - 1
+    }
+
+    /// Whether the sink hung, so that the journal ended before the run.
+    #[cfg(test)]
+    pub(crate) fn has_ended(&self) -> bool {
+        self.0.lock().has_ended
+    }
+}
+
+impl Queue {
+    fn push(&mut self, time: MonotonicTime, event: Event) -> u64 {
+        let number = self.next;
+        self.next += 1;
+        self.lines.push(Entry { number, time, event });
+        number
+    }
+}
+
+impl Inner {
+    fn work(&self) {
+        loop {
+            let queue = self.lock();
+            if queue.is_closed {
+                return;
+            }
+            if queue.lines.len() < BATCH {
+                drop(self.arrived.wait_timeout(queue, PERIOD));
+            } else {
+                drop(queue);
+            }
+            self.flush();
+        }
+    }
+
+    fn flush(&self) {
+        let mut queue = self.lock();
+        if queue.is_draining {
+            return;
+        }
+        while !queue.lines.is_empty() {
+            queue.is_draining = true;
+            let spare = std::mem::take(&mut queue.spare);
+            let mut lines = std::mem::replace(&mut queue.lines, spare);
+            self.waiting.store(0, Ordering::Relaxed);
+            drop(queue);
+            for line in lines.drain(..) {
+                if let Err(fault) = guarded(|| (self.sink)(line)) {
+                    tracing::error!(%fault, "the journal's sink failed");
+                }
+            }
+            queue = self.lock();
+            queue.spare = lines;
+        }
+        queue.is_draining = false;
+        drop(queue);
+        self.room.notify_all();
+    }
+
+    #[cold]
+    fn wait_for_room(&self) {
+        let deadline = Instant::now() + LONGEST_WAIT;
+        let mut queue = self.lock();
+        while queue.lines.len() >= CAPACITY && !queue.has_ended && !queue.is_closed {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                queue.has_ended = true;
+                tracing::error!(line = queue.next, "the journal's sink hangs: the journal ends here");
+                break;
+            }
+            queue = self.room.wait_timeout(queue, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Journal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Journal").field("waiting", &self.0.waiting).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_arrive_in_order_from_many_threads_and_a_changed_wall_clock_is_a_line() {
+        let lines: Arc<Mutex<Vec<Entry>>> = Arc::default();
+        let sink = Arc::clone(&lines);
+        let journal = Journal::new(Arc::new(move |line| sink.lock().expect("no panic").push(line)), 5);
+        journal.start().expect("a thread");
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    (0..10_000).for_each(|_| {
+                        journal.write(MonotonicTime::ZERO, 5, Event::Arm);
+                    })
+                });
+            }
+        });
+        journal.write(MonotonicTime::ZERO, 6, Event::Stop);
+        assert!(journal.close(Duration::from_secs(10)));
+        assert_eq!(journal.write(MonotonicTime::ZERO, 6, Event::Stop), 0, "closed");
+        let lines = lines.lock().expect("no panic");
+        assert_eq!(lines.len(), 40_002);
+        assert!(lines.iter().zip(1..).all(|(line, number)| line.number == number));
+        assert!(matches!(lines[40_000].event, Event::WallClock { offset_nanos: 6 }));
+    }
+
+    #[test]
+    fn a_sink_that_hangs_ends_the_journal_without_a_gap() {
+        let (release, hang) = std::sync::mpsc::channel::<()>();
+        let hang = Mutex::new(hang);
+        let count = Arc::new(AtomicUsize::new(0));
+        let counted = Arc::clone(&count);
+        let sink = move |_| {
+            counted.fetch_add(1, Ordering::SeqCst);
+            let _ = hang.lock().map(|hang| hang.recv());
+        };
+        let journal = Journal::new(Arc::new(sink), 0);
+        journal.start().expect("a thread");
+        journal.write(MonotonicTime::ZERO, 0, Event::Arm);
+        while count.load(Ordering::SeqCst) == 0 {
+            std::thread::yield_now();
+        }
+        for _ in 0..=CAPACITY {
+            journal.wait_for_room();
+            journal.write(MonotonicTime::ZERO, 0, Event::Arm);
+        }
+        assert!(journal.has_ended());
+        assert_eq!(journal.write(MonotonicTime::ZERO, 0, Event::Stop), 0);
+        drop(release);
+    }
+}

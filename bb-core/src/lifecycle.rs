@@ -1,0 +1,21 @@
+//! The one lifecycle of a component: make, bind, run, fail, retire, restart.
+//!
+//! ```text
+//! vacant ── make ──▶ running ── fault, panic ──▶ waiting ── its backoff is over ──▶ make …
+//!                       │                           │
+//!                       ├── permanent fault ──▶ stopped ◀── its supervisor gives up
+//!                       └── restart from above, new options ──▶ retire, then make at once
+//! ```
+//!
+//! What differs between components is who calls: an estimator's slot is called by the turns of its island, a sensor's or
+//! service's by its thread, an actuator's by those who send it commands. Retiring always comes before making: a device is
+//! closed before it is opened again.
+
+mod adapter;
+mod backoff;
+mod slot;
+
+pub(crate) use adapter::AsActuator;
+pub use adapter::{AsEstimator, AsSensor, AsService, Component, HostHandle, Periodic};
+pub use backoff::Supervision;
+pub(crate) use slot::{AfterFault, Recipe, Slot};

@@ -1,0 +1,82 @@
+//! How long a component that has failed waits for its restart.
+
+use crate::time::MonotonicTime;
+use std::time::Duration;
+
+/// How components that fail are restarted.
+///
+/// A fault (`Err`) restarts its component alone, for as long as the robot runs. A panic does too, and counts against the
+/// budget of the component's supervisor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Supervision {
+    /// How many panics a supervisor allows within [`Self::within`] before it escalates to its parent, which restarts
+    /// everything below. Default: 3.
+    pub max_restarts: usize,
+    /// See [`Self::max_restarts`]. Default: 5 s.
+    pub within: Duration,
+    /// How long the first restart of a component waits; each further one in a row twice as long. Default: 10 ms.
+    pub first_backoff: Duration,
+    /// The longest wait. Default: 1 s.
+    pub longest_backoff: Duration,
+}
+
+impl Default for Supervision {
+    fn default() -> Self {
+        Self {
+            max_restarts: 3,
+            within: Duration::from_secs(5),
+            first_backoff: Duration::from_millis(10),
+            longest_backoff: Duration::from_secs(1),
+        }
+    }
+}
+
+impl Supervision {
+    /// How long restart number `attempt` in a row waits, from 0.
+    fn backoff(&self, attempt: u32) -> Duration {
+        let factor = 1_u32.checked_shl(attempt).unwrap_or(u32::MAX);
+        self.first_backoff.saturating_mul(factor).min(self.longest_backoff)
+    }
+}
+
+/// How often in a row a component has failed, and when last.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Failures {
+    count: u32,
+    last: MonotonicTime,
+}
+
+impl Failures {
+    /// Counts a failure; when the component is to be restarted.
+    pub(super) fn add(&mut self, now: MonotonicTime, supervision: &Supervision) -> MonotonicTime {
+        // After so long without a failure the next one is the first again.
+        if now.duration_since(self.last) > supervision.within {
+            self.count = 0;
+        }
+        let at = now + supervision.backoff(self.count);
+        *self = Self { count: self.count.saturating_add(1), last: now };
+        at
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backoff_doubles_up_to_its_bound_and_starts_again_after_a_while() {
+        let supervision = Supervision::default();
+        let mut failures = Failures::default();
+        let mut now = MonotonicTime::ZERO;
+        let mut waits = Vec::new();
+        for _ in 0..9 {
+            let at = failures.add(now, &supervision);
+            waits.push(at.duration_since(now).as_millis());
+            now = at;
+        }
+        assert_eq!(waits, [10, 20, 40, 80, 160, 320, 640, 1000, 1000]);
+        now = now + Duration::from_secs(6);
+        assert_eq!(failures.add(now, &supervision).duration_since(now).as_millis(), 10);
+        assert_eq!(supervision.backoff(200), Duration::from_secs(1));
+    }
+}

@@ -1,0 +1,154 @@
+//! Where one component lives, and what becomes of it.
+
+use super::backoff::{Failures, Supervision};
+use super::{Component, backoff};
+use crate::component::{Binding, Options};
+use crate::declaration::ParameterValues;
+use crate::fault::{Failed, Fault, Then, caught, retire};
+use crate::time::MonotonicTime;
+
+/// What a component is made of, at the start and at every restart.
+pub(crate) struct Recipe<O> {
+    pub(crate) options: O,
+    pub(crate) binding: Binding<O>,
+}
+
+impl<O: Options> Recipe<O> {
+    pub(crate) fn new(options: &O, binding: Binding<O>) -> Self {
+        Self { options: options.clone(), binding }
+    }
+
+    /// The options with the values of parameters, validated.
+    pub(crate) fn bound(&self, parameters: &ParameterValues) -> Result<O, Fault> {
+        self.binding.bound(&self.options, parameters).map_err(Fault::new)
+    }
+}
+
+/// See the [module](super).
+pub(crate) struct Slot<C: Component> {
+    recipe: Recipe<C::Options>,
+    state: State<C>,
+    failures: Failures,
+    supervision: Supervision,
+}
+
+enum State<C> {
+    /// Not made yet, or retired.
+    Vacant,
+    Running(C),
+    /// It has failed and is restarted then.
+    Waiting(MonotonicTime),
+    /// It stays as it is.
+    Stopped,
+}
+
+/// What follows from a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum AfterFault {
+    /// A restart, then.
+    RestartAt(MonotonicTime),
+    /// Nothing: it stays stopped.
+    Stopped,
+}
+
+impl<C: Component> Slot<C> {
+    pub(crate) fn new(recipe: Recipe<C::Options>, supervision: backoff::Supervision) -> Self {
+        Self { recipe, state: State::Vacant, failures: Failures::default(), supervision }
+    }
+
+    #[inline]
+    pub(crate) fn running(&mut self) -> Option<&mut C> {
+        match &mut self.state {
+            State::Running(component) => Some(component),
+            _ => None,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn is_running(&self) -> bool {
+        matches!(self.state, State::Running(_))
+    }
+
+    /// When it is to be restarted, if it waits for that.
+    pub(crate) fn restart_at(&self) -> Option<MonotonicTime> {
+        match self.state {
+            State::Waiting(at) => Some(at),
+            _ => None,
+        }
+    }
+
+    /// Makes it; what was there is retired first. After an error it is vacant, and the caller decides between
+    /// [`Self::fail`] and a robot that does not start.
+    pub(crate) fn make(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<(), Failed> {
+        // What goes wrong while the previous one closes has no bearing on the next one.
+        let _ = self.retire();
+        let made = caught(|| C::make(self.recipe.bound(parameters)?, context))?;
+        self.state = State::Running(made);
+        Ok(())
+    }
+
+    /// Hands new options to it. `Ok(false)`: it has to be restarted with them.
+    pub(crate) fn change(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<bool, Failed> {
+        let State::Running(component) = &mut self.state else { return Ok(true) };
+        let changed = caught(|| component.change(self.recipe.bound(parameters)?, context));
+        match changed {
+            Ok(()) => Ok(true),
+            Err(failed) if failed.fault.then == Then::Remake => Ok(false),
+            Err(failed) => Err(failed),
+        }
+    }
+
+    /// It has failed at `now`: it is retired, and restarted after its backoff unless the fault is permanent.
+    pub(crate) fn fail(&mut self, failed: &Failed, now: MonotonicTime) -> AfterFault {
+        let previous = std::mem::replace(&mut self.state, State::Stopped);
+        if let State::Running(component) = previous {
+            // The fault is known; what goes wrong from here on follows from it.
+            let _ = retire(component, failed.panicked, C::close);
+        }
+        match failed.fault.then {
+            Then::Restart | Then::Remake => {
+                let at = self.failures.add(now, &self.supervision);
+                self.state = State::Waiting(at);
+                AfterFault::RestartAt(at)
+            }
+            Then::Stay | Then::Skip => AfterFault::Stopped,
+        }
+    }
+
+    /// Its supervisor restarts it, though it has not failed; false if it did not run.
+    pub(crate) fn restart(&mut self, now: MonotonicTime) -> bool {
+        if !self.is_running() {
+            return false;
+        }
+        let _ = self.retire();
+        self.state = State::Waiting(now);
+        true
+    }
+
+    /// Its supervisor gives it up: it is not restarted any more.
+    pub(crate) fn give_up(&mut self) {
+        if matches!(self.state, State::Waiting(_)) {
+            self.state = State::Stopped;
+        }
+    }
+
+    /// Leaves it out.
+    pub(crate) fn stop(&mut self) {
+        self.state = State::Stopped;
+    }
+
+    /// Closes and drops it; what went wrong.
+    pub(crate) fn retire(&mut self) -> Option<Fault> {
+        match std::mem::replace(&mut self.state, State::Vacant) {
+            State::Running(component) => retire(component, false, C::close),
+            _ => None,
+        }
+    }
+}
+
+impl<C: Component> Drop for Slot<C> {
+    /// Of a robot that did not start.
+    fn drop(&mut self) {
+        let _ = self.retire();
+    }
+}

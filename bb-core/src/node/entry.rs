@@ -1,0 +1,87 @@
+//! What reaches one estimator beside messages, and what it reports.
+
+use crate::declaration::ParameterValues;
+use crate::event::HealthTransition;
+use crate::journal::{Event, Request};
+use crate::time::MonotonicTime;
+use std::any::Any;
+use std::fmt;
+
+/// An entry for one estimator of an island.
+pub enum NodeEntry {
+    /// It starts: what it asked for in `init` counts from now.
+    Start,
+    /// New values of parameters.
+    Options(ParameterValues),
+    /// A restart from above.
+    Restart,
+    /// Its supervisor gives it up.
+    GiveUp,
+    /// It is lost.
+    Silence {
+        /// How often it has been lost, this time included.
+        epoch: u32,
+        /// When the watchdog saw the last run completed.
+        last_run: MonotonicTime,
+    },
+    /// A one-way request: a `Cast<E>`.
+    Cast {
+        /// The request.
+        request: Request,
+        /// Handles it; none if a journal that does not hold the request is replayed.
+        handle: Option<Box<dyn Any + Send>>,
+    },
+    /// It stops.
+    Retire,
+}
+
+impl NodeEntry {
+    /// Its line in a journal.
+    pub(super) fn line(&self, estimator: usize, island: usize) -> Event {
+        match self {
+            Self::Start => Event::Start { island },
+            Self::Options(values) => Event::Options { estimator, values: values.all().to_vec() },
+            Self::Restart => Event::Restart { estimator },
+            Self::GiveUp => Event::GiveUp { estimator },
+            Self::Silence { epoch, last_run } => Event::Silence { estimator, epoch: *epoch, last_run: *last_run },
+            Self::Cast { request, .. } => Event::Request { estimator, request: request.clone() },
+            Self::Retire => Event::Retire { island },
+        }
+    }
+}
+
+impl fmt::Debug for NodeEntry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Start => "Start",
+            Self::Options(_) => "Options",
+            Self::Restart => "Restart",
+            Self::GiveUp => "GiveUp",
+            Self::Silence { .. } => "Silence",
+            Self::Cast { .. } => "Cast",
+            Self::Retire => "Retire",
+        })
+    }
+}
+
+/// What an estimator reports to the robot's control state.
+#[derive(Clone, Debug)]
+pub(crate) enum Report {
+    /// Its health has changed.
+    Health(HealthReport),
+    /// It has failed.
+    Failed {
+        /// What happened.
+        message: String,
+        /// It panicked, which counts against its supervisor's budget.
+        panicked: bool,
+    },
+}
+
+/// A change of health.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HealthReport {
+    pub(crate) transition: HealthTransition,
+    /// How often the estimator knew itself to be lost: a report made before it learnt of its last loss is out of date.
+    pub(crate) epoch: u32,
+}

@@ -1,0 +1,392 @@
+//! What the estimators, sensors and services of one run share.
+
+use super::entry::Report;
+use super::shared::SharedNode;
+use crate::component::{Binding, Options};
+use crate::declaration::{EstimatorDeclaration, ParameterValues};
+use crate::fault::Fault;
+use crate::journal::{Event, Journal, Recorded};
+use crate::lifecycle::Supervision;
+use crate::message::{Origin, Payload, Stamped};
+use crate::pubsub::DynamicMessage;
+use crate::schedule::{Agenda, Pool};
+use crate::telemetry::Telemetry;
+use crate::time::{Clock, MonotonicTime};
+use std::collections::{HashMap, VecDeque};
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
+
+/// The robot as its estimators see it: the control state takes note of what they report, without waiting for anything.
+pub(crate) trait Overseer: Send + Sync {
+    fn report(&self, estimator: usize, report: Report);
+    /// Takes note that the options of the component at `path` are bound to these parameters. `estimator` is told of new
+    /// values by entries, others by what they registered.
+    fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
+    fn parameters(&self) -> ParameterValues;
+}
+
+/// Whether options would be valid with these parameters.
+pub(crate) type Check = Box<dyn Fn(&ParameterValues) -> Result<(), String> + Send + Sync>;
+
+/// Who is told of new values.
+pub(crate) enum BindTarget {
+    /// An estimator, by its number.
+    Estimator(usize),
+    /// A component with an inbox of its own.
+    Other(Box<dyn Fn() + Send + Sync>),
+    /// Nobody: a command takes its options when it starts.
+    Nobody,
+}
+
+/// How a robot runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mode {
+    /// In real time, on many threads.
+    Real,
+    /// On virtual time, on its caller's thread.
+    Virtual,
+    /// From a journal.
+    Replay,
+}
+
+/// The first component that could not start.
+#[derive(Debug)]
+pub(crate) struct Refusal {
+    pub(crate) path: &'static str,
+    pub(crate) fault: Fault,
+}
+
+/// What the estimators, sensors and services of one run share. Clones are the same.
+#[derive(Clone)]
+pub struct Environment(Arc<Inner>);
+
+struct Inner {
+    mode: Mode,
+    clock: Clock,
+    origin: Origin,
+    overseer: Arc<dyn Overseer>,
+    supervision: Supervision,
+    agenda: Agenda,
+    pool: Pool,
+    nodes: Box<[SharedNode]>,
+    journal: Option<Journal>,
+    telemetry: Option<Telemetry>,
+    /// The time that all components see in their first `init`.
+    start: MonotonicTime,
+    /// One bit, by which a thread knows which robots' islands it is inside.
+    bit: u64,
+    /// Drains an island, once the robot is wired.
+    drain: OnceLock<Box<dyn Fn(usize) + Send + Sync>>,
+    /// Islands with entries that wait, on virtual time.
+    posted: Mutex<VecDeque<usize>>,
+    refusal: Mutex<Option<Refusal>>,
+    /// Facts of the components that are part of the journal's beginning.
+    facts: Mutex<Vec<String>>,
+    /// Facts of the declaration.
+    declared_facts: Mutex<Vec<String>>,
+    /// The line of the journal that is replayed.
+    replayed_line: AtomicU64,
+    /// What islands have emitted in a replay, to be compared with the journal.
+    replayed: ReplayedOutputs,
+    /// Islands whose estimators have stopped.
+    retired: (Mutex<usize>, Condvar),
+}
+
+/// Outputs of islands in a replay: publisher and checksum, in order.
+#[derive(Debug, Default)]
+pub(crate) struct ReplayedOutputs(Mutex<HashMap<usize, VecDeque<(usize, u64)>>>);
+
+impl ReplayedOutputs {
+    pub(crate) fn add(&self, island: usize, publisher: usize, checksum: u64) {
+        lock(&self.0).entry(island).or_default().push_back((publisher, checksum));
+    }
+
+    /// Takes the first output of an island that was not compared yet.
+    pub(crate) fn take(&self, island: usize) -> Option<(usize, u64)> {
+        lock(&self.0).get_mut(&island)?.pop_front()
+    }
+}
+
+/// What [`Environment::new`] takes.
+pub(crate) struct EnvironmentParts {
+    pub(crate) mode: Mode,
+    pub(crate) clock: Clock,
+    pub(crate) origin: Origin,
+    pub(crate) overseer: Arc<dyn Overseer>,
+    pub(crate) supervision: Supervision,
+    pub(crate) agenda: Agenda,
+    pub(crate) pool: Pool,
+    pub(crate) journal: Option<Journal>,
+    pub(crate) telemetry: Option<Telemetry>,
+    pub(crate) start: MonotonicTime,
+}
+
+impl Environment {
+    pub(crate) fn new(parts: EnvironmentParts, nodes: Box<[SharedNode]>) -> Self {
+        static ROBOTS: AtomicU64 = AtomicU64::new(0);
+        let EnvironmentParts {
+            mode,
+            clock,
+            origin,
+            overseer,
+            supervision,
+            agenda,
+            pool,
+            journal,
+            telemetry,
+            start,
+        } = parts;
+        Self(Arc::new(Inner {
+            mode,
+            clock,
+            origin,
+            overseer,
+            supervision,
+            agenda,
+            pool,
+            nodes,
+            journal,
+            telemetry,
+            start,
+            bit: 1 << (ROBOTS.fetch_add(1, Ordering::Relaxed) % 64),
+            drain: OnceLock::new(),
+            posted: Mutex::default(),
+            refusal: Mutex::default(),
+            facts: Mutex::default(),
+            declared_facts: Mutex::default(),
+            replayed_line: AtomicU64::new(0),
+            replayed: ReplayedOutputs::default(),
+            retired: Default::default(),
+        }))
+    }
+
+    /// Makes a component of a robot that starts, unless another one could not start; if it cannot start either, that is kept.
+    /// The error says why it does not run, and whether it was left out.
+    pub(crate) fn make<C>(
+        &self,
+        path: &'static str,
+        make: impl FnOnce() -> Result<C, Fault>,
+    ) -> Result<C, Option<String>> {
+        let mut refusal = lock(&self.0.refusal);
+        if refusal.is_some() {
+            return Err(None);
+        }
+        make().map_err(|fault| {
+            let reason = fault.to_string();
+            if fault.then == crate::fault::Then::Skip {
+                tracing::info!(component = path, reason, "left out");
+                return Some(reason);
+            }
+            *refusal = Some(Refusal { path, fault });
+            None
+        })
+    }
+
+    /// What kept the robot from starting, if anything did.
+    pub(crate) fn take_refusal(&self) -> Option<Refusal> {
+        lock(&self.0.refusal).take()
+    }
+
+    /// Has `target` told when a parameter has changed that these options are bound to. A value with which they would not be
+    /// valid is refused.
+    pub(crate) fn bind<O: Options>(
+        &self,
+        path: &'static str,
+        options: &O,
+        binding: Binding<O>,
+        target: BindTarget,
+    ) {
+        if !binding.parameters.is_empty() {
+            // Options may be sent, and need not be shared.
+            let options = Mutex::new(options.clone());
+            let check = move |values: &ParameterValues| {
+                let options = lock(&options).clone();
+                binding.bound(&options, values).map(drop)
+            };
+            self.0.overseer.bind(path, binding.parameters, Box::new(check), target);
+        }
+    }
+
+    /// Adds a fact to the journal's beginning.
+    pub(crate) fn add_fact(&self, fact: String) {
+        lock(&self.0.facts).push(fact);
+    }
+
+    pub(crate) fn add_declared_fact(&self, fact: String) {
+        lock(&self.0.declared_facts).push(fact);
+    }
+
+    /// Facts of the components.
+    pub(crate) fn facts(&self) -> Vec<String> {
+        lock(&self.0.facts).clone()
+    }
+
+    /// All facts, as a journal begins with them.
+    pub(crate) fn all_facts(&self) -> Vec<String> {
+        lock(&self.0.declared_facts).iter().chain(&*lock(&self.0.facts)).cloned().collect()
+    }
+
+    /// Says how an island is drained, once the robot is wired.
+    pub(crate) fn set_drain(&self, drain: impl Fn(usize) + Send + Sync + 'static) {
+        // It is set once.
+        let _ = self.0.drain.set(Box::new(drain));
+    }
+
+    /// Has an island with a new entry drained: by the pool, or by the loop of a simulation.
+    pub(crate) fn schedule_drain(&self, island: usize) {
+        match self.0.mode {
+            Mode::Real => {
+                let environment = self.clone();
+                self.0.pool.submit(move || environment.drain(island));
+            }
+            Mode::Virtual => lock(&self.0.posted).push_back(island),
+            Mode::Replay => {}
+        }
+    }
+
+    pub(crate) fn drain(&self, island: usize) {
+        if let Some(drain) = self.0.drain.get() {
+            drain(island);
+        }
+    }
+
+    /// Drains the islands with entries that wait, on virtual time.
+    pub(crate) fn drain_posted(&self) {
+        loop {
+            let island = lock(&self.0.posted).pop_front();
+            match island {
+                Some(island) => self.drain(island),
+                None => return,
+            }
+        }
+    }
+
+    /// The estimators of one more island have stopped.
+    pub(super) fn note_retired(&self) {
+        *lock(&self.0.retired.0) += 1;
+        self.0.retired.1.notify_all();
+    }
+
+    /// Waits until the estimators of so many islands have stopped, or until `deadline`.
+    pub(crate) fn wait_for_retired(&self, islands: usize, deadline: Instant) {
+        let mut retired = lock(&self.0.retired.0);
+        while *retired < islands {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return;
+            }
+            retired = self.0.retired.1.wait_timeout(retired, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    pub(crate) fn node(&self, number: usize) -> SharedNode {
+        match self.0.nodes.get(number) {
+            Some(node) => node.clone(),
+            // Numbers and declarations come from one expansion.
+            None => SharedNode::new(usize::MAX, &EstimatorDeclaration::NONE),
+        }
+    }
+
+    pub(crate) fn nodes(&self) -> &[SharedNode] {
+        &self.0.nodes
+    }
+
+    pub(crate) fn mode(&self) -> Mode {
+        self.0.mode
+    }
+
+    pub(crate) fn clock(&self) -> &Clock {
+        &self.0.clock
+    }
+
+    pub(crate) fn origin(&self) -> Origin {
+        self.0.origin
+    }
+
+    pub(crate) fn overseer(&self) -> &Arc<dyn Overseer> {
+        &self.0.overseer
+    }
+
+    pub(crate) fn supervision(&self) -> Supervision {
+        self.0.supervision
+    }
+
+    pub(crate) fn agenda(&self) -> &Agenda {
+        &self.0.agenda
+    }
+
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.0.pool
+    }
+
+    pub(crate) fn start(&self) -> MonotonicTime {
+        self.0.start
+    }
+
+    #[inline]
+    pub(crate) fn bit(&self) -> u64 {
+        self.0.bit
+    }
+
+    #[inline]
+    pub(crate) fn journal(&self) -> Option<&Journal> {
+        self.0.journal.as_ref()
+    }
+
+    #[inline]
+    pub(crate) fn telemetry(&self) -> Option<&Telemetry> {
+        self.0.telemetry.as_ref()
+    }
+
+    /// Whether anything follows single messages: a journal, a handler of telemetry, or a replay that compares.
+    #[inline]
+    pub(crate) fn is_observed(&self) -> bool {
+        self.0.journal.is_some() || self.0.telemetry.is_some() || self.0.mode == Mode::Replay
+    }
+
+    pub(crate) fn replayed(&self) -> &ReplayedOutputs {
+        &self.0.replayed
+    }
+
+    pub(crate) fn set_replayed_line(&self, line: u64) {
+        self.0.replayed_line.store(line, Ordering::Relaxed);
+    }
+
+    /// Writes into the journal, if there is one, what a sensor or a service publishes; the number of the line, or 0.
+    #[inline]
+    pub fn write<T: Payload>(
+        &self,
+        publisher: usize,
+        path: &'static str,
+        message: &Stamped<T>,
+        now: MonotonicTime,
+    ) -> u64 {
+        match &self.0.journal {
+            None => self.0.replayed_line.load(Ordering::Relaxed),
+            Some(journal) => {
+                journal.wait_for_room();
+                let message = Recorded::Message(DynamicMessage::new(path, message));
+                journal.write(now, self.0.clock.wall_offset_nanos(), Event::Message { publisher, message })
+            }
+        }
+    }
+
+    /// Counts a message that did not fit in the inbox of an estimator's island.
+    pub fn overflow(&self, estimator: usize, input: usize) {
+        if let Some(node) = self.0.nodes.get(estimator) {
+            node.overflow(input);
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl fmt::Debug for Environment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Environment").field("robot", &self.0.origin.robot).finish_non_exhaustive()
+    }
+}

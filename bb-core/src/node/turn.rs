@@ -1,0 +1,169 @@
+//! One entry that an island processes.
+
+use super::environment::{Environment, Mode};
+use crate::declaration::EstimatorDeclaration;
+use crate::journal::{Callback, Event, Recorded, checksum};
+use crate::message::{Payload, Stamped};
+use crate::pubsub::DynamicMessage;
+use crate::time::{MonotonicTime, WallTime};
+use std::cell::{Cell, RefCell};
+use std::fmt;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// The processing of one entry: its time, and what is measured and written while it lasts.
+pub struct Turn<'a> {
+    now: MonotonicTime,
+    wall_offset_nanos: i64,
+    environment: &'a Environment,
+    island: usize,
+    is_observed: bool,
+    /// The estimator whose callback runs or ran last, for the report of one that hangs.
+    running: &'a AtomicU32,
+    /// When the clock was read last: the end of one measured callback is the beginning of the next.
+    read_at: Cell<Option<MonotonicTime>>,
+    /// How long measured callbacks took, if there is a journal.
+    measured: RefCell<Vec<Callback>>,
+    /// The estimator whose callback runs now, if the journal does not hold the request that it answers.
+    answering: Cell<Option<&'static EstimatorDeclaration>>,
+    /// The estimator whose outputs are such an answer.
+    unrecorded: Cell<Option<&'static EstimatorDeclaration>>,
+    /// Whether the callback that ran last has emitted at one of its outputs already.
+    has_emitted: Cell<bool>,
+}
+
+impl<'a> Turn<'a> {
+    pub(super) fn new(
+        environment: &'a Environment,
+        island: usize,
+        now: MonotonicTime,
+        wall_offset_nanos: i64,
+        running: &'a AtomicU32,
+    ) -> Self {
+        Self {
+            now,
+            wall_offset_nanos,
+            environment,
+            island,
+            is_observed: environment.is_observed(),
+            running,
+            read_at: Cell::new(None),
+            measured: RefCell::default(),
+            answering: Cell::new(None),
+            unrecorded: Cell::new(None),
+            has_emitted: Cell::new(false),
+        }
+    }
+
+    /// The time of the entry.
+    #[inline]
+    pub fn now(&self) -> MonotonicTime {
+        self.now
+    }
+
+    pub(super) fn wall_at(&self, time: MonotonicTime) -> WallTime {
+        WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos))
+    }
+
+    #[inline]
+    pub(super) fn environment(&self) -> &'a Environment {
+        self.environment
+    }
+
+    #[inline]
+    pub(super) fn is_observed(&self) -> bool {
+        self.is_observed
+    }
+
+    /// A callback of that estimator begins.
+    #[inline]
+    pub(super) fn enter(&self, estimator: u32) {
+        self.running.store(estimator, Ordering::Relaxed);
+    }
+
+    /// When a measured callback begins: when the one before ended, or now.
+    #[inline]
+    pub(super) fn begin_measure(&self) -> MonotonicTime {
+        match self.read_at.get() {
+            Some(read_at) => read_at,
+            None => self.read_clock(),
+        }
+    }
+
+    #[inline]
+    pub(super) fn read_clock(&self) -> MonotonicTime {
+        let read_at = self.environment.clock().now();
+        self.read_at.set(Some(read_at));
+        read_at
+    }
+
+    /// Keeps how long a callback took, for the journal.
+    pub(super) fn keep(&self, estimator: usize, nanos: i64) {
+        if self.environment.journal().is_some() {
+            self.measured.borrow_mut().push(Callback { estimator, nanos });
+        }
+    }
+
+    pub(super) fn take_measured(&self) -> Vec<Callback> {
+        self.measured.take()
+    }
+
+    /// The journal does not hold the request that `estimator` is about to answer, so it holds what it emits. What others
+    /// make of that follows.
+    pub(super) fn set_unrecorded(&self, estimator: &'static EstimatorDeclaration) {
+        self.answering.set(Some(estimator));
+    }
+
+    /// A callback has emitted nothing.
+    #[inline]
+    pub(super) fn no_emission(&self) {
+        self.answering.set(None);
+    }
+
+    /// A callback of `estimator` has emitted, at one or several outputs. Those of others follow in between.
+    #[inline]
+    pub(super) fn begin_emission(&self, estimator: &'static EstimatorDeclaration) {
+        if self.is_observed {
+            if let Some(answering) = self.answering.take() {
+                self.unrecorded.set(Some(answering));
+                self.has_emitted.set(false);
+            } else if self.unrecorded.get().is_some_and(|unrecorded| unrecorded.path == estimator.path) {
+                self.unrecorded.set(None);
+            }
+        }
+    }
+
+    /// An estimator emits `message` at the publisher of that number.
+    #[inline]
+    pub fn emits<T: Payload>(&self, publisher: usize, path: &'static str, message: &Stamped<T>) {
+        if self.is_observed {
+            self.follow(publisher, path, message);
+        }
+    }
+
+    #[cold]
+    fn follow<T: Payload>(&self, publisher: usize, path: &'static str, message: &Stamped<T>) {
+        if let Some(journal) = self.environment.journal() {
+            let is_answer = self.unrecorded.get().is_some_and(|estimator| estimator.outputs.contains(&path));
+            let event = if is_answer {
+                let is_first = !self.has_emitted.replace(true);
+                let message = Recorded::Message(DynamicMessage::new(path, message));
+                Event::Emission { publisher, is_first, message }
+            } else {
+                Event::Output { island: self.island, publisher, checksum: checksum(message) }
+            };
+            journal.write(self.now, self.wall_offset_nanos, event);
+        }
+        if self.environment.mode() == Mode::Replay {
+            self.environment.replayed().add(self.island, publisher, checksum(message));
+        }
+        if let Some(telemetry) = self.environment.telemetry() {
+            telemetry.output(self.environment.origin().robot, path, message, self.environment.clock().now());
+        }
+    }
+}
+
+impl fmt::Debug for Turn<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Turn").field("now", &self.now).finish_non_exhaustive()
+    }
+}

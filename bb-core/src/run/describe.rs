@@ -1,0 +1,40 @@
+//! What a robot is, one fact a line: a journal begins with it, and one of another robot is refused.
+
+use super::Robot;
+use crate::control::Control;
+use crate::pubsub::AnyTopic;
+
+/// The declaration, and the values of parameters.
+pub(super) fn describe<R: Robot>(topics: &R::Topics, control: &Control) -> Vec<String> {
+    let mut facts = vec![format!("robot {}", R::NAME)];
+    let topics: Vec<&dyn AnyTopic> = R::all_topics(topics);
+    facts.extend(topics.iter().map(|topic| format!("{} publishes {}", topic.path(), topic.payload_name())));
+    for declared in R::ESTIMATORS {
+        let inputs: Vec<_> =
+            declared.inputs.iter().map(|input| (input.source, input.driver, input.optional)).collect();
+        let tolerances: Vec<_> =
+            declared.inputs.iter().map(|input| (input.tolerance_nanos, input.stale_after_nanos)).collect();
+        facts.push(format!(
+            "{}: island {}, supervisor {}, inputs {inputs:?}, tolerances {tolerances:?}, {:?}",
+            declared.path, declared.island, declared.supervisor, declared.health
+        ));
+    }
+    facts.extend(R::ACTUATORS.iter().map(|declared| format!("{} moves {}", declared.path, declared.joint)));
+    facts.push(format!("states {:?}", R::STATES));
+    facts.extend(R::CATEGORIES.iter().map(|category| format!("{category:?}")));
+    facts.extend(R::COMMANDS.iter().map(|declared| format!("{declared:?}")));
+    let parameters = control.parameters();
+    facts.extend(
+        R::PARAMETERS.iter().zip(parameters.all()).map(|(declared, value)| format!("{} = {value}", declared.path)),
+    );
+    facts
+}
+
+/// The first fact in which two robots differ: what the journal says, and what this robot has.
+pub(super) fn difference(journal: &[String], own: &[String]) -> Option<String> {
+    let longest = journal.len().max(own.len());
+    let differs = (0..longest).find(|index| journal.get(*index) != own.get(*index))?;
+    let text =
+        |facts: &[String]| facts.get(differs).map_or_else(|| "nothing more".to_owned(), |fact| format!("`{fact}`"));
+    Some(format!("the journal is of another robot: it says {}, and this robot has {}", text(journal), text(own)))
+}

@@ -1,0 +1,132 @@
+//! The robot as its components see it, and where entries for its estimators go.
+
+use super::Robot;
+use super::actuator::AnyActuator;
+use crate::component::{CommandInfo, DisarmHook, DynamicExecution, Host, Permit};
+use crate::control::{Control, Islands, Wired};
+use crate::declaration::ParameterError;
+use crate::event::{ParameterValue, Safety};
+use crate::fault::Fault;
+use crate::journal::{Event, Journal, Recorded};
+use crate::message::Origin;
+use crate::node::NodeEntry;
+use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
+use crate::time::{Clock, MonotonicTime};
+use std::any::Any;
+use std::sync::{Arc, OnceLock, Weak};
+
+/// Weak, since components that have a bus are a part of the wiring.
+pub(super) struct RobotHost<R: Robot> {
+    pub(super) control: Control,
+    pub(super) journal: Option<Journal>,
+    pub(super) wiring: Arc<OnceLock<Weak<R::Wiring>>>,
+}
+
+impl<R: Robot> RobotHost<R> {
+    fn wiring(&self) -> Option<Arc<R::Wiring>> {
+        self.wiring.get()?.upgrade()
+    }
+}
+
+impl<R: Robot> Host for RobotHost<R> {
+    fn origin(&self) -> Origin {
+        self.control.origin()
+    }
+
+    fn clock(&self) -> &Clock {
+        self.control.clock()
+    }
+
+    fn is_stopping(&self) -> bool {
+        self.control.stop_signal().is_set()
+    }
+
+    fn on_disarm(&self, path: &'static str, hook: DisarmHook) {
+        self.control.on_disarm(path, hook);
+    }
+
+    fn hardware_error(&self, path: &'static str, message: String) {
+        self.control.hardware_error(path, message);
+    }
+
+    fn state(&self) -> &'static str {
+        self.control.state()
+    }
+
+    fn safety(&self) -> Safety {
+        self.control.safety()
+    }
+
+    fn arm(&self) -> bool {
+        self.control.arm()
+    }
+
+    fn disarm(&self) -> bool {
+        self.control.disarm(false)
+    }
+
+    fn parameter(&self, path: &str) -> Option<ParameterValue> {
+        self.control.parameter_at(path)
+    }
+
+    fn set_parameter(&self, path: &str, value: ParameterValue, permit: &Permit) -> Result<(), ParameterError> {
+        self.control.set_parameter_at(path, value, permit)
+    }
+
+    fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic])) {
+        let system = self.control.topics().all();
+        // Before the robot is wired, and after it is gone, there are those of the system.
+        let Some(wiring) = self.wiring() else { return call(&system) };
+        let mut topics = R::all_topics(R::wired_topics(&wiring));
+        topics.extend(R::all_actuators(&wiring).into_iter().map(|actuator| actuator.any_topic()));
+        topics.extend(system);
+        call(&topics);
+    }
+
+    fn registry(&self) -> &Registry {
+        &self.control.topics().registry
+    }
+
+    fn is_journaled(&self) -> bool {
+        self.journal.is_some()
+    }
+
+    fn note_own(&self, message: DynamicMessage) {
+        if let Some(journal) = &self.journal {
+            let clock = self.control.clock();
+            let event = Event::Own { path: message.path(), message: Recorded::Message(message) };
+            journal.write(clock.now(), clock.wall_offset_nanos(), event);
+        }
+    }
+
+    fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {
+        let wiring = self.wiring()?;
+        let actuators = R::all_actuators(&wiring);
+        let actuator: &&dyn AnyActuator = actuators.iter().find(|actuator| actuator.path() == path)?;
+        Some((actuator.command_name(), actuator.accepts()))
+    }
+
+    fn actuators(&self) -> Vec<&'static str> {
+        R::ACTUATORS.iter().map(|declared| declared.path).collect()
+    }
+
+    fn commands(&self) -> Vec<CommandInfo> {
+        self.control.infos()
+    }
+
+    fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault> {
+        self.control.execute_untyped(path, arguments)
+    }
+}
+
+/// Where entries for the estimators of a robot `R` go.
+pub(super) struct WiredIslands<R: Robot>(pub(super) Arc<OnceLock<Weak<R::Wiring>>>);
+
+impl<R: Robot> Islands for WiredIslands<R> {
+    fn post(&self, estimator: usize, now: MonotonicTime, entry: NodeEntry) -> Option<Wired> {
+        let wiring = self.0.get()?.upgrade()?;
+        let find = R::ISLANDS.get(R::ESTIMATORS.get(estimator)?.island)?;
+        find(&wiring).post(&wiring, now, estimator, entry);
+        Some(wiring)
+    }
+}

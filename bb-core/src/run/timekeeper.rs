@@ -1,0 +1,82 @@
+//! The thread that keeps time in a real run: it wakes what is due and watches what is overdue, and runs no user code.
+
+use super::Robot;
+use super::machine::Machine;
+use crate::time::MonotonicTime;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The longest sleep.
+const LONGEST_WAIT: Duration = Duration::from_millis(200);
+
+/// How often the wall clock is read again.
+const WALL_PERIOD: Duration = Duration::from_secs(1);
+
+/// How often islands are looked at.
+const LOOK_PERIOD: Duration = Duration::from_millis(100);
+
+/// A callback that has not returned for so long hangs.
+const HANGS_AFTER: Duration = Duration::from_secs(1);
+
+/// What was seen of an island the last time.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    turn: Option<u64>,
+    since: MonotonicTime,
+    is_reported: bool,
+}
+
+/// Until the robot has ended.
+pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
+    let clock = machine.environment.clock();
+    let mut seen = vec![Seen::default(); R::ISLANDS.len()];
+    let mut wall_read = Instant::now();
+    let mut looked = Instant::now();
+    while !machine.has_ended.load(Ordering::Acquire) {
+        let control = &machine.control;
+        let now = clock.now();
+        while control.check_watch(now) {}
+        while let Some(number) = machine.environment.agenda().take(now) {
+            if let Some(island) = machine.island(number) {
+                island.wake(&machine.wiring, now);
+            }
+        }
+        while control.wake_sleepers(now) {}
+        while control.check_limits(now) {}
+        if wall_read.elapsed() >= WALL_PERIOD {
+            wall_read = Instant::now();
+            clock.refresh_wall();
+        }
+        if looked.elapsed() >= LOOK_PERIOD {
+            looked = Instant::now();
+            look(machine, &mut seen, now);
+        }
+        let relief = control.pool().relieve();
+        let due = [
+            machine.environment.agenda().next(),
+            control.next_watch(),
+            control.next_sleeper(),
+            control.next_limit(),
+            relief.map(|relief| clock.now() + relief),
+        ];
+        control.bell().wait_until(clock, due.into_iter().flatten().min(), LONGEST_WAIT.min(LOOK_PERIOD));
+    }
+}
+
+/// Reports estimators that hang, each time once.
+fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
+    for (island, seen) in machine.islands().zip(seen) {
+        let turn = island.busy().map(|(turn, _)| turn);
+        if turn.is_none() || turn != seen.turn {
+            *seen = Seen { turn, since: now, is_reported: false };
+            continue;
+        }
+        let hangs_for = now.duration_since(seen.since);
+        if hangs_for >= HANGS_AFTER && !seen.is_reported {
+            seen.is_reported = true;
+            let path = machine.path_of_busy(island);
+            let since = now.duration_since(island.entered_at());
+            machine.fault(path, format!("hangs: its code was entered {since:.1?} ago and has not returned"));
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! When things are due, and the threads that do them.
+
+mod agenda;
+mod bell;
+mod deadlines;
+mod pool;
+mod sleeper;
+mod stop;
+
+pub(crate) use agenda::Agenda;
+pub(crate) use bell::Bell;
+pub(crate) use deadlines::Deadlines;
+pub(crate) use pool::Pool;
+pub(crate) use sleeper::{Alarm, Sleeper};
+pub(crate) use stop::StopSignal;

@@ -1,0 +1,86 @@
+//! Futures that wait for a time, in the order of their times and then of their numbers.
+
+use super::Bell;
+use crate::time::MonotonicTime;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
+
+/// The alarms that are set. Clones are the same.
+#[derive(Clone, Debug)]
+pub(crate) struct Sleeper {
+    alarms: Arc<Mutex<Alarms>>,
+    bell: Bell,
+}
+
+#[derive(Debug, Default)]
+struct Alarms {
+    set: BTreeMap<Alarm, Waker>,
+    next_number: u64,
+}
+
+/// An alarm: its time, and a number of its own.
+pub(crate) type Alarm = (MonotonicTime, u64);
+
+impl Sleeper {
+    pub(crate) fn new(bell: Bell) -> Self {
+        Self { alarms: Arc::default(), bell }
+    }
+
+    /// Sets an alarm in place of `set`, the one that was set before, if any.
+    pub(crate) fn wake_at(&self, time: MonotonicTime, set: Option<Alarm>, waker: Waker) -> Alarm {
+        let mut alarms = self.lock();
+        let alarm = set.unwrap_or((time, alarms.next_number));
+        alarms.next_number += 1;
+        let replaced = alarms.set.insert(alarm, waker);
+        let is_first = alarms.set.first_key_value().is_some_and(|(first, _)| *first == alarm);
+        // The lock is released first: dropping a waker may run user code.
+        drop(alarms);
+        drop(replaced);
+        if is_first {
+            self.bell.ring();
+        }
+        alarm
+    }
+
+    pub(crate) fn forget(&self, alarm: Alarm) {
+        let waker = self.lock().set.remove(&alarm);
+        drop(waker);
+    }
+
+    pub(crate) fn next(&self) -> Option<MonotonicTime> {
+        self.lock().set.first_key_value().map(|((time, _), _)| *time)
+    }
+
+    /// Takes the waker of the first alarm whose time has come.
+    pub(crate) fn take(&self, now: MonotonicTime) -> Option<Waker> {
+        let mut alarms = self.lock();
+        alarms.set.first_entry().filter(|first| first.key().0 <= now).map(|first| first.remove())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Alarms> {
+        self.alarms.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn an_alarm_is_forgotten_with_its_future_and_set_once() {
+        let sleeper = Sleeper::new(Bell::default());
+        let (hour, waker) = (MonotonicTime::ZERO + Duration::from_secs(3600), Waker::noop());
+        let mut alarm = None;
+        for _ in 0..100 {
+            alarm = Some(sleeper.wake_at(hour, alarm, waker.clone()));
+        }
+        sleeper.wake_at(MonotonicTime::ZERO, None, waker.clone());
+        let set = sleeper.lock().set.len();
+        assert_eq!((set, sleeper.next()), (2, Some(MonotonicTime::ZERO)));
+        assert!(sleeper.take(MonotonicTime::ZERO).is_some() && sleeper.take(MonotonicTime::ZERO).is_none());
+        alarm.into_iter().for_each(|alarm| sleeper.forget(alarm));
+        assert_eq!(sleeper.lock().set.len(), 0);
+    }
+}

@@ -1,0 +1,42 @@
+//! Tells the threads of a robot to stop, and wakes those that sleep.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::Thread;
+use std::time::Duration;
+
+/// Set when the robot's sensors and services are to stop. Each thread that sleeps on it is parked on its own, so that
+/// thousands of them do not meet at one lock.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct StopSignal(Arc<Shared>);
+
+#[derive(Debug, Default)]
+struct Shared {
+    is_set: AtomicBool,
+    threads: Mutex<Vec<Thread>>,
+}
+
+impl StopSignal {
+    /// The calling thread is woken when the signal is set.
+    pub(crate) fn register(&self) {
+        self.0.threads.lock().unwrap_or_else(PoisonError::into_inner).push(std::thread::current());
+    }
+
+    pub(crate) fn set(&self) {
+        self.0.is_set.store(true, Ordering::SeqCst);
+        for thread in &*self.0.threads.lock().unwrap_or_else(PoisonError::into_inner) {
+            thread.unpark();
+        }
+    }
+
+    pub(crate) fn is_set(&self) -> bool {
+        self.0.is_set.load(Ordering::SeqCst)
+    }
+
+    /// Sleeps for `duration`, until the signal is set, or until the thread is unparked; the thread has registered.
+    pub(crate) fn sleep(&self, duration: Duration) {
+        if !self.is_set() {
+            std::thread::park_timeout(duration);
+        }
+    }
+}
