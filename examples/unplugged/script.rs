@@ -20,7 +20,7 @@ impl Silence {
 
 pub(crate) const WHEELS_STALLED: Silence = Silence {
     from_millis: 2000,
-    until_millis: 5000,
+    until_millis: 2250,
     begins: ("the wheels stall", "their encoders fall silent"),
     ends: ("the wheels turn again", ""),
 };
@@ -29,7 +29,7 @@ pub(crate) const IMU_UNPLUGGED: Silence = Silence {
     from_millis: 3000,
     until_millis: 4500,
     begins: ("the IMU is unplugged", "so that nothing runs the estimator"),
-    ends: ("the IMU is plugged in", "but the wheels still stand"),
+    ends: ("the IMU is plugged in", ""),
 };
 
 /// Something that is done.

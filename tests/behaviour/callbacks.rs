@@ -226,7 +226,7 @@ fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Box<dyn std::erro
     assert_eq!(refused(21.0), "param/sum/gain is not set: expected a number in 0.0..=20.0, found `21.0`");
     assert_eq!(simulation.parameter(summing::param::sum::gain), 5.0);
     let unknown = simulation.bus().set_parameter("param/sum/gian", 1.0).expect_err("there is none").to_string();
-    assert_eq!(unknown, "param/sum/gian is not set: no such parameter is declared");
+    assert_eq!(unknown, "param/sum/gian is not set: no such parameter is declared; did you mean `param/sum/gain`?");
     Ok(())
 }
 

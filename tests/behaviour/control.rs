@@ -6,7 +6,7 @@ use bb_core::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// What a [`Move`] is told.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Payload)]
 pub(crate) struct Target {
     pub(crate) millis: u64,
     pub(crate) does: Option<&'static str>,
@@ -96,7 +96,7 @@ pub(crate) struct Follow {
     servo: bb_core::run::ActuatorLink<Number>,
 }
 
-impl Controller for Follow {
+impl Service for Follow {
     type Options = NoOptions;
     type Output = Number;
 
@@ -126,7 +126,7 @@ pub(crate) struct DashboardOptions {
 /// Counts what there is.
 pub(crate) struct Dashboard(bb_core::DynamicSubscription);
 
-impl Bridge for Dashboard {
+impl Service for Dashboard {
     type Options = DashboardOptions;
     type Output = Number;
 

@@ -1,23 +1,29 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
 mod attitude;
+mod by_path;
 mod callbacks;
 mod command_faults;
 mod components;
 mod contention;
 mod control;
+mod disarm_first;
 mod everything;
 mod external;
 mod fan_in;
 mod faults;
 mod frames;
+mod good_runs;
 mod health;
 mod hygiene;
+mod journals;
+mod order;
 mod outputs;
 mod own_paths;
 mod parameters;
 mod real_time;
 mod replay;
+mod restarts;
 mod safety;
 mod simulation;
 mod subscriptions;

@@ -15,7 +15,7 @@ pub(crate) struct Progress {
 #[derive(Debug)]
 pub(crate) struct Planner(Publisher<Progress>);
 
-impl Controller for Planner {
+impl Service for Planner {
     type Options = NoOptions;
     type Output = Number;
 

@@ -68,7 +68,7 @@ impl Command for Tune {
 /// Sets the gain at every turn.
 pub(crate) struct Knob(Bus, f64);
 
-impl Bridge for Knob {
+impl Service for Knob {
     type Options = NoOptions;
     type Output = Number;
 

@@ -166,7 +166,7 @@ robot! {
 }
 
 /// What is published, as text that differs if a bit does.
-fn text(message: &DynamicMessage) -> String {
+pub(crate) fn text(message: &DynamicMessage) -> String {
     let stamp = message.stamp();
     let payload = message
         .downcast::<Number>()
@@ -178,9 +178,9 @@ fn text(message: &DynamicMessage) -> String {
 }
 
 /// Whatever is published while the robot runs, path by path.
-type Heard = BTreeMap<&'static str, Vec<String>>;
+pub(crate) type Heard = BTreeMap<&'static str, Vec<String>>;
 
-fn hear(subscription: &bb_core::DynamicSubscription, heard: &mut Heard) {
+pub(crate) fn hear(subscription: &bb_core::DynamicSubscription, heard: &mut Heard) {
     assert_eq!(subscription.lagged(), 0);
     for message in subscription.drain() {
         heard.entry(message.path()).or_default().push(text(&message));
@@ -188,7 +188,7 @@ fn hear(subscription: &bb_core::DynamicSubscription, heard: &mut Heard) {
 }
 
 /// Counts of estimators, topics and commands; how long callbacks took is no part of it.
-fn counts(report: &Report) -> String {
+pub(crate) fn counts(report: &Report) -> String {
     let estimators: Vec<String> = report
         .estimators
         .iter()
@@ -199,11 +199,13 @@ fn counts(report: &Report) -> String {
             format!("{estimator:?}")
         })
         .collect();
-    let published: Vec<_> = report.topics.iter().map(|topic| (topic.path, topic.published)).collect();
+    // A path of one's own at which nothing was published is not in the journal.
+    let topics = report.topics.iter().filter(|topic| topic.published > 0);
+    let published: Vec<_> = topics.map(|topic| (topic.path, topic.published)).collect();
     format!("{estimators:#?} {published:?} {:#?} {} {}", report.commands, report.state, report.safety)
 }
 
-type Lines = Arc<Mutex<Vec<Entry>>>;
+pub(crate) type Lines = Arc<Mutex<Vec<Entry>>>;
 
 fn builder(reads: u32) -> (bb_core::Builder<Day>, Lines) {
     let mut builder = Day::builder();
@@ -216,7 +218,7 @@ fn builder(reads: u32) -> (bb_core::Builder<Day>, Lines) {
     (builder, lines)
 }
 
-fn overflow() -> Overflow {
+pub(crate) fn overflow() -> Overflow {
     Overflow::DropOldest { capacity: Overflow::MAX_CAPACITY }
 }
 
@@ -237,7 +239,7 @@ fn replayed(lines: &Lines) -> Result<(Heard, Report), Box<dyn std::error::Error>
     Ok((heard, report))
 }
 
-fn same(first: &Heard, again: &Heard) {
+pub(crate) fn same(first: &Heard, again: &Heard) {
     let paths = |heard: &Heard| heard.iter().map(|(path, texts)| (*path, texts.len())).collect::<Vec<_>>();
     assert_eq!(paths(first), paths(again));
     for ((path, first), (_, again)) in first.iter().zip(again) {
@@ -306,17 +308,33 @@ fn a_run_on_many_threads_is_the_same_again() -> Result<(), Box<dyn std::error::E
 
 #[test]
 fn a_journal_of_another_robot_is_refused_with_its_line() -> Result<(), Box<dyn std::error::Error>> {
+    let begin = |robot: &str| {
+        let (builder, lines) = builder(0);
+        builder.simulate().map(drop).expect("it starts");
+        let mut begin = lines.lock().unwrap_or_else(PoisonError::into_inner)[0].clone();
+        if let Event::Begin { declaration, .. } = &mut begin.event {
+            declaration[0] = format!("robot {robot}");
+        }
+        begin
+    };
     let play = |event| -> Result<_, StartError> {
         let mut replay = Day::builder().replay()?;
-        Ok(replay.play(vec![Entry { number: 1, time: at(0), event }]).expect_err("it does not fit").to_string())
+        let lines = vec![begin("Day"), Entry { number: 2, time: at(0), event }];
+        Ok(replay.play(lines).expect_err("it does not fit").to_string())
     };
     assert_eq!(
-        play(Event::Deliver { island: 0, entry: 0, message: 3 })?,
-        "line 1 of the journal cannot be replayed: no such message waits: it is of another robot, or lines are missing"
+        play(Event::Deliver { island: 1, entry: 0, message: 3 })?,
+        "line 2 of the journal cannot be replayed: no such message waits: it is of another robot, or lines are missing"
     );
     assert_eq!(
         play(Event::Wake { island: 99 })?,
-        "line 1 of the journal cannot be replayed: the robot has no such island"
+        "line 2 of the journal cannot be replayed: the robot has no such island"
+    );
+    let error = Day::builder().replay()?.play(vec![begin("Night")]).expect_err("it is of another robot");
+    assert_eq!(
+        error.to_string(),
+        "line 1 of the journal cannot be replayed: the journal is of another robot: it says `robot Night`, and this \
+         robot has `robot Day`"
     );
     let mut replay = Day::builder().replay()?;
     let gap = replay.play(vec![Entry { number: 3, time: at(0), event: Event::Arm }]).expect_err("two are missing");

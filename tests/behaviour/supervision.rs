@@ -60,7 +60,7 @@ impl Sensor for Pulse {
     }
 }
 
-/// Fails as it is told by the number it gets: 1 heals, 2 does not, 3 is as if it had not been there.
+/// Fails as it is told by the number it gets: 1 panics, 2 is permanent, 3 is as if it had not been there, 4 is a fault.
 #[derive(Debug)]
 pub(crate) struct Failing;
 
@@ -74,6 +74,7 @@ impl Estimator for Failing {
     }
 
     fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        assert!(number.0 != 1.0, "no fix");
         Err(match number.0 {
             2.0 => Fault::permanent("the file is broken"),
             3.0 => Fault::skip("not needed"),
@@ -102,9 +103,11 @@ robot! {
 static ALONE: Mutex<()> = Mutex::new(());
 
 #[test]
-fn failures_go_up_link_joint_robot_and_restart_exactly_what_stands_below() -> Result<(), StartError> {
+fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(), StartError> {
     let _alone = ALONE.lock();
-    let builder = Family::builder();
+    let mut builder = Family::builder();
+    // It is back before the next message.
+    builder.supervision().longest_backoff = Duration::from_millis(250);
     let errors = builder.subscribe(system::SafetyErrors);
     let brother = builder.subscribe(family::sensor::base::neck::head::head_pulse::brother);
     let mut simulation = builder.simulate()?;
@@ -127,7 +130,25 @@ fn failures_go_up_link_joint_robot_and_restart_exactly_what_stands_below() -> Re
     assert_eq!(error.path, "sensor/base/neck/head/number/failing");
     let report = simulation.stop();
     let failing = report.estimator("sensor/base/neck/head/number/failing").expect("it is declared");
-    assert_eq!((failing.restarts, failing.stopped.as_deref()), (12, Some("no fix")));
+    assert_eq!((failing.restarts, failing.stopped.as_deref()), (12, Some("panicked: no fix")));
+    Ok(())
+}
+
+#[test]
+fn a_fault_never_touches_another_component_however_often_it_comes() -> Result<(), StartError> {
+    let _alone = ALONE.lock();
+    let mut simulation = Family::builder().simulate()?;
+    simulation.arm();
+    let start: Vec<_> = (0..4).map(made).collect();
+    for round in 1..=200 {
+        simulation.publish(family::sensor::base::neck::head::number, at(20 * round), Number(4.0));
+    }
+    simulation.run_until(at(20_000));
+    assert_eq!((0..4).map(made).collect::<Vec<_>>(), start);
+    assert_eq!(simulation.safety(), Safety::Armed);
+    let report = simulation.stop();
+    let failing = report.estimator("sensor/base/neck/head/number/failing").expect("it is declared");
+    assert!(failing.restarts > 15, "it was restarted {} times", failing.restarts);
     Ok(())
 }
 

@@ -81,12 +81,12 @@ pub struct RosBridgeOptions {
 }
 
 macro_rules! services {
-    ($($(#[$doc:meta])* $name:ident: $service:ident($options:ty))*) => { $(
+    ($($(#[$doc:meta])* $name:ident($options:ty))*) => { $(
         $(#[$doc])*
         #[derive(Debug)]
         pub struct $name;
 
-        impl $service for $name {
+        impl Service for $name {
             type Options = $options;
             type Output = Position;
 
@@ -103,7 +103,7 @@ macro_rules! services {
 
 services! {
     /// A controller.
-    Stability: Controller(NoOptions)
+    Stability(NoOptions)
     /// A bridge.
-    RosBridge: Bridge(RosBridgeOptions)
+    RosBridge(RosBridgeOptions)
 }

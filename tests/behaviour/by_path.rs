@@ -1,0 +1,289 @@
+//! A robot as tools see it: by path, with arguments as JSON; and what they are told of it.
+
+use crate::components::{Counter, Number, at, within};
+use crate::disarm_first::Gate;
+use bb_core::prelude::*;
+use bb_core::telemetry::TelemetryEvent;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Where to go, and how.
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+pub(crate) struct Goal {
+    pub(crate) name: String,
+    pub(crate) speed: f64,
+    pub(crate) stops: Vec<u8>,
+}
+
+/// Where it got to.
+#[derive(Clone, Debug, PartialEq, Payload)]
+pub(crate) struct Arrival {
+    pub(crate) name: String,
+    pub(crate) stops: u64,
+}
+
+/// Goes there, at 10 ms a stop.
+#[derive(Debug)]
+pub(crate) struct Go;
+
+impl Command for Go {
+    type Options = NoOptions;
+    type Arguments = Goal;
+    type Output = Arrival;
+
+    async fn run(_: NoOptions, goal: Goal, context: CommandContext) -> Result<Outcome<Arrival>, Fault> {
+        if goal.speed < 0.0 {
+            return Err(Fault::new("it cannot go back"));
+        }
+        for _ in &goal.stops {
+            context.sleep(Duration::from_millis(10)).await;
+        }
+        Ok(Outcome::done(Arrival { name: goal.name, stops: goal.stops.len() as u64 }))
+    }
+}
+
+/// Doubles; a negative number is a fault.
+#[derive(Debug)]
+pub(crate) struct Double;
+
+impl Estimator for Double {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        if number.0 < 0.0 {
+            return Err(Fault::new(format!("negative: {}", number.0)));
+        }
+        Ok(Reply::emit(Number(2.0 * number.0)))
+    }
+}
+
+/// A sensor that may hang in its reading.
+#[derive(Debug)]
+pub(crate) struct Slow;
+
+static HERE: Gate = Gate::new();
+
+impl Sensor for Slow {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        HERE.pass("a reading");
+        Ok(Reading::now(Number(1.0)))
+    }
+}
+
+robot! {
+    robot Tardy;
+    link base { sensor slow: Slow() { rate: 100 Hz; } sensor beside: Counter(count = 3) { rate: 1 Hz; } }
+}
+
+#[test]
+fn readings_that_a_sensor_skips_are_counted() {
+    within(60, || {
+        HERE.close("a reading");
+        let builder = Tardy::builder();
+        let slow = builder.subscribe(tardy::sensor::base::slow);
+        let running = builder.start().expect("it starts");
+        HERE.wait_for(1);
+        // It lasts at least so long, during which it should have been read ten times.
+        std::thread::sleep(Duration::from_millis(100));
+        HERE.open();
+        for _ in 0..3 {
+            slow.recv_timeout(Duration::from_secs(20)).expect("it goes on");
+        }
+        let report = running.stop();
+        let of = |path: &str| report.sources.iter().find(|source| source.path == path).expect("it is declared");
+        let slow = of("sensor/base/slow");
+        assert!(slow.skipped >= 8 && slow.readings >= 3, "{slow:?}");
+        assert!(report.to_string().contains("sensor/base/slow: "), "{report}");
+        let mut simulation = Tardy::builder().simulate().expect("it starts");
+        simulation.run_until(at(1000));
+        assert!(simulation.report().sources.iter().all(|source| source.skipped == 0), "virtual time misses none");
+    });
+}
+
+robot! {
+    robot Open;
+
+    commands {
+        arm: Arm;
+        category trips { concurrency: 1; }
+        go: Go { category: trips; timeout: 1 s; allowed_states: [idle, executing]; }
+    }
+
+    link base {
+        sensor number: External<Number>() { estimator double: Double() { latency_budget: 1 ms; } }
+        sensor slow: Counter(count = 100000) { rate: 100 Hz; }
+    }
+}
+
+/// The result of a command, if it has ended.
+fn result(execution: &bb_core::component::DynamicExecution) -> Option<Result<String, String>> {
+    execution.try_result().map(|result| result.map_err(|error| error.to_string()))
+}
+
+fn refused<T>(result: Result<T, Fault>) -> String {
+    result.map(drop).expect_err("it is refused").to_string()
+}
+
+#[test]
+fn commands_are_listed_with_what_they_take_and_give() -> Result<(), StartError> {
+    let simulation = Open::builder().simulate()?;
+    let commands = simulation.bus().commands();
+    assert_eq!(commands.iter().map(|command| command.path).collect::<Vec<_>>(), ["command/arm", "command/go"]);
+    let go = &commands[1];
+    assert_eq!((go.category, go.timeout), ("trips", Some(Duration::from_secs(1))));
+    assert_eq!(go.allowed_states, Some(["idle", "executing"].as_slice()));
+    let (arguments, output) = (format!("{:?}", go.arguments), format!("{:?}", go.output));
+    for field in ["name", "speed", "stops"] {
+        assert!(arguments.contains(field), "{field} is missing in {arguments}");
+    }
+    assert!(output.contains("stops") && !output.contains("speed"), "{output}");
+    Ok(())
+}
+
+#[test]
+fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Box<dyn std::error::Error>> {
+    let mut simulation = Open::builder().simulate()?;
+    let bus = simulation.bus();
+    let goal = r#"{"name": "dock", "speed": 0.5, "stops": [1, 2, 3]}"#;
+    assert_eq!(
+        refused(bus.start_command("command/go", goal)),
+        "`go` is refused: it is not allowed in the state `disarmed`"
+    );
+    assert!(bus.arm());
+    assert_eq!((bus.safety(), bus.state()), (Safety::Armed, "idle"));
+    let events = simulation.subscribe(open::command::go);
+    let going = bus.start_command("command/go", goal)?;
+    simulation.run_until(at(29));
+    assert_eq!((bus.state(), result(&going)), ("executing", None));
+    simulation.run_until(at(30));
+    assert_eq!(result(&going), Some(Ok(r#"{"name":"dock","stops":3}"#.to_owned())));
+    assert_eq!(result(&going), None, "it is taken once");
+    assert_eq!(events.drain().count(), 2);
+
+    let failing = bus.start_command("command/go", r#"{"name": "", "speed": -1, "stops": []}"#)?;
+    simulation.run_until(at(40));
+    let failed = failing.try_result().ok_or("it has ended")?.expect_err("it cannot go back").to_string();
+    assert!(failed.contains("it cannot go back"), "{failed}");
+
+    let cancelled = bus.start_command("command/go", goal)?;
+    simulation.run_until(at(50));
+    cancelled.cancel();
+    simulation.run_until(at(60));
+    assert!(cancelled.try_result().is_some_and(|result| result.is_err()));
+    // Nothing stands for the default arguments: no stops.
+    let default = bus.start_command("command/go", "")?;
+    simulation.run_until(at(61));
+    assert_eq!(result(&default), Some(Ok(r#"{"name":"","stops":0}"#.to_owned())));
+    assert!(bus.disarm());
+    assert_eq!(simulation.safety(), Safety::Disarmed);
+    Ok(())
+}
+
+#[test]
+fn arguments_that_do_not_fit_are_refused_with_the_field() -> Result<(), StartError> {
+    let simulation = Open::builder().simulate()?;
+    let bus = simulation.bus();
+    assert!(bus.arm());
+    for (arguments, field) in [
+        (r#"{"name": "dock", "stops": []}"#, "speed"),
+        (r#"{"name": "dock", "speed": "fast", "stops": []}"#, "speed"),
+        (r#"{"name": 3, "speed": 1, "stops": []}"#, "name"),
+        (r#"{"name": "dock", "speed": 1, "stops": [1, 300]}"#, "stops[1]"),
+        (r#"{"name": "dock", "speed": 1, "stops": [], "haste": 1}"#, "haste"),
+    ] {
+        let error = refused(bus.start_command("command/go", arguments));
+        assert!(error.contains(field), "{arguments}: {error}");
+    }
+    assert!(bus.start_command("command/go", "{").is_err());
+    let near = refused(bus.start_command("command/og", ""));
+    assert_eq!(near, "no command is at `command/og`; did you mean `command/go`?");
+    let go = simulation.report().commands.into_iter().find(|command| command.name == "go").map(|go| go.started);
+    assert_eq!(go, Some(0), "none was started");
+    Ok(())
+}
+
+#[test]
+fn messages_say_which_process_they_come_from() -> Result<(), StartError> {
+    let mut builder = Open::builder();
+    builder.node("left_computer");
+    let double = builder.subscribe(open::sensor::base::number::double);
+    let all = builder.subscribe_any(Select::All, None, Overflow::default());
+    let mut simulation = builder.simulate()?;
+    simulation.publish(open::sensor::base::number, at(5), Number(1.0));
+    assert!(simulation.arm());
+    simulation.bus().publisher::<Number>("radio").expect("it is free").publish(Number(1.0));
+    let origins: Vec<_> = double.drain().map(|number| (number.origin.robot, number.origin.node)).collect();
+    assert_eq!(origins, [("Open", "left_computer")]);
+    let mut paths = std::collections::BTreeSet::new();
+    for message in all.drain() {
+        assert_eq!(message.stamp().origin.node, "left_computer", "{}", message.path());
+        paths.insert(message.path());
+    }
+    for path in ["sensor/base/slow", "sensor/base/number", "safety", "state_machine", "radio"] {
+        assert!(paths.contains(path), "{path} is not among {paths:?}");
+    }
+    let other = Open::builder();
+    let slow = other.subscribe(open::sensor::base::slow);
+    let mut simulation = other.simulate()?;
+    simulation.run_until(at(1));
+    assert_eq!(slow.try_recv().map(|number| number.origin.node), Some("local"));
+    Ok(())
+}
+
+#[test]
+fn handlers_of_telemetry_are_told_of_everything_and_may_panic() -> Result<(), StartError> {
+    let mut builder = Open::builder();
+    builder.supervision().first_backoff = Duration::from_millis(1);
+    let told: Arc<Mutex<Vec<TelemetryEvent>>> = Arc::default();
+    let seen = Arc::clone(&told);
+    builder.telemetry(|_, _| panic!("a handler"));
+    builder.telemetry(move |robot, event| {
+        assert_eq!(robot, "Open");
+        seen.lock().unwrap_or_else(PoisonError::into_inner).push(event.clone());
+    });
+    let mut simulation = builder.simulate()?;
+    for (millis, number) in [(10, 1.0), (20, f64::NAN), (30, -1.0), (40, 2.0)] {
+        simulation.publish(open::sensor::base::number, at(millis), Number(number));
+    }
+    simulation.stop();
+    let told = told.lock().unwrap_or_else(PoisonError::into_inner);
+    let count = |is: fn(&TelemetryEvent) -> bool| told.iter().filter(|event| is(event)).count();
+    const DOUBLE: &str = "sensor/base/number/double";
+    assert!(count(|event| matches!(event, TelemetryEvent::Input { estimator: DOUBLE, input: "number", .. })) >= 3);
+    assert_eq!(count(|event| matches!(event, TelemetryEvent::Output { path: DOUBLE, .. })), 2);
+    assert!(count(|event| matches!(event, TelemetryEvent::Latency { estimator: DOUBLE, .. })) >= 2);
+    assert_eq!(count(|event| matches!(event, TelemetryEvent::Dropped { reason: "non-finite", .. })), 1);
+    assert_eq!(count(|event| matches!(event, TelemetryEvent::Fault(fault) if fault.path == DOUBLE)), 1);
+    let degrades =
+        |event: &TelemetryEvent| matches!(event, TelemetryEvent::Transition(change) if change.estimator == DOUBLE);
+    assert!(count(degrades) >= 1);
+    Ok(())
+}
+
+#[test]
+fn the_newest_faults_are_kept_and_all_are_counted() -> Result<(), StartError> {
+    let mut builder = Open::builder();
+    let supervision = builder.supervision();
+    (supervision.first_backoff, supervision.longest_backoff) = (Duration::from_millis(1), Duration::from_millis(1));
+    let mut simulation = builder.simulate()?;
+    for number in 1..=400 {
+        simulation.publish(open::sensor::base::number, at(10 * number), Number(-number as f64));
+    }
+    let report = simulation.stop();
+    let kept: Vec<_> = report.faults.iter().map(|fault| fault.message.clone()).collect();
+    let expected: Vec<_> = (145..=400).map(|number| format!("negative: -{number}")).collect();
+    assert_eq!((kept, report.all_faults), (expected, 400));
+    Ok(())
+}

@@ -1,0 +1,649 @@
+//! Whatever hangs, hardware is made safe first; and what is not safe, or was cancelled, moves nothing any more.
+
+use crate::components::{Number, at, within};
+use bb_core::control::{CommandError, CommandPhase};
+use bb_core::prelude::*;
+use bb_core::run::ActuatorError;
+use std::future::Future;
+use std::pin::pin;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use std::task::{Context as Polled, Wake, Waker};
+
+/// Longer than anything takes that does not hang, however busy the machine.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Within it a motor is told to stop, whatever hangs: shorter than any time that the robot gives code that hangs.
+const AT_ONCE: Duration = Duration::from_secs(2);
+
+/// A place at which code waits until the test lets it go on.
+pub(crate) struct Gate {
+    /// The place that is closed, and how many have come there.
+    state: Mutex<(Option<&'static str>, u32)>,
+    changed: Condvar,
+}
+
+impl Gate {
+    pub(crate) const fn new() -> Self {
+        Self { state: Mutex::new((None, 0)), changed: Condvar::new() }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, (Option<&'static str>, u32)> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn close(&self, place: &'static str) {
+        *self.lock() = (Some(place), 0);
+    }
+
+    pub(crate) fn open(&self) {
+        self.lock().0 = None;
+        self.changed.notify_all();
+    }
+
+    pub(crate) fn pass(&self, place: &'static str) {
+        let mut state = self.lock();
+        if state.0 == Some(place) {
+            state.1 += 1;
+            self.changed.notify_all();
+        }
+        while state.0 == Some(place) {
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Waits until so many wait there.
+    pub(crate) fn wait_for(&self, many: u32) {
+        let state = self.lock();
+        let waited = self.changed.wait_timeout_while(state, PATIENCE, |state| state.1 < many);
+        let (state, timeout) = waited.unwrap_or_else(PoisonError::into_inner);
+        assert!(!timeout.timed_out(), "nobody came to {:?}", state.0);
+    }
+}
+
+static HERE: Gate = Gate::new();
+
+/// Whether the motor was told to stop.
+static STOPPED: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
+
+fn set_stopped(stopped: bool) {
+    *STOPPED.0.lock().unwrap_or_else(PoisonError::into_inner) = stopped;
+    STOPPED.1.notify_all();
+}
+
+fn is_stopped_within(limit: Duration) -> bool {
+    let stopped = STOPPED.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let waited = STOPPED.1.wait_timeout_while(stopped, limit, |stopped| !*stopped);
+    *waited.unwrap_or_else(PoisonError::into_inner).0
+}
+
+/// Hangs in `read`.
+#[derive(Debug)]
+pub(crate) struct Device;
+
+impl Sensor for Device {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        HERE.pass("a sensor's read");
+        Ok(Reading::now(Number(1.0)))
+    }
+}
+
+/// Hangs at a message, or at a tick.
+#[derive(Debug)]
+pub(crate) struct Thinker;
+
+impl Estimator for Thinker {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
+        context.request(Request::Tick(Duration::from_millis(5)));
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        HERE.pass("an estimator's callback");
+        Ok(Reply::emit(number.payload))
+    }
+
+    fn handle_info(&mut self, _: Info) -> Result<Reply<Number>, Fault> {
+        HERE.pass("an estimator's tick");
+        Ok(Reply::none())
+    }
+}
+
+/// Blocks the thread that runs it.
+#[derive(Debug)]
+pub(crate) struct Errand;
+
+impl Command for Errand {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        HERE.pass("a command");
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Is done at once.
+#[derive(Debug)]
+pub(crate) struct Alarm;
+
+impl Command for Alarm {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.sleep(Duration::from_millis(1)).await;
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Hangs in `update`.
+#[derive(Debug)]
+pub(crate) struct Steer;
+
+impl Service for Steer {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &ServiceContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        HERE.pass("a service's update");
+        Ok(Reading::nothing())
+    }
+}
+
+/// What must be stopped.
+#[derive(Debug)]
+pub(crate) struct Motor;
+
+impl Actuator for Motor {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        set_stopped(true);
+        Ok(())
+    }
+}
+
+/// Another one, which hangs.
+#[derive(Debug)]
+pub(crate) struct Brake;
+
+impl Actuator for Brake {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
+        HERE.pass("another actuator's command");
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        HERE.pass("another actuator's disarm");
+        Ok(())
+    }
+}
+
+robot! {
+    robot Hanging;
+
+    commands {
+        category many { concurrency: 8; }
+        errand: Errand { category: many; allowed_states: [idle, executing]; }
+        hurried: Errand { category: many; timeout: 20 ms; allowed_states: [idle, executing]; }
+        alarm: Alarm { allowed_states: [disarmed, idle, executing]; }
+    }
+
+    controllers { controller steer: Steer() { rate: 100 Hz; } }
+
+    link base {
+        joint tilt: continuous { axis: y; sensor encoder: External<Number>(); actuator brake: Brake(); link lens { } }
+        joint pan: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Motor(); link head { } }
+        sensor device: Device() { rate: 100 Hz; estimator thinker: Thinker(); }
+        sensor silent: External<Number>() {
+            estimator waiting: Thinker() { lost_after: 1 s; on_lost: alarm; }
+        }
+    }
+}
+
+/// What hangs is one place.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    let guard = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    HERE.open();
+    guard
+}
+
+/// Hangs at the place of its name.
+struct Hangs(&'static str);
+
+impl Wake for Hangs {
+    fn wake(self: Arc<Self>) {
+        HERE.pass(self.0);
+    }
+}
+
+/// Has the waker of a subscriber called at the next message.
+fn wait<T: Payload>(subscription: &mut Subscription<T>, place: &'static str) {
+    let waker = Waker::from(Arc::new(Hangs(place)));
+    let awaited = pin!(subscription.recv_async());
+    assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
+}
+
+/// Ends the robot while something hangs at `place`: the motor is told to stop at once.
+fn motor_stops_first(place: &'static str, way: &'static str) {
+    let case = format!("`{way}` while {place} hangs");
+    HERE.open();
+    let mut builder = Hanging::builder();
+    let mut numbers = builder.subscribe_with(hanging::sensor::base::device, Overflow::KeepLatest);
+    let mut safety = builder.subscribe(system::SafetyState);
+    if place == "the journal's sink" {
+        builder.journal(move |_| HERE.pass(place));
+    }
+    if place == "a handler of telemetry" {
+        builder.telemetry(move |_, _| HERE.pass(place));
+    }
+    let running = builder.start().expect("it starts");
+    assert!(running.arm());
+    safety.drain().for_each(drop);
+    HERE.close(place);
+    set_stopped(false);
+    let comes_before = !matches!(place, "another actuator's disarm" | "a subscriber of the safety state");
+    match place {
+        "a command" => drop(running.command(hanging::command::errand, NoArguments).expect("it is allowed")),
+        "another actuator's command" => {
+            let live = running.live();
+            std::thread::spawn(move || live.actuate(hanging::actuator::base::tilt::brake, Number(1.0)));
+        }
+        "a subscriber of a sensor" => {
+            while running.subscribe(hanging::sensor::base::device).recv_timeout(PATIENCE).is_none() {}
+            numbers.drain().for_each(drop);
+            wait(&mut numbers, place);
+        }
+        "a subscriber of the safety state" => wait(&mut safety, place),
+        _ => {}
+    }
+    if comes_before {
+        HERE.wait_for(1);
+    }
+    let (returned, has_returned) = mpsc::channel();
+    let stopping = std::thread::spawn(move || match way {
+        "stop" => drop(running.stop()),
+        "drop" => drop(running),
+        "request_stop" => {
+            running.request_stop();
+            // Nobody waits there, so that it returns while something hangs.
+            returned.send(running).expect("the test waits for it");
+        }
+        _ => {
+            running.disarm();
+            drop(running);
+        }
+    });
+    let is_stopped = is_stopped_within(AT_ONCE);
+    let requested = (way == "request_stop").then(|| has_returned.recv_timeout(PATIENCE));
+    HERE.open();
+    assert!(is_stopped, "{case}: the motor moves on");
+    stopping.join().expect("it does not panic");
+    if let Some(running) = requested {
+        let mut running = running.unwrap_or_else(|_| panic!("{case}: it waits"));
+        running.wait();
+        assert_eq!(running.stop().safety, Safety::Disarmed, "{case}");
+    }
+}
+
+/// Goes through all ways in which a robot ends.
+fn motor_stops_first_whatever_way(places: &'static [&'static str]) {
+    let _alone = alone();
+    within(300, move || {
+        for place in places {
+            for way in ["stop", "drop", "request_stop", "disarm"] {
+                motor_stops_first(place, way);
+            }
+        }
+    });
+}
+
+#[test]
+fn the_motor_stops_first_while_a_component_hangs() {
+    motor_stops_first_whatever_way(&[
+        "a sensor's read",
+        "an estimator's callback",
+        "an estimator's tick",
+        "a service's update",
+    ]);
+}
+
+#[test]
+fn the_motor_stops_first_while_a_command_or_another_actuator_hangs() {
+    motor_stops_first_whatever_way(&["a command", "another actuator's command", "another actuator's disarm"]);
+}
+
+#[test]
+fn the_motor_stops_first_while_somebody_who_listens_hangs() {
+    motor_stops_first_whatever_way(&[
+        "a subscriber of a sensor",
+        "a subscriber of the safety state",
+        "the journal's sink",
+        "a handler of telemetry",
+    ]);
+}
+
+#[test]
+fn a_silent_estimator_is_lost_and_its_command_runs_while_the_code_of_others_hangs() {
+    let _alone = alone();
+    within(120, || {
+        for place in ["an estimator's tick", "a command"] {
+            HERE.open();
+            let builder = Hanging::builder();
+            let (health, alarms) = (builder.subscribe(system::Health), builder.subscribe(hanging::command::alarm));
+            let running = builder.start().expect("it starts");
+            assert!(running.arm());
+            HERE.close(place);
+            if place == "a command" {
+                // As many as there are cores, and more.
+                for _ in 0..8 {
+                    running.command(hanging::command::errand, NoArguments).expect("it is allowed");
+                }
+                HERE.wait_for(8);
+            } else {
+                // Both estimators tick.
+                HERE.wait_for(2);
+            }
+            // The estimator whose tick does not hang, where one does, has had no message at all.
+            let lost = health.recv_timeout(PATIENCE).unwrap_or_else(|| panic!("not lost while {place} hangs"));
+            assert_eq!((lost.estimator, lost.to), ("sensor/base/silent/waiting", HealthState::Lost));
+            let phases = std::iter::from_fn(|| alarms.recv_timeout(PATIENCE)).map(|event| event.payload.phase);
+            assert_eq!(phases.take(2).collect::<Vec<_>>(), [CommandPhase::Started, CommandPhase::Succeeded]);
+            HERE.open();
+            running.stop();
+        }
+    });
+}
+
+#[test]
+fn a_command_that_blocks_times_out() {
+    let _alone = alone();
+    within(60, || {
+        let builder = Hanging::builder();
+        let events = builder.subscribe(hanging::command::hurried);
+        let running = builder.start().expect("it starts");
+        assert!(running.arm());
+        HERE.close("a command");
+        let hurried = running.command(hanging::command::hurried, NoArguments).expect("it is allowed");
+        HERE.wait_for(1);
+        assert_eq!(hurried.wait_timeout(PATIENCE), Some(Err(CommandError::TimedOut)));
+        let phases: Vec<_> = (0..2).filter_map(|_| events.recv_timeout(PATIENCE)).collect();
+        let phases: Vec<_> = phases.iter().map(|event| &event.phase).collect();
+        assert_eq!(phases, [&CommandPhase::Started, &CommandPhase::TimedOut]);
+        HERE.open();
+    });
+}
+
+/// Moves; at -1 it fails, and from then on it cannot be made safe.
+#[derive(Debug)]
+pub(crate) struct Winch {
+    is_stuck: bool,
+}
+
+static MOVED: AtomicU32 = AtomicU32::new(0);
+static MADE_SAFE: AtomicU32 = AtomicU32::new(0);
+
+impl Actuator for Winch {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self { is_stuck: false })
+    }
+
+    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
+        MOVED.fetch_add(1, Ordering::SeqCst);
+        self.is_stuck = command.0 == -1.0;
+        if self.is_stuck { Err(Fault::new("the rope is torn")) } else { Ok(()) }
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        if self.is_stuck {
+            return Err(Fault::new("the brake does not answer"));
+        }
+        MADE_SAFE.fetch_add(1, Ordering::SeqCst);
+        Ok(())
+    }
+}
+
+/// Watches a temperature.
+#[derive(Debug)]
+pub(crate) struct Thermometer(SensorContext);
+
+static IS_HOT: AtomicBool = AtomicBool::new(false);
+
+impl Sensor for Thermometer {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(context.clone()))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if IS_HOT.swap(false, Ordering::SeqCst) {
+            self.0.hardware_error("it burns");
+        }
+        Ok(Reading::nothing())
+    }
+}
+
+/// What a command has been given.
+static LENT: Mutex<Option<CommandContext>> = Mutex::new(None);
+
+/// Gives away what it was given, and waits.
+#[derive(Debug)]
+pub(crate) struct Lend;
+
+impl Command for Lend {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        *LENT.lock().unwrap_or_else(PoisonError::into_inner) = Some(context.clone());
+        context.sleep(Duration::from_secs(3600)).await;
+        Ok(Outcome::done(()))
+    }
+}
+
+/// What became of the last attempt of a command to move.
+static TRIED: Mutex<Option<Result<(), ActuatorError>>> = Mutex::new(None);
+
+/// Hangs, and moves once it is let go.
+#[derive(Debug)]
+pub(crate) struct Late;
+
+impl Command for Late {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        let winch = context.bus().actuator::<Number>("actuator/base/hook/winch")?;
+        winch.send(Number(1.0)).map_err(|error| Fault::new(error.to_string()))?;
+        HERE.pass("a command on its way");
+        *TRIED.lock().unwrap_or_else(PoisonError::into_inner) = Some(winch.send(Number(1.0)));
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Crane;
+
+    parameters { speed: f64 = 1.0; }
+
+    commands {
+        arm: Arm;
+        lend: Lend;
+        late: Late;
+    }
+
+    link base {
+        joint hook: continuous { axis: z; sensor encoder: External<Number>(); actuator winch: Winch(); link load { } }
+        sensor thermometer: Thermometer() { rate: 10 Hz; }
+    }
+}
+
+#[test]
+fn an_actuator_that_fails_and_cannot_be_made_safe_is_an_error_and_nobody_arms() -> Result<(), StartError> {
+    let _alone = alone();
+    let builder = Crane::builder();
+    let errors = builder.subscribe(system::SafetyErrors);
+    let mut simulation = builder.simulate()?;
+    assert!(simulation.arm());
+    simulation.actuate(crane::actuator::base::hook::winch, Number(1.0)).expect("it moves");
+    assert!(simulation.actuate(crane::actuator::base::hook::winch, Number(-1.0)).is_err());
+    simulation.run_until(at(5));
+    assert_eq!(simulation.safety(), Safety::Error);
+    let error = errors.try_recv().map(|error| (error.path, error.payload.message));
+    let message = "it has failed and could not be made safe: the brake does not answer";
+    assert_eq!(error, Some(("actuator/base/hook/winch", message.to_owned())));
+    // Nor later, when it was made again.
+    for millis in [5, 1000, 5000] {
+        simulation.run_until(at(millis));
+        assert!(!simulation.arm() && !simulation.disarm() && !simulation.bus().arm());
+        assert!(simulation.command(crane::command::arm, NoArguments).is_err());
+        assert_eq!(simulation.safety(), Safety::Error);
+    }
+    simulation.force_disarm();
+    assert!(simulation.arm(), "whoever forces it has seen to that");
+    Ok(())
+}
+
+#[test]
+fn an_actuator_that_cannot_be_made_safe_is_an_error_in_real_time_too() {
+    let _alone = alone();
+    within(60, || {
+        let builder = Crane::builder();
+        let safety = builder.subscribe(system::SafetyState);
+        let running = builder.start().expect("it starts");
+        assert!(running.arm());
+        assert!(running.actuate(crane::actuator::base::hook::winch, Number(-1.0)).is_err());
+        let mut changes = std::iter::from_fn(|| safety.recv_timeout(PATIENCE)).map(|change| change.to);
+        assert!(changes.any(|safety| safety == Safety::Error));
+        assert!(!running.arm());
+        assert_eq!(running.stop().safety, Safety::Error);
+    });
+}
+
+#[test]
+fn what_a_cancelled_command_holds_moves_nothing_even_when_the_robot_is_armed_again() -> Result<(), StartError> {
+    let _alone = alone();
+    let mut simulation = Crane::builder().simulate()?;
+    assert!(simulation.arm());
+    let lending = simulation.command(crane::command::lend, NoArguments).expect("it is idle");
+    simulation.run_until(at(10));
+    let context = LENT.lock().unwrap_or_else(PoisonError::into_inner).take().expect("it runs");
+    let bus = context.bus();
+    let winch = bus.actuator::<Number>("actuator/base/hook/winch").expect("it is declared");
+    let progress = bus.publisher::<Number>("progress").expect("it is free");
+    assert_eq!(winch.send(Number(1.0)), Ok(()));
+    assert!(!context.is_cancelled());
+    assert!(simulation.disarm());
+    assert!(simulation.arm());
+    assert_eq!(lending.try_result(), Some(Err(CommandError::Cancelled)));
+    let moved = MOVED.load(Ordering::SeqCst);
+    assert!(context.is_cancelled());
+    assert_eq!(winch.send(Number(1.0)), Err(ActuatorError::Cancelled));
+    assert_eq!(MOVED.load(Ordering::SeqCst), moved);
+    assert!(bus.set_parameter("param/speed", 2.0).is_err() && context.set_parameter("param/speed", 2.0).is_err());
+    assert_eq!(simulation.parameter(crane::param::speed), 1.0);
+    assert!(bus.start_command("command/lend", "").is_err());
+    let heard = simulation.subscribe_any(Select::Path("progress"), None, Overflow::default());
+    progress.publish(Number(1.0));
+    assert!(heard.try_recv().is_none());
+    simulation.disarm();
+    assert!(!bus.arm(), "it arms no robot either");
+    Ok(())
+}
+
+#[test]
+fn arming_waits_until_the_code_of_a_cancelled_command_has_returned() {
+    let _alone = alone();
+    within(60, || {
+        let running = Crane::builder().start().expect("it starts");
+        assert!(running.arm());
+        HERE.close("a command on its way");
+        let late = running.command(crane::command::late, NoArguments).expect("it is idle");
+        HERE.wait_for(1);
+        let moved = MOVED.load(Ordering::SeqCst);
+        assert!(running.disarm());
+        assert_eq!(late.wait_timeout(PATIENCE), Some(Err(CommandError::Cancelled)));
+        let (armed, is_armed) = mpsc::channel();
+        let live = running.live();
+        std::thread::spawn(move || {
+            let is_armed = live.arm();
+            armed.send((is_armed, TRIED.lock().unwrap_or_else(PoisonError::into_inner).clone()))
+        });
+        assert!(is_armed.recv_timeout(Duration::from_millis(300)).is_err(), "its code has not returned");
+        assert_eq!(running.safety(), Safety::Disarmed);
+        HERE.open();
+        let (is_armed, tried) = is_armed.recv_timeout(PATIENCE).expect("the command is gone");
+        assert!(is_armed);
+        assert!(matches!(tried, Some(Err(ActuatorError::Cancelled | ActuatorError::NotArmed(_)))), "{tried:?}");
+        assert_eq!(MOVED.load(Ordering::SeqCst), moved);
+    });
+}
+
+#[test]
+fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<(), StartError> {
+    let _alone = alone();
+    let builder = Crane::builder();
+    let errors = builder.subscribe(system::SafetyErrors);
+    let mut simulation = builder.simulate()?;
+    assert!(simulation.arm());
+    simulation.run_until(at(50));
+    let made_safe = MADE_SAFE.load(Ordering::SeqCst);
+    IS_HOT.store(true, Ordering::SeqCst);
+    simulation.run_until(at(99));
+    assert_eq!(simulation.safety(), Safety::Armed);
+    simulation.run_until(at(100));
+    assert_eq!(simulation.safety(), Safety::Error);
+    assert_eq!(MADE_SAFE.load(Ordering::SeqCst), made_safe + 1);
+    let error = errors.try_recv().map(|error| (error.path, error.payload.message));
+    assert_eq!(error, Some(("sensor/base/thermometer", "it burns".to_owned())));
+    assert!(!simulation.arm());
+    // A robot that is disarmed is in `error` as well.
+    simulation.force_disarm();
+    IS_HOT.store(true, Ordering::SeqCst);
+    simulation.run_until(at(200));
+    assert_eq!(simulation.safety(), Safety::Error);
+    Ok(())
+}

@@ -1,0 +1,693 @@
+//! What may happen to a robot once, and happens again from its journal; and journals that cannot be replayed.
+
+use crate::components::{Number, at, within};
+use crate::disarm_first::Gate;
+use crate::replay::{Heard, Lines, counts, hear, overflow, same};
+use bb_core::control::CommandError;
+use bb_core::journal::{Entry, Event, JournalLine, JournalReader};
+use bb_core::node::DropReason;
+use bb_core::prelude::*;
+use bb_core::{Builder, DynamicSubscription, Report, RequestCodec};
+use bb_recorder::{Recorder, RecorderOptions, Recording};
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+type Failure = Box<dyn std::error::Error>;
+
+static HERE: Gate = Gate::new();
+
+/// Whether this is the first run, and not the one from its journal.
+static IS_FIRST: AtomicBool = AtomicBool::new(true);
+
+const PANICS: f64 = -2.0;
+const HANGS: f64 = -1000.0;
+const IS_SLOW: f64 = 1000.0;
+
+/// Options of [`Adder`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct AdderOptions {
+    #[option(default = 1.0)]
+    pub(crate) gain: f64,
+}
+
+/// Adds up, from the second in which it was made on; what it is told by its input may go wrong.
+#[derive(Debug)]
+pub(crate) struct Adder {
+    sum: f64,
+    gain: f64,
+}
+
+impl Estimator for Adder {
+    type Options = AdderOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: AdderOptions, context: &Context) -> Result<Self, Fault> {
+        context.request(Request::Tick(Duration::from_millis(7)));
+        Ok(Self { sum: context.now().as_nanos() as f64, gain: options.gain })
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        match number.0 {
+            PANICS => panic!("told to"),
+            HANGS => HERE.pass("an adder"),
+            // Only the first time: the run from the journal must know it from there.
+            IS_SLOW if IS_FIRST.load(Ordering::SeqCst) => std::thread::sleep(Duration::from_millis(5)),
+            _ => {}
+        }
+        self.sum += self.gain * number.0;
+        Ok(Reply::emit(Number(self.sum)))
+    }
+
+    fn handle_info(&mut self, _: Info) -> Result<Reply<Number>, Fault> {
+        self.sum *= 0.75;
+        Ok(Reply::emit(Number(self.sum * self.gain)))
+    }
+
+    fn handle_options(&mut self, options: AdderOptions, _: &Context) -> Result<(), Fault> {
+        self.gain = options.gain;
+        Ok(())
+    }
+}
+
+/// A request that a journal holds.
+#[derive(Clone, Copy, Debug, Default, Payload)]
+pub(crate) struct Add(f64);
+
+impl HandleCall<Add> for Adder {
+    type Response = f64;
+    const RECORD: Option<RequestCodec<Add>> = Some(RequestCodec::bytes());
+
+    fn handle_call(&mut self, Add(number): Add) -> Result<(f64, Reply<Number>), Fault> {
+        self.sum += number;
+        Ok((self.sum, Reply::emit(Number(self.sum))))
+    }
+}
+
+impl HandleCast<Add> for Adder {
+    const RECORD: Option<RequestCodec<Add>> = Some(RequestCodec::bytes());
+
+    fn handle_cast(&mut self, Add(number): Add) -> Result<Reply<Number>, Fault> {
+        self.sum += number;
+        Ok(Reply::none())
+    }
+}
+
+/// One that it does not hold.
+pub(crate) struct Forget;
+
+impl HandleCast<Forget> for Adder {
+    fn handle_cast(&mut self, Forget: Forget) -> Result<Reply<Number>, Fault> {
+        self.sum = 0.0;
+        Ok(Reply::none())
+    }
+}
+
+/// Moves, and may refuse to be made safe.
+#[derive(Debug)]
+pub(crate) struct Servo {
+    refuses: bool,
+}
+
+const REFUSES: f64 = 99.0;
+
+impl Actuator for Servo {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self { refuses: false })
+    }
+
+    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
+        self.refuses = command.0 == REFUSES;
+        if command.0 < 0.0 { Err(Fault::new("it is at its end")) } else { Ok(()) }
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        if self.refuses { Err(Fault::new("no brake")) } else { Ok(()) }
+    }
+}
+
+/// How often a [`Drive`] moves, and what it does then.
+#[derive(Clone, Copy, Debug, Default, Payload)]
+pub(crate) struct Way {
+    pub(crate) steps: u32,
+    pub(crate) tunes: bool,
+}
+
+/// Drives the actuator step by step, publishes how far it is, and sets a parameter as it goes.
+#[derive(Debug)]
+pub(crate) struct Drive;
+
+impl Command for Drive {
+    type Options = NoOptions;
+    type Arguments = Way;
+    type Output = u32;
+
+    async fn run(_: NoOptions, way: Way, context: CommandContext) -> Result<Outcome<u32>, Fault> {
+        let servo = context.bus().actuator::<Number>("actuator/base/pan/servo")?;
+        let progress = context.bus().publisher::<Number>("progress")?;
+        for step in 0..way.steps {
+            servo.send(Number(f64::from(step))).map_err(|error| Fault::new(error.to_string()))?;
+            progress.publish(Number(f64::from(step)));
+            if way.tunes {
+                context.set_parameter("param/gain", 1.0 + f64::from(step))?;
+            }
+            context.sleep(Duration::from_millis(2)).await;
+        }
+        Ok(Outcome::done(way.steps))
+    }
+}
+
+robot! {
+    robot Again;
+
+    parameters { gain: f64 = 1.0; }
+
+    commands {
+        arm: Arm;
+        disarm: Disarm;
+        drive: Drive { timeout: 60 ms; }
+        alarm: Drive { allowed_states: [idle, executing]; cancel: all; }
+    }
+
+    link base {
+        joint pan: continuous {
+            axis: z;
+            sensor encoder: External<Number>() { estimator position: Adder(gain = param::gain); }
+            actuator servo: Servo();
+            link head { }
+        }
+        sensor number: External<Number>() {
+            estimator sum: Adder(gain = param::gain) {
+                latency_budget: 2 ms;
+                lost_after: 40 ms;
+                recover_after: 2;
+                on_degraded: alarm;
+                on_lost: alarm;
+            }
+        }
+        estimator apart: Adder(gain = param::gain) { input number: sensor::base::number::sum; runs_on: worker; }
+        estimator behind: Adder() { input number: estimator::base::apart; }
+    }
+}
+
+/// What hangs, and which run it is, is one for all.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    HERE.open();
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A robot with its journal, and those who hear what it does.
+struct Journaled {
+    lines: Lines,
+    all: DynamicSubscription,
+}
+
+impl Journaled {
+    fn new() -> (Self, Builder<Again>) {
+        IS_FIRST.store(true, Ordering::SeqCst);
+        let mut builder = Again::builder();
+        let lines = Lines::default();
+        let sink = std::sync::Arc::clone(&lines);
+        builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+        let all = builder.subscribe_any(Select::All, None, overflow());
+        (Self { lines, all }, builder)
+    }
+
+    /// Runs it again, which gives the same: what is published, counted, and how it ends.
+    fn expect_the_same_again(self, moves: &DynamicSubscription, report: &Report) -> Result<Heard, Failure> {
+        IS_FIRST.store(false, Ordering::SeqCst);
+        let mut first = Heard::new();
+        hear(&self.all, &mut first);
+        hear(moves, &mut first);
+        let builder = Again::builder();
+        let all = builder.subscribe_any(Select::All, None, overflow());
+        let mut replay = builder.replay()?;
+        let moves = moves_of(&replay);
+        let mut lines = std::mem::take(&mut *self.lines.lock().unwrap_or_else(PoisonError::into_inner));
+        lines.sort_by_key(|line| line.number);
+        // In parts, as from a file.
+        for part in lines.chunks(7) {
+            replay.play(part.to_vec())?;
+        }
+        let report_again = replay.stop();
+        let mut again = Heard::new();
+        hear(&all, &mut again);
+        hear(&moves, &mut again);
+        same(&first, &again);
+        assert_eq!(counts(report), counts(&report_again));
+        Ok(first)
+    }
+}
+
+fn moves_of(live: &bb_core::Live<Again>) -> DynamicSubscription {
+    live.subscribe_any(Select::Path("actuator/base/pan/servo"), None, overflow())
+}
+
+/// Runs it on virtual time as `script` has it, and again.
+fn again(script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>) -> Result<(Heard, Report), Failure> {
+    let (journaled, builder) = Journaled::new();
+    let mut simulation = builder.simulate()?;
+    let moves = moves_of(&simulation);
+    assert!(simulation.arm());
+    script(&mut simulation)?;
+    let report = simulation.stop();
+    Ok((journaled.expect_the_same_again(&moves, &report)?, report))
+}
+
+/// The same in real time.
+fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Heard, Report), Failure> {
+    let (journaled, builder) = Journaled::new();
+    let running = builder.start()?;
+    let moves = moves_of(&running);
+    assert!(running.arm());
+    script(&running);
+    let report = running.stop();
+    Ok((journaled.expect_the_same_again(&moves, &report)?, report))
+}
+
+fn count(heard: &Heard, path: &str) -> usize {
+    heard.get(path).map_or(0, Vec::len)
+}
+
+fn feed(simulation: &mut Simulation<Again>, millis: std::ops::Range<i64>) {
+    for millis in millis {
+        simulation.publish(again::sensor::base::number, at(millis), Number(millis as f64));
+        simulation.publish(again::sensor::base::pan::encoder, at(millis), Number(-0.5));
+    }
+}
+
+#[test]
+fn requests_that_a_journal_holds_are_made_again() -> Result<(), Failure> {
+    let _alone = alone();
+    let (heard, _) = again(|simulation| {
+        for round in 0..20 {
+            feed(simulation, round * 10..round * 10 + 9);
+            simulation.call(again::sensor::base::number::sum, Add(round as f64 * 1e6))?;
+            simulation.cast(again::estimator::base::apart, Add(round as f64 * 1e7))?;
+        }
+        Ok(())
+    })?;
+    assert!(count(&heard, "sensor/base/number/sum") > 200);
+    Ok(())
+}
+
+#[test]
+fn a_request_that_a_journal_does_not_hold_is_named_where_it_makes_a_difference() -> Result<(), Failure> {
+    let _alone = alone();
+    let failed = again(|simulation| {
+        feed(simulation, 1..20);
+        simulation.cast(again::sensor::base::number::sum, Forget)?;
+        feed(simulation, 20..30);
+        Ok(())
+    });
+    let error = failed.err().ok_or("it is not the same")?.to_string();
+    assert!(error.contains("`sensor/base/number/sum` emits another message than it did"), "{error}");
+    assert!(error.contains("Forget` in line") && error.contains("set `RECORD` for it"), "{error}");
+    Ok(())
+}
+
+#[test]
+fn commands_that_drive_an_actuator_and_are_cancelled_or_time_out_do_so_again() -> Result<(), Failure> {
+    let _alone = alone();
+    let (heard, report) = again(|simulation| {
+        // Fed, so that it is not lost, which would start a command that cancels these.
+        feed(simulation, 1..10);
+        let done = simulation.command(again::command::drive, Way { steps: 5, tunes: true })?;
+        feed(simulation, 10..30);
+        assert_eq!(done.try_result(), Some(Ok(5)));
+        let cancelled = simulation.command(again::command::drive, Way { steps: 20, tunes: true })?;
+        feed(simulation, 30..45);
+        cancelled.cancel();
+        feed(simulation, 45..50);
+        assert_eq!(cancelled.try_result(), Some(Err(CommandError::Cancelled)));
+        let late = simulation.command(again::command::drive, Way { steps: 1000, tunes: false })?;
+        feed(simulation, 50..150);
+        assert_eq!(late.try_result(), Some(Err(CommandError::TimedOut)));
+        Ok(())
+    })?;
+    assert!(count(&heard, "actuator/base/pan/servo") > 30 && count(&heard, "progress") > 30);
+    assert!(count(&heard, "param/gain") > 10);
+    let drive = report.commands.iter().find(|command| command.name == "drive").ok_or("it is declared")?;
+    assert_eq!((drive.succeeded, drive.cancelled, drive.timed_out), (1, 1, 1));
+    Ok(())
+}
+
+#[test]
+fn parameters_that_are_set_and_estimators_that_are_lost_are_so_again() -> Result<(), Failure> {
+    let _alone = alone();
+    let (heard, report) = again(|simulation| {
+        for round in 0..10 {
+            feed(simulation, round * 100..round * 100 + 20);
+            // At the instant of a tick too, and of a loss.
+            simulation.set_parameter(again::param::gain, round as f64 / 10.0)?;
+            simulation.run_until(at(round * 100 + 21));
+            simulation.set_parameter(again::param::gain, round as f64 / 5.0)?;
+            simulation.run_until(at(round * 100 + 59));
+            simulation.set_parameter(again::param::gain, 1.0)?;
+        }
+        Ok(())
+    })?;
+    assert_eq!(count(&heard, "param/gain"), 30);
+    let sum = report.estimator("sensor/base/number/sum").ok_or("it is declared")?;
+    assert!(sum.transitions >= 20, "it is lost and found each time: {}", sum.transitions);
+    Ok(())
+}
+
+#[test]
+fn panics_that_escalate_until_the_robot_is_disarmed_do_so_again() -> Result<(), Failure> {
+    let _alone = alone();
+    let (heard, report) = again(|simulation| {
+        for failure in 1..=12 {
+            feed(simulation, failure * 300..failure * 300 + 3);
+            simulation.publish(again::sensor::base::number, at(failure * 300 + 3), Number(PANICS));
+            simulation.publish(again::sensor::base::pan::encoder, at(failure * 300 + 3), Number(PANICS));
+        }
+        Ok(())
+    })?;
+    assert!(count(&heard, "safety/error") > 0 && report.safety == Safety::Error, "the budget was used up");
+    assert!(report.estimators.iter().all(|estimator| estimator.restarts > 0), "all were restarted");
+    Ok(())
+}
+
+#[test]
+fn a_stop_with_a_command_that_runs_and_a_disarm_that_fails_is_one_again() -> Result<(), Failure> {
+    let _alone = alone();
+    let (heard, report) = again(|simulation| {
+        feed(simulation, 1..20);
+        simulation.command(again::command::drive, Way { steps: 3, tunes: false })?;
+        feed(simulation, 20..30);
+        simulation.command(again::command::drive, Way { steps: 10, tunes: false })?;
+        simulation.run_until(at(31));
+        simulation.actuate(again::actuator::base::pan::servo, Number(REFUSES))?;
+        assert_eq!(simulation.state(), "executing");
+        Ok(())
+    })?;
+    assert_eq!((report.safety, count(&heard, "safety/error")), (Safety::Error, 1));
+    Ok(())
+}
+
+#[test]
+fn an_actuator_that_fails_does_so_again() -> Result<(), Failure> {
+    let _alone = alone();
+    let (heard, report) = again(|simulation| {
+        for round in 1..5 {
+            simulation.run_until(at(round * 200));
+            assert!(simulation.actuate(again::actuator::base::pan::servo, Number(-1.0)).is_err());
+            assert!(simulation.actuate(again::actuator::base::pan::servo, Number(1.0)).is_err(), "not yet back");
+            simulation.run_until(at(round * 200 + 150));
+            simulation.actuate(again::actuator::base::pan::servo, Number(1.0))?;
+        }
+        Ok(())
+    })?;
+    assert_eq!((count(&heard, "fault"), count(&heard, "actuator/base/pan/servo")), (4, 4));
+    assert_eq!(report.all_faults, 4);
+    Ok(())
+}
+
+#[test]
+fn what_did_not_fit_in_a_full_inbox_does_not_fit_again() {
+    let _alone = alone();
+    within(120, || {
+        let (_, report) = again_in_real_time(|running| {
+            HERE.close("an adder");
+            // The worker adds what the first estimator emits: it hangs alone.
+            let publish = |number| {
+                let live = running.live();
+                std::thread::spawn(move || {
+                    live.publish(again::sensor::base::number, live.clock().now(), Number(number));
+                })
+            };
+            let hung = publish(HANGS);
+            HERE.wait_for(1);
+            for number in 0..1500 {
+                running.publish(again::sensor::base::number, running.clock().now(), Number(f64::from(number)));
+            }
+            HERE.open();
+            hung.join().expect("it does not panic");
+        })
+        .expect("it is the same");
+        let sum = report.estimator("sensor/base/number/sum").expect("it is declared");
+        assert!(sum.inputs[0].dropped(DropReason::Overflow) >= 1500 - 1024);
+    });
+}
+
+#[test]
+fn an_overrun_of_a_budget_is_one_again_though_the_code_is_fast_now() {
+    let _alone = alone();
+    within(120, || {
+        let (_, report) = again_in_real_time(|running| {
+            for round in 0..30 {
+                let number = if round % 3 == 0 { IS_SLOW } else { 1.0 };
+                running.publish(again::sensor::base::number, running.clock().now(), Number(number));
+                // An answer comes when what waited before is done.
+                running.call(again::sensor::base::number::sum, Add(0.0)).expect("it runs");
+            }
+        })
+        .expect("it is the same");
+        let sum = report.estimator("sensor/base/number/sum").expect("it is declared");
+        assert!(sum.transitions > 10, "it overruns and recovers: {}", sum.transitions);
+    });
+}
+
+#[test]
+fn everything_at_once_on_many_threads_expect_the_same_again() {
+    let _alone = alone();
+    within(240, || {
+        let (heard, report) = again_in_real_time(|running| {
+            std::thread::scope(|scope| {
+                scope.spawn(|| {
+                    for round in 0..400 {
+                        let number = if round % 40 == 20 { IS_SLOW } else { f64::from(round) };
+                        running.publish(again::sensor::base::number, running.clock().now(), Number(number));
+                        std::thread::sleep(Duration::from_micros(500));
+                    }
+                });
+                scope.spawn(|| {
+                    for round in 0..400 {
+                        let number = if round % 100 == 50 { PANICS } else { 1.0 };
+                        running.publish(again::sensor::base::pan::encoder, running.clock().now(), Number(number));
+                        std::thread::sleep(Duration::from_micros(400));
+                    }
+                });
+                scope.spawn(|| {
+                    for round in 0..200 {
+                        running.set_parameter(again::param::gain, f64::from(round % 7)).expect("it is finite");
+                        // The estimator may wait for its restart.
+                        let _ = running.call(again::sensor::base::number::sum, Add(1.0));
+                        let _ = running.cast(again::estimator::base::behind, Add(2.0));
+                        std::thread::sleep(Duration::from_millis(1));
+                    }
+                });
+                scope.spawn(|| {
+                    for round in 0..60 {
+                        // Refused, or not, as its state has it.
+                        let drive = running.command(again::command::drive, Way { steps: 3, tunes: round % 2 == 0 });
+                        std::thread::sleep(Duration::from_millis(3));
+                        if let Ok(drive) = drive
+                            && round % 3 == 0
+                        {
+                            drive.cancel();
+                        }
+                        if round % 20 == 10 {
+                            running.disarm();
+                            running.arm();
+                        }
+                    }
+                });
+            });
+            // Messages wait, and a command runs, when it is stopped.
+            for number in 0..50 {
+                running.publish(again::sensor::base::number, running.clock().now(), Number(f64::from(number)));
+            }
+        })
+        .expect("it is the same");
+        assert!(count(&heard, "sensor/base/number/sum") > 300 && count(&heard, "param/gain") >= 200, "{report}");
+        assert!(count(&heard, "actuator/base/pan/servo") > 5 && count(&heard, "safety") > 4, "{report}");
+    });
+}
+
+/// Gives what it did not give the first time, from its third message on.
+#[derive(Debug)]
+pub(crate) struct Dice(u32);
+
+impl Estimator for Dice {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self(0))
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        self.0 += 1;
+        let differs = self.0 >= 3 && !IS_FIRST.load(Ordering::SeqCst);
+        // The least bit of one number.
+        Ok(Reply::emit(if differs { Number(f64::from_bits(number.0.to_bits() ^ 1)) } else { number.payload }))
+    }
+}
+
+macro_rules! rig {
+    ($module:ident: $($sensor:ident)*) => {
+        mod $module {
+            use super::*;
+            robot! {
+                pub(crate) robot Rig;
+                link base { $( sensor $sensor: External<Number>() { estimator dice: Dice(); } )* }
+            }
+        }
+    };
+}
+
+rig!(left_first: left right);
+rig!(right_first: right left);
+
+/// The journal of five messages of each sensor.
+fn of_rig() -> Result<Vec<Entry>, Failure> {
+    IS_FIRST.store(true, Ordering::SeqCst);
+    let mut builder = left_first::Rig::builder();
+    let lines = Lines::default();
+    let sink = std::sync::Arc::clone(&lines);
+    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let mut simulation = builder.simulate()?;
+    for millis in 1..=5 {
+        simulation.publish(left_first::rig::sensor::base::left, at(millis), Number(1.0));
+        simulation.publish(left_first::rig::sensor::base::right, at(millis), Number(2.0));
+    }
+    simulation.stop();
+    let lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    Ok(lines)
+}
+
+#[test]
+fn a_journal_of_a_robot_whose_sensors_stand_in_another_order_is_refused() -> Result<(), Failure> {
+    let _alone = alone();
+    let lines = of_rig()?;
+    let error = right_first::Rig::builder().replay()?.play(lines.clone()).expect_err("it is of another robot");
+    assert_eq!(error.line, 1);
+    assert_eq!(
+        error.message,
+        "the journal is of another robot: it says `sensor/base/left publishes Number`, and this robot has \
+         `sensor/base/right publishes Number`"
+    );
+    left_first::Rig::builder().replay()?.play(lines)?;
+    Ok(())
+}
+
+#[test]
+fn an_estimator_that_gives_something_else_is_named_at_its_first_difference() -> Result<(), Failure> {
+    let _alone = alone();
+    let lines = of_rig()?;
+    IS_FIRST.store(false, Ordering::SeqCst);
+    let outputs: Vec<_> =
+        lines.iter().filter(|line| matches!(line.event, Event::Output { .. })).map(|line| line.number).collect();
+    assert_eq!(outputs.len(), 10);
+    let error = left_first::Rig::builder().replay()?.play(lines).expect_err("it gives something else");
+    assert_eq!(error.line, outputs[4], "the third of the first of the two");
+    assert_eq!(
+        error.message,
+        "`sensor/base/left/dice` emits another message than it did: the algorithm is not deterministic"
+    );
+    Ok(())
+}
+
+const FILE: &str = "BB_TESTS_KILLED_JOURNAL";
+
+/// A robot that is killed while its journal is recorded.
+#[test]
+fn child() {
+    let Ok(file) = std::env::var(FILE) else { return };
+    let mut builder = Again::builder();
+    builder.publish_journal();
+    let journal = builder.subscribe_any(Select::Path("journal"), None, overflow());
+    let mut options = RecorderOptions::of::<Again>();
+    options.flush_messages = 50;
+    let recorder = Recorder::new(file, journal, options).expect("it can be created").spawn().expect("a thread");
+    let running = builder.start().expect("it starts");
+    running.arm();
+    for round in 0_u32.. {
+        running.publish(again::sensor::base::number, running.clock().now(), Number(f64::from(round % 100)));
+        running.publish(again::sensor::base::pan::encoder, running.clock().now(), Number(1.0));
+        if round.is_multiple_of(10) {
+            running.set_parameter(again::param::gain, f64::from(round % 7)).expect("it is finite");
+            let _ = running.command(again::command::drive, Way { steps: 3, tunes: true });
+            println!("\nround {round}");
+        }
+        std::thread::sleep(Duration::from_micros(300));
+    }
+    drop(recorder);
+}
+
+/// What a file holds up to where it breaks off.
+fn lines_of(file: &std::path::Path) -> Result<Vec<Entry>, Failure> {
+    let reader = JournalReader::<Again>::default();
+    let recording = Recording::open(file)?;
+    let lines = recording.messages::<JournalLine>("journal")?.map_while(Result::ok);
+    lines.map(|line| Ok(reader.entry(&line.payload)?)).collect()
+}
+
+#[test]
+fn the_journal_of_a_robot_that_was_killed_is_replayed_up_to_where_it_breaks_off() -> Result<(), Failure> {
+    let _alone = alone();
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    for rounds in [100, 333, 871, 1500] {
+        let number = NUMBER.fetch_add(1, Ordering::SeqCst);
+        let file = std::env::temp_dir().join(format!("bb-killed-{}-{number}.mcap", std::process::id()));
+        let _ = std::fs::remove_file(&file);
+        let mut child = std::process::Command::new(std::env::current_exe()?)
+            .args(["--exact", "journals::child", "--nocapture"])
+            .env(FILE, &file)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let lines = BufReader::new(child.stdout.take().ok_or("it is piped")?).lines();
+        let mut reached = lines
+            .map_while(Result::ok)
+            .filter_map(|line| line.strip_prefix("round ")?.parse::<u32>().ok())
+            .skip_while(|round| *round < rounds);
+        assert!(reached.next().is_some(), "it runs until it is killed");
+        // The recorder may lag behind.
+        let start = std::time::Instant::now();
+        while std::fs::metadata(&file).map_or(0, |file| file.len()) < 30_000 + 20 * u64::from(rounds) {
+            assert!(start.elapsed() < Duration::from_secs(20), "nothing is recorded");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        // At any moment, in the middle of a line too.
+        std::thread::sleep(Duration::from_micros(u64::from(rounds) * 37 % 5000));
+        child.kill()?;
+        child.wait()?;
+        let mut lines = lines_of(&file)?;
+        std::fs::remove_file(&file)?;
+        lines.sort_by_key(|line| line.number);
+        let whole = (1..).zip(&lines).take_while(|(number, line)| *number == line.number).count();
+        assert!(whole > 50, "{whole} lines are left of {rounds} rounds");
+        assert_eq!(whole, lines.len(), "none is missing in between");
+        let Event::Begin { declaration, .. } = &lines[0].event else {
+            return Err("it begins with the robot".into());
+        };
+        let mut publishers = declaration.iter().filter(|fact| fact.contains(" publishes "));
+        let sum = publishers.position(|fact| fact.starts_with("sensor/base/number/sum "));
+        let is_of_sum =
+            |line: &&Entry| matches!(line.event, Event::Output { publisher, .. } if Some(publisher) == sum);
+        let recorded = lines.iter().filter(is_of_sum).count();
+        let builder = Again::builder();
+        let sums = builder.subscribe_with(again::sensor::base::number::sum, overflow());
+        let mut replay = builder.replay()?;
+        // Another process does not know what was published at a path made at run time, nor which requests there are.
+        let _progress = replay.bus().publisher::<Number>("progress")?;
+        replay.play(lines)?;
+        let report = replay.stop();
+        assert_eq!(report.faults.iter().find(|fault| fault.path == "journal"), None);
+        // The line of the last one may be missing, and not that of the message that led to it.
+        let replayed = sums.drain().count();
+        assert!(recorded > 0 && (recorded..=recorded + 1).contains(&replayed), "{replayed} of {recorded}");
+    }
+    Ok(())
+}

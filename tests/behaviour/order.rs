@@ -1,0 +1,238 @@
+//! What comes before what, on many threads; and code that the robot calls, which may call it back.
+
+use crate::components::{Number, within};
+use bb_core::prelude::*;
+use std::future::Future;
+use std::pin::pin;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
+use std::task::{Context as Polled, Wake, Waker};
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Says whether what it asked for in `init` came before its first message.
+#[derive(Debug)]
+pub(crate) struct Prepared(bool);
+
+impl Estimator for Prepared {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
+        context.request(Request::Continue(1));
+        Ok(Self(false))
+    }
+
+    fn handle_continue(&mut self, _: u32) -> Result<Reply<Number>, Fault> {
+        self.0 = true;
+        Ok(Reply::none())
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(if self.0 { 1.0 } else { -1.0 })))
+    }
+}
+
+pub(crate) struct Ask;
+
+impl HandleCall<Ask> for Prepared {
+    type Response = bool;
+    fn handle_call(&mut self, Ask: Ask) -> Result<(bool, Reply<Number>), Fault> {
+        Ok((self.0, Reply::none()))
+    }
+}
+
+/// Always has something.
+#[derive(Debug)]
+pub(crate) struct Eager;
+
+impl Sensor for Eager {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::now(Number(1.0)))
+    }
+}
+
+/// Notes what it is told, in order.
+#[derive(Debug)]
+pub(crate) struct Obedient;
+
+static DONE: Mutex<Vec<f64>> = Mutex::new(Vec::new());
+
+impl Actuator for Obedient {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
+        lock(&DONE).push(command.0);
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+robot! {
+    robot Orderly;
+    parameters { gain: f64 = 1.0; }
+    commands { arm: Arm; disarm: Disarm; }
+    link base {
+        joint pan: continuous {
+            axis: z;
+            sensor encoder: External<Number>() { estimator position: Prepared(); }
+            actuator motor: Obedient();
+            link head { }
+        }
+        sensor eager: Eager() { rate: 1 kHz; estimator prepared: Prepared(); }
+        estimator apart: Prepared() { input number: sensor::base::eager; runs_on: worker; }
+    }
+}
+
+#[test]
+fn what_is_asked_for_in_init_comes_before_the_first_message() {
+    within(120, || {
+        for _ in 0..50 {
+            let builder = Orderly::builder();
+            let near = builder.subscribe(orderly::sensor::base::eager::prepared);
+            let apart = builder.subscribe(orderly::estimator::base::apart);
+            let running = builder.start().expect("it starts");
+            for prepared in [near, apart] {
+                assert_eq!(prepared.recv_timeout(PATIENCE).map(|number| number.0), Some(1.0));
+            }
+            running.stop();
+        }
+    });
+}
+
+#[test]
+fn commands_to_an_actuator_are_published_in_the_order_in_which_it_carried_them_out() {
+    within(60, || {
+        let running = Orderly::builder().start().expect("it starts");
+        assert!(running.arm());
+        let motor = orderly::actuator::base::pan::motor;
+        let room = Overflow::DropOldest { capacity: 10_000 };
+        let told = running.subscribe_any(Select::Path(motor.path()), None, room);
+        lock(&DONE).clear();
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let running = &running;
+                scope.spawn(move || {
+                    for number in 0..1000 {
+                        running.actuate(motor, Number(f64::from(1000 * thread + number))).expect("it is armed");
+                    }
+                });
+            }
+        });
+        let numbers = told.drain().filter_map(|message| message.downcast::<Number>().map(|number| number.0));
+        let (numbers, done): (Vec<_>, _) = (numbers.collect(), lock(&DONE).clone());
+        assert_eq!(numbers.len(), 4000);
+        let differs = numbers.iter().zip(&done).position(|(told, done)| told != done);
+        assert_eq!(differs, None, "the first that was published at another place than it was carried out");
+    });
+}
+
+/// Runs a function when it is woken.
+struct Wakes(Mutex<Box<dyn FnMut() + Send>>);
+
+impl Wake for Wakes {
+    fn wake(self: Arc<Self>) {
+        (lock(&self.0))();
+    }
+}
+
+fn when_woken<T: Payload>(subscription: &mut Subscription<T>, run: impl FnMut() + Send + 'static) {
+    let waker = Waker::from(Arc::new(Wakes(Mutex::new(Box::new(run)))));
+    let awaited = pin!(subscription.recv_async());
+    assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
+}
+
+#[test]
+fn who_listens_to_the_robot_itself_may_call_it_back() {
+    within(120, || {
+        for topic in ["safety", "state", "parameter", "command"] {
+            let builder = Orderly::builder();
+            let (mut safety, mut state) =
+                (builder.subscribe(system::SafetyState), builder.subscribe(system::StateMachine));
+            let (mut parameter, mut command) =
+                (builder.subscribe(orderly::param::gain), builder.subscribe(orderly::command::arm));
+            let running = builder.start().expect("it starts");
+            let (live, (called, is_called)) = (running.live(), mpsc::channel());
+            let call = move || {
+                live.set_parameter(orderly::param::gain, 2.0).expect("it is finite");
+                let _ = live.command(orderly::command::disarm, NoArguments);
+                live.disarm();
+                live.arm();
+                called.send((live.safety(), live.report().faults.len())).expect("the test waits for it");
+            };
+            match topic {
+                "safety" => when_woken(&mut safety, call),
+                "state" => when_woken(&mut state, call),
+                "parameter" => when_woken(&mut parameter, call),
+                _ => when_woken(&mut command, call),
+            }
+            running.set_parameter(orderly::param::gain, 3.0).expect("it is finite");
+            running.command(orderly::command::arm, NoArguments).expect("it is disarmed");
+            let called = is_called.recv_timeout(PATIENCE);
+            assert!(called.is_ok(), "{topic}: it hangs");
+            running.stop();
+        }
+    });
+}
+
+#[test]
+fn the_sink_of_a_journal_may_ask_the_robot() {
+    within(120, || {
+        let live: Arc<OnceLock<bb_core::Live<Orderly>>> = Arc::default();
+        let (asked, is_asked) = mpsc::channel();
+        let (seen, asked) = (Arc::clone(&live), Mutex::new(asked));
+        let mut builder = Orderly::builder();
+        builder.journal(move |_| {
+            if let Some(live) = seen.get() {
+                let _ = live.parameter(orderly::param::gain);
+                let _ = live.report();
+                // Nobody may wait for it any more.
+                let _ = lock(&asked).send((live.safety(), live.state()));
+            }
+        });
+        let mut simulation = builder.simulate().expect("it starts");
+        assert!(live.set(simulation.live()).is_ok());
+        assert!(simulation.arm());
+        simulation.set_parameter(orderly::param::gain, 2.0).expect("it is finite");
+        simulation.run_for(Duration::from_millis(3));
+        assert!(simulation.disarm());
+        assert!(is_asked.try_iter().count() > 5);
+        simulation.stop();
+    });
+}
+
+#[test]
+fn a_subscriber_of_one_robot_may_ask_another_robot() {
+    within(120, || {
+        let builder = Orderly::builder();
+        let mut position = builder.subscribe(orderly::sensor::base::pan::encoder::position);
+        let running = builder.start().expect("it starts");
+        let other = Orderly::builder().start().expect("it starts");
+        let (live, (asked, is_asked)) = (other.live(), mpsc::channel());
+        when_woken(&mut position, move || {
+            let answer = live.call(orderly::sensor::base::pan::encoder::position, Ask);
+            asked.send(answer.map_err(|fault| fault.to_string())).expect("the test waits for it");
+        });
+        running.publish(orderly::sensor::base::pan::encoder, running.clock().now(), Number(1.0));
+        assert_eq!(is_asked.recv_timeout(PATIENCE), Ok(Ok(true)));
+    });
+}

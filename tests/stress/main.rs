@@ -1,0 +1,210 @@
+//! Random bad days, each run once and then again from its journal: everything that was published, and every count, must be
+//! the same. `BB_STRESS_SECONDS` says for how long, `BB_STRESS_SEED` which days.
+
+mod robot;
+
+use bb_core::journal::Entry;
+use bb_core::prelude::*;
+use bb_core::{DynamicSubscription, Report};
+use robot::{Add, Ask, Dice, Random, Weathered, weathered};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+type Lines = Arc<Mutex<Vec<Entry>>>;
+
+/// What was published, path by path, to the last bit of payload and stamp.
+type Heard = BTreeMap<&'static str, Vec<String>>;
+
+fn hear(subscription: &DynamicSubscription) -> Heard {
+    assert_eq!(subscription.lagged(), 0);
+    let mut heard = Heard::new();
+    for message in subscription.drain() {
+        let payload = match message.downcast::<Dice>() {
+            Some(dice) => format!("{:016x}", dice.0.to_bits()),
+            None => format!("{message:?}"),
+        };
+        heard.entry(message.path()).or_default().push(format!("{:?} {payload}", message.stamp()));
+    }
+    heard
+}
+
+/// Counts of estimators, topics and commands; measured durations are not part of it.
+fn counts(report: &Report) -> Vec<String> {
+    let estimators = report.estimators.iter().map(|estimator| {
+        let mut estimator = estimator.clone();
+        estimator.latency = Default::default();
+        estimator.inputs.iter_mut().for_each(|input| input.age = Default::default());
+        format!("{estimator:?}")
+    });
+    let topics = report.topics.iter().map(|topic| format!("{} {}", topic.path, topic.published));
+    let commands = report.commands.iter().map(|command| format!("{command:?}"));
+    let whole = [format!("{} {}", report.state, report.safety)];
+    estimators.chain(topics).chain(commands).chain(whole).collect()
+}
+
+fn room() -> Overflow {
+    Overflow::DropOldest { capacity: Overflow::MAX_CAPACITY }
+}
+
+/// A robot of that seed: some days panics escalate, and on others the budgets are wide.
+fn builder(random: &mut Random) -> bb_core::Builder<Weathered> {
+    let mut builder = Weathered::builder();
+    builder.supervision().max_restarts = [3, 10, 1_000_000][random.below(3) as usize];
+    builder.options(weathered::sensor::base::a).seed = random.below(1 << 30);
+    builder.options(weathered::sensor::base::b).seed = random.below(1 << 30);
+    builder
+}
+
+/// What comes from outside: the same calls on a simulated robot and on a running one.
+fn disturb(live: &bb_core::Live<Weathered>, random: &mut Random) {
+    let dice = Dice(random.below(1000) as f64);
+    match random.below(14) {
+        0..3 => live.publish(weathered::sensor::base::fed, live.clock().now(), dice),
+        3 => drop(live.command(weathered::command::drive, NoArguments)),
+        4 => drop(live.command(weathered::command::halt, NoArguments)),
+        5 => {
+            if let Ok(execution) = live.command(weathered::command::drive, NoArguments) {
+                execution.cancel();
+            }
+        }
+        6 => drop(live.set_parameter(weathered::param::gain, dice.0 / 500.0 - 0.5)),
+        7 => drop(live.set_parameter(weathered::param::pace, dice.0)),
+        8 => drop(live.call(weathered::sensor::base::a::near, Ask(dice.0 / 10.0))),
+        9 => drop(live.cast(weathered::estimator::base::far, Ask(dice.0 / 10.0))),
+        10 => drop(live.cast(weathered::sensor::base::b::beside, Add(dice.0))),
+        11 if dice.0 < 500.0 => drop(live.cast(weathered::estimator::base::far, Add(dice.0))),
+        11 => drop(live.call(weathered::estimator::base::last, Ask(dice.0 / 10.0))),
+        12 if dice.0 < 300.0 => drop(live.disarm()),
+        _ => drop(live.arm()),
+    }
+}
+
+fn virtual_day(seed: u64) -> Result<bool, Box<dyn Error>> {
+    let mut random = Random::new(seed);
+    let mut builder = builder(&mut random);
+    let lines = Lines::default();
+    let sink = Arc::clone(&lines);
+    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let all = builder.subscribe_any(Select::All, None, room());
+    let mut simulation = builder.simulate()?;
+    simulation.arm();
+    let live = simulation.live();
+    for _ in 0..60 {
+        simulation.run_for(Duration::from_micros(random.below(9000)));
+        for _ in 0..random.below(4) {
+            disturb(&live, &mut random);
+        }
+        if random.below(20) == 0 {
+            let latency = Duration::from_micros(random.below(600));
+            simulation.pretend_latency(weathered::sensor::base::a::near, latency);
+        }
+    }
+    let report = simulation.stop();
+    is_same_again(seed, &lines, &hear(&all), &report)
+}
+
+fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
+    let mut random = Random::new(seed);
+    let mut builder = builder(&mut random);
+    let lines = Lines::default();
+    let sink = Arc::clone(&lines);
+    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let all = builder.subscribe_any(Select::All, None, room());
+    let running = builder.start()?;
+    running.arm();
+    let disturbers: Vec<_> = (0..2)
+        .map(|number| {
+            let live = running.live();
+            let mut random = Random::new(seed ^ (number << 40));
+            std::thread::spawn(move || {
+                for _ in 0..80 {
+                    std::thread::sleep(Duration::from_micros(random.below(5000)));
+                    disturb(&live, &mut random);
+                }
+            })
+        })
+        .collect();
+    std::thread::sleep(Duration::from_millis(100 + random.below(150)));
+    // Sensors, services, timers and commands go on while it stops. Of callers that do, what they publish after the last line
+    // of the journal may still be counted: `BB_STRESS_CALLERS` has them go on as well.
+    let callers_go_on = std::env::var_os("BB_STRESS_CALLERS").is_some();
+    if !callers_go_on {
+        disturbers.into_iter().try_for_each(std::thread::JoinHandle::join).map_err(|_| "a disturber panicked")?;
+    }
+    let report = running.stop();
+    is_same_again(seed, &lines, &hear(&all), &report)
+}
+
+/// Plays the journal; false, with the first difference, if something is not the same.
+fn is_same_again(seed: u64, lines: &Lines, first: &Heard, report: &Report) -> Result<bool, Box<dyn Error>> {
+    let builder = builder(&mut Random::new(seed));
+    let all = builder.subscribe_any(Select::All, None, room());
+    let mut replay = builder.replay()?;
+    let lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    assert!(
+        lines.windows(2).all(|pair| pair[0].number + 1 == pair[1].number),
+        "lines come in order, without a gap"
+    );
+    replay.play(lines)?;
+    let report_again = replay.stop();
+    let again = hear(&all);
+    for path in first.keys().chain(again.keys()) {
+        let none = Vec::new();
+        let (then, now) = (first.get(path).unwrap_or(&none), again.get(path).unwrap_or(&none));
+        if then != now {
+            let at = (0..).find(|&at| then.get(at) != now.get(at)).unwrap_or(0);
+            println!("seed {seed}: {path}, message {at}:\n  then {:?}\n  now  {:?}", then.get(at), now.get(at));
+            return Ok(false);
+        }
+    }
+    let (then, now) = (counts(report), counts(&report_again));
+    if let Some((then, now)) = then.iter().zip(&now).find(|(then, now)| then != now) {
+        println!("seed {seed}:\n  then {then}\n  now  {now}");
+        return Ok(false);
+    }
+    Ok(then.len() == now.len())
+}
+
+fn from_environment(name: &str) -> Option<u64> {
+    std::env::var(name).ok()?.parse().ok()
+}
+
+/// So many days, or as many as fit into `BB_STRESS_SECONDS`.
+fn days(kind: &str, few: u64, day: fn(u64) -> Result<bool, Box<dyn Error>>) {
+    std::panic::set_hook(Box::new(|info| {
+        let of_test = std::thread::current().name().is_some_and(|name| name.contains("days"));
+        if of_test {
+            println!("{info}");
+        }
+    }));
+    let first = from_environment("BB_STRESS_SEED").unwrap_or(1);
+    let seconds = from_environment("BB_STRESS_SECONDS");
+    let start = Instant::now();
+    let mut different = Vec::new();
+    let mut seed = first;
+    while seconds.map_or(seed < first + few, |seconds| start.elapsed() < Duration::from_secs(seconds)) {
+        match day(seed) {
+            Ok(true) => {}
+            Ok(false) => different.push(seed),
+            Err(error) => {
+                println!("seed {seed}: {error}");
+                different.push(seed);
+            }
+        }
+        seed += 1;
+    }
+    println!("{kind}: {} days from seed {first}, different: {different:?}", seed - first);
+    assert!(different.is_empty(), "{kind}: different at the seeds {different:?}");
+}
+
+#[test]
+fn days_on_virtual_time() {
+    days("virtual time", 40, virtual_day);
+}
+
+#[test]
+fn days_on_many_threads() {
+    days("many threads", 6, real_day);
+}
