@@ -1,8 +1,9 @@
 //! A report as metrics. One family after the other: the text format wants each in one piece.
 
 use bb_core::control::CommandStatistics;
-use bb_core::node::{DropReason, EstimatorStatistics};
+use bb_core::node::{DropReason, EstimatorStatistics, LatencyStatistics};
 use bb_core::pubsub::TopicStatistics;
+use bb_core::run::SourceStatistics;
 use bb_core::{HealthState, Live, Report, Robot, Safety};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, MetricEncoder, NoLabelSet};
@@ -29,6 +30,7 @@ impl<R: Robot> Collector for Counts<R> {
         inputs(&mut families, &report.estimators)?;
         estimators(&mut families, &report.estimators)?;
         latencies(&mut families, &report.estimators)?;
+        sources(&mut families, &report.sources)?;
         topics(&mut families, &report.topics)?;
         commands(&mut families, &report.commands)?;
         robot(&mut families, &report, R::STATES)
@@ -64,7 +66,7 @@ fn estimators(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -
         ("estimator_dispatches", "Calls of the estimator", |estimator| estimator.dispatched),
         ("estimator_emissions", "Calls in which it emitted", |estimator| estimator.emitted),
         ("estimator_divergences", "Times it said that it has diverged", |estimator| estimator.diverged),
-        ("estimator_restarts", "Times it was made anew", |estimator| estimator.restarts),
+        ("estimator_restarts", "Times it was restarted", |estimator| estimator.restarts),
         ("estimator_health_transitions", "Changes of its health", |estimator| estimator.transitions),
     ];
     for (name, help, count) in counters {
@@ -96,18 +98,38 @@ fn latencies(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) ->
             .iter()
             .try_for_each(|estimator| family.count(&[("estimator", estimator.path)], estimator.latency.count))
     })?;
-    let measured = || estimators.iter().filter(|estimator| estimator.latency.count > 0);
     families.gauge("estimator_latency", "Time in callbacks since the start", Some(Unit::Seconds), |family| {
-        for estimator in measured() {
-            let latency = estimator.latency;
-            for (quantile, duration) in
-                [("0.5", latency.median), ("0.99", latency.p99), ("0.999", latency.p999), ("1", latency.longest)]
-            {
-                let labels = [("estimator", estimator.path), ("quantile", quantile)];
-                family.gauge(&labels, duration.as_secs_f64())?;
+        estimators
+            .iter()
+            .try_for_each(|estimator| family.quantiles(&[("estimator", estimator.path)], &estimator.latency))
+    })?;
+    let help = "Age of the driver's messages when the callback returned, since the start";
+    families.gauge("estimator_input_age", help, Some(Unit::Seconds), |family| {
+        for estimator in estimators {
+            for input in &estimator.inputs {
+                family.quantiles(&[("estimator", estimator.path), ("input", input.name)], &input.age)?;
             }
         }
         Ok(())
+    })
+}
+
+fn sources(families: &mut Families<'_>, sources: &[SourceStatistics]) -> fmt::Result {
+    type Count = fn(&SourceStatistics) -> u64;
+    let counters: [(&str, &str, Count); 3] = [
+        ("source_readings", "Readings of a sensor, updates of a service", |source| source.readings),
+        ("source_readings_skipped", "Readings at its rate for which it came too late", |source| source.skipped),
+        ("source_restarts", "Times it was restarted", |source| source.restarts),
+    ];
+    for (name, help, count) in counters {
+        families.counter(name, help, |family| {
+            sources.iter().try_for_each(|source| family.count(&[("source", source.path)], count(source)))
+        })?;
+    }
+    families.gauge("source_running", "0 if it has stopped or waits for its restart", None, |family| {
+        sources
+            .iter()
+            .try_for_each(|source| family.gauge(&[("source", source.path)], one_if(source.stopped.is_none())))
     })
 }
 
@@ -217,5 +239,16 @@ impl Family<'_> {
 
     fn gauge(&mut self, labels: &[Label<'_>], value: f64) -> fmt::Result {
         self.0.encode_family(&labels)?.encode_gauge(&value)
+    }
+
+    /// Nothing if nothing was measured.
+    fn quantiles(&mut self, labels: &[Label<'_>], measured: &LatencyStatistics) -> fmt::Result {
+        let quantiles =
+            [("0.5", measured.median), ("0.99", measured.p99), ("0.999", measured.p999), ("1", measured.longest)];
+        for (quantile, duration) in quantiles.iter().filter(|_| measured.count > 0) {
+            let labels: Vec<Label<'_>> = labels.iter().copied().chain([("quantile", *quantile)]).collect();
+            self.gauge(&labels, duration.as_secs_f64())?;
+        }
+        Ok(())
     }
 }

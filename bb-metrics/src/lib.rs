@@ -1,6 +1,6 @@
 //! What a running robot counts, as Prometheus reads it.
 //!
-//! An [`Exporter`] takes the robot's report anew for each scrape: the robot itself does nothing more than without it.
+//! An [`Exporter`] takes a new report of the robot for each scrape: the robot itself does nothing more than without it.
 //! [`Exporter::render`] gives the text, [`Exporter::serve`] answers `GET /metrics`.
 //!
 //! | metric | labels beside `robot` | what |
@@ -10,12 +10,17 @@
 //! | `bb_estimator_dispatches_total` | `estimator` | calls |
 //! | `bb_estimator_emissions_total` | `estimator` | calls that emitted |
 //! | `bb_estimator_divergences_total` | `estimator` | times it said that it has diverged |
-//! | `bb_estimator_restarts_total` | `estimator` | times it was made anew |
+//! | `bb_estimator_restarts_total` | `estimator` | times it was restarted |
 //! | `bb_estimator_health_transitions_total` | `estimator` | changes of its health |
 //! | `bb_estimator_health` | `estimator`, `state` | 1 for `healthy`, `degraded` or `lost`, 0 for the others |
 //! | `bb_estimator_running` | `estimator` | 0 if it has stopped or waits for its restart |
 //! | `bb_estimator_latencies_total` | `estimator` | callbacks that were measured |
-//! | `bb_estimator_latency_seconds` | `estimator`, `quantile` | since the start, within an eighth; where a `latency_budget` is declared; 1 is the longest |
+//! | `bb_estimator_latency_seconds` | `estimator`, `quantile` | time in callbacks since the start, within an eighth; 1 is the longest; every callback where a `latency_budget` is declared, otherwise every 64th |
+//! | `bb_estimator_input_age_seconds` | `estimator`, `input`, `quantile` | how old messages of the driver were when the callback returned; likewise |
+//! | `bb_source_readings_total` | `source` | readings of a sensor, updates of a service |
+//! | `bb_source_readings_skipped_total` | `source` | readings at its rate for which it came too late |
+//! | `bb_source_restarts_total` | `source` | times it was restarted |
+//! | `bb_source_running` | `source` | 0 if it has stopped or waits for its restart |
 //! | `bb_topic_messages_published_total` | `topic`, `payload` | messages |
 //! | `bb_topic_messages_lost_total` | `topic`, `payload` | messages that slow subscribers lost |
 //! | `bb_topic_subscribers` | `topic`, `payload` | subscriptions that listen now |
@@ -26,7 +31,7 @@
 //! | `bb_operational_state` | `state` | 1 for the one that it is in |
 //! | `bb_faults_total` | | faults of components |
 //!
-//! Counters stand at 0 from the first scrape on, so that the first increment is seen as one.
+//! Counters are exported at 0 from the first scrape on, so that the first increment is seen as one.
 
 mod collector;
 mod exporter;

@@ -58,7 +58,7 @@ where
     type Output = O;
 
     fn init(params: F::Params, context: &Context) -> Result<Self, Fault> {
-        Ok(Self { filter: F::new(params)?, frames: Frames::of(context), types: PhantomData })
+        Ok(Self { filter: F::new(params)?, frames: Frames::of(context)?, types: PhantomData })
     }
 
     fn handle_input(&mut self, input: <I as Inputs>::View<'_>) -> Result<Reply<O>, Fault> {

@@ -3,7 +3,7 @@
 use crate::attitude::ImuSample;
 use bb_core::message::Stamped;
 use bb_core::payload::{Imu, MagneticField, Marg};
-use bb_core::{Context, Input, Inputs};
+use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Matrix3, Vector3};
 
 /// An input of which an inertial sample can be made.
@@ -38,16 +38,19 @@ pub struct Frames {
 
 impl Frames {
     /// As the robot declares them.
-    pub fn of(context: &Context) -> Self {
+    ///
+    /// # Errors
+    /// A moving joint lies between an input and the output.
+    pub fn of(context: &Context) -> Result<Self, Fault> {
         let turned = |rotation: nalgebra::UnitQuaternion<f64>| {
             (rotation.angle() > 0.0).then(|| rotation.to_rotation_matrix().into_inner())
         };
         // Without a magnetometer there is nothing to turn.
         let magnetometer = context.frame_from_input("magnetic_field");
-        Self {
-            frame_from_imu: turned(context.frame_from_driver().rotation),
+        Ok(Self {
+            frame_from_imu: turned(context.frame_from_driver()?.rotation),
             frame_from_magnetometer: magnetometer.ok().and_then(|magnetometer| turned(magnetometer.rotation)),
-        }
+        })
     }
 }
 
