@@ -111,7 +111,7 @@ fn a_component_that_fails_starts_anew_alone_from_a_clean_state() -> Result<(), S
             builder.subscribe(patient::sensor::base::numbers::second),
         );
         let mut simulation = builder.simulate()?;
-        // The sensor beside it breaks at 100 ms and, started anew, at 210 ms; the estimator at 200 ms.
+        // The sensor beside it breaks at 100 ms and, restarted, at 210 ms; the estimator at 200 ms.
         simulation.run_until(at(320));
         assert_eq!(first.drain().map(|number| number.0).collect::<Vec<_>>(), [0.0, 1.0, 3.0], "the third kills it");
         assert_eq!(second.drain().count(), 4, "its sibling misses nothing");

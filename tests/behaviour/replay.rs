@@ -38,7 +38,7 @@ impl Sensor for BadDay {
     type Output = Number;
 
     fn init(options: BadDayOptions, _: &SensorContext) -> Result<Self, Fault> {
-        // One that starts anew must not give the same again.
+        // One that restarts must not give the same again.
         Ok(Self { random: options.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1, reads: options.reads })
     }
 

@@ -1,4 +1,4 @@
-//! What a restart leaves alone, what it begins anew, and what becomes of those who fail in an unusual way.
+//! What a restart leaves alone, what it resets, and what becomes of those who fail in an unusual way.
 
 use crate::components::{Counter, Number, at, within};
 use bb_core::HealthTransition;

@@ -1,4 +1,4 @@
-//! Who is started anew when something fails too often, and who is not.
+//! Who is restarted when something fails too often, and who is not.
 
 use crate::components::{Number, at, within};
 use bb_core::prelude::*;
@@ -217,7 +217,7 @@ fn a_sensor_that_panics_when_it_is_made_anew_is_made_anew_after_longer() {
         assert_eq!(numbers.drain().count(), 10);
         let report = simulation.stop();
         let messages: Vec<_> = report.faults.iter().map(|fault| fault.message.as_str()).collect();
-        let anew = "panicked: no device";
-        assert_eq!(messages, ["panicked: unplugged", anew, anew, "panicked: cannot be closed"]);
+        let remade = "panicked: no device";
+        assert_eq!(messages, ["panicked: unplugged", remade, remade, "panicked: cannot be closed"]);
     });
 }

@@ -126,7 +126,7 @@ impl Step<'_> {
         let HealthReport { transition, epoch } = report;
         let Some(health) = self.state.health.get_mut(estimator) else { return };
         if health.epoch != epoch {
-            // It was lost meanwhile, and does not know yet: what follows is told anew once it does.
+            // It was lost meanwhile, and does not know yet: what follows is told again once it does.
             return;
         }
         let was_lost = health.state == HealthState::Lost;

@@ -167,7 +167,7 @@ pub struct EstimatorStatistics {
     pub emitted: u64,
     /// How often it reported that it has diverged.
     pub diverged: u64,
-    /// How often it was started anew.
+    /// How often it was restarted.
     pub restarts: u64,
     /// How often its health has changed.
     pub transitions: u64,

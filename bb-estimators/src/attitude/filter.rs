@@ -15,7 +15,7 @@ use super::{ImuSample, ParamsError, Real, SampleError};
 /// * Without a field in that sample the filter starts with the shortest rotation that levels it (heading 0).
 ///   If it uses a magnetometer, the first field that comes later sets the heading at once.
 /// * The time step is the difference of two stamps. After a gap longer than [`MAX_GAP_S`](super::MAX_GAP_S)
-///   nothing is integrated: tilt starts anew from the accelerometer, heading is kept until the next field
+///   nothing is integrated: tilt restarts from the accelerometer, heading is kept until the next field
 ///   sets it at once (for ever without a magnetometer).
 /// * In free fall the filter follows the gyroscope alone; one without a gyroscope stays as it is.
 /// * A sample that is refused leaves the filter as it was.

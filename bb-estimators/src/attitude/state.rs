@@ -10,7 +10,7 @@ use super::{ImuSample, Quantity, Real, SampleError};
 /// The longest time between two samples that a filter integrates over, seconds.
 ///
 /// Over a second a hand turns a sensor by more than half a turn, which no single angular velocity describes.
-/// After a longer gap the tilt starts anew from the accelerometer.
+/// After a longer gap the tilt restarts from the accelerometer.
 pub const MAX_GAP_S: f64 = 1.0;
 
 const MAX_GAP_NS: i64 = (MAX_GAP_S * 1e9) as i64;

@@ -30,7 +30,7 @@
 //! * The Butterworth low-passes are in state-variable form. The transfer function is the same, but its states are
 //!   signals, so that the sample's time may change from one to the next, and no small differences of large numbers
 //!   appear.
-//! * Time comes from the stamps. Coefficients are made anew when it differs by more than 1/64 from that of the
+//! * Time comes from the stamps. Coefficients are recomputed when it differs by more than 1/64 from that of the
 //!   coefficients at hand.
 //! * Started from a known orientation, the low-pass starts with gravity in it, and no field sets the heading at once.
 

@@ -8,7 +8,7 @@ use syn::ext::IdentExt;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{Attribute, Token};
 
-/// All words of the language that start an item: where reading can start anew.
+/// All words of the language that start an item: where reading can restart.
 pub(crate) const WORDS: &[&str] = &[
     "parameters",
     "states",

@@ -20,7 +20,7 @@ pub struct FusionParams {
     /// Unit: 1/s. Default: 0.5. Source: the library's `gain`.
     #[cfg_attr(feature = "runtime", option(default = Self::default().gain, range = 0.0..=1000.0))]
     pub gain: f64,
-    /// The gyroscope's range, beyond 98 % of which about any axis the filter starts up anew.
+    /// The gyroscope's range, beyond 98 % of which about any axis the filter restarts.
     ///
     /// Small: fast rotation starts it up again and again. Large: a saturated gyroscope goes unseen. 0: never. From
     /// 0 to 1000.

@@ -221,7 +221,7 @@ impl<T: Real> MekfFilter<T> {
         self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
     }
 
-    /// Starts the orientation's errors anew; what is known of the sensors stays.
+    /// Resets the orientation's errors; what is known of the sensors stays.
     fn begin(&mut self, orientation: &UnitQuaternion<T>, tilt_deviation: T, heading_deviation: T) {
         // Without a magnetometer there is no heading to be wrong.
         let heading_deviation = if self.params.magnetometer { heading_deviation } else { T::ZERO };
@@ -365,7 +365,7 @@ impl<T: Real> MekfFilter<T> {
         })
     }
 
-    /// The tilt contradicts the mean specific force: starts it anew, and the heading with the next field.
+    /// The tilt contradicts the mean specific force: restarts it, and the heading with the next field.
     #[cold]
     fn level(&mut self, orientation: UnitQuaternion<T>, up: &Vector3<T>) -> UnitQuaternion<T> {
         let orientation = turn_upright(&orientation, up);
@@ -376,7 +376,7 @@ impl<T: Real> MekfFilter<T> {
         orientation
     }
 
-    /// Numbers beyond all reason came in, and no knowledge is left: starts anew from the orientation.
+    /// Numbers beyond all reason came in, and no knowledge is left: restarts from the orientation.
     #[cold]
     fn recover(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
         let (state, heading_known) = (self.state.clone(), self.heading_known);

@@ -31,7 +31,7 @@ impl<T: Real> Bias<T> {
         }
     }
 
-    /// Starts the low-passes anew; what is known of the bias stays.
+    /// Restarts the low-passes; what is known of the bias stays.
     pub(super) fn forget_motion(&mut self) {
         self.rotations = LowPass::new();
         self.biases = LowPass::new();

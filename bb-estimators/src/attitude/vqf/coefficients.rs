@@ -51,7 +51,7 @@ impl<T: Real> InertialCoefficients<T> {
         }
     }
 
-    /// Makes them anew if they are not for this sample time.
+    /// Recomputes them if they are not for this sample time.
     #[inline]
     pub(super) fn follow(&mut self, params: &VqfParams, dt_s: T) {
         if (dt_s - self.dt_s).abs() > T::of(TOLERANCE) * self.dt_s {
@@ -79,7 +79,7 @@ impl<T: Real> FieldCoefficients<T> {
         }
     }
 
-    /// Makes them anew if they are not for this sample time.
+    /// Recomputes them if they are not for this sample time.
     #[inline]
     pub(super) fn follow(&mut self, params: &VqfParams, dt_s: T) {
         if (dt_s - self.dt_s).abs() > T::of(TOLERANCE) * self.dt_s {
