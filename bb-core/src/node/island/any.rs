@@ -1,0 +1,201 @@
+//! An island whose estimators are not known: what the runtime does with each.
+
+use super::{Key, NodeEntry};
+use crate::declaration::{IslandDeclaration, WorkerDeclaration};
+use crate::pubsub::DynamicMessage;
+use crate::time::MonotonicTime;
+
+#[cfg(not(loom))]
+use super::{Island, IslandState, IslandWiring, RELAXED, for_all, inbox::Pending, inside::Inside};
+#[cfg(not(loom))]
+use std::{
+    sync::PoisonError,
+    sync::atomic::{Ordering, fence},
+    time::Duration,
+};
+
+/// What all islands of a robot with the wiring `W` have in common.
+pub trait AnyIsland<W> {
+    /// The island as declared.
+    fn declaration(&self) -> IslandDeclaration;
+    /// The numbers of its estimators.
+    fn estimators(&self) -> &'static [usize];
+    /// Something may be due.
+    fn wake(&self, wiring: &W, now: MonotonicTime);
+    /// Adds an entry for an estimator.
+    fn post(&self, wiring: &W, now: MonotonicTime, estimator: usize, entry: NodeEntry);
+    /// Has its estimators start.
+    fn start(&self, wiring: &W, now: MonotonicTime);
+    /// Has its estimators stop, before anything else that waits.
+    fn retire(&self, wiring: &W, now: MonotonicTime);
+    /// Processes what waits, unless another thread does.
+    fn drain(&self, wiring: &W);
+    /// How its worker runs, if it has one.
+    fn worker(&self) -> Option<WorkerDeclaration>;
+    /// From now on a worker serves it, see [`Self::serve`].
+    fn give_to_worker(&self);
+    /// Processes what comes, on the calling thread, until its estimators have stopped.
+    fn serve(&self, wiring: &W);
+    /// Entries processed, and the estimator whose callback ran last; none if no thread holds it now.
+    fn busy(&self) -> Option<(u64, usize)>;
+    /// The time of the last entry.
+    fn entered_at(&self) -> MonotonicTime;
+    /// Whether the calling thread is inside an island of this robot, and must not wait for one.
+    fn is_inside(&self, wiring: &W) -> bool;
+    /// Whether its estimators have stopped.
+    fn has_retired(&self) -> bool;
+    /// From now on entries are processed when [`Self::replay`] says so.
+    fn begin_replay(&self, wiring: &W);
+    /// Processes an entry of a journal; false if there is none that matches.
+    fn replay(&self, wiring: &W, now: MonotonicTime, entry: Replayed<'_>) -> bool;
+}
+
+/// An entry of an island in a journal.
+#[derive(Debug)]
+pub enum Replayed<'a> {
+    /// The first message of that key.
+    Deliver(Key),
+    /// The first message of that key was dropped.
+    Drop(Key),
+    /// Something was due.
+    Wake,
+    /// The estimators start.
+    Start,
+    /// The estimators stop.
+    Retire,
+    /// An entry for an estimator.
+    Node(usize, NodeEntry),
+    /// What an estimator emitted in reply to a request that the journal does not hold, at that publisher.
+    Emission(usize, &'a DynamicMessage),
+}
+
+#[cfg(not(loom))]
+impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
+    fn declaration(&self) -> IslandDeclaration {
+        S::DECLARATION
+    }
+
+    fn estimators(&self) -> &'static [usize] {
+        S::estimators()
+    }
+
+    fn wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
+        self.post_with(wiring, |inbox| inbox.wake(now));
+    }
+
+    fn post(&self, wiring: &S::Wiring, now: MonotonicTime, estimator: usize, entry: NodeEntry) {
+        self.post_with(wiring, |inbox| inbox.post(now, estimator, entry));
+    }
+
+    fn start(&self, wiring: &S::Wiring, now: MonotonicTime) {
+        self.post_with(wiring, |inbox| inbox.start(now));
+    }
+
+    fn retire(&self, wiring: &S::Wiring, now: MonotonicTime) {
+        self.post_with(wiring, |inbox| inbox.retire(now));
+    }
+
+    fn drain(&self, wiring: &S::Wiring) {
+        if !self.served.load(Ordering::Relaxed) {
+            Self::drain(self, wiring);
+        }
+    }
+
+    fn worker(&self) -> Option<WorkerDeclaration> {
+        S::DECLARATION.worker
+    }
+
+    fn give_to_worker(&self) {
+        self.inbox().reserve(S::CAPACITY);
+        self.served.store(true, Ordering::SeqCst);
+    }
+
+    fn serve(&self, wiring: &S::Wiring) {
+        loop {
+            let mut inbox = self.inbox();
+            while inbox.pending() == Pending::NOTHING {
+                inbox = self.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
+            }
+            let is_last = inbox.retires();
+            drop(inbox);
+            // A caller may hold the island; it tells when it is done.
+            let Some(mut state) = self.hold(wiring, Duration::MAX) else { continue };
+            while self.process_next(&mut state, wiring) && self.waiting.load(Ordering::Relaxed) == 0 {}
+            drop(state);
+            if is_last {
+                break;
+            }
+            if self.waiting.load(Ordering::SeqCst) != 0 {
+                self.tell_waiting();
+                // A lock is not fair, and this thread would be faster than those that have to be woken.
+                self.wait(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
+            }
+        }
+        self.served.store(false, Ordering::SeqCst);
+        // A publisher that still saw the worker left its message to it: the fences make sure that one of the two sees the
+        // other. What came after the estimators had stopped is counted.
+        fence(Ordering::SeqCst);
+        Self::drain(self, wiring);
+    }
+
+    fn busy(&self) -> Option<(u64, usize)> {
+        (!self.is_free()).then(|| (self.turns.load(RELAXED), self.running.load(RELAXED) as usize))
+    }
+
+    fn entered_at(&self) -> MonotonicTime {
+        MonotonicTime::from_nanos(self.entered_nanos.load(RELAXED))
+    }
+
+    fn is_inside(&self, wiring: &S::Wiring) -> bool {
+        Inside::is_here(wiring.environment().bit())
+    }
+
+    fn has_retired(&self) -> bool {
+        self.has_retired.load(Ordering::SeqCst)
+    }
+
+    fn begin_replay(&self, wiring: &S::Wiring) {
+        self.replayed.store(true, Ordering::Relaxed);
+        // So that publishers never enter directly.
+        self.pending.store(usize::MAX, Ordering::Relaxed);
+        if let Some(mut state) = self.try_hold(wiring) {
+            state.begin_replay();
+        }
+    }
+
+    fn replay(&self, wiring: &S::Wiring, now: MonotonicTime, entry: Replayed<'_>) -> bool {
+        let message = match &entry {
+            Replayed::Deliver(key) | Replayed::Drop(key) => {
+                match self.inbox().take_message(|waiting| waiting.key == *key) {
+                    Some(keyed) => Some(keyed.message),
+                    None => return false,
+                }
+            }
+            _ => None,
+        };
+        let Some(mut state) = self.try_hold(wiring) else { return false };
+        self.process_line(wiring, now, None, |turn| {
+            match entry {
+                Replayed::Deliver(_) => {
+                    if let Some(message) = &message {
+                        state.deliver(wiring, message, turn);
+                    }
+                }
+                Replayed::Drop(_) => {
+                    if let Some(message) = &message {
+                        S::dropped(wiring, message);
+                    }
+                }
+                Replayed::Wake => state.wake(wiring, turn),
+                Replayed::Start => for_all(&mut *state, wiring, turn, || NodeEntry::Start),
+                Replayed::Retire => {
+                    for_all(&mut *state, wiring, turn, || NodeEntry::Retire);
+                    self.has_retired.store(true, Ordering::SeqCst);
+                }
+                Replayed::Node(estimator, entry) => state.handle(wiring, estimator, entry, turn),
+                Replayed::Emission(publisher, message) => return state.emit(wiring, publisher, message, turn),
+            }
+            true
+        })
+    }
+}
