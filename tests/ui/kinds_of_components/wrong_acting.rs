@@ -4,8 +4,8 @@ use bb_ui_tests::*;
 robot! {
     robot Rover;
     commands { stop: Servo; }
-    controllers { controller balance: RosBridge(); }
-    bridges { bridge ros: Stability(); }
+    controllers { controller balance: Servo(); }
+    bridges { bridge ros: Stop(); }
     link base {
         sensor imu: Bmi270(bus = "i2c-1") { estimator tilt: Tilt(); }
         joint pan: continuous {
