@@ -54,11 +54,40 @@ pub struct Node<E: Estimator> {
 const STUCK_AFTER: u32 = 1_000_000;
 
 /// What became of a message.
-enum Handled<O> {
+enum Handled {
     Refused(DropReason),
     Stored,
     Missed(SyncMiss),
-    Ran(Reply<O>),
+    Ran,
+}
+
+/// Where the parts of a reply go, one by one. To hand a reply on as a whole, from one result into the next, costs more than
+/// all else that a hop does.
+struct Taken<'a, O> {
+    emitted: &'a mut Option<O>,
+    timers: &'a mut Timers,
+    diverged: Option<&'static str>,
+    /// Whether something new is due.
+    has_asked: bool,
+}
+
+impl<'a, O> Taken<'a, O> {
+    #[inline]
+    fn new(emitted: &'a mut Option<O>, timers: &'a mut Timers) -> Self {
+        Self { emitted, timers, diverged: None, has_asked: false }
+    }
+
+    #[inline]
+    fn take(&mut self, reply: Reply<O>, now: MonotonicTime) {
+        let Reply { output, diverged, request } = reply;
+        *self.emitted = output;
+        self.diverged = diverged;
+        self.timers.happened();
+        if let Some(request) = request {
+            self.timers.request(request, now);
+            self.has_asked = true;
+        }
+    }
 }
 
 /// What [`Node::turn`] has done.
@@ -150,6 +179,7 @@ impl<E: Estimator> Node<E> {
         let declared = self.declaration.inputs.get(input)?;
         let AsEstimator(running) = self.slot.running()?;
         let (admission, cache) = (&mut self.admission, &mut self.cache);
+        let mut taken = Taken::new(emitted, &mut self.timers);
         let counters = self.shared.counters();
         let budget = self.declaration.health.latency_budget_nanos;
         let mut start = None;
@@ -174,10 +204,12 @@ impl<E: Estimator> Node<E> {
             if budget.is_some() || dispatched.is_multiple_of(SAMPLED) {
                 start = Some(turn.begin_measure());
             }
-            running.handle_input(view).map(Handled::Ran)
+            taken.take(running.handle_input(view)?, turn.now());
+            Ok(Handled::Ran)
         });
+        let Taken { diverged, has_asked, .. } = taken;
         match handled {
-            Ok(Handled::Ran(reply)) => {
+            Ok(Handled::Ran) => {
                 if self.declaration.health.lost_after_nanos.is_some() {
                     self.shared.set_last_run(turn.now());
                 }
@@ -190,7 +222,9 @@ impl<E: Estimator> Node<E> {
                 }
                 let Stamped { monotonic_time, wall_time, .. } = *message;
                 let stamp = Stamp { monotonic_time, wall_time, ..self.template };
-                self.complete(reply, bad, Some(declared.source), stamp, turn, emitted)
+                let has_emitted = emitted.is_some();
+                self.complete(diverged, has_asked, bad, Some(declared.source), has_emitted, turn);
+                has_emitted.then_some(stamp)
             }
             Ok(Handled::Stored) => None,
             Ok(Handled::Refused(reason)) => {
@@ -264,12 +298,19 @@ impl<E: Estimator> Node<E> {
         turn.enter(self.shared.number() as u32);
         let is_measured = self.declaration.health.latency_budget_nanos.is_some();
         let start = is_measured.then(|| turn.begin_measure());
-        match caught(|| callback(running)) {
-            Ok(reply) => {
+        let mut taken = Taken::new(emitted, &mut self.timers);
+        let called = caught(|| {
+            taken.take(callback(running)?, turn.now());
+            Ok(())
+        });
+        let Taken { diverged, has_asked, .. } = taken;
+        match called {
+            Ok(()) => {
                 let bad = start.and_then(|start| self.measure(start, None, turn));
                 let now = turn.now();
                 let stamp = Stamp { monotonic_time: now, wall_time: turn.wall_at(now), ..self.template };
-                self.complete(reply, bad, None, stamp, turn, emitted).map_or(Next::Quiet, Next::Emitted)
+                self.complete(diverged, has_asked, bad, None, emitted.is_some(), turn);
+                if emitted.is_some() { Next::Emitted(stamp) } else { Next::Quiet }
             }
             Err(failed) => {
                 turn.no_emission();
@@ -283,17 +324,14 @@ impl<E: Estimator> Node<E> {
     #[inline]
     fn complete(
         &mut self,
-        reply: Reply<E::Output>,
+        diverged: Option<&'static str>,
+        has_asked: bool,
         bad: Option<HealthReason>,
         source: Option<&'static str>,
-        stamp: Stamp,
+        has_emitted: bool,
         turn: &Turn<'_>,
-        emitted: &mut Option<E::Output>,
-    ) -> Option<Stamp> {
-        let Reply { output, diverged, request } = reply;
-        self.timers.happened();
-        if let Some(request) = request {
-            self.timers.request(request, turn.now());
+    ) {
+        if has_asked {
             self.schedule();
         }
         if bad.is_some() || diverged.is_some() || self.health.state != HealthState::Healthy {
@@ -301,14 +339,12 @@ impl<E: Estimator> Node<E> {
         } else if source.is_some() {
             self.was_good = true;
         }
-        *emitted = output;
-        if emitted.is_none() {
+        if has_emitted {
+            self.shared.counters().emitted.increment();
+            turn.begin_emission(self.declaration);
+        } else {
             turn.no_emission();
-            return None;
         }
-        self.shared.counters().emitted.increment();
-        turn.begin_emission(self.declaration);
-        Some(stamp)
     }
 
     #[cold]
