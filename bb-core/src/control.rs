@@ -25,7 +25,7 @@ mod topics;
 
 pub use command::{CommandStatistics, Prepared};
 pub use execution::{CommandError, Execution};
-pub(crate) use system::{ComponentOrder, Control, Declared, Islands, Parts, Wired};
+pub(crate) use system::{ComponentOrder, Control, Declared, Islands, Parts, Summary, Wired};
 pub use topics::SystemTopics;
 
 pub use crate::component::{

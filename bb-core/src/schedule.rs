@@ -3,6 +3,7 @@
 mod agenda;
 mod bell;
 mod deadlines;
+mod door;
 mod pool;
 mod sleeper;
 mod stop;
@@ -10,6 +11,7 @@ mod stop;
 pub(crate) use agenda::Agenda;
 pub(crate) use bell::Bell;
 pub(crate) use deadlines::Deadlines;
+pub(crate) use door::Door;
 pub(crate) use pool::Pool;
 pub(crate) use sleeper::{Alarm, Sleeper};
 pub(crate) use stop::StopSignal;

@@ -1,6 +1,7 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
 mod attitude;
+mod bad_journals;
 mod by_path;
 mod callbacks;
 mod command_faults;
@@ -8,6 +9,7 @@ mod components;
 mod contention;
 mod control;
 mod disarm_first;
+mod end;
 mod everything;
 mod external;
 mod fan_in;

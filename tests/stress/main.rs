@@ -127,13 +127,9 @@ fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
         })
         .collect();
     std::thread::sleep(Duration::from_millis(100 + random.below(150)));
-    // Sensors, services, timers and commands go on while it stops. Of callers that do, what they publish after the last line
-    // of the journal may still be counted: `BB_STRESS_CALLERS` has them go on as well.
-    let callers_go_on = std::env::var_os("BB_STRESS_CALLERS").is_some();
-    if !callers_go_on {
-        disturbers.into_iter().try_for_each(std::thread::JoinHandle::join).map_err(|_| "a disturber panicked")?;
-    }
+    // Callers go on while it stops, and after that, as do sensors, services, timers and commands.
     let report = running.stop();
+    disturbers.into_iter().try_for_each(std::thread::JoinHandle::join).map_err(|_| "a disturber panicked")?;
     is_same_again(seed, &lines, &hear(&all), &report)
 }
 

@@ -206,12 +206,14 @@ struct OwnPath {
 }
 
 impl Gate for OwnPath {
-    fn stamp(&self) -> Option<Stamp> {
+    fn pass(&self, publish: &mut dyn FnMut(Stamp)) {
         let clock = self.host.clock();
         let monotonic_time = clock.now();
         let wall_time = clock.wall_at(monotonic_time);
         let stamp = Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() };
-        self.permit.is_valid().then_some(stamp)
+        if self.permit.is_valid() {
+            self.host.while_open(&mut || publish(stamp));
+        }
     }
 
     fn is_noted(&self) -> bool {

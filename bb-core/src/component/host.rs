@@ -33,6 +33,8 @@ pub(crate) trait Host: Send + Sync {
     fn registry(&self) -> &Registry;
     /// Whether there is a journal.
     fn is_journaled(&self) -> bool;
+    /// Has something published, unless the robot has stopped.
+    fn while_open(&self, publish: &mut dyn FnMut());
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage);
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.

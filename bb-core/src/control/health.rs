@@ -78,6 +78,7 @@ impl Control {
     /// Something that no component did, or one that hangs: it is kept, published and logged, and nothing follows from it.
     pub(crate) fn note_fault(&self, path: &'static str, message: String) {
         let mut step = self.step();
+        step.line(Event::Noted { path, message: message.clone() });
         step.publish_fault(path, message);
         step.finish();
     }

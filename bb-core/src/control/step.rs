@@ -39,6 +39,7 @@ impl Step<'_> {
     /// Writes the entry's line; its number, or 0 without a journal.
     pub(super) fn line(&self, event: Event) -> u64 {
         match &self.control.0.journal {
+            Some(_) if self.state.has_ended => 0,
             Some(journal) => journal.write(self.now, self.wall_offset_nanos, event),
             None => 0,
         }
@@ -46,6 +47,9 @@ impl Step<'_> {
 
     /// Publishes on a system topic; subscribers are woken once the lock is released.
     pub(super) fn publish<T: Payload>(&mut self, topic: &Topic<T>, payload: T, time: MonotonicTime) {
+        if self.state.has_ended {
+            return;
+        }
         let wall_time = WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos));
         let origin = self.control.0.origin;
         let stamp = Stamp { monotonic_time: time, wall_time, origin, ..Stamp::default() };

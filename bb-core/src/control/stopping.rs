@@ -6,7 +6,7 @@ use crate::event::Safety;
 use crate::journal::Event;
 use crate::node::Mode;
 use crate::time::MonotonicTime;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 impl Control {
     /// Disarms the robot and cancels its commands, at once and without waiting; nothing is started any more. Sensors and
@@ -47,8 +47,18 @@ impl Control {
         }
     }
 
-    /// The paths of commands whose code has not returned.
-    pub(crate) fn lingering(&self) -> Vec<&'static str> {
+    /// The paths of commands whose code has not returned at `deadline`.
+    pub(crate) fn lingering(&self, deadline: Instant) -> Vec<&'static str> {
+        loop {
+            let lingering = self.polled();
+            if lingering.is_empty() || Instant::now() >= deadline {
+                return lingering;
+            }
+            std::thread::sleep(Duration::from_micros(100));
+        }
+    }
+
+    fn polled(&self) -> Vec<&'static str> {
         let state = self.lock();
         let inside = state
             .executions

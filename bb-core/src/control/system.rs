@@ -95,6 +95,16 @@ pub(super) struct Inner {
     pub(super) host: OnceLock<Arc<dyn Host>>,
 }
 
+/// What the control state adds to a report.
+pub(crate) struct Summary {
+    pub(crate) commands: Vec<CommandStatistics>,
+    pub(crate) state: &'static str,
+    pub(crate) safety: Safety,
+    /// The newest.
+    pub(crate) faults: Vec<ComponentFault>,
+    pub(crate) all_faults: u64,
+}
+
 /// Where entries for estimators go.
 pub(crate) trait Islands: Send + Sync {
     /// Adds an entry. What is returned is dropped without the lock: it may be the last owner of the wiring.
@@ -133,6 +143,8 @@ pub(super) struct State {
     /// How often the robot was disarmed.
     pub(super) generation: u64,
     pub(super) is_stopping: bool,
+    /// The journal and the last report are made: entries that come later are neither written nor published.
+    pub(super) has_ended: bool,
 }
 
 /// An execution of a command.
@@ -236,6 +248,7 @@ impl Control {
             last_disarm_was_safe: true,
             generation: 0,
             is_stopping: false,
+            has_ended: false,
         };
         let bell = Bell::default();
         let alarm = bell.clone();
@@ -344,14 +357,31 @@ impl Control {
         }
     }
 
-    pub(crate) fn statistics(&self) -> Vec<CommandStatistics> {
-        self.lock().statistics.clone()
+    /// Calls `call` with what has been done so far, while no entry is processed.
+    pub(crate) fn between_entries<T>(&self, call: impl FnOnce(Summary) -> T) -> T {
+        let state = self.lock();
+        call(self.summary(&state))
     }
 
-    /// The newest faults, and how many there were.
-    pub(crate) fn faults(&self) -> (Vec<ComponentFault>, u64) {
-        let faults = self.0.faults.lock().unwrap_or_else(PoisonError::into_inner);
-        (faults.newest.iter().cloned().collect(), faults.count)
+    /// The same after the last entry.
+    pub(crate) fn end<T>(&self, call: impl FnOnce(Summary) -> T) -> T {
+        let mut state = self.lock();
+        state.has_ended = true;
+        call(self.summary(&state))
+    }
+
+    fn summary(&self, state: &State) -> Summary {
+        let (faults, all_faults) = {
+            let faults = self.0.faults.lock().unwrap_or_else(PoisonError::into_inner);
+            (faults.newest.iter().cloned().collect(), faults.count)
+        };
+        Summary {
+            commands: state.statistics.clone(),
+            state: state.machine.state(),
+            safety: state.machine.safety,
+            faults,
+            all_faults,
+        }
     }
 
     pub(crate) fn clock(&self) -> &Clock {

@@ -176,6 +176,13 @@ pub enum Event {
         /// Whether it panicked.
         panicked: bool,
     },
+    /// A component hangs or did not stop well, or something that is no component failed; nothing followed from it.
+    Noted {
+        /// Its path.
+        path: &'static str,
+        /// What happened.
+        message: String,
+    },
     /// Hardware was reported to be in a dangerous state.
     HardwareError {
         /// By which component.

@@ -108,10 +108,14 @@ impl Journal {
         std::thread::Builder::new().name("journal".into()).spawn(move || inner.work()).map(drop)
     }
 
-    /// Takes no more lines and waits until the sink has what was written, `longest` at most; false if it does not.
-    pub(crate) fn close(&self, longest: Duration) -> bool {
+    /// Takes no more lines.
+    pub(crate) fn close(&self) {
         self.0.lock().is_closed = true;
         self.0.arrived.notify_all();
+    }
+
+    /// Waits until the sink has what was written, `longest` at most; false if it does not.
+    pub(crate) fn hand_over(&self, longest: Duration) -> bool {
         let deadline = Instant::now() + longest;
         loop {
             self.0.flush();
@@ -234,7 +238,8 @@ mod tests {
             }
         });
         journal.write(MonotonicTime::ZERO, 6, Event::Stop);
-        assert!(journal.close(Duration::from_secs(10)));
+        journal.close();
+        assert!(journal.hand_over(Duration::from_secs(10)));
         assert_eq!(journal.write(MonotonicTime::ZERO, 6, Event::Stop), 0, "closed");
         let lines = lines.lock().expect("no panic");
         assert_eq!(lines.len(), 40_002);

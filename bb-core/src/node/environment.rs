@@ -8,8 +8,8 @@ use crate::fault::Fault;
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
 use crate::message::{Origin, Payload, Stamped};
-use crate::pubsub::DynamicMessage;
-use crate::schedule::{Agenda, Pool};
+use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
+use crate::schedule::{Agenda, Door, Pool};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use std::collections::{HashMap, VecDeque};
@@ -70,6 +70,7 @@ struct Inner {
     supervision: Supervision,
     agenda: Agenda,
     pool: Pool,
+    door: Door,
     nodes: Box<[SharedNode]>,
     journal: Option<Journal>,
     telemetry: Option<Telemetry>,
@@ -146,6 +147,7 @@ impl Environment {
             supervision,
             agenda,
             pool,
+            door: Door::new(journal.is_some()),
             nodes,
             journal,
             telemetry,
@@ -321,6 +323,12 @@ impl Environment {
         &self.0.pool
     }
 
+    /// Where messages come in.
+    #[inline]
+    pub(crate) fn door(&self) -> &Door {
+        &self.0.door
+    }
+
     pub(crate) fn start(&self) -> MonotonicTime {
         self.0.start
     }
@@ -354,21 +362,26 @@ impl Environment {
         self.0.replayed_line.store(line, Ordering::Relaxed);
     }
 
-    /// Writes into the journal, if there is one, what a sensor or a service publishes; the number of the line, or 0.
+    /// Hands what a sensor or a service publishes to its subscribers, and writes it into the journal, if there is one; the
+    /// number of the line, or 0.
     #[inline]
-    pub fn write<T: Payload>(
+    pub fn publish<T: Payload>(
         &self,
         publisher: usize,
-        path: &'static str,
+        topic: &Topic<T>,
         message: &Stamped<T>,
         now: MonotonicTime,
     ) -> u64 {
         match &self.0.journal {
-            None => self.0.replayed_line.load(Ordering::Relaxed),
+            None => {
+                topic.publish(message);
+                self.0.replayed_line.load(Ordering::Relaxed)
+            }
             Some(journal) => {
                 journal.wait_for_room();
-                let message = Recorded::Message(DynamicMessage::new(path, message));
-                journal.write(now, self.0.clock.wall_offset_nanos(), Event::Message { publisher, message })
+                let recorded = Recorded::Message(DynamicMessage::new(topic.path(), message));
+                let event = Event::Message { publisher, message: recorded };
+                topic.publish_as_written(message, || journal.write(now, self.0.clock.wall_offset_nanos(), event))
             }
         }
     }

@@ -14,8 +14,8 @@ pub struct Publisher<T> {
 
 /// What stands between a publisher and its topic.
 pub(crate) trait Gate: Send + Sync {
-    /// The stamp of a payload that is published now; none once the publisher may not act any more.
-    fn stamp(&self) -> Option<Stamp>;
+    /// Has `publish` called with the stamp of a payload that is published now; not once the publisher may not act any more.
+    fn pass(&self, publish: &mut dyn FnMut(Stamp));
     /// Whether messages are to be shown to [`Self::note`].
     fn is_noted(&self) -> bool;
     /// A message is about to be published.
@@ -27,26 +27,29 @@ impl<T: Payload> Publisher<T> {
         Self { topic, gate }
     }
 
-    /// Publishes a payload measured now, in no frame. Once the command that made this publisher has ended, nothing is
-    /// published any more.
+    /// Publishes a payload measured now, in no frame. Once the command that made this publisher has ended, or the robot has
+    /// stopped, nothing is published any more.
     pub fn publish(&self, payload: T) {
-        if let Some(stamp) = self.gate.stamp() {
-            self.hand_out(&stamp.message(payload));
-        }
+        let mut payload = Some(payload);
+        self.gate.pass(&mut |stamp| {
+            if let Some(payload) = payload.take() {
+                self.hand_out(&stamp.message(payload));
+            }
+        });
     }
 
     /// Publishes a message with the stamp that it has: one that comes from elsewhere and is passed on.
     pub fn forward(&self, message: &Stamped<T>) {
-        if self.gate.stamp().is_some() {
-            self.hand_out(message);
-        }
+        self.gate.pass(&mut |_| self.hand_out(message));
     }
 
     fn hand_out(&self, message: &Stamped<T>) {
         if self.gate.is_noted() {
-            self.gate.note(DynamicMessage::new(self.topic.path(), message));
+            let noted = DynamicMessage::new(self.topic.path(), message);
+            self.topic.publish_as_written(message, || self.gate.note(noted));
+        } else {
+            self.topic.publish(message);
         }
-        self.topic.publish(message);
     }
 
     /// Its path.

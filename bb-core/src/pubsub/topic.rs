@@ -20,6 +20,8 @@ pub struct Topic<T> {
     /// How many listen: read before the lock, so that publishing to nobody costs next to nothing.
     listening: AtomicUsize,
     subscribers: Arc<Mutex<Subscribers<T>>>,
+    /// Held while a message is written into a journal and enqueued, so that both have the same order.
+    order: Mutex<()>,
 }
 
 pub(super) struct Subscribers<T> {
@@ -48,6 +50,7 @@ impl<T> Topic<T> {
             lost: AtomicU64::new(0),
             listening: AtomicUsize::new(0),
             subscribers: Arc::new(Mutex::new(subscribers)),
+            order: Mutex::default(),
         }
     }
 
@@ -94,10 +97,21 @@ impl<T: Payload> Topic<T> {
         self.hand_out(message);
     }
 
+    /// The same for one of several publishers, of a message that `write` writes into a journal: subscribers receive messages
+    /// in the order of their lines. What `write` gives is returned.
+    pub(crate) fn publish_as_written<L>(&self, message: &Stamped<T>, write: impl FnOnce() -> L) -> L {
+        let mut wakers = Wakers::default();
+        let order = self.order.lock().unwrap_or_else(PoisonError::into_inner);
+        let line = write();
+        self.publish_deferred(message, &mut wakers);
+        drop(order);
+        wakers.run();
+        line
+    }
+
     /// Only enqueues `message`: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's
     /// code runs here but the payload's `clone`, and that only if somebody listens.
     #[inline]
-    #[allow(dead_code, reason = "for publishers that hold a lock of the robot")]
     pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         self.published.fetch_add(1, Ordering::Relaxed);
         if self.listening.load(Ordering::Acquire) > 0 {

@@ -210,6 +210,7 @@ impl<R: Robot> Builder<R> {
         let host: Arc<dyn Host> = Arc::new(RobotHost::<R> {
             control: control.clone(),
             journal: journal.clone(),
+            door: environment.door().clone(),
             wiring: Arc::clone(&place),
         });
         control.set_host(Arc::clone(&host));
@@ -255,6 +256,7 @@ impl<R: Robot> Builder<R> {
             host,
             sources: Mutex::new(shared),
             has_ended: AtomicBool::new(false),
+            last_report: OnceLock::new(),
         };
         Ok((machine, sources))
     }

@@ -11,6 +11,7 @@ use crate::journal::{Event, Journal, Recorded};
 use crate::message::Origin;
 use crate::node::NodeEntry;
 use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
+use crate::schedule::Door;
 use crate::time::{Clock, MonotonicTime};
 use std::any::Any;
 use std::sync::{Arc, OnceLock, Weak};
@@ -19,6 +20,7 @@ use std::sync::{Arc, OnceLock, Weak};
 pub(super) struct RobotHost<R: Robot> {
     pub(super) control: Control,
     pub(super) journal: Option<Journal>,
+    pub(super) door: Door,
     pub(super) wiring: Arc<OnceLock<Weak<R::Wiring>>>,
 }
 
@@ -89,6 +91,12 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn is_journaled(&self) -> bool {
         self.journal.is_some()
+    }
+
+    fn while_open(&self, publish: &mut dyn FnMut()) {
+        if let Some(_inside) = self.door.enter() {
+            publish();
+        }
     }
 
     fn note_own(&self, message: DynamicMessage) {

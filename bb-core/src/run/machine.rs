@@ -5,16 +5,16 @@ use super::source::SharedSource;
 use super::visit::{Visit, Visitable};
 use super::{ActuatorError, Report, Robot, SensorHandle};
 use crate::component::{Actuator, Bus, Command, Fault, HandleCall, HandleCast, Host, Permit, RequestCodec, Sensor};
-use crate::control::{Control, Execution};
+use crate::control::{Control, Execution, Summary};
 use crate::declaration::{ParameterError, ParameterType};
-use crate::event::Refusal;
+use crate::event::{ComponentFault, Refusal};
 use crate::journal::RequestKind;
 use crate::message::Stamp;
 use crate::node::{AnyIsland, CallError, Environment, Node, NodeEntry, Replayed, Turn, know_calls, know_casts};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::MonotonicTime;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 pub(super) struct Machine<R: Robot> {
@@ -25,6 +25,8 @@ pub(super) struct Machine<R: Robot> {
     pub(super) sources: Mutex<Vec<SharedSource>>,
     /// The threads of the robot have nothing left to do.
     pub(super) has_ended: AtomicBool,
+    /// What it had done when it ended.
+    pub(super) last_report: OnceLock<Report>,
 }
 
 /// One-way requests that may wait for an estimator; one more is refused.
@@ -55,6 +57,7 @@ impl<R: Robot> Machine<R> {
     }
 
     pub(super) fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
+        let Some(_inside) = self.environment.door().enter() else { return };
         let clock = self.environment.clock();
         let stamp = Stamp {
             monotonic_time: time,
@@ -209,18 +212,42 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Tells subscribers that no more will come, and ends the journal.
+    /// Takes no more messages; until `deadline`, waits for those that are on their way and until estimators that have stopped
+    /// have counted theirs.
+    pub(super) fn close_door(&self, deadline: Instant) {
+        if !self.environment.door().close(deadline) {
+            let message = "a publisher did not come back: what followed from its message may be missing";
+            self.fault("journal", message.to_owned());
+        }
+        for island in self.islands().filter(|island| island.has_retired()) {
+            while !island.is_idle() && Instant::now() < deadline {
+                std::thread::sleep(Duration::from_micros(100));
+            }
+        }
+    }
+
+    /// Ends the journal after the last entry of the control state, tells subscribers that no more will come, and makes the
+    /// last report.
     pub(super) fn end(&self) {
+        let summary = self.control.end(|summary| {
+            if let Some(journal) = self.environment.journal() {
+                journal.close();
+            }
+            summary
+        });
         for topic in self.topics() {
             if topic.path() != "journal" {
                 topic.close();
             }
         }
+        let mut report = self.report_of(summary);
         if let Some(journal) = self.environment.journal()
-            && !journal.close(Duration::from_secs(1))
+            && !journal.hand_over(Duration::from_secs(1))
         {
-            self.fault("journal", "its sink hung, and it ends before the run".to_owned());
+            report.add_fault(self.fault("journal", "its sink hung, and it ends before the run".to_owned()));
         }
+        // It is set once.
+        let _ = self.last_report.set(report);
         self.control.topics().journal.close();
         self.control.topics().registry.close();
         self.has_ended.store(true, Ordering::Release);
@@ -237,27 +264,36 @@ impl<R: Robot> Machine<R> {
         }
     }
 
+    /// What it has done so far; the last report once it has ended.
     pub(super) fn report(&self) -> Report {
+        match self.last_report.get() {
+            Some(report) => report.clone(),
+            None => self.control.between_entries(|control| self.report_of(control)),
+        }
+    }
+
+    fn report_of(&self, control: Summary) -> Report {
         let topics = self.topics();
         let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
         let made = self.control.topics().registry.topics();
         let made = made.iter().map(|topic| topic.statistics());
         let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
-        let (faults, all_faults) = self.control.faults();
+        let Summary { commands, state, safety, faults, all_faults } = control;
         Report {
             topics: topics.iter().map(|topic| topic.statistics()).chain(made).collect(),
             estimators,
             sources: sources.iter().map(SharedSource::statistics).collect(),
-            commands: self.control.statistics(),
-            state: self.control.state(),
-            safety: self.control.safety(),
+            commands,
+            state,
+            safety,
             faults,
             all_faults,
         }
     }
 
     /// Keeps what is wrong with a component that did not come back.
-    pub(super) fn fault(&self, path: &'static str, message: String) {
-        self.control.note_fault(path, message);
+    pub(super) fn fault(&self, path: &'static str, message: String) -> ComponentFault {
+        self.control.note_fault(path, message.clone());
+        ComponentFault { path, message }
     }
 }

@@ -244,6 +244,7 @@ impl<R: Robot> Replay<R> {
             Event::Failed { path, supervisor, message, panicked } => {
                 control.component_failed(path, supervisor, message, panicked);
             }
+            Event::Noted { path, message } => control.note_fault(path, message),
             Event::HardwareError { path, message } => control.hardware_error(path, message),
             Event::Parameter { parameter, value } => control.replay_parameter(parameter, value),
             Event::Command { command } => control.replay_command(command),

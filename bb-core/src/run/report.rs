@@ -40,6 +40,11 @@ impl Report {
         self.estimators.iter().find(|estimator| estimator.path == path)
     }
 
+    pub(super) fn add_fault(&mut self, fault: ComponentFault) {
+        self.faults.push(fault);
+        self.all_faults += 1;
+    }
+
     /// This report, if no component has failed.
     ///
     /// # Errors

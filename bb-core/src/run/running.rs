@@ -17,7 +17,7 @@ pub struct Running<R: Robot> {
 }
 
 /// How long user code may take to return after the robot was told to stop.
-const STOP_WITHIN: Duration = Duration::from_secs(5);
+pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 
 /// How long it may take at least, once disarm callbacks have used up their time.
 const GRACE: Duration = Duration::from_millis(500);
@@ -81,10 +81,11 @@ impl<R: Robot> Running<R> {
             }
         }
         machine.retire_islands(deadline);
-        for path in machine.control.lingering() {
+        for path in machine.control.lingering(deadline) {
             machine.fault(path, "did not come back when the robot stopped".to_owned());
         }
         machine.terminate_actuators(deadline);
+        machine.close_door(deadline);
         machine.end();
     }
 }

@@ -194,6 +194,7 @@ impl<R: Robot> Simulation<R> {
         for mut source in self.sources.drain(..) {
             source.terminate();
         }
+        machine.close_door(std::time::Instant::now() + super::running::STOP_WITHIN);
         // One thread runs all of this, so that nothing can be busy elsewhere.
         machine.retire_quietly();
         machine.terminate_actuators(std::time::Instant::now());

@@ -271,7 +271,10 @@ where
                 frame: self.declaration.frame,
                 origin: self.environment.origin(),
             };
-            (self.publish)(&self.wiring, &stamp.message(payload), now);
+            // One that was left behind may come back after the robot has stopped.
+            if let Some(_inside) = self.environment.door().enter() {
+                (self.publish)(&self.wiring, &stamp.message(payload), now);
+            }
         }
         self.next_due(reading.next, due, now)
     }

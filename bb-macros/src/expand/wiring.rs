@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! fn p0(&self, message: &Stamped<Imu>, now: MonotonicTime) {   // sensor::base::imu
-//!     self.topics.g0.p0.publish(message);
+//!     let line = self.environment.publish(0, &self.topics.g0.p0, message, now);
 //!     self.islands.g0.i0.enter(self, now, key, |island, turn| self.p0_i0(island, message, turn), || …);
 //! }
 //! fn p0_i0(&self, island: &mut __Island0, message: &Stamped<Imu>, turn: &Turn) {
@@ -247,8 +247,7 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
         None => quote! {
             #[inline]
             fn #name(&self, #message, now: ::bb_core::__private::MonotonicTime) {
-                let line = self.environment.write(#id, #path, message, now);
-                self.topics.#topic.publish(message);
+                let line = self.environment.publish(#id, &self.topics.#topic, message, now);
                 #(#calls)*
             }
         },

@@ -44,6 +44,8 @@ pub trait AnyIsland<W> {
     fn is_inside(&self, wiring: &W) -> bool;
     /// Whether its estimators have stopped.
     fn has_retired(&self) -> bool;
+    /// Whether nothing waits for it and no thread holds it.
+    fn is_idle(&self) -> bool;
     /// From now on entries are processed when [`Self::replay`] says so.
     fn begin_replay(&self, wiring: &W);
     /// Processes an entry of a journal; false if there is none that matches.
@@ -152,6 +154,11 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
 
     fn has_retired(&self) -> bool {
         self.has_retired.load(Ordering::SeqCst)
+    }
+
+    fn is_idle(&self) -> bool {
+        // In this order: whoever takes the last entry holds the island before.
+        self.pending.load(Ordering::SeqCst) == 0 && self.is_free()
     }
 
     fn begin_replay(&self, wiring: &S::Wiring) {

@@ -1,0 +1,191 @@
+//! Journals that cannot be replayed, or not to their end.
+
+use crate::components::{Number, at};
+use crate::journals::{Again, Failure, IS_FIRST, Way, again, alone};
+use crate::replay::{Lines, overflow};
+use bb_core::journal::{Entry, Event, JournalLine, JournalReader};
+use bb_core::prelude::*;
+use bb_recorder::{Recorder, RecorderOptions, Recording};
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Gives what it did not give the first time, from its third message on.
+#[derive(Debug)]
+pub(crate) struct Dice(u32);
+
+impl Estimator for Dice {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self(0))
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        self.0 += 1;
+        let differs = self.0 >= 3 && !IS_FIRST.load(Ordering::SeqCst);
+        // The least bit of one number.
+        Ok(Reply::emit(if differs { Number(f64::from_bits(number.0.to_bits() ^ 1)) } else { number.payload }))
+    }
+}
+
+macro_rules! rig {
+    ($module:ident: $($sensor:ident)*) => {
+        mod $module {
+            use super::*;
+            robot! {
+                pub(crate) robot Rig;
+                link base { $( sensor $sensor: External<Number>() { estimator dice: Dice(); } )* }
+            }
+        }
+    };
+}
+
+rig!(left_first: left right);
+rig!(right_first: right left);
+
+/// The journal of five messages of each sensor.
+fn of_rig() -> Result<Vec<Entry>, Failure> {
+    IS_FIRST.store(true, Ordering::SeqCst);
+    let mut builder = left_first::Rig::builder();
+    let lines = Lines::default();
+    let sink = std::sync::Arc::clone(&lines);
+    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let mut simulation = builder.simulate()?;
+    for millis in 1..=5 {
+        simulation.publish(left_first::rig::sensor::base::left, at(millis), Number(1.0));
+        simulation.publish(left_first::rig::sensor::base::right, at(millis), Number(2.0));
+    }
+    simulation.stop();
+    let lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    Ok(lines)
+}
+
+#[test]
+fn a_journal_of_a_robot_whose_sensors_stand_in_another_order_is_refused() -> Result<(), Failure> {
+    let _alone = alone();
+    let lines = of_rig()?;
+    let error = right_first::Rig::builder().replay()?.play(lines.clone()).expect_err("it is of another robot");
+    assert_eq!(error.line, 1);
+    assert_eq!(
+        error.message,
+        "the journal is of another robot: it says `sensor/base/left publishes Number`, and this robot has \
+         `sensor/base/right publishes Number`"
+    );
+    left_first::Rig::builder().replay()?.play(lines)?;
+    Ok(())
+}
+
+#[test]
+fn an_estimator_that_gives_something_else_is_named_at_its_first_difference() -> Result<(), Failure> {
+    let _alone = alone();
+    let lines = of_rig()?;
+    IS_FIRST.store(false, Ordering::SeqCst);
+    let outputs: Vec<_> =
+        lines.iter().filter(|line| matches!(line.event, Event::Output { .. })).map(|line| line.number).collect();
+    assert_eq!(outputs.len(), 10);
+    let error = left_first::Rig::builder().replay()?.play(lines).expect_err("it gives something else");
+    assert_eq!(error.line, outputs[4], "the third of the first of the two");
+    assert_eq!(
+        error.message,
+        "`sensor/base/left/dice` emits another message than it did: the algorithm is not deterministic"
+    );
+    Ok(())
+}
+
+const FILE: &str = "BB_TESTS_KILLED_JOURNAL";
+
+/// A robot that is killed while its journal is recorded.
+#[test]
+fn child() {
+    let Ok(file) = std::env::var(FILE) else { return };
+    let mut builder = Again::builder();
+    builder.publish_journal();
+    let journal = builder.subscribe_any(Select::Path("journal"), None, overflow());
+    let mut options = RecorderOptions::of::<Again>();
+    options.flush_messages = 50;
+    let recorder = Recorder::new(file, journal, options).expect("it can be created").spawn().expect("a thread");
+    let running = builder.start().expect("it starts");
+    running.arm();
+    for round in 0_u32.. {
+        running.publish(again::sensor::base::number, running.clock().now(), Number(f64::from(round % 100)));
+        running.publish(again::sensor::base::pan::encoder, running.clock().now(), Number(1.0));
+        if round.is_multiple_of(10) {
+            running.set_parameter(again::param::gain, f64::from(round % 7)).expect("it is finite");
+            let _ = running.command(again::command::drive, Way { steps: 3, tunes: true });
+            println!("\nround {round}");
+        }
+        std::thread::sleep(Duration::from_micros(300));
+    }
+    drop(recorder);
+}
+
+/// What a file holds up to where it breaks off.
+fn lines_of(file: &std::path::Path) -> Result<Vec<Entry>, Failure> {
+    let reader = JournalReader::<Again>::default();
+    let recording = Recording::open(file)?;
+    let lines = recording.messages::<JournalLine>("journal")?.map_while(Result::ok);
+    lines.map(|line| Ok(reader.entry(&line.payload)?)).collect()
+}
+
+#[test]
+fn the_journal_of_a_robot_that_was_killed_is_replayed_up_to_where_it_breaks_off() -> Result<(), Failure> {
+    let _alone = alone();
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    for rounds in [100, 333, 871, 1500] {
+        let number = NUMBER.fetch_add(1, Ordering::SeqCst);
+        let file = std::env::temp_dir().join(format!("bb-killed-{}-{number}.mcap", std::process::id()));
+        let _ = std::fs::remove_file(&file);
+        let mut child = std::process::Command::new(std::env::current_exe()?)
+            .args(["--exact", "bad_journals::child", "--nocapture"])
+            .env(FILE, &file)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let lines = BufReader::new(child.stdout.take().ok_or("it is piped")?).lines();
+        let mut reached = lines
+            .map_while(Result::ok)
+            .filter_map(|line| line.strip_prefix("round ")?.parse::<u32>().ok())
+            .skip_while(|round| *round < rounds);
+        assert!(reached.next().is_some(), "it runs until it is killed");
+        // The recorder may lag behind.
+        let start = std::time::Instant::now();
+        while std::fs::metadata(&file).map_or(0, |file| file.len()) < 30_000 + 20 * u64::from(rounds) {
+            assert!(start.elapsed() < Duration::from_secs(20), "nothing is recorded");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        // At any moment, in the middle of a line too.
+        std::thread::sleep(Duration::from_micros(u64::from(rounds) * 37 % 5000));
+        child.kill()?;
+        child.wait()?;
+        let mut lines = lines_of(&file)?;
+        std::fs::remove_file(&file)?;
+        lines.sort_by_key(|line| line.number);
+        let whole = (1..).zip(&lines).take_while(|(number, line)| *number == line.number).count();
+        assert!(whole > 50, "{whole} lines are left of {rounds} rounds");
+        assert_eq!(whole, lines.len(), "none is missing in between");
+        let Event::Begin { declaration, .. } = &lines[0].event else {
+            return Err("it begins with the robot".into());
+        };
+        let mut publishers = declaration.iter().filter(|fact| fact.contains(" publishes "));
+        let sum = publishers.position(|fact| fact.starts_with("sensor/base/number/sum "));
+        let is_of_sum =
+            |line: &&Entry| matches!(line.event, Event::Output { publisher, .. } if Some(publisher) == sum);
+        let recorded = lines.iter().filter(is_of_sum).count();
+        let builder = Again::builder();
+        let sums = builder.subscribe_with(again::sensor::base::number::sum, overflow());
+        let mut replay = builder.replay()?;
+        // Another process does not know what was published at a path made at run time, nor which requests there are.
+        let _progress = replay.bus().publisher::<Number>("progress")?;
+        replay.play(lines)?;
+        let report = replay.stop();
+        assert_eq!(report.faults.iter().find(|fault| fault.path == "journal"), None);
+        // The line of the last one may be missing, and not that of the message that led to it.
+        let replayed = sums.drain().count();
+        assert!(recorded > 0 && (recorded..=recorded + 1).contains(&replayed), "{replayed} of {recorded}");
+    }
+    Ok(())
+}
