@@ -8,6 +8,7 @@ mod command;
 mod context;
 mod estimator;
 mod external;
+mod guardian;
 mod host;
 mod info;
 mod inputs;
@@ -28,7 +29,9 @@ pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Sl
 pub use context::{ActuatorContext, ComponentContext, Context, SensorContext, ServiceContext};
 pub use estimator::{Estimator, HandleCall, HandleCast, Reply};
 pub use external::External;
-pub(crate) use host::{DisarmHook, Host};
+pub use guardian::SafetyLink;
+pub(crate) use guardian::{DisarmHook, Guardian, OwnHooks};
+pub(crate) use host::Host;
 pub use info::{Info, Request};
 pub use inputs::{FieldIndex, Input, InputAt, InputField, Inputs, Slot, SyncMiss, declare};
 pub use options::{FromQuantity, FromText, NoOptions, OptionField, Options};

@@ -51,8 +51,8 @@ pub use bb_macros::robot;
 pub use bb_macros::{Inputs, Options, Outputs, Payload};
 pub use component::{
     Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, HandleCall, HandleCast, Info,
-    Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, Sensor, SensorContext,
-    Service, ServiceContext,
+    Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,
+    SensorContext, Service, ServiceContext,
 };
 pub use control::Execution;
 pub use declaration::{ParameterError, Role};
@@ -79,8 +79,8 @@ pub use nalgebra;
 pub mod prelude {
     pub use crate::component::{
         Actuator, ActuatorContext, Arm, Command, CommandContext, Context, Disarm, Estimator, External, HandleCall,
-        HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reading, Reply, Request, Sensor, SensorContext,
-        Service, ServiceContext,
+        HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reading, Reply, Request, SafetyLink, Sensor,
+        SensorContext, Service, ServiceContext,
     };
     pub use crate::declaration::Role;
     pub use crate::event::{HealthReason, HealthState, HealthTransition, Safety};

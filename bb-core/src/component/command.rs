@@ -1,5 +1,6 @@
 //! The contract of a command.
 
+use super::guardian::OwnHooks;
 use super::host::Host;
 use super::{Bus, Fault, NoOptions, Options, Permit};
 use crate::Payload;
@@ -108,6 +109,7 @@ pub struct CommandContext {
     pub(crate) host: Arc<dyn Host>,
     pub(crate) sleeper: Sleeper,
     pub(crate) permit: Permit,
+    pub(crate) hooks: Arc<OwnHooks>,
 }
 
 impl CommandContext {
@@ -140,6 +142,19 @@ impl CommandContext {
     /// asks now and then.
     pub fn is_cancelled(&self) -> bool {
         !self.permit.is_valid()
+    }
+
+    /// Registers what makes hardware safe when the robot is disarmed while this command runs: it is forgotten with the last
+    /// clone of this context. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one
+    /// that fails or takes longer leads to the safety state `error`.
+    pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
+        self.hooks.add(Arc::new(hook));
+    }
+
+    /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
+    /// is published at `safety/error`.
+    pub fn hardware_error(&self, message: impl Into<String>) {
+        self.hooks.hardware_error(message.into());
     }
 
     /// The operational state.

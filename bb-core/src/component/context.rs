@@ -1,7 +1,8 @@
 //! What a component is given when it starts.
 
+use super::guardian::Guardian;
 use super::host::Host;
-use super::{Bus, Fault, Permit, Request};
+use super::{Bus, Fault, Permit, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
 use crate::message::Frame;
 use crate::time::{Clock, MonotonicTime};
@@ -17,12 +18,19 @@ pub struct Context {
     robot: &'static str,
     declaration: &'static EstimatorDeclaration,
     now: MonotonicTime,
+    safety: SafetyLink,
     requests: RefCell<Vec<Request>>,
 }
 
 impl Context {
-    pub(crate) fn new(robot: &'static str, declaration: &'static EstimatorDeclaration, now: MonotonicTime) -> Self {
-        Self { robot, declaration, now, requests: RefCell::default() }
+    pub(crate) fn new(
+        robot: &'static str,
+        declaration: &'static EstimatorDeclaration,
+        now: MonotonicTime,
+        guardian: Option<Arc<dyn Guardian>>,
+    ) -> Self {
+        let safety = SafetyLink::new(declaration.path, guardian);
+        Self { robot, declaration, now, safety, requests: RefCell::default() }
     }
 
     /// Takes what was asked for.
@@ -56,7 +64,7 @@ impl Context {
         });
         let inputs: &'static [InputDeclaration] = Vec::leak(inputs.collect());
         let declaration = EstimatorDeclaration { path: "test", inputs, ..EstimatorDeclaration::NONE };
-        Self::new("test", Box::leak(Box::new(declaration)), MonotonicTime::ZERO)
+        Self::new("test", Box::leak(Box::new(declaration)), MonotonicTime::ZERO, None)
     }
 
     /// The robot's name.
@@ -92,6 +100,21 @@ impl Context {
     /// The time of this start or restart.
     pub fn now(&self) -> MonotonicTime {
         self.now
+    }
+
+    /// Registers what makes hardware safe when the robot is disarmed; see [`SafetyLink::on_disarm`].
+    pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
+        self.safety.on_disarm(hook);
+    }
+
+    /// Reports that hardware is in a dangerous state; see [`SafetyLink::hardware_error`].
+    pub fn hardware_error(&self, message: impl Into<String>) {
+        self.safety.hardware_error(message);
+    }
+
+    /// The same for later, from any callback: keep it.
+    pub fn safety(&self) -> SafetyLink {
+        self.safety.clone()
     }
 
     /// Asks for a timer, a tick, a timeout or a continue, from the start on.

@@ -1,5 +1,6 @@
 //! The robot as its components see it.
 
+use super::guardian::Guardian;
 use super::{Fault, Permit};
 use crate::component::bus::{CommandInfo, DynamicExecution};
 use crate::declaration::ParameterError;
@@ -9,18 +10,12 @@ use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::time::Clock;
 use std::any::Any;
 use std::fmt;
-use std::sync::Arc;
-
-/// Makes hardware safe.
-pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
 
 /// What components reach of the robot that runs them; the runtime implements it.
-pub(crate) trait Host: Send + Sync {
+pub(crate) trait Host: Guardian {
     fn origin(&self) -> Origin;
     fn clock(&self) -> &Clock;
     fn is_stopping(&self) -> bool;
-    fn on_disarm(&self, path: &'static str, hook: DisarmHook);
-    fn hardware_error(&self, path: &'static str, message: String);
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
     fn arm(&self) -> bool;

@@ -5,7 +5,7 @@ use super::hooks;
 use super::machine::IDLE;
 use super::step::Step;
 use super::system::{Control, Disarming, Limit, Phase, State};
-use crate::component::DisarmHook;
+use crate::component::{DisarmHook, Guardian};
 use crate::event::{Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
@@ -158,7 +158,7 @@ impl Control {
     }
 
     /// Hardware is in a dangerous state: the robot is disarmed, and in `error`.
-    pub(crate) fn hardware_error(&self, path: &'static str, message: String) {
+    pub(crate) fn note_hardware_error(&self, path: &'static str, message: String) {
         let mut step = self.step();
         step.line(Event::HardwareError { path, message: message.clone() });
         step.hardware_error(SafetyError { path, message });
@@ -166,13 +166,13 @@ impl Control {
     }
 
     /// Remembers what makes hardware safe.
-    pub(crate) fn on_disarm(&self, path: &'static str, hook: DisarmHook) {
-        self.lock().hooks.add(path, hook, false);
+    fn remember(&self, path: &'static str, hook: DisarmHook, is_kept: bool) -> u64 {
+        self.lock().hooks.add(path, hook, is_kept)
     }
 
     /// The same for an actuator's own `disarm`, which restarts do not replace.
     pub(crate) fn on_disarm_always(&self, path: &'static str, hook: DisarmHook) {
-        self.lock().hooks.add(path, hook, true);
+        self.remember(path, hook, true);
     }
 
     /// Runs `make`, which makes the component at `path` or changes it. What it registers replaces what was registered before,
@@ -193,6 +193,27 @@ impl Control {
         drop(state);
         gone.into_iter().for_each(crate::fault::discard);
         made
+    }
+}
+
+/// In a replay, the journal says what components have reported, and there is no hardware.
+impl Guardian for Control {
+    fn on_disarm(&self, path: &'static str, hook: DisarmHook) -> u64 {
+        match self.0.mode {
+            Mode::Replay => 0,
+            Mode::Real | Mode::Virtual => self.remember(path, hook, false),
+        }
+    }
+
+    fn forget_hooks(&self, numbers: &[u64]) {
+        let gone = self.lock().hooks.take_numbers(numbers);
+        gone.into_iter().for_each(crate::fault::discard);
+    }
+
+    fn hardware_error(&self, path: &'static str, message: String) {
+        if self.0.mode != Mode::Replay {
+            self.note_hardware_error(path, message);
+        }
     }
 }
 

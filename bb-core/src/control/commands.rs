@@ -8,7 +8,7 @@ use super::machine::IDLE;
 use super::step::Step;
 use super::system::{Control, Limit, Phase, RunningCommand};
 use super::task::{Ended, Task, Value};
-use crate::component::{CommandContext, CommandInfo, DynamicExecution, Outcome, Permit};
+use crate::component::{CommandContext, CommandInfo, DynamicExecution, Outcome, OwnHooks, Permit};
 use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{
     CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Safety,
@@ -245,10 +245,12 @@ impl Step<'_> {
                 let gone = || Fault::new("the robot is gone");
                 let control = weak.upgrade().ok_or_else(gone)?;
                 let prepared = control.0.commands.get(number).ok_or_else(gone)?;
+                let host = control.host()?;
                 let context = CommandContext {
                     name: declared.name,
                     health,
-                    host: control.host()?,
+                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _)),
+                    host,
                     sleeper: control.0.sleeper.clone(),
                     permit,
                 };

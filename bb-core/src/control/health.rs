@@ -28,6 +28,10 @@ impl Overseer for Control {
     fn parameters(&self) -> ParameterValues {
         Control::parameters(self)
     }
+
+    fn replacing_hooks(&self, path: &'static str, always: bool, make: &mut dyn FnMut() -> bool) {
+        let _ = Control::replacing_hooks(self, path, always, || make().then_some(()).ok_or(()));
+    }
 }
 
 impl Control {

@@ -21,9 +21,11 @@ struct Hook {
 }
 
 impl Hooks {
-    pub(super) fn add(&mut self, path: &'static str, run: DisarmHook, is_kept: bool) {
-        self.all.push(Hook { path, number: self.next, is_kept, run });
+    pub(super) fn add(&mut self, path: &'static str, run: DisarmHook, is_kept: bool) -> u64 {
+        let number = self.next;
+        self.all.push(Hook { path, number, is_kept, run });
         self.next += 1;
+        number
     }
 
     /// What is registered from now on has a number from this one on.
@@ -41,6 +43,11 @@ impl Hooks {
         let taken =
             self.all.extract_if(.., |hook| hook.path == path && !hook.is_kept && (hook.number < number) == before);
         taken.map(|hook| hook.run).collect()
+    }
+
+    /// Takes out those of these numbers; to be dropped without a lock.
+    pub(super) fn take_numbers(&mut self, numbers: &[u64]) -> Vec<DisarmHook> {
+        self.all.extract_if(.., |hook| numbers.contains(&hook.number)).map(|hook| hook.run).collect()
     }
 
     pub(super) fn all(&self) -> Vec<(&'static str, DisarmHook)> {

@@ -44,6 +44,7 @@ struct Queue {
     wall_offset_nanos: i64,
     /// A thread hands lines to the sink.
     is_draining: bool,
+    has_begun: bool,
     is_closed: bool,
     /// The sink hung: no more lines are taken.
     has_ended: bool,
@@ -54,9 +55,11 @@ impl Journal {
         let queue = Queue {
             lines: Vec::new(),
             spare: Vec::new(),
-            next: 1,
+            // The first line is written last, by `begin`.
+            next: 2,
             wall_offset_nanos,
             is_draining: false,
+            has_begun: false,
             is_closed: false,
             has_ended: false,
         };
@@ -67,6 +70,14 @@ impl Journal {
             room: Condvar::new(),
             sink,
         }))
+    }
+
+    /// Puts the first line in its place, before those of components that did something as they were made. Nothing is handed to
+    /// the sink before.
+    pub(crate) fn begin(&self, time: MonotonicTime, event: Event) {
+        let mut queue = self.0.lock();
+        queue.lines.insert(0, Entry { number: 1, time, event });
+        queue.has_begun = true;
     }
 
     /// Writes a line of an entry that sees this offset of the wall clock; its number. Never waits for the sink.
@@ -170,7 +181,7 @@ impl Inner {
 
     fn flush(&self) {
         let mut queue = self.lock();
-        if queue.is_draining {
+        if queue.is_draining || !queue.has_begun {
             return;
         }
         while !queue.lines.is_empty() {
@@ -227,6 +238,9 @@ mod tests {
         let lines: Arc<Mutex<Vec<Entry>>> = Arc::default();
         let sink = Arc::clone(&lines);
         let journal = Journal::new(Arc::new(move |line| sink.lock().expect("no panic").push(line)), 5);
+        journal.write(MonotonicTime::ZERO, 5, Event::Disarm { force: false });
+        journal.flush();
+        journal.begin(MonotonicTime::ZERO, Event::Arm);
         journal.start().expect("a thread");
         std::thread::scope(|scope| {
             for _ in 0..4 {
@@ -242,9 +256,13 @@ mod tests {
         assert!(journal.hand_over(Duration::from_secs(10)));
         assert_eq!(journal.write(MonotonicTime::ZERO, 6, Event::Stop), 0, "closed");
         let lines = lines.lock().expect("no panic");
-        assert_eq!(lines.len(), 40_002);
+        assert_eq!(lines.len(), 40_004);
+        assert!(
+            matches!((&lines[0].event, &lines[1].event), (Event::Arm, Event::Disarm { .. })),
+            "it begins first"
+        );
         assert!(lines.iter().zip(1..).all(|(line, number)| line.number == number));
-        assert!(matches!(lines[40_000].event, Event::WallClock { offset_nanos: 6 }));
+        assert!(matches!(lines[40_002].event, Event::WallClock { offset_nanos: 6 }));
     }
 
     #[test]
@@ -258,6 +276,7 @@ mod tests {
             let _ = hang.lock().map(|hang| hang.recv());
         };
         let journal = Journal::new(Arc::new(sink), 0);
+        journal.begin(MonotonicTime::ZERO, Event::Arm);
         journal.start().expect("a thread");
         journal.write(MonotonicTime::ZERO, 0, Event::Arm);
         while count.load(Ordering::SeqCst) == 0 {

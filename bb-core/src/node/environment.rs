@@ -2,7 +2,7 @@
 
 use super::entry::Report;
 use super::shared::SharedNode;
-use crate::component::{Binding, Options};
+use crate::component::{Binding, Guardian, Options};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
 use crate::fault::Fault;
 use crate::journal::{Event, Journal, Recorded};
@@ -19,12 +19,15 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// The robot as its estimators see it: the control state takes note of what they report, without waiting for anything.
-pub(crate) trait Overseer: Send + Sync {
+pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
     /// Takes note that the options of the component at `path` are bound to these parameters. `estimator` is told of new
     /// values by entries, others by what they registered.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
     fn parameters(&self) -> ParameterValues;
+    /// Runs `make`, which makes the component at `path` or changes it, and says whether it has succeeded. The disarm callbacks
+    /// that it registers replace those from before.
+    fn replacing_hooks(&self, path: &'static str, always: bool, make: &mut dyn FnMut() -> bool);
 }
 
 /// Whether options would be valid with these parameters.

@@ -12,8 +12,7 @@ use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
 use super::turn::Turn;
 use super::{DropReason, HealthReport, Report};
-use crate::component::Request;
-use crate::component::{Binding, Context, Estimator, InputAt, Inputs, Reply, SyncMiss};
+use crate::component::{Binding, Context, Estimator, Guardian, InputAt, Inputs, Reply, Request, SyncMiss};
 use crate::declaration::{EstimatorDeclaration, InputDeclaration, ParameterValues};
 use crate::event::{HealthReason, HealthState, HealthTransition};
 use crate::fault::{Failed, Fault, caught};
@@ -22,6 +21,7 @@ use crate::message::{Stamp, Stamped};
 use crate::telemetry::TelemetryEvent;
 use crate::time::MonotonicTime;
 use std::fmt;
+use std::sync::Arc;
 
 /// One estimator with its fan-in, its health and its timers. Its island sees to it that one thread at a time is in here.
 pub struct Node<E: Estimator> {
@@ -491,7 +491,8 @@ impl<E: Estimator> Node<E> {
     }
 
     fn context(&self, now: MonotonicTime) -> Context {
-        Context::new(self.environment.origin().robot, self.declaration, now)
+        let guardian: Arc<dyn Guardian> = Arc::clone(self.environment.overseer()) as _;
+        Context::new(self.environment.origin().robot, self.declaration, now, Some(guardian))
     }
 }
 

@@ -237,7 +237,7 @@ impl<A: Actuator> Inner<A> {
         if let Err(failed) = caught(|| actuator.disarm()) {
             state.is_unsafe = true;
             let message = format!("it has failed and could not be made safe: {}", failed.fault);
-            self.control.hardware_error(self.declaration.path, message);
+            self.control.note_hardware_error(self.declaration.path, message);
         }
     }
 

@@ -172,7 +172,8 @@ impl<R: Robot> Builder<R> {
     fn assemble(self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
         let origin = Origin { robot: R::NAME, node: self.node };
         let journal = self.journal.filter(|_| mode != Mode::Replay);
-        let journal = journal.map(|sink| Journal::new(sink, clock.wall_offset_nanos()));
+        let wall_offset_nanos = clock.wall_offset_nanos();
+        let journal = journal.map(|sink| Journal::new(sink, wall_offset_nanos));
         let telemetry = (!self.telemetry.is_empty()).then_some(self.telemetry);
         let nodes: Box<[SharedNode]> =
             R::ESTIMATORS.iter().enumerate().map(|(number, declared)| SharedNode::new(number, declared)).collect();
@@ -238,9 +239,8 @@ impl<R: Robot> Builder<R> {
         }
         if let Some(journal) = &journal {
             let declaration = facts.iter().cloned().chain(environment.facts()).collect();
-            let wall_offset_nanos = clock.wall_offset_nanos();
             let begin = Event::Begin { declaration, wall_offset_nanos, is_virtual: mode == Mode::Virtual };
-            journal.write(start, wall_offset_nanos, begin);
+            journal.begin(start, begin);
             if mode == Mode::Real {
                 journal.start().map_err(|error| StartError::component("journal", Fault::from(error)))?;
             }

@@ -2,7 +2,7 @@
 
 use super::Robot;
 use super::actuator::AnyActuator;
-use crate::component::{CommandInfo, DisarmHook, DynamicExecution, Host, Permit};
+use crate::component::{CommandInfo, DisarmHook, DynamicExecution, Guardian, Host, Permit};
 use crate::control::{Control, Islands, Wired};
 use crate::declaration::ParameterError;
 use crate::event::{ParameterValue, Safety};
@@ -30,6 +30,20 @@ impl<R: Robot> RobotHost<R> {
     }
 }
 
+impl<R: Robot> Guardian for RobotHost<R> {
+    fn on_disarm(&self, path: &'static str, hook: DisarmHook) -> u64 {
+        self.control.on_disarm(path, hook)
+    }
+
+    fn forget_hooks(&self, numbers: &[u64]) {
+        self.control.forget_hooks(numbers);
+    }
+
+    fn hardware_error(&self, path: &'static str, message: String) {
+        Guardian::hardware_error(&self.control, path, message);
+    }
+}
+
 impl<R: Robot> Host for RobotHost<R> {
     fn origin(&self) -> Origin {
         self.control.origin()
@@ -41,14 +55,6 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn is_stopping(&self) -> bool {
         self.control.stop_signal().is_set()
-    }
-
-    fn on_disarm(&self, path: &'static str, hook: DisarmHook) {
-        self.control.on_disarm(path, hook);
-    }
-
-    fn hardware_error(&self, path: &'static str, message: String) {
-        self.control.hardware_error(path, message);
     }
 
     fn state(&self) -> &'static str {

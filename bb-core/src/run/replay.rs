@@ -245,7 +245,7 @@ impl<R: Robot> Replay<R> {
                 control.component_failed(path, supervisor, message, panicked);
             }
             Event::Noted { path, message } => control.note_fault(path, message),
-            Event::HardwareError { path, message } => control.hardware_error(path, message),
+            Event::HardwareError { path, message } => control.note_hardware_error(path, message),
             Event::Parameter { parameter, value } => control.replay_parameter(parameter, value),
             Event::Command { command } => control.replay_command(command),
             Event::Ended { execution, end } => control.replay_end(execution, end),

@@ -5,6 +5,7 @@
 //! locks order more than real ones do: the comments at the fences say what the fences are for.)
 
 use super::{Island, IslandDeclaration, IslandState, IslandWiring, Key};
+use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
 use crate::journal::Event;
 use crate::lifecycle::Supervision;
@@ -56,7 +57,21 @@ impl IslandWiring for Wiring {
 /// Nothing is reported and nothing bound.
 struct Nobody;
 
+impl Guardian for Nobody {
+    fn on_disarm(&self, _: &'static str, _: DisarmHook) -> u64 {
+        0
+    }
+
+    fn forget_hooks(&self, _: &[u64]) {}
+
+    fn hardware_error(&self, _: &'static str, _: String) {}
+}
+
 impl Overseer for Nobody {
+    fn replacing_hooks(&self, _: &'static str, _: bool, make: &mut dyn FnMut() -> bool) {
+        make();
+    }
+
     fn report(&self, _: usize, _: Report) {}
 
     fn bind(&self, _: &'static str, _: &'static [usize], _: Check, _: BindTarget) {}

@@ -3,9 +3,10 @@
 use super::{Context, Node};
 use crate::component::Estimator;
 use crate::event::HealthReason;
-use crate::fault::Failed;
+use crate::fault::{Failed, Fault};
 use crate::lifecycle::AfterFault;
 use crate::node::admission::Admission;
+use crate::node::environment::Environment;
 use crate::node::health::Event;
 use crate::node::timers::Timers;
 use crate::node::turn::Turn;
@@ -62,7 +63,10 @@ impl<E: Estimator> Node<E> {
     /// Its backoff is over, or it is restarted from above.
     pub(super) fn restart(&mut self, turn: &Turn<'_>) {
         let context = self.context(turn.now());
-        match self.slot.make(&context, &self.parameters) {
+        let (slot, parameters) = (&mut self.slot, &self.parameters);
+        let made =
+            replacing_hooks(&self.environment, self.declaration.path, true, || slot.make(&context, parameters));
+        match made {
             Ok(()) => self.refresh(context, turn.now()),
             Err(failed) => self.fail(failed, turn),
         }
@@ -78,7 +82,10 @@ impl<E: Estimator> Node<E> {
     /// New values of parameters.
     pub(super) fn change_options(&mut self, turn: &Turn<'_>) {
         let context = self.context(turn.now());
-        match self.slot.change(&context, &self.parameters) {
+        let (slot, parameters) = (&mut self.slot, &self.parameters);
+        let changed =
+            replacing_hooks(&self.environment, self.declaration.path, false, || slot.change(&context, parameters));
+        match changed {
             Ok(true) => {
                 for request in context.into_requests() {
                     self.timers.request(request, turn.now());
@@ -113,4 +120,21 @@ impl<E: Estimator> Node<E> {
         let counters = self.shared.counters();
         self.backlog.clear().for_each(|input| counters.drop(input, DropReason::Stopped));
     }
+}
+
+/// Runs `make`; the disarm callbacks that it registers replace those from before.
+fn replacing_hooks<T>(
+    environment: &Environment,
+    path: &'static str,
+    always: bool,
+    make: impl FnOnce() -> Result<T, Failed>,
+) -> Result<T, Failed> {
+    let (mut make, mut made) = (Some(make), None);
+    environment.overseer().replacing_hooks(path, always, &mut || {
+        let result = make.take().map(|make| make());
+        let has_succeeded = matches!(result, Some(Ok(_)));
+        made = result;
+        has_succeeded
+    });
+    made.unwrap_or_else(|| Err(Failed::from(Fault::new("it was not made"))))
 }

@@ -1,0 +1,92 @@
+//! What any component can do for the safety of the robot.
+
+use super::Fault;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Makes hardware safe.
+pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
+
+/// Keeps disarm callbacks and takes note of hardware errors; the runtime implements it.
+pub(crate) trait Guardian: Send + Sync {
+    /// Adds a callback of the component at `path`; its number.
+    fn on_disarm(&self, path: &'static str, hook: DisarmHook) -> u64;
+    /// Drops callbacks, by their numbers.
+    fn forget_hooks(&self, numbers: &[u64]);
+    fn hardware_error(&self, path: &'static str, message: String);
+}
+
+/// Registers disarm callbacks and reports hardware errors, for a component whose later calls are given no context: an
+/// estimator keeps the one that [`Context::safety`](super::Context::safety) gives. Clones are the same.
+#[derive(Clone)]
+pub struct SafetyLink {
+    path: &'static str,
+    guardian: Option<Arc<dyn Guardian>>,
+}
+
+impl SafetyLink {
+    /// With no guardian, for tests, nothing happens.
+    pub(crate) fn new(path: &'static str, guardian: Option<Arc<dyn Guardian>>) -> Self {
+        Self { path, guardian }
+    }
+
+    /// Registers what makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
+    /// own, and must return within 5 s; one that fails or takes longer leads to the safety state `error`. A restart of the
+    /// component replaces what it registered before.
+    pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
+        if let Some(guardian) = &self.guardian {
+            guardian.on_disarm(self.path, Arc::new(hook));
+        }
+    }
+
+    /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
+    /// is published at `safety/error`.
+    pub fn hardware_error(&self, message: impl Into<String>) {
+        if let Some(guardian) = &self.guardian {
+            guardian.hardware_error(self.path, message.into());
+        }
+    }
+}
+
+impl fmt::Debug for SafetyLink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("SafetyLink").field(&self.path).finish()
+    }
+}
+
+/// The disarm callbacks of one execution of a command: they end with it.
+pub(crate) struct OwnHooks {
+    path: &'static str,
+    guardian: Arc<dyn Guardian>,
+    numbers: Mutex<Vec<u64>>,
+}
+
+impl OwnHooks {
+    pub(crate) fn new(path: &'static str, guardian: Arc<dyn Guardian>) -> Self {
+        Self { path, guardian, numbers: Mutex::default() }
+    }
+
+    pub(crate) fn add(&self, hook: DisarmHook) {
+        let number = self.guardian.on_disarm(self.path, hook);
+        self.numbers.lock().unwrap_or_else(PoisonError::into_inner).push(number);
+    }
+
+    pub(crate) fn hardware_error(&self, message: String) {
+        self.guardian.hardware_error(self.path, message);
+    }
+}
+
+impl Drop for OwnHooks {
+    fn drop(&mut self) {
+        let numbers = self.numbers.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if !numbers.is_empty() {
+            self.guardian.forget_hooks(numbers);
+        }
+    }
+}
+
+impl fmt::Debug for OwnHooks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("OwnHooks").field(&self.path).finish()
+    }
+}
