@@ -16,6 +16,8 @@ mod execution;
 mod health;
 mod hooks;
 mod machine;
+#[cfg(all(test, loom))]
+mod model;
 mod parameters;
 mod step;
 mod stopping;

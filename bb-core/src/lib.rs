@@ -23,6 +23,8 @@
 //!
 //! All stored quantities are SI: metres, seconds, radians, kilograms, tesla.
 
+#![cfg_attr(loom, allow(dead_code, reason = "a model is of a part"))]
+
 // The derives name this crate by its absolute path, also when this crate itself uses them.
 extern crate self as bb_core;
 

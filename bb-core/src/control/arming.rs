@@ -29,6 +29,10 @@ impl State {
     fn is_disarming(&self, generation: u64) -> bool {
         self.disarming.as_ref().is_some_and(|disarming| disarming.generation == generation)
     }
+
+    fn disarming_of(&mut self, generation: u64) -> Option<&mut Disarming> {
+        self.disarming.as_mut().filter(|disarming| disarming.generation == generation)
+    }
 }
 
 impl Control {
@@ -107,41 +111,26 @@ impl Control {
 
     /// A disarm callback has returned; `None` if there was none to run.
     pub(super) fn hook_returned(&self, generation: u64, index: Option<usize>, error: Option<SafetyError>) {
-        let mut state = self.lock();
-        let Some(disarming) = state.disarming.as_mut().filter(|disarming| disarming.generation == generation)
-        else {
-            return;
-        };
+        let mut step = self.step();
+        let Some(disarming) = step.state.disarming_of(generation) else { return };
         disarming.left.retain(|(other, _)| Some(*other) != index);
         disarming.errors.extend(error);
         if disarming.left.is_empty() {
             let errors = std::mem::take(&mut disarming.errors);
-            drop(state);
-            self.disarmed_in(generation, errors);
+            step.disarmed(errors);
         }
     }
 
     /// The time of the disarm callbacks is over: those that have not returned are not safe.
     pub(super) fn disarm_timeout(&self, generation: u64) {
-        let mut state = self.lock();
-        let Some(disarming) = state.disarming.as_mut().filter(|disarming| disarming.generation == generation)
-        else {
-            return;
-        };
+        let mut step = self.step();
+        let Some(disarming) = step.state.disarming_of(generation) else { return };
         let late = std::mem::take(&mut disarming.left).into_iter();
         let mut errors = std::mem::take(&mut disarming.errors);
         errors.extend(
             late.map(|(_, path)| SafetyError { path, message: "did not come back from disarming in time".into() }),
         );
-        drop(state);
-        self.disarmed_in(generation, errors);
-    }
-
-    fn disarmed_in(&self, generation: u64, errors: Vec<SafetyError>) {
-        let step = self.step();
-        if step.state.is_disarming(generation) {
-            step.disarmed(errors);
-        }
+        step.disarmed(errors);
     }
 
     /// The disarm callbacks have returned, or their time is over.

@@ -123,7 +123,7 @@ impl Control {
                 discard(hook);
                 control.hook_returned(generation, Some(index), error);
             };
-            let spawned = std::thread::Builder::new().name(format!("disarm {path}")).spawn(run);
+            let spawned = spawn(format!("disarm {path}"), run);
             if let Err(error) = spawned {
                 let error = SafetyError { path, message: format!("cannot be disarmed: {error}") };
                 self.hook_returned(generation, Some(index), Some(error));
@@ -153,6 +153,10 @@ impl Control {
     }
 
     fn report(&self, logs: Vec<Log>) {
+        // The pool's threads are no part of a model.
+        if cfg!(loom) {
+            return;
+        }
         let mut reports = lock(&self.0.reporter.0);
         for log in logs {
             if reports.logs.len() < MOST_LOGS {
@@ -203,6 +207,17 @@ impl Control {
             }
         }
     }
+}
+
+#[cfg(not(loom))]
+fn spawn(name: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    std::thread::Builder::new().name(name).spawn(run).map(drop)
+}
+
+#[cfg(loom)]
+fn spawn(_: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    loom::thread::spawn(run);
+    Ok(())
 }
 
 fn write_log(log: &Log) {

@@ -2,21 +2,20 @@
 
 use super::effects::{Effects, Log};
 use super::machine::Machine;
-use super::system::{Control, State};
+use super::system::{Control, StateGuard};
 use crate::event::{ComponentFault, SafetyError, SafetyTransition, StateTransition};
 use crate::journal::Event;
 use crate::message::{Payload, Stamp};
 use crate::node::{Mode, NodeEntry};
 use crate::pubsub::Topic;
 use crate::time::{MonotonicTime, WallTime};
-use std::sync::MutexGuard;
 use std::sync::atomic::Ordering;
 
 /// The processing of one entry: the lock, the entry's time, and what follows from it once the lock is released. No user code
 /// may be called while it lives.
 pub(super) struct Step<'a> {
     pub(super) control: &'a Control,
-    pub(super) state: MutexGuard<'a, State>,
+    pub(super) state: StateGuard<'a>,
     pub(super) now: MonotonicTime,
     wall_offset_nanos: i64,
     before: Machine,

@@ -22,11 +22,15 @@ use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::Topology;
+#[cfg(loom)]
+use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+#[cfg(not(loom))]
+use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
+use std::time::Duration;
 
 /// What `robot!` declares of all this.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +72,7 @@ pub(super) struct Inner {
     pub(super) nodes: Box<[SharedNode]>,
     pub(super) journal: Option<Journal>,
     pub(super) telemetry: Option<Telemetry>,
-    pub(super) state: Mutex<State>,
+    pub(super) state: StateMutex<State>,
     /// Told of every entry: for those who wait for the robot to be disarmed, or for commands to be gone.
     pub(super) changed: Condvar,
     /// The safety state, for actuators, which ask before every command.
@@ -124,6 +128,9 @@ pub(super) enum Limit {
     /// How long disarm callbacks may take.
     Disarming(u64),
 }
+
+/// The control state's lock.
+pub(super) type StateGuard<'a> = MutexGuard<'a, State>;
 
 pub(super) struct State {
     pub(super) machine: Machine,
@@ -262,7 +269,7 @@ impl Control {
             nodes: parts.nodes,
             journal: parts.journal,
             telemetry: parts.telemetry,
-            state: Mutex::new(state),
+            state: StateMutex::new(state),
             changed: Condvar::new(),
             safety: AtomicU8::new(Safety::Disarmed as u8),
             sleeper: Sleeper::new(bell.clone()),
@@ -301,22 +308,30 @@ impl Control {
     }
 
     /// The state, for a look; entries are processed by [`Self::step`](super::step).
-    pub(super) fn lock(&self) -> MutexGuard<'_, State> {
+    pub(super) fn lock(&self) -> StateGuard<'_> {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Waits until `holds`, `longest` at most; whether it does.
+    #[cfg(not(loom))]
     pub(super) fn wait_until(&self, longest: Duration, holds: impl Fn(&State) -> bool) -> bool {
-        let deadline = Instant::now() + longest;
+        let deadline = std::time::Instant::now() + longest;
         let mut state = self.lock();
         while !holds(&state) {
-            let left = deadline.saturating_duration_since(Instant::now());
+            let left = deadline.saturating_duration_since(std::time::Instant::now());
             if left.is_zero() {
                 return false;
             }
             state = self.0.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
         true
+    }
+
+    /// A model has no time: others go on once.
+    #[cfg(loom)]
+    pub(super) fn wait_until(&self, _: Duration, holds: impl Fn(&State) -> bool) -> bool {
+        loom::thread::yield_now();
+        holds(&self.lock())
     }
 
     /// Has a supervisor look after a sensor, a service or an actuator.

@@ -30,7 +30,7 @@ use crate::journal::Event;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::fmt;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 #[cfg(loom)]
 use loom::sync::{
@@ -287,7 +287,7 @@ impl<S: IslandState> Island<S> {
     fn wait(&self, longest: Duration, holds: impl Fn() -> bool) -> bool {
         // How long a change may go unnoticed that nobody could tell of, since it came before this thread began to wait.
         const STEP: Duration = Duration::from_millis(1);
-        let start = Instant::now();
+        let start = std::time::Instant::now();
         loop {
             if holds() {
                 return true;

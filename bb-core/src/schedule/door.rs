@@ -1,8 +1,12 @@
 //! Through which messages come in from threads that the robot does not wait for.
 
+#[cfg(loom)]
+use loom::sync::atomic::AtomicUsize;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+#[cfg(not(loom))]
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 /// Open from the start until the robot has stopped: what is published later is not taken, so that the last report counts what
 /// the journal holds, neither more nor less. Clones are the same door.
@@ -11,11 +15,15 @@ pub(crate) struct Door(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {
-    is_closed: AtomicBool,
-    inside: AtomicUsize,
+    /// Twice the number of those inside, and 1 once it is closed: in one word, so that whoever enters is either seen by the one
+    /// who closes it or sees it closed.
+    state: AtomicUsize,
     /// Without a journal nothing has to agree with it, and nobody is counted.
     is_counted: bool,
 }
+
+const CLOSED: usize = 1;
+const ONE_INSIDE: usize = 2;
 
 /// Somebody is inside as long as this lives.
 #[derive(Debug)]
@@ -23,7 +31,7 @@ pub(crate) struct Inside<'a>(Option<&'a Shared>);
 
 impl Door {
     pub(crate) fn new(is_counted: bool) -> Self {
-        Self(Arc::new(Shared { is_closed: AtomicBool::new(false), inside: AtomicUsize::new(0), is_counted }))
+        Self(Arc::new(Shared { state: AtomicUsize::new(0), is_counted }))
     }
 
     /// Lets the caller in; none once the door is closed.
@@ -31,22 +39,21 @@ impl Door {
     pub(crate) fn enter(&self) -> Option<Inside<'_>> {
         let shared = &*self.0;
         if !shared.is_counted {
-            return (!shared.is_closed.load(Ordering::Relaxed)).then_some(Inside(None));
+            return (shared.state.load(Ordering::Relaxed) & CLOSED == 0).then_some(Inside(None));
         }
-        // Whoever closes it sees this one inside, or this one sees it closed.
-        shared.inside.fetch_add(1, Ordering::SeqCst);
+        let before = shared.state.fetch_add(ONE_INSIDE, Ordering::AcqRel);
         let inside = Inside(Some(shared));
-        (!shared.is_closed.load(Ordering::SeqCst)).then_some(inside)
+        (before & CLOSED == 0).then_some(inside)
     }
 
     /// Lets nobody in any more, and waits until `deadline` for those who are inside; false if some are still.
     pub(crate) fn close(&self, deadline: Instant) -> bool {
-        self.0.is_closed.store(true, Ordering::SeqCst);
-        while self.0.inside.load(Ordering::SeqCst) != 0 {
+        self.0.state.fetch_or(CLOSED, Ordering::AcqRel);
+        while self.0.state.load(Ordering::Acquire) >= ONE_INSIDE {
             if Instant::now() >= deadline {
                 return false;
             }
-            std::thread::sleep(Duration::from_micros(100));
+            wait();
         }
         true
     }
@@ -56,14 +63,52 @@ impl Drop for Inside<'_> {
     #[inline]
     fn drop(&mut self) {
         if let Some(shared) = self.0 {
-            shared.inside.fetch_sub(1, Ordering::SeqCst);
+            shared.state.fetch_sub(ONE_INSIDE, Ordering::AcqRel);
         }
     }
 }
 
-#[cfg(test)]
+#[cfg(not(loom))]
+fn wait() {
+    std::thread::sleep(std::time::Duration::from_micros(100));
+}
+
+#[cfg(loom)]
+fn wait() {
+    loom::thread::yield_now();
+}
+
+#[cfg(all(test, loom))]
+mod model {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn nobody_is_inside_a_door_that_was_closed() {
+        loom::model(|| {
+            let door = Door::new(true);
+            // Only those inside count, without an order of its own.
+            let written = loom::sync::Arc::new(AtomicUsize::new(0));
+            let publishers = [0, 1].map(|_| {
+                let (door, written) = (door.clone(), loom::sync::Arc::clone(&written));
+                loom::thread::spawn(move || {
+                    if let Some(_inside) = door.enter() {
+                        written.fetch_add(1, Ordering::Relaxed);
+                    }
+                })
+            });
+            assert!(door.close(Instant::now() + Duration::from_secs(3600)));
+            let at_the_end = written.load(Ordering::Relaxed);
+            publishers.into_iter().for_each(|publisher| publisher.join().expect("it does not panic"));
+            assert_eq!(at_the_end, written.load(Ordering::Relaxed));
+        });
+    }
+}
+
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     #[test]
     fn whoever_was_let_in_is_waited_for_and_nobody_comes_in_later() {

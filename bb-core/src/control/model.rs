@@ -1,0 +1,157 @@
+//! Every order in which threads can enter the control state, by a model checker: `RUSTFLAGS="--cfg loom"`.
+//!
+//! In each, a robot that was told to stop stays disarmed, what could not be made safe ends in `error`, and an actuator does not
+//! move once it was made safe.
+
+use super::system::{Control, Declared, Parts};
+use super::topics::SystemTopics;
+use crate::component::Guardian;
+use crate::declaration::ParameterValues;
+use crate::event::Safety;
+use crate::fault::Fault;
+use crate::lifecycle::Supervision;
+use crate::message::Origin;
+use crate::node::Mode;
+use crate::time::{Clock, MonotonicTime};
+use crate::topology::Topology;
+use loom::sync::{Arc, Mutex};
+use loom::thread;
+
+static NOTHING: Topology = Topology { links: &[], joints: &[] };
+
+/// A robot without components.
+fn control() -> Control {
+    let declared = Declared {
+        topology: &NOTHING,
+        states: &[],
+        categories: &[],
+        commands: &[],
+        parameters: &[],
+        estimators: &[],
+    };
+    Control::new(Parts {
+        declared,
+        mode: Mode::Real,
+        topics: std::sync::Arc::new(SystemTopics::new(declared)),
+        clock: Clock::virtual_at(MonotonicTime::ZERO),
+        origin: Origin::default(),
+        commands: Vec::new(),
+        parameters: ParameterValues::new(vec![]),
+        supervision: Supervision::default(),
+        nodes: Box::default(),
+        journal: None,
+        telemetry: None,
+    })
+}
+
+/// What moves, as the runtime drives it: under one lock it asks whether the robot is armed and moves, or is made safe.
+#[derive(Clone, Default)]
+struct Motor(Arc<Mutex<Positions>>);
+
+#[derive(Default)]
+struct Positions {
+    is_safe: bool,
+    has_moved_though_safe: bool,
+}
+
+impl Motor {
+    fn of(control: &Control) -> Self {
+        let motor = Self::default();
+        let disarmed = motor.clone();
+        let disarm = move || {
+            disarmed.0.lock().expect("nobody panicked").is_safe = true;
+            Ok(())
+        };
+        control.on_disarm("motor", std::sync::Arc::new(disarm));
+        motor
+    }
+
+    fn drive(&self, control: &Control) {
+        let mut positions = self.0.lock().expect("nobody panicked");
+        if control.safety_now() == Safety::Armed {
+            positions.has_moved_though_safe |= positions.is_safe;
+        }
+    }
+
+    fn check(&self) {
+        assert!(!self.0.lock().expect("nobody panicked").has_moved_though_safe);
+    }
+}
+
+/// What a thread does.
+type Thread = fn(&Control, &Motor);
+
+/// Has an armed robot entered by these threads, in all orders with that many preemptions at most; `holds` at the end.
+fn check<const THREADS: usize>(threads: [Thread; THREADS], prepare: fn(&Control), holds: fn(&Control)) {
+    let mut checker = loom::model::Builder::new();
+    checker.preemption_bound = Some(2);
+    checker.check(move || {
+        let control = control();
+        let motor = Motor::of(&control);
+        prepare(&control);
+        assert!(control.arm());
+        let spawned: Vec<_> = threads
+            .iter()
+            .map(|&run| {
+                let (control, motor) = (control.clone(), motor.clone());
+                thread::spawn(move || run(&control, &motor))
+            })
+            .collect();
+        spawned.into_iter().for_each(|thread| thread.join().expect("it does not panic"));
+        // Disarm callbacks have threads of their own.
+        while control.is_disarming() {
+            thread::yield_now();
+        }
+        holds(&control);
+        assert_eq!(control.safety(), control.safety_now());
+        motor.check();
+    });
+}
+
+const NOTHING_ELSE: fn(&Control) = |_| {};
+const DRIVES: Thread = |control, motor| motor.drive(control);
+const DISARMS: Thread = |control, _| {
+    control.disarm(false);
+};
+const STOPS: Thread = |control, _| control.begin_stop();
+const ARMS: Thread = |control, _| {
+    control.arm();
+};
+const BURNS: Thread = |control, _| control.hardware_error("motor", "it burns".to_owned());
+/// The first time that the robot is disarmed.
+const TIME_IS_OVER: Thread = |control, _| control.disarm_timeout(1);
+
+fn has_an_error(control: &Control) {
+    control.on_disarm("brake", std::sync::Arc::new(|| Err(Fault::new("no air"))));
+}
+
+#[test]
+fn a_motor_that_is_driven_while_the_robot_is_disarmed() {
+    check([DRIVES, DISARMS], NOTHING_ELSE, |control| assert_eq!(control.safety(), Safety::Disarmed));
+}
+
+#[test]
+fn a_robot_that_is_armed_while_it_stops() {
+    check([STOPS, ARMS], NOTHING_ELSE, |control| {
+        assert_eq!(control.safety(), Safety::Disarmed);
+        assert!(control.stop_signal().is_set(), "sensors are told");
+    });
+}
+
+#[test]
+fn a_hardware_error_while_the_robot_is_disarmed() {
+    check([BURNS, DISARMS], NOTHING_ELSE, |control| assert_eq!(control.safety(), Safety::Error));
+}
+
+#[test]
+fn a_callback_that_fails_as_its_time_is_over() {
+    check([DISARMS, TIME_IS_OVER], has_an_error, |control| assert_eq!(control.safety(), Safety::Error));
+}
+
+#[test]
+fn a_callback_that_fails_while_the_robot_stops() {
+    check([DISARMS, STOPS], has_an_error, |control| {
+        assert_eq!(control.safety(), Safety::Error);
+        assert!(control.stop_signal().is_set());
+    });
+}
