@@ -234,11 +234,15 @@ fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Box<dyn std::erro
 fn an_estimator_may_be_left_out() -> Result<(), StartError> {
     let mut builder = Summing::builder();
     builder.options(summing::sensor::base::other::second).skipped = true;
+    let health = builder.subscribe(system::Health);
     let mut simulation = builder.simulate()?;
     simulation.publish(summing::sensor::base::other, at(5), Number(1.0));
     let report = simulation.stop();
     let second = report.estimator("sensor/base/other/second").expect("it is declared");
     assert_eq!(second.stopped.as_deref(), Some("not on this robot"));
+    assert_eq!(second.health, HealthState::Degraded);
+    let changes: Vec<_> = health.drain().map(|change| (change.payload.estimator, change.payload.reason)).collect();
+    assert_eq!(changes, [("sensor/base/other/second", HealthReason::Stopped)]);
     assert!(report.ok().is_ok(), "that is no fault");
     Ok(())
 }

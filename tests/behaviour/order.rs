@@ -186,7 +186,10 @@ fn who_listens_to_the_robot_itself_may_call_it_back() {
                 _ => when_woken(&mut command, call),
             }
             running.set_parameter(orderly::param::gain, 3.0).expect("it is finite");
-            running.command(orderly::command::arm, NoArguments).expect("it is disarmed");
+            // Whoever was woken by the parameter arms it as well, on a thread of the pool.
+            if topic != "parameter" {
+                running.command(orderly::command::arm, NoArguments).expect("it is disarmed");
+            }
             let called = is_called.recv_timeout(PATIENCE);
             assert!(called.is_ok(), "{topic}: it hangs");
             running.stop();

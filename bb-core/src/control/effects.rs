@@ -230,7 +230,7 @@ fn write_log(log: &Log) {
         Log::Safety { from, to } => tracing::info!(%from, %to, "safety changed"),
         Log::State { from, to, command } => tracing::info!(from, to, command, "state changed"),
         Log::SafetyError(SafetyError { path, message }) => {
-            tracing::error!(component = path, message, "safety error");
+            tracing::error!(component = path, error = message, "safety error");
             if is_plain {
                 eprintln!("safety error at {path}: {message}");
             }

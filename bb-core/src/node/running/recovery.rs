@@ -32,9 +32,12 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Takes note that it is not there, if it was left out.
+    /// It starts; one that was left out is not healthy.
     pub(super) fn begin(&mut self, turn: &Turn<'_>) {
         self.shared.set_last_run(turn.now());
+        if !self.slot.is_running() {
+            self.judge(Event::Bad(HealthReason::Stopped), self.declaration.path, turn.now());
+        }
         for request in std::mem::take(&mut self.requested) {
             self.timers.request(request, turn.now());
         }

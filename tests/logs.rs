@@ -1,0 +1,120 @@
+//! What a running robot tells a `tracing` subscriber. Alone in its process, which has one subscriber.
+
+use bb_core::prelude::*;
+use std::fmt::Write;
+use std::sync::{Arc, Mutex, PoisonError};
+use tracing::field::{Field, Visit};
+use tracing::{Event, Level, Metadata, Subscriber, span};
+
+/// Number, as a sensor measures it.
+#[derive(Clone, Copy, Debug, Payload)]
+pub struct Number(f64);
+
+/// Fails at negative numbers, and refuses to be told so.
+#[derive(Debug)]
+pub struct Root;
+
+impl Estimator for Root {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        if number.0 < 0.0 { Err(Fault::new("no real root")) } else { Ok(Reply::emit(Number(number.0.sqrt()))) }
+    }
+}
+
+/// Cannot be made safe.
+#[derive(Debug)]
+pub struct Saw;
+
+impl Sensor for Saw {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        context.on_disarm(|| Err(Fault::new("it turns on")));
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::finished())
+    }
+}
+
+robot! {
+    robot Logging;
+    commands { arm: Arm; }
+    link base {
+        sensor number: External<Number>() { estimator root: Root(); }
+        sensor saw: Saw() { rate: 1 Hz; }
+    }
+}
+
+/// Keeps each event in a line.
+#[derive(Clone, Default)]
+struct Lines(Arc<Mutex<Vec<String>>>);
+
+struct Line(String);
+
+impl Visit for Line {
+    fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
+        let _ = write!(self.0, " {}={value:?}", field.name());
+    }
+}
+
+impl Subscriber for Lines {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        *metadata.level() <= Level::INFO
+    }
+
+    fn new_span(&self, _: &span::Attributes<'_>) -> span::Id {
+        span::Id::from_u64(1)
+    }
+
+    fn record(&self, _: &span::Id, _: &span::Record<'_>) {}
+
+    fn record_follows_from(&self, _: &span::Id, _: &span::Id) {}
+
+    fn event(&self, event: &Event<'_>) {
+        let mut line = Line(event.metadata().level().to_string());
+        event.record(&mut line);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(line.0);
+    }
+
+    fn enter(&self, _: &span::Id) {}
+
+    fn exit(&self, _: &span::Id) {}
+}
+
+#[test]
+fn changes_of_safety_and_health_faults_and_refusals_are_events() -> Result<(), Box<dyn std::error::Error>> {
+    let lines = Lines::default();
+    tracing::subscriber::set_global_default(lines.clone())?;
+    let mut simulation = Logging::builder().simulate()?;
+    let at = |millis| MonotonicTime::ZERO + Duration::from_millis(millis);
+    simulation.command(logging::command::arm, NoArguments)?;
+    simulation.publish(logging::sensor::base::number, at(1), Number(-1.0));
+    assert!(simulation.command(logging::command::arm, NoArguments).is_err(), "it is armed");
+    assert!(!simulation.disarm());
+    simulation.stop();
+    let lines = std::mem::take(&mut *lines.0.lock().unwrap_or_else(PoisonError::into_inner));
+    let expected = [
+        "INFO message=safety changed from=disarmed to=armed",
+        "INFO message=state changed",
+        "WARN message=component failed component=\"sensor/base/number/root\" fault=\"no real root\"",
+        "INFO message=health changed estimator=\"sensor/base/number/root\"",
+        "WARN message=command refused command=\"arm\"",
+        "ERROR message=safety error component=\"sensor/base/saw\" error=\"disarming failed: it turns on\"",
+        "INFO message=safety changed from=disarming to=error",
+    ];
+    let mut left = lines.iter();
+    for expected in expected {
+        assert!(left.any(|line| line.starts_with(expected)), "{expected} is not in its place in {lines:#?}");
+    }
+    Ok(())
+}
