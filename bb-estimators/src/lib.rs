@@ -12,6 +12,9 @@
 //! | `Vqf<Marg, AttitudeOutputs>(…)`, … | as before | `output orientation`, and `output status`: bias, rest, disturbance |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
+//! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry` and `input pose` | `Odometry` of the link |
+//! | `Eskf<NavigationOutputs>(…)` | as before | `output odometry`, and `output status`: biases, dead reckoning, refusals |
+//!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
@@ -22,7 +25,7 @@ pub mod navigation;
 pub mod simulation;
 
 #[cfg(feature = "runtime")]
-use bb_core::payload::{Imu, Orientation};
+use bb_core::payload::{Imu, Odometry, Orientation};
 
 #[cfg(feature = "runtime")]
 pub use attitude::average::OrientationAverage;
@@ -30,6 +33,10 @@ pub use attitude::average::OrientationAverage;
 pub use attitude::{Attitude, ImuAndMagnetometer};
 #[cfg(feature = "simulation")]
 pub use simulation::SimulatedImu;
+
+/// The error-state Kalman filter of position, velocity and attitude as an estimator.
+#[cfg(feature = "runtime")]
+pub type Eskf<O = Odometry> = navigation::EskfEstimator<O>;
 
 /// Madgwick's filter as an estimator: of six axes, `Madgwick<Marg>` and `Madgwick<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]

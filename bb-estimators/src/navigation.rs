@@ -18,6 +18,9 @@ mod bank;
 pub mod chi_square;
 mod consistency;
 pub mod eskf;
+#[cfg(feature = "runtime")]
+mod estimator;
+mod geodesy;
 mod history;
 mod math;
 pub mod measurement;
@@ -33,6 +36,12 @@ pub use eskf::{
     ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuMean, Keyframe, NAVIGATION,
     Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
 };
+#[cfg(feature = "runtime")]
+pub use estimator::{
+    EskfEstimator, NavigationInputs, NavigationOptions, NavigationOutput, NavigationOutputs, NavigationStatus,
+    Verdicts,
+};
+pub use geodesy::{Geodetic, LocalFrame};
 pub use history::{Arrivals, History, Placed, Replayed};
 pub use measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, Linearised,

@@ -20,6 +20,7 @@ mod guards;
 mod health;
 mod hygiene;
 mod journals;
+mod navigation;
 mod order;
 mod outputs;
 mod own_paths;

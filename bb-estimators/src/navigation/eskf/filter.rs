@@ -1,6 +1,6 @@
 //! The filter: samples of the IMU move it, measurements correct it.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::covariance::{Covariance, Innovation};
 use super::estimate::{Estimate, Keyframe};
@@ -421,6 +421,37 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.covariance.copy(POSITION + i, first + i, position);
             self.covariance.copy(ROTATION + i, first + 3 + i, rotation);
         }
+    }
+
+    /// Moves the filter to another world, a local frame nearer by: `new_from_old` takes coordinates of the present one there.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NonFinite`] if that has a component that is not finite. The filter is then as it was.
+    pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+        let Some(estimate) = &mut self.estimate else { return Ok(()) };
+        let mut components = new_from_old.translation.vector.iter().chain(new_from_old.rotation.coords.iter());
+        if !components.all(|x| x.is_finite()) {
+            return Err(Refusal::NonFinite);
+        }
+        let rotation = new_from_old.rotation;
+        estimate.position = new_from_old.transform_point(&estimate.position.into()).coords;
+        estimate.velocity = rotation * estimate.velocity;
+        estimate.world_from_body = rotation * estimate.world_from_body;
+        if let Some(keyframe) = &mut estimate.keyframe {
+            keyframe.position = new_from_old.transform_point(&keyframe.position.into()).coords;
+            keyframe.world_from_body = rotation * keyframe.world_from_body;
+        }
+        // Errors are in the world's axes.
+        let rotation = rotation.to_rotation_matrix().into_inner();
+        for first in [POSITION, VELOCITY, ROTATION] {
+            self.covariance.transform(first, &rotation);
+        }
+        if let Some(first) = offset::<S>(Optional::Keyframe) {
+            self.covariance.transform(first, &rotation);
+            self.covariance.transform(first + 3, &rotation);
+        }
+        Ok(())
     }
 
     /// Adds to the variance of an error, for those who know of something that the model does not.

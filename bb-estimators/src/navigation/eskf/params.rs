@@ -150,7 +150,7 @@ impl EskfParams {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), ParamsError> {
+    pub(crate) fn check(&self) -> Result<(), ParamsError> {
         accept("gyroscope_noise", self.gyroscope_noise, (1e-9, 10.0), "rad/s/√Hz")?;
         accept("accelerometer_noise", self.accelerometer_noise, (1e-9, 100.0), "m/s²/√Hz")?;
         accept("gyroscope_bias_walk", self.gyroscope_bias_walk, (0.0, 1.0), "rad/s²/√Hz")?;

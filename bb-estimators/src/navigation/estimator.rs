@@ -1,0 +1,183 @@
+//! The error-state Kalman filter as an estimator to declare in `robot!`.
+
+mod aligning;
+mod filter;
+mod health;
+mod input;
+mod options;
+mod output;
+mod world;
+
+pub use input::NavigationInputs;
+pub use options::NavigationOptions;
+pub use output::{NavigationOutput, NavigationOutputs, NavigationStatus, Verdicts};
+
+use self::aligning::Aligning;
+use self::filter::{Filter, Measured};
+use self::health::Watch;
+use self::input::Mounting;
+use self::world::World;
+use super::eskf::{ImuMean, Refusal};
+use super::history::History;
+use bb_core::payload::Odometry;
+use bb_core::{Context, Estimator, Fault, Reply};
+use std::marker::PhantomData;
+
+/// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
+const SAMPLES: usize = 512;
+const MEASUREMENTS: usize = 64;
+const STATES: usize = 16;
+type Past = History<Filter, SAMPLES, MEASUREMENTS, STATES>;
+
+/// How far ahead of the IMU a measurement may be stamped, ns.
+const LONGEST_LEAD_NS: i64 = 500_000_000;
+
+/// Position, velocity and attitude of the link where it is declared, from an IMU and any of satellite navigation, wheels or
+/// another odometry, and poses in the world. It emits [`Odometry`] with every sample of the IMU, or [`NavigationOutputs`].
+///
+/// ```
+/// # fn main() {}
+/// use bb_core::prelude::*;
+/// use bb_estimators::Eskf;
+///
+/// robot! {
+///     robot Rover;
+///
+///     link base {
+///         sensor imu: External<Imu>();
+///         sensor wheels: External<Odometry>();
+///         joint mast: fixed {
+///             origin: { xyz: [0 m, 0 m, 1.2 m] };
+///             link antenna { sensor gnss: External<GnssFix>(); }
+///         }
+///         estimator navigation: Eskf(heading = 90 deg) {
+///             input imu: sensor::base::imu, driver;
+///             input gnss: sensor::base::mast::antenna::gnss, optional;
+///             input odometry: sensor::base::wheels, optional;
+///         }
+///     }
+/// }
+/// ```
+///
+/// The world is a local tangent frame, x east, y north, z up. Its origin is where the first fix was; without satellites, where
+/// the filter started. It starts once the IMU has lain still for a second, with the heading of the options, or, with
+/// `heading_from_course`, once fixes show in which direction the robot travels. Until then it emits nothing.
+///
+/// Measurements are fused at the time of their stamps, up to a second late. A gate for each sensor refuses what does not fit; what
+/// it has refused is in the status. The health of the estimator says when the position was dead-reckoned for too long, is less
+/// certain than the options allow, or does not agree with what is measured.
+#[derive(Debug)]
+pub struct EskfEstimator<O = Odometry> {
+    options: NavigationOptions,
+    mounting: Mounting,
+    phase: Phase,
+    output: PhantomData<fn() -> O>,
+}
+
+#[derive(Debug)]
+enum Phase {
+    Aligning(Box<Aligning>),
+    Running(Box<Running>),
+}
+
+#[derive(Debug)]
+struct Running {
+    past: Past,
+    world: World,
+    watch: Watch,
+}
+
+impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
+    type Options = NavigationOptions;
+    type Input = NavigationInputs<'static>;
+    type Output = O;
+    const REPORTS_DIVERGENCE: bool = true;
+
+    fn init(options: NavigationOptions, context: &Context) -> Result<Self, Fault> {
+        options.params().check()?;
+        let mounting = Mounting::of(context)?;
+        let phase = Phase::Aligning(Box::new(Aligning::new(&options)));
+        Ok(Self { options, mounting, phase, output: PhantomData })
+    }
+
+    fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
+        let sample = self.mounting.sample(inputs.imu.message());
+        match &mut self.phase {
+            Phase::Aligning(aligning) => {
+                let start = aligning.take(&sample, &inputs, &self.options, &self.mounting);
+                let reply = if aligning.takes_too_long() {
+                    Reply::none().diverged("it has neither lain still nor seen a course, and cannot start")
+                } else {
+                    Reply::none()
+                };
+                if let Some((start, world)) = start {
+                    let filter = Filter::new(&self.options, &start)?;
+                    let past =
+                        Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
+                    let watch = Watch::new(&self.mounting);
+                    self.phase = Phase::Running(Box::new(Running { past, world, watch }));
+                }
+                Ok(reply)
+            }
+            Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
+                Ok(()) => Ok(running.reply(&self.options, &self.mounting)),
+                Err(Refusal::Gap { .. }) => {
+                    tracing::info!("no sample for too long: it starts again");
+                    self.phase = Phase::Aligning(Box::new(Aligning::new(&self.options)));
+                    Ok(Reply::none().diverged("no sample of the IMU for too long"))
+                }
+                Err(refusal) => {
+                    tracing::debug!(%refusal, "sample refused");
+                    Ok(Reply::none())
+                }
+            },
+        }
+    }
+}
+
+impl Running {
+    fn take(
+        &mut self,
+        sample: &ImuMean,
+        inputs: &NavigationInputs<'_>,
+        options: &NavigationOptions,
+        mounting: &Mounting,
+    ) -> Result<(), Refusal> {
+        self.past.propagate(sample)?;
+        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
+            && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
+        {
+            self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
+        }
+        if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
+            let measured = mounting.velocity(&odometry.payload, options);
+            self.fuse(odometry.monotonic_time.as_nanos(), Measured::Odometry(measured));
+        }
+        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
+            let measured = self.world.pose(&pose.payload, options, mounting);
+            self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
+        }
+        if let Some(new_from_old) = self.past.now().position().and_then(|position| self.world.moves_on(&position)) {
+            // What is in the history belongs to the world that is left.
+            let mut filter = self.past.now().clone();
+            filter.move_world(&new_from_old)?;
+            self.past = Past::new(filter, LONGEST_LEAD_NS)?;
+        }
+        Ok(())
+    }
+
+    fn fuse(&mut self, time_ns: i64, measured: Measured) {
+        if let Err(refusal) = self.past.update(time_ns, &measured) {
+            tracing::debug!(%refusal, sensor = measured.name(), "measurement refused");
+        }
+    }
+
+    fn reply<O: NavigationOutput>(&mut self, options: &NavigationOptions, mounting: &Mounting) -> Reply<O> {
+        let filter = self.past.now();
+        let reply: Reply<O> = O::of(filter, &self.world, mounting).into();
+        match self.watch.look(filter, options) {
+            Some(reason) => reply.diverged(reason),
+            None => reply,
+        }
+    }
+}
