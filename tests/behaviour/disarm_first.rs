@@ -647,3 +647,22 @@ fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<
     assert_eq!(simulation.safety(), Safety::Error);
     Ok(())
 }
+
+/// While the robot runs, and once each time.
+#[test]
+fn a_sensor_that_hangs_is_reported_with_the_time_since() {
+    let _alone = alone();
+    within(60, || {
+        let builder = Hanging::builder();
+        let faults = builder.subscribe(system::Faults);
+        let running = builder.start().expect("it starts");
+        HERE.close("a sensor's read");
+        HERE.wait_for(1);
+        std::thread::sleep(Duration::from_millis(1500));
+        let told: Vec<String> = faults.drain().map(|fault| fault.to_string()).collect();
+        let expected = "sensor/base/device failed: hangs: its code was entered 1.";
+        assert!(told.len() == 1 && told[0].contains(expected), "{told:?}");
+        HERE.open();
+        running.stop();
+    });
+}

@@ -155,6 +155,10 @@ impl<R: Robot> Machine<R> {
         self.control.set_parameter(parameter.number(), value.into_value(), &Permit::UNLIMITED)
     }
 
+    pub(super) fn shared_sources(&self) -> Vec<SharedSource> {
+        self.sources.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
     pub(super) fn islands(&self) -> impl Iterator<Item = &dyn AnyIsland<R::Wiring>> {
         R::ISLANDS.iter().map(|find| find(&self.wiring))
     }

@@ -58,6 +58,8 @@ pub struct SharedSource(Arc<Shared>);
 #[derive(Debug)]
 struct Shared {
     path: &'static str,
+    /// Whether it is read at a rate; else it may wait for its device.
+    has_rate: bool,
     inbox: Mutex<Inbox>,
     readings: AtomicU64,
     skipped: AtomicU64,
@@ -101,9 +103,10 @@ pub struct SourceStatistics {
 const OUTSIDE: i64 = i64::MIN;
 
 impl SharedSource {
-    fn new(path: &'static str) -> Self {
+    fn new(path: &'static str, has_rate: bool) -> Self {
         Self(Arc::new(Shared {
             path,
+            has_rate,
             inbox: Mutex::default(),
             readings: AtomicU64::new(0),
             skipped: AtomicU64::new(0),
@@ -134,6 +137,10 @@ impl SharedSource {
 
     pub(super) fn path(&self) -> &'static str {
         self.0.path
+    }
+
+    pub(super) fn has_rate(&self) -> bool {
+        self.0.has_rate
     }
 
     /// When its code was entered, if it is inside.
@@ -209,7 +216,7 @@ impl Assembly {
         if made.is_err() {
             return;
         }
-        let shared = SharedSource::new(declaration.path);
+        let shared = SharedSource::new(declaration.path, declaration.period_nanos.is_some());
         let tell = {
             let (told, control) = (shared.clone(), self.control.downgrade());
             move |order| {

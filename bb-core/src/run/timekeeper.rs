@@ -18,6 +18,10 @@ const LOOK_PERIOD: Duration = Duration::from_millis(100);
 /// A callback that has not returned for so long hangs.
 const HANGS_AFTER: Duration = Duration::from_secs(1);
 
+/// The same for a sensor or a service without a rate, which may wait for its device: as long as the robot waits for it when it
+/// stops.
+const WAITS_TOO_LONG: Duration = Duration::from_secs(5);
+
 /// What was seen of an island the last time.
 #[derive(Clone, Copy, Default)]
 struct Seen {
@@ -30,6 +34,7 @@ struct Seen {
 pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
     let clock = machine.environment.clock();
     let mut seen = vec![Seen::default(); R::ISLANDS.len()];
+    let mut reported = vec![None; machine.shared_sources().len()];
     let mut wall_read = Instant::now();
     let mut looked = Instant::now();
     while !machine.has_ended.load(Ordering::Acquire) {
@@ -50,6 +55,7 @@ pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
         if looked.elapsed() >= LOOK_PERIOD {
             looked = Instant::now();
             look(machine, &mut seen, now);
+            look_at_sources(machine, &mut reported, now);
         }
         let relief = control.pool().relieve();
         let due = [
@@ -77,6 +83,23 @@ fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
             let path = machine.path_of_busy(island);
             let since = now.duration_since(island.entered_at());
             machine.fault(path, format!("hangs: its code was entered {since:.1?} ago and has not returned"));
+        }
+    }
+}
+
+/// The same of sensors and services. `reported`: when the code of each was entered, of which it was reported that it hangs.
+fn look_at_sources<R: Robot>(machine: &Machine<R>, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
+    for (source, reported) in machine.shared_sources().iter().zip(reported) {
+        let entered = source.entered_at();
+        let longest = if source.has_rate() { HANGS_AFTER } else { WAITS_TOO_LONG };
+        let Some(since) = entered.map(|entered| now.duration_since(entered)).filter(|since| *since >= longest)
+        else {
+            continue;
+        };
+        if *reported != entered {
+            *reported = entered;
+            let message = format!("hangs: its code was entered {since:.1?} ago and has not returned");
+            machine.fault(source.path(), message);
         }
     }
 }
