@@ -318,7 +318,7 @@ fn a_journal_of_another_robot_is_refused_with_its_line() -> Result<(), Box<dyn s
         begin
     };
     let play = |event| -> Result<_, StartError> {
-        let mut replay = Day::builder().replay()?;
+        let mut replay = builder(0).0.replay()?;
         let lines = vec![begin("Day"), Entry { number: 2, time: at(0), event }];
         Ok(replay.play(lines).expect_err("it does not fit").to_string())
     };

@@ -166,7 +166,7 @@ impl Bus {
 
     /// Arms the robot; true if it is armed now. See [`Live::arm`](crate::Live::arm).
     pub fn arm(&self) -> bool {
-        self.permit.is_valid() && self.host.arm()
+        self.permit.is_valid() && self.host.arm(&self.permit)
     }
 
     /// Disarms the robot; true if everything could be made safe. See [`Live::disarm`](crate::Live::disarm).

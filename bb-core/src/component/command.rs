@@ -144,8 +144,8 @@ impl CommandContext {
         !self.permit.is_valid()
     }
 
-    /// Registers what makes hardware safe when the robot is disarmed while this command runs: it is forgotten with the last
-    /// clone of this context. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one
+    /// Registers what makes hardware safe when the robot is disarmed while this command runs: it is forgotten when that has
+    /// ended. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one
     /// that fails or takes longer leads to the safety state `error`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.hooks.add(Arc::new(hook));

@@ -1,6 +1,6 @@
 //! What any component can do for the safety of the robot.
 
-use super::Fault;
+use super::{Fault, Permit};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -11,8 +11,6 @@ pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
 pub(crate) trait Guardian: Send + Sync {
     /// Adds a callback of the component at `path`; its number.
     fn on_disarm(&self, path: &'static str, hook: DisarmHook) -> u64;
-    /// Drops callbacks, by their numbers.
-    fn forget_hooks(&self, numbers: &[u64]);
     fn hardware_error(&self, path: &'static str, message: String);
 }
 
@@ -58,30 +56,31 @@ impl fmt::Debug for SafetyLink {
 pub(crate) struct OwnHooks {
     path: &'static str,
     guardian: Arc<dyn Guardian>,
-    numbers: Mutex<Vec<u64>>,
+    permit: Permit,
+    numbers: Arc<Mutex<Vec<u64>>>,
 }
 
 impl OwnHooks {
-    pub(crate) fn new(path: &'static str, guardian: Arc<dyn Guardian>) -> Self {
-        Self { path, guardian, numbers: Mutex::default() }
+    /// `numbers` are those of its callbacks: whoever ends the execution forgets them.
+    pub(crate) fn new(
+        path: &'static str,
+        guardian: Arc<dyn Guardian>,
+        permit: Permit,
+        numbers: Arc<Mutex<Vec<u64>>>,
+    ) -> Self {
+        Self { path, guardian, permit, numbers }
     }
 
+    /// Nothing happens once the execution has ended.
     pub(crate) fn add(&self, hook: DisarmHook) {
-        let number = self.guardian.on_disarm(self.path, hook);
-        self.numbers.lock().unwrap_or_else(PoisonError::into_inner).push(number);
+        let mut numbers = self.numbers.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.permit.is_valid() {
+            numbers.push(self.guardian.on_disarm(self.path, hook));
+        }
     }
 
     pub(crate) fn hardware_error(&self, message: String) {
         self.guardian.hardware_error(self.path, message);
-    }
-}
-
-impl Drop for OwnHooks {
-    fn drop(&mut self) {
-        let numbers = self.numbers.get_mut().unwrap_or_else(PoisonError::into_inner);
-        if !numbers.is_empty() {
-            self.guardian.forget_hooks(numbers);
-        }
     }
 }
 

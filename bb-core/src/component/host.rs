@@ -18,7 +18,7 @@ pub(crate) trait Host: Guardian {
     fn is_stopping(&self) -> bool;
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
-    fn arm(&self) -> bool;
+    fn arm(&self, permit: &Permit) -> bool;
     fn disarm(&self) -> bool;
     fn parameter(&self, path: &str) -> Option<ParameterValue>;
     fn set_parameter(&self, path: &str, value: ParameterValue, permit: &Permit) -> Result<(), ParameterError>;

@@ -5,7 +5,7 @@ use super::hooks;
 use super::machine::IDLE;
 use super::step::Step;
 use super::system::{Control, Disarming, Limit, Phase, State};
-use crate::component::{DisarmHook, Guardian};
+use crate::component::{DisarmHook, Guardian, Permit};
 use crate::event::{Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
@@ -26,8 +26,13 @@ impl State {
         self.executions.iter().any(|execution| matches!(execution.phase, Phase::Lingering))
     }
 
-    fn is_disarming(&self, generation: u64) -> bool {
+    pub(super) fn is_disarming(&self, generation: u64) -> bool {
         self.disarming.as_ref().is_some_and(|disarming| disarming.generation == generation)
+    }
+
+    /// Whether it was disarmed for the last time.
+    fn is_stopped(&self) -> bool {
+        self.is_stopping && self.disarming.is_none()
     }
 
     fn disarming_of(&mut self, generation: u64) -> Option<&mut Disarming> {
@@ -37,7 +42,7 @@ impl State {
 
 impl Control {
     /// Arms the robot, unless it is in `error` or stops; true if it is armed now. Waits until cancelled commands are gone.
-    pub(crate) fn arm(&self) -> bool {
+    pub(crate) fn arm(&self, permit: &Permit) -> bool {
         match self.0.mode {
             Mode::Real => {
                 // If it is in vain, the entry finds them still there.
@@ -49,6 +54,10 @@ impl Control {
             Mode::Replay => {}
         }
         let mut step = self.step();
+        // A command may have been cancelled while it waited.
+        if !permit.is_valid() {
+            return false;
+        }
         step.line(Event::Arm);
         let is_free = !step.state.has_lingering() && !step.state.is_stopping;
         if step.state.machine.safety == Safety::Disarmed && is_free {
@@ -64,14 +73,16 @@ impl Control {
     /// the safety state is `error`, out of which `force` leads even if something still fails.
     pub(crate) fn disarm(&self, force: bool) -> bool {
         let mut step = self.step();
+        if step.state.is_stopped() {
+            return step.state.last_disarm_was_safe;
+        }
         let (generation, is_new) = match step.state.machine.safety {
             Safety::Error if !force => return false,
             Safety::Disarmed if !force => return true,
             Safety::Disarming => (step.state.generation, false),
             Safety::Armed | Safety::Disarmed | Safety::Error => {
-                let line = step.line(Event::Disarm { force });
+                step.line(Event::Disarm { force });
                 let generation = step.begin_disarming(None, None, force);
-                step.is_disarmed_at_once(line);
                 (generation, true)
             }
         };
@@ -85,7 +96,7 @@ impl Control {
         step.finish();
         match self.0.mode {
             // A callback must not wait for itself.
-            Mode::Real if hooks::is_inside() => return false,
+            Mode::Real if hooks::is_inside(self.id()) => return false,
             Mode::Real => drop(self.wait_until(DISARM_WITHIN + MARGIN, |state| !state.is_disarming(generation))),
             Mode::Virtual => while self.run_pending_hooks() {},
             Mode::Replay => {}
@@ -97,6 +108,7 @@ impl Control {
     pub(crate) fn replay_disarm(&self, force: bool) {
         let mut step = self.step();
         match step.state.machine.safety {
+            _ if step.state.is_stopped() => {}
             Safety::Error if !force => {}
             Safety::Disarmed if !force => {}
             Safety::Disarming => {
@@ -156,7 +168,19 @@ impl Control {
 
     /// Remembers what makes hardware safe.
     fn remember(&self, path: &'static str, hook: DisarmHook, is_kept: bool) -> u64 {
-        self.lock().hooks.add(path, hook, is_kept)
+        let mut state = self.lock();
+        if state.has_ended {
+            drop(state);
+            crate::fault::discard(hook);
+            return 0;
+        }
+        state.hooks.add(path, hook, is_kept)
+    }
+
+    /// Of a robot that has ended: what they own is closed, and what they hold of the robot no longer keeps it alive.
+    pub(crate) fn forget_all_hooks(&self) {
+        let gone = self.lock().hooks.take_all();
+        gone.into_iter().for_each(crate::fault::discard);
     }
 
     /// The same for an actuator's own `disarm`, which restarts do not replace.
@@ -194,11 +218,6 @@ impl Guardian for Control {
         }
     }
 
-    fn forget_hooks(&self, numbers: &[u64]) {
-        let gone = self.lock().hooks.take_numbers(numbers);
-        gone.into_iter().for_each(crate::fault::discard);
-    }
-
     fn hardware_error(&self, path: &'static str, message: String) {
         if self.0.mode != Mode::Replay {
             self.note_hardware_error(path, message);
@@ -209,17 +228,17 @@ impl Guardian for Control {
 impl Step<'_> {
     /// Motion is inhibited from here on; the disarm callbacks run once the lock is released. The generation.
     pub(super) fn begin_disarming(&mut self, by: Option<u64>, name: Option<&'static str>, force: bool) -> u64 {
+        // Those of commands too, which end below.
+        let hooks = if self.control.0.mode == Mode::Replay { Vec::new() } else { self.state.hooks.all() };
         self.state.machine.safety = Safety::Disarming;
         self.state.generation += 1;
         let generation = self.state.generation;
         self.publish_machine(name);
         self.cancel_all(by);
-        let hooks = if self.control.0.mode == Mode::Replay { Vec::new() } else { self.state.hooks.all() };
         self.state.disarming = Some(Disarming {
             generation,
             force,
             to_error: false,
-            at_once: None,
             by,
             left: hooks.iter().map(|(path, _)| *path).enumerate().collect(),
             errors: Vec::new(),
@@ -234,26 +253,10 @@ impl Step<'_> {
         generation
     }
 
-    /// On virtual time the callbacks run before anything else happens. Unless one fails or does something, the journal needs
-    /// no line for their success: the one of that number implies it.
-    pub(super) fn is_disarmed_at_once(&mut self, line: u64) {
-        if self.control.0.mode == Mode::Virtual
-            && let Some(disarming) = &mut self.state.disarming
-        {
-            disarming.at_once = Some(line);
-        }
-    }
-
     /// The disarm callbacks have returned with these errors.
     fn disarmed(mut self, errors: Vec<SafetyError>) {
         let Some(disarming) = self.state.disarming.take() else { return };
-        let is_implied = match (disarming.at_once, &self.control.0.journal) {
-            (Some(line), Some(journal)) => errors.is_empty() && journal.last() == line,
-            _ => false,
-        };
-        if !is_implied {
-            self.line(Event::Disarmed { errors: errors.clone() });
-        }
+        self.line(Event::Disarmed { errors: errors.clone() });
         self.control.0.limits.clear(Limit::Disarming(disarming.generation));
         let is_safe = errors.is_empty();
         self.state.last_disarm_was_safe = is_safe;
@@ -277,8 +280,11 @@ impl Step<'_> {
     pub(super) fn hardware_error(&mut self, error: SafetyError) {
         self.publish_safety_error(error);
         match self.state.machine.safety {
-            Safety::Armed => drop(self.begin_disarming(None, None, false)),
-            Safety::Disarmed => self.state.machine.safety = Safety::Error,
+            // Of a robot that is disarmed, something may move all the same.
+            Safety::Armed | Safety::Disarmed if !self.state.is_stopped() => {
+                self.begin_disarming(None, None, false);
+            }
+            Safety::Armed | Safety::Disarmed => self.state.machine.safety = Safety::Error,
             Safety::Disarming | Safety::Error => {}
         }
         if let Some(disarming) = &mut self.state.disarming {

@@ -16,7 +16,7 @@ use crate::event::{
 use crate::fault::Fault;
 use crate::journal::{End, Event};
 use crate::node::Mode;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 impl Control {
@@ -239,8 +239,9 @@ impl Step<'_> {
         let control = self.control.clone();
         let slot = Arc::new(Slot::new(id, number, control.downgrade()));
         let permit = Permit::revocable();
+        let hooks = Arc::new(Mutex::new(Vec::new()));
         let task = (control.0.mode != Mode::Replay).then(|| {
-            let (permit, weak) = (permit.clone(), control.downgrade());
+            let (permit, numbers, weak) = (permit.clone(), Arc::clone(&hooks), control.downgrade());
             let starter = move || {
                 let gone = || Fault::new("the robot is gone");
                 let control = weak.upgrade().ok_or_else(gone)?;
@@ -249,7 +250,7 @@ impl Step<'_> {
                 let context = CommandContext {
                     name: declared.name,
                     health,
-                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _)),
+                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _, permit.clone(), numbers)),
                     host,
                     sleeper: control.0.sleeper.clone(),
                     permit,
@@ -266,7 +267,7 @@ impl Step<'_> {
         }
         let phase = Phase::Running;
         let execution =
-            RunningCommand { id, command: number, health, slot: Arc::clone(&slot), permit, task, phase };
+            RunningCommand { id, command: number, health, slot: Arc::clone(&slot), permit, hooks, task, phase };
         self.state.executions.push(execution);
         self.publish_phase(number, id, CommandPhase::Started, health);
         self.publish_machine(Some(declared.name));
@@ -387,14 +388,29 @@ impl Step<'_> {
             self.state.machine.safety = Safety::Armed;
             self.state.machine.resting = IDLE;
         }
-        self.end(index, Ok(value), next_state);
+        if self.state.machine.safety == Safety::Armed {
+            return self.end(index, Ok(value), next_state);
+        }
+        self.effects.dropped.extend(value);
+        let why = if self.state.is_stopping { "the robot stops".to_owned() } else { self.safety_text() };
+        self.end(index, Err(CommandError::Failed(format!("the robot was not armed: {why}"))), None);
+    }
+
+    fn safety_text(&self) -> String {
+        format!("its safety state is `{}`", self.state.machine.safety)
     }
 
     /// The robot was disarmed by that execution.
     pub(super) fn finish_disarming_command(&mut self, id: u64) {
         let Some(index) = self.running(id) else { return };
+        let is_error = self.state.machine.safety == Safety::Error;
         let Some(execution) = self.state.executions.get_mut(index) else { return };
         match std::mem::replace(&mut execution.phase, Phase::Running) {
+            Phase::Disarming(value, _) if is_error => {
+                self.effects.dropped.extend(value);
+                let message = format!("not everything could be made safe: {}", self.safety_text());
+                self.end(index, Err(CommandError::Failed(message)), None);
+            }
             Phase::Disarming(value, next_state) => self.end(index, Ok(value), next_state),
             phase => execution.phase = phase,
         }
@@ -419,6 +435,10 @@ impl Step<'_> {
         let (id, command, health) = (execution.id, execution.command, execution.health);
         execution.permit.revoke();
         let slot = Arc::clone(&execution.slot);
+        let hooks = std::mem::take(&mut *execution.hooks.lock().unwrap_or_else(PoisonError::into_inner));
+        let forgotten = self.state.hooks.take_numbers(&hooks);
+        self.effects.forgotten.extend(forgotten);
+        let Some(execution) = self.state.executions.get_mut(index) else { return };
         // One whose code has ended is gone; another one's code has yet to notice.
         let previous = std::mem::replace(&mut execution.phase, Phase::Lingering);
         match previous {

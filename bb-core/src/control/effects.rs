@@ -26,6 +26,8 @@ pub(super) struct Effects {
     pub(super) results: Vec<(Arc<Slot>, Result<Value, CommandError>)>,
     pub(super) hooks: Option<(u64, Vec<(&'static str, DisarmHook)>)>,
     pub(super) dropped: Vec<Value>,
+    /// Disarm callbacks of commands that have ended.
+    pub(super) forgotten: Vec<DisarmHook>,
     /// Owners of the wiring, which may be the last.
     pub(super) wired: Vec<Wired>,
 }
@@ -61,7 +63,7 @@ impl Effects {
     }
 
     pub(super) fn run(self, control: &Control) {
-        let Self { wakers, logs, begun, cancelled, results, hooks, dropped, wired } = self;
+        let Self { wakers, logs, begun, cancelled, results, hooks, dropped, forgotten, wired } = self;
         // First of all: hardware.
         if let Some((generation, hooks)) = hooks {
             control.run_hooks(generation, hooks);
@@ -74,11 +76,13 @@ impl Effects {
             dropped.extend(late);
         }
         drop(wired);
-        let has_code = !wakers.is_empty() || !wakers_of_results.is_empty() || !dropped.is_empty();
+        let has_code =
+            !wakers.is_empty() || !wakers_of_results.is_empty() || !dropped.is_empty() || !forgotten.is_empty();
         let code = move || {
             wakers.run();
             wakers_of_results.into_iter().for_each(wake);
             dropped.into_iter().for_each(discard);
+            forgotten.into_iter().for_each(discard);
         };
         match control.0.mode {
             Mode::Real if has_code => control.0.pool.submit(code),
@@ -115,27 +119,32 @@ impl Control {
         if all.is_empty() {
             return self.hook_returned(generation, None, None);
         }
+        let mut left = Vec::new();
         for (index, (path, hook)) in all.into_iter().enumerate() {
-            let control = self.clone();
-            let run = move || {
-                let error = hooks::run(path, &hook);
-                // The hook may be the last owner of what it captured.
-                discard(hook);
-                control.hook_returned(generation, Some(index), error);
-            };
-            let spawned = spawn(format!("disarm {path}"), run);
-            if let Err(error) = spawned {
-                let error = SafetyError { path, message: format!("cannot be disarmed: {error}") };
-                self.hook_returned(generation, Some(index), Some(error));
+            let (control, kept) = (self.clone(), DisarmHook::clone(&hook));
+            let run = move || control.run_hook(generation, index, path, hook);
+            if spawn(format!("disarm {path}"), run).is_err() {
+                left.push((index, path, kept));
             }
         }
+        // Without a thread of its own, a callback runs here: hardware that is made safe late is better than never.
+        for (index, path, hook) in left {
+            self.run_hook(generation, index, path, hook);
+        }
+    }
+
+    fn run_hook(&self, generation: u64, index: usize, path: &'static str, hook: DisarmHook) {
+        let error = hooks::run(self.id(), path, &hook);
+        // The hook may be the last owner of what it captured.
+        discard(hook);
+        self.hook_returned(generation, Some(index), error);
     }
 
     /// On virtual time: runs the disarm callbacks that wait, in order, on the calling thread; true if there were any.
     pub(crate) fn run_pending_hooks(&self) -> bool {
         let Some(all) = lock(&self.0.pending_hooks).pop_front() else { return false };
         let errors = all.into_iter().filter_map(|(path, hook)| {
-            let error = hooks::run(path, &hook);
+            let error = hooks::run(self.id(), path, &hook);
             discard(hook);
             error
         });

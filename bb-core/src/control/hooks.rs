@@ -50,24 +50,30 @@ impl Hooks {
         self.all.extract_if(.., |hook| numbers.contains(&hook.number)).map(|hook| hook.run).collect()
     }
 
+    /// Takes out all; to be dropped without a lock.
+    pub(super) fn take_all(&mut self) -> Vec<DisarmHook> {
+        self.all.drain(..).map(|hook| hook.run).collect()
+    }
+
     pub(super) fn all(&self) -> Vec<(&'static str, DisarmHook)> {
         self.all.iter().map(|hook| (hook.path, DisarmHook::clone(&hook.run))).collect()
     }
 }
 
 thread_local! {
-    /// The calling thread runs a disarm callback, which must not wait for the disarming that it is a part of.
-    static IS_INSIDE: Cell<bool> = const { Cell::new(false) };
+    /// Of which robot the calling thread runs a disarm callback, which must not wait for the disarming that it is a part of; 0
+    /// for none.
+    static INSIDE: Cell<usize> = const { Cell::new(0) };
 }
 
-pub(super) fn is_inside() -> bool {
-    IS_INSIDE.get()
+pub(super) fn is_inside(robot: usize) -> bool {
+    INSIDE.get() == robot
 }
 
 /// Runs a disarm callback on the calling thread; what went wrong.
-pub(super) fn run(path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
-    let before = IS_INSIDE.replace(true);
+pub(super) fn run(robot: usize, path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
+    let before = INSIDE.replace(robot);
     let failed: Option<Fault> = caught(|| hook()).err().map(|failed| failed.fault);
-    IS_INSIDE.set(before);
+    INSIDE.set(before);
     failed.map(|fault| SafetyError { path, message: format!("disarming failed: {fault}") })
 }

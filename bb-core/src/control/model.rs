@@ -5,7 +5,7 @@
 
 use super::system::{Control, Declared, Parts};
 use super::topics::SystemTopics;
-use crate::component::Guardian;
+use crate::component::{Guardian, Permit};
 use crate::declaration::ParameterValues;
 use crate::event::Safety;
 use crate::fault::Fault;
@@ -89,7 +89,7 @@ fn check<const THREADS: usize>(threads: [Thread; THREADS], prepare: fn(&Control)
         let control = control();
         let motor = Motor::of(&control);
         prepare(&control);
-        assert!(control.arm());
+        assert!(control.arm(&Permit::UNLIMITED));
         let spawned: Vec<_> = threads
             .iter()
             .map(|&run| {
@@ -115,7 +115,7 @@ const DISARMS: Thread = |control, _| {
 };
 const STOPS: Thread = |control, _| control.begin_stop();
 const ARMS: Thread = |control, _| {
-    control.arm();
+    control.arm(&Permit::UNLIMITED);
 };
 const BURNS: Thread = |control, _| control.hardware_error("motor", "it burns".to_owned());
 /// The first time that the robot is disarmed.

@@ -16,8 +16,8 @@ impl Control {
         if step.state.is_stopping {
             return;
         }
-        let line = step.line(Event::Stop);
-        step.begin_stop(line);
+        step.line(Event::Stop);
+        step.begin_stop();
         step.finish();
         if self.0.mode == Mode::Virtual {
             while self.run_pending_hooks() {}
@@ -28,7 +28,10 @@ impl Control {
     /// In a replay: the robot was stopped.
     pub(crate) fn replay_stop(&self) {
         let mut step = self.step();
-        step.begin_stop(0);
+        if step.state.is_stopping {
+            return;
+        }
+        step.begin_stop();
         step.finish();
     }
 
@@ -39,9 +42,9 @@ impl Control {
     /// Waits until the disarm callbacks have returned, or their time is over.
     pub(crate) fn wait_until_disarmed(&self) {
         if self.0.mode == Mode::Real {
-            self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| state.disarming.is_none());
-            // If even the thread that keeps time is gone.
             let generation = self.lock().generation;
+            self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| !state.is_disarming(generation));
+            // If even the thread that keeps time is gone.
             self.disarm_timeout(generation);
             self.0.stop.set();
         }
@@ -113,16 +116,16 @@ impl Control {
 }
 
 impl super::step::Step<'_> {
-    fn begin_stop(&mut self, line: u64) {
-        self.state.is_stopping = true;
-        match self.state.machine.safety {
-            Safety::Armed => {
-                self.begin_disarming(None, None, false);
-                self.is_disarmed_at_once(line);
-            }
-            Safety::Disarmed | Safety::Error => self.control.0.stop.set(),
-            Safety::Disarming => {}
+    /// Whatever its safety state is: what was started while the robot was disarmed may move as well.
+    fn begin_stop(&mut self) {
+        let was_in_error = self.state.machine.safety == Safety::Error;
+        if self.state.disarming.is_none() {
+            self.begin_disarming(None, None, false);
         }
+        if let Some(disarming) = self.state.disarming.as_mut().filter(|_| was_in_error) {
+            disarming.to_error = true;
+        }
+        self.state.is_stopping = true;
         self.cancel_all(None);
         self.publish_machine(None);
     }

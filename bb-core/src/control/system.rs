@@ -96,7 +96,8 @@ pub(super) struct Inner {
     /// Tells sensors and services to stop.
     pub(super) stop: StopSignal,
     pub(super) islands: OnceLock<Box<dyn Islands>>,
-    pub(super) host: OnceLock<Arc<dyn Host>>,
+    /// Weak, since the host has the control state.
+    pub(super) host: OnceLock<Weak<dyn Host>>,
 }
 
 /// What the control state adds to a report.
@@ -162,6 +163,8 @@ pub(super) struct RunningCommand {
     pub(super) health: Option<HealthTransition>,
     pub(super) slot: Arc<Slot>,
     pub(super) permit: Permit,
+    /// Its disarm callbacks, by their numbers.
+    pub(super) hooks: Arc<Mutex<Vec<u64>>>,
     /// None in a replay.
     pub(super) task: Option<Arc<Task>>,
     pub(super) phase: Phase,
@@ -215,8 +218,6 @@ pub(super) struct Disarming {
     pub(super) force: bool,
     /// It ends in `error`, whatever the callbacks say.
     pub(super) to_error: bool,
-    /// The line of the journal that implies that the callbacks succeed, see [`Step::is_disarmed_at_once`](super::step::Step).
-    pub(super) at_once: Option<u64>,
     /// The execution that disarms it.
     pub(super) by: Option<u64>,
     /// Callbacks that have not returned.
@@ -298,9 +299,14 @@ impl Control {
     }
 
     /// Says what components and commands see of the robot.
-    pub(crate) fn set_host(&self, host: Arc<dyn Host>) {
+    pub(crate) fn set_host(&self, host: &Arc<dyn Host>) {
         // It is set once.
-        let _ = self.0.host.set(host);
+        let _ = self.0.host.set(Arc::downgrade(host));
+    }
+
+    /// What it differs from other robots by.
+    pub(super) fn id(&self) -> usize {
+        Arc::as_ptr(&self.0).addr()
     }
 
     pub(crate) fn downgrade(&self) -> WeakControl {
@@ -428,7 +434,7 @@ impl Control {
     }
 
     pub(super) fn host(&self) -> Result<Arc<dyn Host>, Fault> {
-        self.0.host.get().cloned().ok_or_else(|| Fault::new("the robot is not wired"))
+        self.0.host.get().and_then(Weak::upgrade).ok_or_else(|| Fault::new("the robot is gone"))
     }
 }
 

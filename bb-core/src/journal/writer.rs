@@ -142,11 +142,6 @@ impl Journal {
         }
     }
 
-    /// The number of the last line.
-    pub(crate) fn last(&self) -> u64 {
-        self.0.lock().next - 1
-    }
-
     /// Whether the sink hung, so that the journal ended before the run.
     #[cfg(test)]
     pub(crate) fn has_ended(&self) -> bool {
@@ -211,7 +206,10 @@ impl Inner {
             let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 queue.has_ended = true;
-                tracing::error!(line = queue.next, "the journal's sink hangs: the journal ends here");
+                let line = queue.next;
+                // A logger may block for as long as the sink does.
+                drop(queue);
+                tracing::error!(line, "the journal's sink hangs: the journal ends here");
                 break;
             }
             queue = self.room.wait_timeout(queue, left).unwrap_or_else(PoisonError::into_inner).0;

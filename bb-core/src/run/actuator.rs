@@ -64,8 +64,10 @@ impl<A: Actuator> ActuatorNode<A> {
         // A journal does not move anything.
         if environment.mode() != Mode::Replay {
             let parameters = control.parameters();
-            let _ = environment
-                .make(declaration.path, || slot.make(&context, &parameters).map_err(|failed| failed.fault));
+            let _ = environment.make(declaration.path, || {
+                let made = control.replacing_hooks(declaration.path, true, || slot.make(&context, &parameters));
+                made.map_err(|failed| failed.fault)
+            });
         }
         let inner = Arc::new_cyclic(|this| Inner {
             this: Weak::clone(this),
@@ -218,10 +220,19 @@ impl<A: Actuator> Inner<A> {
         let (path, slot) = (self.declaration.path, &mut state.slot);
         match self.control.replacing_hooks(path, true, || slot.make(&self.context, &parameters)) {
             Ok(()) => {
-                tracing::info!(component = self.declaration.path, "restarted");
+                // A logger may block, and disarming needs the lock that is held here.
+                let path = self.declaration.path;
+                self.log(move || tracing::info!(component = path, "restarted"));
                 state.is_unsafe = false;
             }
             Err(failed) => self.fail(state, &failed, now),
+        }
+    }
+
+    fn log(&self, write: impl FnOnce() + Send + 'static) {
+        match self.environment.mode() {
+            Mode::Real => self.environment.pool().submit(write),
+            Mode::Virtual | Mode::Replay => write(),
         }
     }
 

@@ -214,7 +214,7 @@ impl<R: Robot> Builder<R> {
             door: environment.door().clone(),
             wiring: Arc::clone(&place),
         });
-        control.set_host(Arc::clone(&host));
+        control.set_host(&host);
         control.set_islands(Box::new(WiredIslands::<R>(Arc::clone(&place))));
         let drained = Arc::clone(&place);
         environment.set_drain(move |island| {
@@ -223,7 +223,8 @@ impl<R: Robot> Builder<R> {
                 find(&wiring).drain(&wiring);
             }
         });
-        let facts = describe::<R>(&self.topics, &control);
+        let mut facts = describe::<R>(&self.topics, &control);
+        facts.push(format!("supervision: {:?}", self.supervision));
         let assembly = Assembly {
             environment: environment.clone(),
             control: control.clone(),
@@ -235,6 +236,11 @@ impl<R: Robot> Builder<R> {
         let is_replay = mode == Mode::Replay;
         let sources = if is_replay { Vec::new() } else { R::sources(&wiring, &self.options, &assembly) };
         if let Some(refusal) = environment.take_refusal() {
+            // What the others have started in `init` is made safe.
+            control.begin_stop();
+            control.wait_until_disarmed();
+            control.forget_all_hooks();
+            control.pool().close();
             return Err(StartError::component(refusal.path, refusal.fault));
         }
         if let Some(journal) = &journal {

@@ -35,10 +35,6 @@ impl<R: Robot> Guardian for RobotHost<R> {
         self.control.on_disarm(path, hook)
     }
 
-    fn forget_hooks(&self, numbers: &[u64]) {
-        self.control.forget_hooks(numbers);
-    }
-
     fn hardware_error(&self, path: &'static str, message: String) {
         Guardian::hardware_error(&self.control, path, message);
     }
@@ -65,8 +61,8 @@ impl<R: Robot> Host for RobotHost<R> {
         self.control.safety()
     }
 
-    fn arm(&self) -> bool {
-        self.control.arm()
+    fn arm(&self, permit: &Permit) -> bool {
+        self.control.arm(permit)
     }
 
     fn disarm(&self) -> bool {

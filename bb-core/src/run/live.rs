@@ -4,7 +4,7 @@ use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::machine::Machine;
 use super::visit::Visitable;
 use super::{ActuatorError, Bus, Report, Robot, SensorHandle};
-use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Sensor};
+use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Permit, Sensor};
 use crate::control::Execution;
 use crate::declaration::{ParameterError, ParameterType};
 use crate::event::{Refusal, Safety};
@@ -139,7 +139,7 @@ impl<R: Robot> Live<R> {
 
     /// Arms the robot, as a command would; true if it is armed now. In `error` it stays disarmed.
     pub fn arm(&self) -> bool {
-        self.settled(|machine| machine.control.arm())
+        self.settled(|machine| machine.control.arm(&Permit::UNLIMITED))
     }
 
     /// Disarms the robot: commands are cancelled, and whoever owns hardware makes it safe, within 5 s. True if all could;

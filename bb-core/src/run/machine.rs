@@ -255,6 +255,7 @@ impl<R: Robot> Machine<R> {
         self.control.topics().journal.close();
         self.control.topics().registry.close();
         self.has_ended.store(true, Ordering::Release);
+        self.control.forget_all_hooks();
         self.control.bell().ring();
         self.control.pool().close();
     }

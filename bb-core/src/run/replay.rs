@@ -4,7 +4,7 @@ use super::describe::difference;
 use super::machine::Machine;
 use super::visit::Visitable;
 use super::{Live, Report, Robot};
-use crate::component::{HandleCall, HandleCast};
+use crate::component::{HandleCall, HandleCast, Permit};
 use crate::declaration::ParameterValues;
 use crate::journal::{Callback, Entry, Event, Publishers, Recorded, Request, decoded};
 use crate::node::{Key, NodeEntry, Replayed, know_calls, know_casts};
@@ -26,7 +26,6 @@ pub struct Replay<R: Robot> {
     has_begun: bool,
     is_virtual: bool,
     /// The line before had the robot disarmed, which on virtual time succeeds at once unless the next line says otherwise.
-    is_disarmed_at_once: bool,
     /// The last request of each island that the journal does not hold, by line and type.
     unrecorded: HashMap<usize, (u64, String)>,
 }
@@ -49,7 +48,6 @@ impl<R: Robot> Replay<R> {
             last: 0,
             has_begun: false,
             is_virtual: false,
-            is_disarmed_at_once: false,
             unrecorded: HashMap::new(),
         }
     }
@@ -185,9 +183,6 @@ impl<R: Robot> Replay<R> {
         }
         let machine = Arc::clone(&self.live.0);
         let control = &machine.control;
-        if std::mem::take(&mut self.is_disarmed_at_once) && !matches!(event, Event::Disarmed { .. }) {
-            control.disarmed(Vec::new());
-        }
         machine.environment.clock().set_to(time);
         for Callback { estimator, nanos } in self.measured.remove(&number).unwrap_or_default() {
             machine.environment.node(estimator).replay_latency(nanos);
@@ -252,16 +247,16 @@ impl<R: Robot> Replay<R> {
             Event::Cancel { execution } => control.cancel(execution),
             Event::Timeout { execution } => control.timed_out(execution),
             Event::Gone { execution } => control.gone(execution),
-            Event::Arm => drop(control.arm()),
+            Event::Arm => {
+                control.arm(&Permit::UNLIMITED);
+            }
             Event::Disarm { force } => {
                 control.replay_disarm(force);
-                self.is_disarmed_at_once = self.is_virtual && control.is_disarming();
             }
             Event::Disarmed { errors } => control.disarmed(errors),
             Event::ArmTimeout => control.arm_timeout(),
             Event::Stop => {
                 control.replay_stop();
-                self.is_disarmed_at_once = self.is_virtual && control.is_disarming();
             }
         }
         // The journal says when islands wake.

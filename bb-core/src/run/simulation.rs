@@ -42,6 +42,8 @@ impl<R: Robot> Simulation<R> {
         machine.control.begin_watch(now);
         machine.start_islands(now);
         machine.environment.drain_posted();
+        // Of hardware errors that components have reported as they were made.
+        while machine.control.run_pending_hooks() {}
         sources.iter_mut().for_each(|source| source.begin());
         let due = sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
         let due = due.collect();

@@ -210,9 +210,10 @@ impl Assembly {
         let context = S::context(declaration, self.host.clone());
         let mut slot = Slot::<S>::new(Recipe::new(options, binding), self.environment.supervision());
         let parameters = self.control.parameters();
-        let made = self
-            .environment
-            .make(declaration.path, || slot.make(&context, &parameters).map_err(|failed| failed.fault));
+        let made = self.environment.make(declaration.path, || {
+            let made = self.control.replacing_hooks(declaration.path, true, || slot.make(&context, &parameters));
+            made.map_err(|failed| failed.fault)
+        });
         if made.is_err() {
             return;
         }

@@ -59,7 +59,8 @@ impl Pool {
     pub(crate) fn submit(&self, job: impl FnOnce() + Send + 'static) {
         let mut state = self.0.lock();
         state.jobs.push_back((Instant::now(), Box::new(job)));
-        if state.idle > 0 {
+        // Of the threads without work, some have been told of jobs that wait.
+        if state.idle >= state.jobs.len() {
             drop(state);
             self.0.arrived.notify_one();
         } else if state.threads < READY {

@@ -62,8 +62,6 @@ impl Guardian for Nobody {
         0
     }
 
-    fn forget_hooks(&self, _: &[u64]) {}
-
     fn hardware_error(&self, _: &'static str, _: String) {}
 }
 

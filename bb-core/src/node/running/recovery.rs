@@ -19,9 +19,11 @@ impl<E: Estimator> Node<E> {
         let context = self.context(now);
         self.shared.set_last_run(now);
         let (slot, parameters) = (&mut self.slot, &self.parameters);
-        let made = self
-            .environment
-            .make(self.declaration.path, || slot.make(&context, parameters).map_err(|failed| failed.fault));
+        let (environment, path) = (&self.environment, self.declaration.path);
+        let made = environment.make(path, || {
+            let made = replacing_hooks(environment, path, true, || slot.make(&context, parameters));
+            made.map_err(|failed| failed.fault)
+        });
         match made {
             Ok(()) => self.requested = context.into_requests(),
             Err(skipped) => {
