@@ -16,6 +16,7 @@ mod fan_in;
 mod faults;
 mod frames;
 mod good_runs;
+mod guarded;
 mod guards;
 mod health;
 mod hygiene;
