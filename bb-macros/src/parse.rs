@@ -11,6 +11,7 @@ mod input;
 mod joint;
 mod link;
 mod literal;
+mod name;
 mod output;
 mod parameters;
 mod path;
@@ -62,7 +63,7 @@ pub(crate) fn robot(tokens: TokenStream, diagnostics: &mut Diagnostics) -> Robot
     let mut whole = Group::new(Delimiter::Brace, tokens);
     whole.set_span(end);
     let parser = |input: ParseStream<'_>| {
-        robot.parse(&block::braced(input)?, diagnostics);
+        robot.parse(&block::opened(input)?, diagnostics);
         Ok(())
     };
     // syn reports what is left unread in brackets; where reading it has failed is reported already.

@@ -1,5 +1,6 @@
 //! The contents of braces, item by item, and how to go on behind one that cannot be read.
 
+use super::name::{is_keyword, whole};
 use crate::diagnostics::{Diagnostics, Place};
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::{Delimiter, Ident, TokenTree};
@@ -65,7 +66,8 @@ impl Head {
             let message = format!("what stands in this block starts with its name; leave `{text}` out");
             return Err(syn::Error::new(self.word.span(), message));
         }
-        if syn::parse_str::<Ident>(&text).is_err() {
+        whole(input, &self.word)?;
+        if is_keyword(&self.word) {
             let message = format!("`{text}` is a keyword of Rust; choose another name");
             return Err(syn::Error::new(self.word.span(), message));
         }
@@ -100,7 +102,12 @@ pub(super) fn items_of(
             let _: syn::Result<Token![;]> = input.parse();
             continue;
         }
-        let result = head(input, expected, diagnostics).and_then(|head| item(head, input, diagnostics));
+        let result = match head(input, expected, diagnostics) {
+            Ok(Some(head)) => item(head, input, diagnostics),
+            // Nothing follows a comment that is none.
+            Ok(None) => return,
+            Err(error) => Err(error),
+        };
         if let Err(error) = result {
             diagnostics.syntax(&error);
             skip(input);
@@ -108,8 +115,16 @@ pub(super) fn items_of(
     }
 }
 
-/// Opens `{ … }`.
-pub(super) fn braced<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>> {
+/// Opens the `{ … }` that must come next, as in `example`.
+pub(super) fn braced<'a>(input: ParseStream<'a>, example: &str) -> syn::Result<ParseBuffer<'a>> {
+    if !input.peek(syn::token::Brace) {
+        return Err(syn::Error::new(input.span(), format!("expected `{{`, as in `{example}`")));
+    }
+    opened(input)
+}
+
+/// Opens a `{ … }` that is known to come next.
+pub(super) fn opened<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>> {
     let content;
     syn::braced!(content in input);
     Ok(content)
@@ -174,15 +189,39 @@ pub(super) fn unexpected(word: &Ident, place: &str, allowed: &[&str]) -> syn::Er
     syn::Error::new(word.span(), message)
 }
 
-fn head(input: ParseStream<'_>, expected: &str, diagnostics: &mut Diagnostics) -> syn::Result<Head> {
-    let attributes = input.call(Attribute::parse_outer)?;
+fn head(input: ParseStream<'_>, expected: &str, diagnostics: &mut Diagnostics) -> syn::Result<Option<Head>> {
+    let before = diagnostics.count();
+    let attributes = attributes(input, diagnostics)?;
+    if input.is_empty() && attributes.is_empty() && diagnostics.count() > before {
+        return Ok(None);
+    }
     for attribute in attributes.iter().filter(|attribute| !attribute.path().is_ident("doc")) {
         let message = "only doc comments can stand before a part of a robot; leave this attribute out";
         diagnostics.error(attribute, message.into());
     }
     let place = input.span();
     let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, expected))?;
-    Ok(Head { attributes, word })
+    Ok(Some(Head { attributes, word }))
+}
+
+/// Reads attributes and doc comments; what is a comment in other languages is reported and passed over.
+pub(super) fn attributes(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Vec<Attribute>> {
+    let mut attributes = Vec::new();
+    while input.peek(Token![#]) {
+        if input.peek2(syn::token::Bracket) {
+            attributes.extend(input.call(Attribute::parse_outer)?);
+            continue;
+        }
+        let place = input.span();
+        let message = if input.peek2(Token![!]) {
+            "`//!` and `#![…]` cannot stand in a robot; write `///` before what it documents"
+        } else {
+            "`#` starts no comment; write `//`"
+        };
+        diagnostics.at(place, message.into());
+        while input.span().start().line == place.start().line && input.parse::<TokenTree>().is_ok() {}
+    }
+    Ok(attributes)
 }
 
 /// Skips to behind the next `;` or `{ … }` of this level.

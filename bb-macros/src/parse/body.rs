@@ -51,22 +51,32 @@ impl Inertial {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut inertial = Self { word: head.word, origin: None, mass: None, inertia: Default::default() };
-        record(input, &["mass", "origin", "inertia"], |field, input| {
-            match &*field.to_string() {
-                "mass" => inertial.mass = Some(Quantity::parse(input)?),
-                "origin" => inertial.origin = Some(Origin::parse_value(field.clone(), input)?),
-                _ => record(input, &MOMENTS, |moment, input| {
-                    let quantity = Quantity::parse(input)?;
-                    for (slot, name) in inertial.inertia.iter_mut().zip(MOMENTS) {
-                        if moment == name {
-                            *slot = Some(quantity.clone());
-                        }
-                    }
-                    Ok(())
-                })?,
-            }
-            Ok(())
-        })?;
+        record(
+            input,
+            "{ mass: 1.2 kg, inertia: { xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 } }",
+            &["mass", "origin", "inertia"],
+            |field, input| {
+                match &*field.to_string() {
+                    "mass" => inertial.mass = Some(Quantity::parse(input)?),
+                    "origin" => inertial.origin = Some(Origin::parse_value(field.clone(), input)?),
+                    _ => record(
+                        input,
+                        "{ xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 }",
+                        &MOMENTS,
+                        |moment, input| {
+                            let quantity = Quantity::parse(input)?;
+                            for (slot, name) in inertial.inertia.iter_mut().zip(MOMENTS) {
+                                if moment == name {
+                                    *slot = Some(quantity.clone());
+                                }
+                            }
+                            Ok(())
+                        },
+                    )?,
+                }
+                Ok(())
+            },
+        )?;
         semicolon(input, "`inertial`", diagnostics);
         Ok(inertial)
     }
@@ -79,7 +89,7 @@ impl Shape {
         // A collision is not to be seen.
         let fields = if head.word == "visual" { &fields[..] } else { &fields[..5] };
         let mut shape = Self { word: head.word, origin: None, geometries: Vec::new(), material: None };
-        record(input, fields, |field, input| {
+        record(input, "{ box: [0.4 m, 0.3 m, 0.1 m] }", fields, |field, input| {
             match &*field.to_string() {
                 "origin" => shape.origin = Some(Origin::parse_value(field.clone(), input)?),
                 "material" => shape.material = Some(Material::parse(input)?),
@@ -97,16 +107,18 @@ impl Geometry {
         let (mut radius, mut length, mut file, mut scale) = (None, None, None, None);
         match kind {
             "box" => return array(input).map(Self::Box),
-            "cylinder" => record(input, &["radius", "length"], |field, input| {
-                let slot = if field == "radius" { &mut radius } else { &mut length };
-                *slot = Some(Quantity::parse(input)?);
-                Ok(())
-            })?,
-            "sphere" => record(input, &["radius"], |_, input| {
+            "cylinder" => {
+                record(input, "{ radius: 0.1 m, length: 0.3 m }", &["radius", "length"], |field, input| {
+                    let slot = if field == "radius" { &mut radius } else { &mut length };
+                    *slot = Some(Quantity::parse(input)?);
+                    Ok(())
+                })?
+            }
+            "sphere" => record(input, "{ radius: 0.1 m }", &["radius"], |_, input| {
                 radius = Some(Quantity::parse(input)?);
                 Ok(())
             })?,
-            _ => record(input, &["file", "scale"], |field, input| {
+            _ => record(input, "{ file: \"base.stl\" }", &["file", "scale"], |field, input| {
                 if field == "file" {
                     file = Some(input.parse()?);
                 } else {
@@ -126,7 +138,7 @@ impl Geometry {
 impl Material {
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let mut material = Self::default();
-        record(input, &["name", "color", "texture"], |field, input| {
+        record(input, "{ color: [0, 0, 1, 1] }", &["name", "color", "texture"], |field, input| {
             match &*field.to_string() {
                 "name" => material.name = Some(input.parse()?),
                 "color" => material.color = Some(array(input)?),

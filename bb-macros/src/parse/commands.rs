@@ -4,8 +4,9 @@ mod settings;
 
 pub(crate) use settings::{Cancelled, CommandSettings};
 
-use super::block::{Head, braced, items, items_of, semicolon, unexpected};
-use super::component::{Declared, name};
+use super::block::{Head, braced, items, items_of, opened, semicolon, unexpected};
+use super::component::Declared;
+use super::name::name;
 use super::{Component, Setting};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
@@ -40,7 +41,7 @@ impl Commands {
     /// Reads the braces.
     pub(super) fn parse(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
         const EXPECTED: &str = "expected a command, as in `arm: Arm;`, or a `category`";
-        let body = braced(input)?;
+        let body = braced(input, "commands { stop: Stop; }")?;
         items_of(&body, EXPECTED, diagnostics, |head, input, diagnostics| {
             // A command may have that name.
             if head.word == "category" && !input.peek(Token![:]) {
@@ -62,7 +63,7 @@ impl Category {
             semicolon(input, &format!("the category `{}`", category.name), diagnostics);
             return Ok(category);
         }
-        let body = braced(input)?;
+        let body = opened(input)?;
         items(&body, diagnostics, |head, input, diagnostics| {
             if head.word != "concurrency" {
                 return Err(unexpected(&head.word, "a category", &["concurrency"]));

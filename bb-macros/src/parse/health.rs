@@ -2,6 +2,7 @@
 
 use super::Setting;
 use super::block::{Head, colon, semicolon};
+use super::name::whole;
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
@@ -53,6 +54,7 @@ impl Reaction {
         let place = input.span();
         let message = "expected the name of a command";
         let command = input.parse().map_err(|_| syn::Error::new(place, message))?;
+        whole(input, &command)?;
         semicolon(input, &format!("`{}`", head.word), diagnostics);
         Ok(Self { word: head.word, command })
     }

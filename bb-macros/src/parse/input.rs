@@ -1,7 +1,7 @@
 //! `input gnss: sensor::base_link::gnss, optional, within: 250 ms;`
 
 use super::block::{Head, colon, semicolon};
-use super::component::name;
+use super::name::name;
 use super::{Path, Quantity};
 use crate::diagnostics::Diagnostics;
 use crate::names::did_you_mean;
@@ -24,9 +24,10 @@ pub(crate) struct Input {
 
 impl Input {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+        unnamed(&input.fork())?;
         let name = name(input, &head.word)?;
         colon(input, &name, "the path of a publisher")?;
-        let path = Path::parse(input, "the path of a publisher, as in `sensor::base_link::imu`")?;
+        let path = Path::parse_publisher(input)?;
         let mut parsed = Self { word: head.word, name, path, driver: None, optional: None, within: None };
         while input.peek(Token![,]) {
             input.parse::<Token![,]>()?;
@@ -55,5 +56,21 @@ impl Input {
             }
         }
         Ok(())
+    }
+}
+
+/// That no path stands where the name is expected.
+fn unnamed(input: ParseStream<'_>) -> syn::Result<()> {
+    let Ok(path) = Path::parse(input, "") else { return Ok(()) };
+    match &path.0[..] {
+        [_, .., last] if input.peek(Token![;]) || input.peek(Token![,]) => {
+            let (path_text, last) = (path.text(), crate::names::text(last));
+            let message = format!(
+                "expected the name of this `input` before the path, as in `input {last}: {path_text};`; the algorithm \
+                 says what its inputs are called"
+            );
+            Err(path.place().syntax(message))
+        }
+        _ => Ok(()),
     }
 }

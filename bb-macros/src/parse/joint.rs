@@ -6,8 +6,8 @@ mod mechanics;
 pub(crate) use geometry::{Axis, Limit, Origin};
 pub(crate) use mechanics::{Dynamics, Mimic, Transmission};
 
-use super::block::{Head, braced, colon, items, semicolon, unexpected};
-use super::component::name;
+use super::block::{Head, colon, items, opened, semicolon, unexpected};
+use super::name::name;
 use super::{Actuator, Link, Sensor};
 use crate::diagnostics::Diagnostics;
 use crate::names::{did_you_mean, one_of};
@@ -101,7 +101,7 @@ impl Joint {
             links: Vec::new(),
         };
         if input.peek(syn::token::Brace) {
-            let body = braced(input)?;
+            let body = opened(input)?;
             items(&body, diagnostics, |head, input, diagnostics| joint.item(head, input, diagnostics));
         } else {
             semicolon(input, &format!("`{}`", joint.name), diagnostics);

@@ -1,7 +1,7 @@
 //! `link base { sensor … estimator … joint … }`
 
-use super::block::{Head, braced, items, semicolon, unexpected};
-use super::component::name;
+use super::block::{Head, items, opened, semicolon, unexpected};
+use super::name::name;
 use super::{Estimator, Inertial, Joint, Sensor, Shape};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
@@ -40,7 +40,7 @@ impl Link {
             collisions: Vec::new(),
         };
         if input.peek(syn::token::Brace) {
-            let body = braced(input)?;
+            let body = opened(input)?;
             items(&body, diagnostics, |head, input, diagnostics| link.item(head, input, diagnostics));
         } else {
             semicolon(input, &format!("`{}`", link.name), diagnostics);

@@ -1,7 +1,7 @@
 //! `output pose;` or `output velocity: [nav, velocity];`
 
 use super::block::{Head, semicolon};
-use super::component::name;
+use super::name::name;
 use super::record::names;
 use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;

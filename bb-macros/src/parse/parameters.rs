@@ -1,7 +1,7 @@
 //! `parameters { imu { beta: f64 = 0.1, range: 0.0..=1.0; } }`
 
 use super::Literal;
-use super::block::{Head, braced, colon, items_of, semicolon};
+use super::block::{Head, colon, items_of, opened, semicolon};
 use crate::diagnostics::Diagnostics;
 use crate::names::did_you_mean;
 use proc_macro2::Ident;
@@ -59,7 +59,7 @@ impl ParameterItem {
     fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         let name = head.name(input)?;
         if input.peek(syn::token::Brace) {
-            let items = Self::parse_all(&braced(input)?, diagnostics);
+            let items = Self::parse_all(&opened(input)?, diagnostics);
             return Ok(Self::Group { attributes: head.attributes, name, items });
         }
         Parameter::parse(head.attributes, name, input, diagnostics).map(Self::Parameter)

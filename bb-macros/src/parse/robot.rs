@@ -1,6 +1,6 @@
 //! `robot Rover; parameters { … } states { … } commands { … } sensors { … } link base { … }`
 
-use super::block::{Head, braced, items, semicolon, skip_to_item, unexpected};
+use super::block::{Head, attributes, braced, items, semicolon, skip_to_item, unexpected};
 use super::{Commands, JointAddition, Link, ParameterItem, Sensor, Service, ServiceKind, State, Topology};
 use crate::diagnostics::Diagnostics;
 use proc_macro2::{Ident, Span};
@@ -42,23 +42,23 @@ impl Robot {
         items(input, diagnostics, |head, input, diagnostics| self.item(head, input, diagnostics));
     }
 
-    /// `pub robot Rover;` If it is not there, nothing is consumed.
+    /// `pub robot Rover;` If it is not there, its attributes alone are consumed.
     fn header(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
         const EXPECTED: &str = "expected the robot's name first, as in `robot Rover;`";
         if input.is_empty() {
             return Err(syn::Error::new(Span::call_site(), EXPECTED));
         }
+        let comments = attributes(input, diagnostics)?;
         let ahead = input.fork();
-        ahead.call(Attribute::parse_outer)?;
         ahead.parse::<Visibility>()?;
         let place = ahead.span();
         if ahead.call(Ident::parse_any).ok().is_none_or(|word| word != "robot") {
             return Err(syn::Error::new(place, EXPECTED));
         }
-        self.attributes = input.call(Attribute::parse_outer)?;
+        self.attributes = comments;
         self.visibility = Some(input.parse()?);
         let word = input.call(Ident::parse_any)?;
-        self.name = Some(super::component::name(input, &word)?);
+        self.name = Some(super::name::name(input, &word)?);
         semicolon(input, "the robot's name", diagnostics);
         Ok(())
     }
@@ -66,7 +66,7 @@ impl Robot {
     fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
         match &*head.word.to_string() {
             "parameters" => {
-                let body = braced(input)?;
+                let body = braced(input, "parameters { gain: f64 = 0.1; }")?;
                 self.parameters.extend(ParameterItem::parse_all(&body, diagnostics));
             }
             "states" => self.states.extend(State::parse_all(input, diagnostics)?),
@@ -75,7 +75,7 @@ impl Robot {
             "bridges" => self.services.extend(Service::parse_all(ServiceKind::Bridge, input, diagnostics)?),
             "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
             "sensors" => {
-                let body = braced(input)?;
+                let body = braced(input, "sensors { sensor battery: Ina219(); }")?;
                 items(&body, diagnostics, |head, input, diagnostics| {
                     if head.word != "sensor" {
                         return Err(unexpected(&head.word, "`sensors`", &["sensor"]));

@@ -32,6 +32,13 @@ impl ServiceKind {
         }
     }
 
+    fn example(self) -> &'static str {
+        match self {
+            Self::Controller => "controllers { controller stability: Stability(); }",
+            Self::Bridge => "bridges { bridge ros: RosBridge(); }",
+        }
+    }
+
     /// The word of the block in which it stands.
     fn block(self) -> &'static str {
         match self {
@@ -48,7 +55,7 @@ impl Service {
         input: ParseStream<'_>,
         diagnostics: &mut Diagnostics,
     ) -> syn::Result<Vec<Self>> {
-        let body = braced(input)?;
+        let body = braced(input, kind.example())?;
         let mut services = Vec::new();
         items(&body, diagnostics, |head, input, diagnostics| {
             if head.word != kind.word() {

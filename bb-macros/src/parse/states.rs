@@ -17,7 +17,7 @@ pub(crate) struct State {
 impl State {
     /// Reads the braces.
     pub(super) fn parse_all(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Vec<Self>> {
-        let body = braced(input)?;
+        let body = braced(input, "states { degraded; }")?;
         let mut states = Vec::new();
         items_of(
             &body,

@@ -1,7 +1,7 @@
 //! `topology: urdf("robot.urdf");`, and what is declared onto the joints that it brings: `joint elbow { sensor … }`.
 
 use super::block::{Head, braced, items, semicolon, unexpected};
-use super::component::name;
+use super::name::name;
 use super::{Actuator, Sensor};
 use crate::diagnostics::{Diagnostics, Place};
 use proc_macro2::Ident;
@@ -51,7 +51,7 @@ impl JointAddition {
             let message = "a joint stands in the link that it is mounted on; only joints of a URDF are named here";
             return Err(input.error(message));
         }
-        let body = braced(input)?;
+        let body = braced(input, "joint elbow { sensor encoder: Encoder(); }")?;
         items(&body, diagnostics, |head, input, diagnostics| {
             match &*head.word.to_string() {
                 "sensor" => joint.sensors.push(Sensor::parse(head, input, diagnostics)?),

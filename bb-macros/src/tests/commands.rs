@@ -58,8 +58,7 @@ fn declared_states() {
     wrong(
         "robot R; states { idle; moving; moving; } link b;",
         &[
-            ("moving", "the name `moving` is taken among its siblings; choose another"),
-            ("moving", "`moving` is declared here first"),
+            ("moving", "the name `moving` is taken among its siblings, on line 1; choose another"),
             ("idle", "every robot has the state `idle`; leave it out"),
         ],
     );
@@ -118,11 +117,8 @@ fn names_are_unique_among_their_kind() {
             "l",
         ),
     ] {
-        let (taken, first) = (
-            format!("the name `{name}` is taken among its siblings; choose another"),
-            format!("`{name}` is declared here first"),
-        );
-        wrong(&robot, &[(name, &taken), (name, &first)]);
+        let taken = format!("the name `{name}` is taken among its siblings, on line 1; choose another");
+        wrong(&robot, &[(name, &taken)]);
     }
 }
 

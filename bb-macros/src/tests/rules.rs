@@ -6,32 +6,19 @@ use super::{base, places, right, sensing, wrong};
 fn unique_names() {
     right(&base("sensor imu: A() { estimator imu: T(); } joint j: fixed { link mast { sensor imu: A(); } }"));
     right("robot Rover; sensors { sensor imu: A(); } link base { sensor imu: A(); }");
-    let taken = "the name `imu` is taken among its siblings; choose another";
-    let first = "`imu` is declared here first";
-    wrong(&base("sensor imu: A(); sensor imu: B();"), &[("imu", taken), ("imu", first)]);
-    wrong(
-        &base("sensor imu: A(); sensor imu: B(); sensor imu: C();"),
-        &[("imu", taken), ("imu", first), ("imu", taken)],
-    );
-    wrong(
-        &base("sensor imu: A(); estimator imu: T() { input imu: sensor::base::imu; }"),
-        &[("imu", taken), ("imu", first)],
-    );
-    wrong(&base("sensor imu: A(); joint imu: fixed { link mast; }"), &[("imu", taken), ("imu", first)]);
-    wrong(&base("sensor a: A() { estimator imu: T(); estimator imu: T(); }"), &[("imu", taken), ("imu", first)]);
+    let taken = "the name `imu` is taken among its siblings, on line 1; choose another";
+    wrong(&base("sensor imu: A(); sensor imu: B();"), &[("imu", taken)]);
+    wrong(&base("sensor imu: A(); sensor imu: B(); sensor imu: C();"), &[("imu", taken), ("imu", taken)]);
+    wrong(&base("sensor imu: A(); estimator imu: T() { input imu: sensor::base::imu; }"), &[("imu", taken)]);
+    wrong(&base("sensor imu: A(); joint imu: fixed { link mast; }"), &[("imu", taken)]);
+    wrong(&base("sensor a: A() { estimator imu: T(); estimator imu: T(); }"), &[("imu", taken)]);
     wrong(
         "robot Rover; sensors { sensor base: A() { estimator imu: T(); } } link base { sensor imu: B(); }",
-        &[
-            ("base", "the name `base` is taken among its siblings; choose another"),
-            ("base", "`base` is declared here first"),
-        ],
+        &[("base", "the name `base` is taken among its siblings, on line 1; choose another")],
     );
     wrong(
         &base("joint a: fixed { link m; } joint b: fixed { link m; }"),
-        &[
-            ("m", "the name `m` is taken among the links and joints of the robot; choose another"),
-            ("m", "`m` is declared here first"),
-        ],
+        &[("m", "the name `m` is taken among the links and joints of the robot, on line 1; choose another")],
     );
     wrong(
         "robot rover; link base;",

@@ -49,15 +49,20 @@ impl Origin {
     /// Reads `{ xyz: […], rpy: […] }`.
     pub(in crate::parse) fn parse_value(word: Ident, input: ParseStream<'_>) -> syn::Result<Self> {
         let mut origin = Self { word, xyz: None, rpy: None };
-        record(input, &["xyz", "rpy"], |field, input| {
-            let triple = array(input)?;
-            if field == "xyz" {
-                origin.xyz = Some(triple);
-            } else {
-                origin.rpy = Some(triple);
-            }
-            Ok(())
-        })?;
+        record(
+            input,
+            "{ xyz: [0 m, 0 m, 0.9 m], rpy: [0 deg, 0 deg, 90 deg] }",
+            &["xyz", "rpy"],
+            |field, input| {
+                let triple = array(input)?;
+                if field == "xyz" {
+                    origin.xyz = Some(triple);
+                } else {
+                    origin.rpy = Some(triple);
+                }
+                Ok(())
+            },
+        )?;
         Ok(origin)
     }
 }
@@ -104,16 +109,21 @@ impl Limit {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut limit = Self { word: head.word, lower: None, upper: None, velocity: None, effort: None };
-        record(input, &["lower", "upper", "velocity", "effort"], |field, input| {
-            let quantity = Some(Quantity::parse(input)?);
-            match &*field.to_string() {
-                "lower" => limit.lower = quantity,
-                "upper" => limit.upper = quantity,
-                "velocity" => limit.velocity = quantity,
-                _ => limit.effort = quantity,
-            }
-            Ok(())
-        })?;
+        record(
+            input,
+            "{ lower: -90 deg, upper: 90 deg }",
+            &["lower", "upper", "velocity", "effort"],
+            |field, input| {
+                let quantity = Some(Quantity::parse(input)?);
+                match &*field.to_string() {
+                    "lower" => limit.lower = quantity,
+                    "upper" => limit.upper = quantity,
+                    "velocity" => limit.velocity = quantity,
+                    _ => limit.effort = quantity,
+                }
+                Ok(())
+            },
+        )?;
         semicolon(input, "`limit`", diagnostics);
         Ok(limit)
     }

@@ -36,15 +36,20 @@ impl Dynamics {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut dynamics = Self { word: head.word, damping: None, friction: None };
-        record(input, &["damping", "friction"], |field, input| {
-            let quantity = Some(Quantity::parse(input)?);
-            if field == "damping" {
-                dynamics.damping = quantity;
-            } else {
-                dynamics.friction = quantity;
-            }
-            Ok(())
-        })?;
+        record(
+            input,
+            "{ damping: 0.1 N*m*s/rad, friction: 0.2 N*m }",
+            &["damping", "friction"],
+            |field, input| {
+                let quantity = Some(Quantity::parse(input)?);
+                if field == "damping" {
+                    dynamics.damping = quantity;
+                } else {
+                    dynamics.friction = quantity;
+                }
+                Ok(())
+            },
+        )?;
         semicolon(input, "`dynamics`", diagnostics);
         Ok(dynamics)
     }
@@ -54,14 +59,19 @@ impl Mimic {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut mimic = Self { word: head.word, joint: None, multiplier: None, offset: None };
-        record(input, &["joint", "multiplier", "offset"], |field, input| {
-            match &*field.to_string() {
-                "joint" => mimic.joint = Some(input.parse()?),
-                "multiplier" => mimic.multiplier = Some(Quantity::parse(input)?),
-                _ => mimic.offset = Some(Quantity::parse(input)?),
-            }
-            Ok(())
-        })?;
+        record(
+            input,
+            "{ joint: left_finger, multiplier: -1 }",
+            &["joint", "multiplier", "offset"],
+            |field, input| {
+                match &*field.to_string() {
+                    "joint" => mimic.joint = Some(input.parse()?),
+                    "multiplier" => mimic.multiplier = Some(Quantity::parse(input)?),
+                    _ => mimic.offset = Some(Quantity::parse(input)?),
+                }
+                Ok(())
+            },
+        )?;
         semicolon(input, "`mimic`", diagnostics);
         Ok(mimic)
     }
@@ -71,7 +81,7 @@ impl Transmission {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut transmission = Self { word: head.word, reduction: None };
-        record(input, &["reduction"], |_, input| {
+        record(input, "{ reduction: 50 }", &["reduction"], |_, input| {
             transmission.reduction = Some(Quantity::parse(input)?);
             Ok(())
         })?;
