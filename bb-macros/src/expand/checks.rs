@@ -5,7 +5,7 @@ use super::literal::{dimension, option, spanned_call};
 use super::part::Part;
 use super::types::{Types, type_name};
 use crate::diagnostics::Place;
-use crate::model::{EstimatorId, Robot};
+use crate::model::Robot;
 use crate::parse::{Component, ComponentOption, OptionValue, Value};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
@@ -23,9 +23,9 @@ pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
     for id in 0..robot.estimators.len() {
         checks.extend(inputs(robot, &types, id));
         checks.extend(outputs(robot, &types, id));
-        checks.extend(divergence(robot, &types, id));
     }
     checks.extend(moving_joints(verified, &types));
+    checks.extend(positions(robot, &types));
     checks.extend(roles(robot, &types));
     checks
 }
@@ -147,19 +147,22 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     checks
 }
 
-/// Where only the algorithm's own report can degrade an estimator, it makes one.
-fn divergence(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
-    let (name, kind) = (type_name(&estimator.component), types.estimator(id));
-    let words = estimator.needs_divergence().map(|word| {
-        let text = word.to_string();
-        spanned_call(
-            Place::of(word),
-            quote!(::bb_core::__private::check_divergence),
-            quote!(#name, <#kind as ::bb_core::Estimator>::REPORTS_DIVERGENCE, #text),
-        )
+/// What measures the position of a joint that an actuator moves is known by its payload.
+fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
+    let checks = robot.actuators.iter().filter_map(|actuator| {
+        let sources = robot.position_sources(actuator.joint)?;
+        let (name, joint) = (crate::names::text(&actuator.name), &robot.joints.get(actuator.joint)?.label);
+        let payloads = sources.iter().map(|source| {
+            let payload = types.payload(*source);
+            quote!(<#payload as ::bb_core::Payload>::TELLS_JOINT_POSITION)
+        });
+        Some(spanned_call(
+            Place::of(&actuator.name),
+            quote!(::bb_core::__private::check_position),
+            quote!(#name, #joint, &[#(#payloads),*]),
+        ))
     });
-    words.collect()
+    checks.collect()
 }
 
 /// At most one command arms and one disarms, each in a state in which it can.

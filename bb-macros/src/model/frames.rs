@@ -1,6 +1,6 @@
 //! How one frame is reached from another: the joints between, and the transform if all of them are fixed.
 
-use super::{JointId, LinkId, Mount, Rigid, Robot};
+use super::{JointId, LinkId, Mount, PublisherId, Rigid, Robot};
 use crate::names::text;
 use crate::parse::JointKind;
 use proc_macro2::Ident;
@@ -16,6 +16,15 @@ pub(crate) struct Route {
 }
 
 impl Robot {
+    /// What publishes at a joint and may tell its position; `None` where none is needed.
+    pub(crate) fn position_sources(&self, id: JointId) -> Option<Vec<PublisherId>> {
+        let joint = self.joints.get(id)?;
+        if joint.kind == JointKind::Fixed || !joint.mimics.is_empty() {
+            return None;
+        }
+        Some((0..self.publishers.len()).filter(|publisher| self.mount_of(*publisher) == Mount::Joint(id)).collect())
+    }
+
     /// The way from the frame of `source` to that of `target`. What has no frame needs no way.
     pub(crate) fn route(&self, source: Mount, target: Mount) -> Route {
         let (Some((source, link_from_source)), Some((target, link_from_target))) =

@@ -1,8 +1,7 @@
-//! When an estimator counts as degraded or lost, and what can make it so.
+//! When an estimator counts as degraded or lost, and what that calls.
 
-use super::{CommandId, Estimator, Robot};
+use super::{CommandId, Robot};
 use crate::parse::{HealthSettings, Reaction, RunsOn};
-use proc_macro2::Ident;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Health {
@@ -57,20 +56,5 @@ impl Worker {
             priority: priority.as_ref().map(|priority| priority.value as u8),
             core: core.as_ref().map(|core| core.value as u32),
         })
-    }
-}
-
-impl Estimator {
-    /// The words that are of use only if the algorithm reports divergence, since nothing else can degrade this
-    /// estimator: no budget to overrun, and no input that may be missing. (Recovery is from a loss, too.)
-    pub(crate) fn needs_divergence(&self) -> impl Iterator<Item = &Ident> {
-        let Health { settings, latency_budget_s, lost_after_s, .. } = &self.health;
-        let may_miss = self.inputs.iter().any(|input| input.driver.is_none() && input.optional.is_none());
-        let degrades = latency_budget_s.is_some() || self.inputs.len() > 1 && may_miss;
-        let recovers = degrades || lost_after_s.is_some();
-        let degraded = settings.on_degraded.iter().map(|reaction| &reaction.word).filter(move |_| !degrades);
-        let recovered = settings.on_recovered.iter().map(|reaction| &reaction.word);
-        let recovered = recovered.chain(settings.recover_afters.iter().map(|count| &count.word));
-        degraded.chain(recovered.filter(move |_| !recovers))
     }
 }

@@ -77,21 +77,3 @@ fn paths_of_what_acts() {
         robot.estimators[1].inputs.iter().map(|input| robot.publishers[input.source?].path.last().cloned());
     assert_eq!(sources.collect::<Option<Vec<_>>>(), Some(vec!["imu".into(), "stability".into(), "log".into()]));
 }
-
-#[test]
-fn words_that_wait_for_divergence() {
-    let waiting = |inputs: &str, settings: &str| {
-        let text = format!(
-            "robot R; commands {{ c: C; }} link b {{ sensor i: S(); estimator e: E() {{ {inputs} {settings} }} }}"
-        );
-        let robot = robot(&text);
-        robot.estimators[0].needs_divergence().map(ToString::to_string).collect::<Vec<_>>().join(" ")
-    };
-    let all = "on_degraded: c; on_lost: c; on_recovered: c; recover_after: 2;";
-    let one = "input a: i;";
-    assert_eq!(waiting(one, all), "on_degraded on_recovered recover_after");
-    assert_eq!(waiting(one, &format!("{all} lost_after: 1 s;")), "on_degraded");
-    assert_eq!(waiting(one, &format!("{all} latency_budget: 1 s;")), "");
-    assert_eq!(waiting("input a: i, driver; input b: i;", all), "");
-    assert_eq!(waiting("input a: i, driver; input b: i, optional;", "on_degraded: c;"), "on_degraded");
-}

@@ -3,8 +3,7 @@
 //! Right: `lost_after: 100 ms; on_lost: stop;`
 //! Wrong: `on_lost: stop;` alone
 //!
-//! Whether an estimator without `latency_budget` and with one input can degrade is a fact about its type, see
-//! `Estimator::needs_divergence`.
+//! `on_degraded` needs nothing: any estimator degrades when it is restarted.
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
