@@ -13,6 +13,7 @@ use proc_macro::TokenStream;
 mod derive;
 mod diagnostics;
 mod expand;
+mod language;
 mod model;
 mod names;
 mod parse;

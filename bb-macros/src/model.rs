@@ -9,15 +9,16 @@ mod rigid;
 mod trigger;
 
 pub(crate) use commands::{BUILT_IN_STATES, Cancel, Category, Command, CommandId};
-pub(crate) use health::{Health, Worker};
+pub(crate) use health::{Health, Timing, Worker};
 pub(crate) use parameters::{Parameter, ParameterGroup, ParameterGroupId, ParameterId};
 pub(crate) use resolve::resolve;
 pub(crate) use rigid::Rigid;
 pub(crate) use trigger::Trigger;
 
+use crate::language::EstimatorSetting;
 use crate::parse::{
-    self, Axis, Component, Dynamics, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity, RunsOn,
-    ServiceKind, Setting, Shape, State, Transmission,
+    self, Axis, Component, Dynamics, Given, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity,
+    Reactions, ServiceKind, Settings, Shape, State, Transmission,
 };
 use proc_macro2::Ident;
 use std::collections::HashMap;
@@ -56,6 +57,10 @@ pub(crate) struct Robot {
     pub(crate) commands: Vec<Command>,
     /// Whatever can be subscribed to, sensors first.
     pub(crate) publishers: Vec<Publisher>,
+    /// All numbers that are given to words of the language.
+    pub(crate) given: Vec<Given>,
+    /// All words that are written more often than they may.
+    pub(crate) repeated: Vec<Ident>,
     /// Whether everything could be read; if not, what is missing may have been declared.
     pub(crate) complete: bool,
 }
@@ -109,7 +114,8 @@ pub(crate) struct Sensor {
     pub(crate) name: Ident,
     pub(crate) mount: Mount,
     pub(crate) component: Component,
-    pub(crate) rates: Vec<Setting>,
+    /// The time between two calls of `read`, in s; none if it does not say.
+    pub(crate) period_s: Option<f64>,
     pub(crate) publisher: PublisherId,
 }
 
@@ -130,7 +136,8 @@ pub(crate) struct Service {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     pub(crate) component: Component,
-    pub(crate) rates: Vec<Setting>,
+    /// The time between two calls of `update`, in s; none if it does not say.
+    pub(crate) period_s: Option<f64>,
     pub(crate) publisher: PublisherId,
     pub(crate) path: Vec<String>,
 }
@@ -150,10 +157,11 @@ pub(crate) struct Estimator {
     pub(crate) component: Component,
     pub(crate) inputs: Vec<Input>,
     pub(crate) outputs: Vec<Output>,
-    pub(crate) sync_tolerances: Vec<Setting>,
-    pub(crate) health: Health,
     /// As written.
-    pub(crate) runs_on: Vec<RunsOn>,
+    pub(crate) settings: Settings<EstimatorSetting>,
+    pub(crate) timing: Timing,
+    pub(crate) reactions: Reactions,
+    pub(crate) health: Health,
     /// None where its input's thread runs it.
     pub(crate) worker: Option<Worker>,
     /// Its own path.
@@ -200,12 +208,6 @@ impl Robot {
             Some(From::Estimator(estimator, _)) => self.mount_of_estimator(estimator),
             Some(From::Service(_)) | None => Mount::Robot,
         }
-    }
-
-    /// The rates of sensors, controllers and bridges.
-    pub(crate) fn rates(&self) -> impl Iterator<Item = &Setting> {
-        let sensors = self.sensors.iter().flat_map(|sensor| &sensor.rates);
-        sensors.chain(self.services.iter().flat_map(|service| &service.rates))
     }
 
     /// All that is declared by a type of the user's.

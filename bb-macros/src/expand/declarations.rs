@@ -3,8 +3,7 @@
 use super::islands::Islands;
 use super::literal::{nanos, option, transform};
 use super::{control, path_text, topology};
-use crate::model::{Actuator, EstimatorId, Mount, Robot, Sensor, Service};
-use crate::parse::Setting;
+use crate::model::{Actuator, EstimatorId, Health, Mount, Robot, Sensor, Service, Timing};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
@@ -46,7 +45,7 @@ pub(super) fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> 
 fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let path = robot.publishers.get(sensor.publisher).map_or(String::new(), |publisher| path_text(&publisher.path));
     let frame = robot.frame_name(sensor.mount);
-    let period = period(&sensor.rates);
+    let period = period(sensor.period_s);
     let root = root_from(robot, sensor.mount);
     let supervisor = supervisor(robot, sensor.mount);
     quote!(::bb_core::__private::SensorDeclaration {
@@ -73,22 +72,25 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: usize) 
     let (path, frame) = (path_text(&estimator.path), robot.frame_name(mount));
     let island = islands.of.get(id).copied().unwrap_or(0);
     let supervisor = supervisor(robot, mount);
-    let (health, worker) = (health(robot, id), worker(robot, id));
+    // All of it is declared to the runtime.
+    let Timing { sync_tolerance_s, latency_budget_s, lost_after_s, recover_after } = estimator.timing;
+    let health = health(&estimator.health, latency_budget_s, lost_after_s, recover_after);
+    let worker = worker(robot, id);
     let nested = estimator.is_nested().then(|| nested_input(&estimator.path));
-    let synchronous = estimator.sync_tolerances.first().map(|tolerance| &tolerance.quantity);
     let several = estimator.inputs.len() > 1;
     let declared = estimator.inputs.iter().zip(sources).enumerate().map(|(index, (input, source))| {
         let name = crate::names::text(&input.name);
         let path = robot.publishers.get(*source).map_or(String::new(), |publisher| path_text(&publisher.path));
         let driver = input.driver.is_some() || !several;
         let optional = input.optional.is_some();
-        let tolerance = option(input.within.as_ref().or(synchronous).map(|tolerance| {
-            let tolerance = nanos(tolerance.value);
+        let within_s = input.within.as_ref().map(|within| within.value);
+        let tolerance = option(within_s.or(sync_tolerance_s).map(|tolerance_s| {
+            let tolerance = nanos(tolerance_s);
             quote!(#tolerance)
         }));
         // The driver has nothing to be compared with but the clock.
-        let stale = option(input.within.as_ref().filter(|_| driver).map(|limit| {
-            let limit = nanos(limit.value);
+        let stale = option(within_s.filter(|_| driver).map(|limit_s| {
+            let limit = nanos(limit_s);
             quote!(#limit)
         }));
         let route = robot.route(robot.mount_of(*source), mount);
@@ -119,9 +121,9 @@ pub(super) fn supervisor(robot: &Robot, mount: Mount) -> usize {
     }
 }
 
-fn period(rates: &[Setting]) -> TokenStream {
-    option(rates.first().map(|rate| {
-        let period = nanos(1.0 / rate.quantity.value).max(1);
+fn period(period_s: Option<f64>) -> TokenStream {
+    option(period_s.map(|period_s| {
+        let period = nanos(period_s).max(1);
         quote!(#period)
     }))
 }
@@ -134,7 +136,7 @@ fn actuator_declaration(robot: &Robot, actuator: &Actuator) -> TokenStream {
 }
 
 fn service_declaration(service: &Service) -> TokenStream {
-    let (path, period) = (path_text(&service.path), period(&service.rates));
+    let (path, period) = (path_text(&service.path), period(service.period_s));
     quote!(::bb_core::__private::SensorDeclaration {
         path: #path,
         frame: ::bb_core::__private::Frame::NONE,
@@ -144,16 +146,18 @@ fn service_declaration(service: &Service) -> TokenStream {
     })
 }
 
-fn health(robot: &Robot, id: EstimatorId) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
-    let health = &estimator.health;
-    let [budget, lost] = [health.latency_budget_s, health.lost_after_s].map(|time| {
+fn health(
+    health: &Health,
+    latency_budget_s: Option<f64>,
+    lost_after_s: Option<f64>,
+    recover_after: u32,
+) -> TokenStream {
+    let [budget, lost] = [latency_budget_s, lost_after_s].map(|time| {
         option(time.map(|time| {
             let time = nanos(time);
             quote!(#time)
         }))
     });
-    let recover_after = health.recover_after;
     let [degraded, lost_command, recovered] = [health.on_degraded, health.on_lost, health.on_recovered]
         .map(|command| option(command.map(|command| quote!(#command))));
     quote!(::bb_core::__private::HealthDeclaration {

@@ -55,10 +55,7 @@ fn parameters(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
 
 /// Commands of `on_…`, states, categories.
 fn control(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
-    let reactions = robot.estimators.iter().flat_map(|estimator| {
-        let settings = &estimator.health.settings;
-        settings.on_degraded.iter().chain(&settings.on_lost).chain(&settings.on_recovered)
-    });
+    let reactions = robot.estimators.iter().flat_map(|estimator| estimator.reactions.all());
     let reactions = reactions.map(|reaction| vec![at_none("command"), reaction.command.clone()]);
     let states = robot.commands.iter().filter_map(|command| command.allowed_states.as_ref()).flatten();
     let states = states.filter(|state| robot.states.iter().any(|declared| declared.name == **state));

@@ -442,7 +442,7 @@ fn island_state(
     let numbers = &island.estimators;
     let is_measured = island.estimators.iter().any(|id| {
         let estimator = types.model().estimators.get(*id);
-        estimator.is_some_and(|estimator| estimator.health.latency_budget_s.is_some())
+        estimator.is_some_and(|estimator| estimator.timing.latency_budget_s.is_some())
     });
     quote! {
         pub struct #name { #(#fields)* }

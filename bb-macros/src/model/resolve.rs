@@ -2,10 +2,12 @@
 
 use super::{
     Actuator, Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor,
-    SensorId, Service, Worker,
+    SensorId, Service, Timing, Worker,
 };
+use crate::language::{SensorSetting, ServiceSetting};
 use crate::names::text;
-use crate::parse;
+use crate::parse::{self, Quantity};
+use crate::units::Dimension;
 use proc_macro2::Ident;
 use std::collections::HashMap;
 use syn::Visibility;
@@ -24,6 +26,8 @@ pub(crate) fn resolve(tree: parse::Robot) -> Robot {
         links,
         topologies: _,
         joints: _,
+        given,
+        repeated,
         complete,
     } = tree;
     let mut robot = Robot {
@@ -43,6 +47,8 @@ pub(crate) fn resolve(tree: parse::Robot) -> Robot {
         categories: Vec::new(),
         commands: Vec::new(),
         publishers: Vec::new(),
+        given,
+        repeated,
         complete,
     };
     // Before what refers to them.
@@ -135,9 +141,15 @@ impl Robot {
     fn add_sensor(&mut self, sensor: parse::Sensor, mount: Mount, above: &[Ident]) {
         let id: SensorId = self.sensors.len();
         let path = texts("sensor", &below(above, &sensor.name));
-        let parse::Sensor { attributes, name, component, rates, estimators } = sensor;
+        let parse::Sensor { attributes, name, component, settings, estimators } = sensor;
+        let mut period_s = None;
+        for (setting, quantity) in settings.each() {
+            match setting {
+                SensorSetting::Rate => period_s = period(quantity),
+            }
+        }
         let publisher = self.add_publisher(path.clone(), From::Sensor(id));
-        self.sensors.push(Sensor { attributes, name, mount, component, rates, publisher });
+        self.sensors.push(Sensor { attributes, name, mount, component, period_s, publisher });
         for estimator in estimators {
             let mut own = path.clone();
             own.push(text(&estimator.name));
@@ -146,15 +158,21 @@ impl Robot {
     }
 
     fn add_service(&mut self, service: parse::Service) {
-        let parse::Service { kind, attributes, name, component, rates } = service;
+        let parse::Service { kind, attributes, name, component, settings } = service;
+        let mut period_s = None;
+        for (setting, quantity) in settings.each() {
+            match setting {
+                ServiceSetting::Rate => period_s = period(quantity),
+            }
+        }
         let path = vec![kind.word().to_owned(), text(&name)];
         let publisher = self.add_publisher(path.clone(), From::Service(self.services.len()));
-        self.services.push(Service { kind, attributes, name, component, rates, publisher, path });
+        self.services.push(Service { kind, attributes, name, component, period_s, publisher, path });
     }
 
     fn add_estimator(&mut self, estimator: parse::Estimator, home: Home, path: Vec<String>) {
         let id = self.estimators.len();
-        let parse::Estimator { attributes, name, component, inputs, outputs, sync_tolerances, health, runs_on } =
+        let parse::Estimator { attributes, name, component, inputs, outputs, settings, reactions, runs_on } =
             estimator;
         let publishers = if outputs.is_empty() {
             vec![self.add_publisher(path.clone(), From::Estimator(id, None))]
@@ -175,10 +193,11 @@ impl Robot {
             component,
             inputs,
             outputs,
-            sync_tolerances,
-            health: self.resolve_health(health),
+            timing: Timing::of(&settings),
+            settings,
+            health: self.resolve_health(&reactions),
+            reactions,
             worker: Worker::of(&runs_on),
-            runs_on,
             path,
             publishers,
         });
@@ -226,4 +245,9 @@ fn below(above: &[Ident], name: &Ident) -> Vec<Ident> {
 
 fn texts(root: &str, path: &[Ident]) -> Vec<String> {
     std::iter::once(root.to_owned()).chain(path.iter().map(text)).collect()
+}
+
+/// Of a rate that is none, none: it is refused.
+fn period(rate: &Quantity) -> Option<f64> {
+    (rate.dimension == Dimension::FREQUENCY && rate.value > 0.0).then(|| 1.0 / rate.value)
 }

@@ -1,8 +1,6 @@
 //! What makes a publisher publish, followed back through estimators, and how often that is.
 
 use super::{From, Home, PublisherId, Robot, SensorId, ServiceId};
-use crate::parse::Setting;
-use crate::units::Dimension;
 
 /// Where a chain of messages starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,11 +29,9 @@ impl Robot {
 
     /// The time between two messages of a publisher, in s, if the rate behind it is declared.
     pub(crate) fn period_s(&self, publisher: PublisherId) -> Option<f64> {
-        let rates: &[Setting] = match self.trigger(publisher)? {
-            Trigger::Sensor(id) => &self.sensors.get(id)?.rates,
-            Trigger::Service(id) => &self.services.get(id)?.rates,
-        };
-        let rate = &rates.first()?.quantity;
-        (rate.dimension == Dimension::FREQUENCY && rate.value > 0.0).then(|| 1.0 / rate.value)
+        match self.trigger(publisher)? {
+            Trigger::Sensor(id) => self.sensors.get(id)?.period_s,
+            Trigger::Service(id) => self.services.get(id)?.period_s,
+        }
     }
 }

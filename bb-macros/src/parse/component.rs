@@ -5,9 +5,9 @@ mod options;
 
 pub(crate) use options::{ComponentOption, OptionValue};
 
+use super::Notes;
 use super::block::{Head, colon, opened, semicolon};
 use super::name::name;
-use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{AngleBracketedGenericArguments, Attribute, Token};
@@ -30,9 +30,9 @@ pub(crate) struct Declared<'a> {
 
 impl<'a> Declared<'a> {
     /// Reads what stands behind the word.
-    pub(super) fn parse(head: Head, input: ParseStream<'a>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'a>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        Self::named(head.attributes, name, input, diagnostics)
+        Self::named(head.attributes, name, input, notes)
     }
 
     /// Reads what stands behind the name.
@@ -40,15 +40,15 @@ impl<'a> Declared<'a> {
         attributes: Vec<Attribute>,
         name: Ident,
         input: ParseStream<'a>,
-        diagnostics: &mut Diagnostics,
+        notes: &mut Notes<'_>,
     ) -> syn::Result<Self> {
         colon(input, &name, "a type")?;
-        let (component, is_closed) = Component::parse(&name, input, diagnostics)?;
+        let (component, is_closed) = Component::parse(&name, input, notes)?;
         let body = if input.peek(syn::token::Brace) {
             Some(opened(input)?)
         } else {
             if !is_closed {
-                semicolon(input, &format!("`{name}`"), diagnostics);
+                semicolon(input, &format!("`{name}`"), notes);
             }
             None
         };
@@ -58,9 +58,9 @@ impl<'a> Declared<'a> {
 
 impl Component {
     /// Also whether its braces have ended it, so that no `;` is missing.
-    fn parse(name: &Ident, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<(Self, bool)> {
+    fn parse(name: &Ident, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<(Self, bool)> {
         let mut kind = path_of_type(name, input)?;
-        let is_made_here = mistaken::constructor(&mut kind, diagnostics);
+        let is_made_here = mistaken::constructor(&mut kind, notes);
         let mut options = Vec::new();
         let mut is_closed = false;
         if input.peek(syn::token::Paren) {
@@ -71,10 +71,10 @@ impl Component {
                 Ok(parsed) => options.extend(parsed),
                 // What a constructor takes has no names; that is reported already.
                 Err(_) if is_made_here => drop(content.parse::<proc_macro2::TokenStream>()),
-                Err(error) => diagnostics.syntax(&error),
+                Err(error) => notes.syntax(&error),
             }
         } else if let Some(error) = mistaken::fields(&kind, input) {
-            diagnostics.syntax(&error);
+            notes.syntax(&error);
             is_closed = true;
         }
         Ok((Self { kind, options }, is_closed))

@@ -1,6 +1,5 @@
 //! Names that a robot declares, and what is written in place of one.
 
-use super::block::WORDS;
 use crate::diagnostics::Place;
 use proc_macro2::{Ident, TokenStream, TokenTree};
 use syn::ext::IdentExt;
@@ -89,7 +88,7 @@ fn spaced(input: ParseStream<'_>, name: &Ident, word: &Ident) -> Option<Vec<Toke
     let ahead = input.fork();
     let mut words = vec![TokenTree::from(name.clone())];
     while let Ok(next) = ahead.call(Ident::parse_any) {
-        if WORDS.contains(&&*next.to_string()) {
+        if crate::language::starts_item(&next.to_string()) {
             return None;
         }
         words.push(next.into());

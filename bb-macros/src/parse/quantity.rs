@@ -1,7 +1,9 @@
 //! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also glued, `20ms`.
 
+use super::Notes;
 use super::block::{place_since, starts_item};
 use crate::diagnostics::Place;
+use crate::language::{Value, Word};
 use crate::units::{Dimension, Unit};
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
@@ -31,9 +33,14 @@ impl Quantity {
         is_number(input)
     }
 
-    /// Reads a number of which the rules will say that it is whole and has no unit.
-    pub(crate) fn parse_count(input: ParseStream<'_>) -> syn::Result<Self> {
-        if Self::peek(input) { Self::parse(input) } else { Err(input.error("expected a whole number")) }
+    /// Reads the number that is given to a word; the rules say whether it is one that the word takes.
+    pub(super) fn of(word: &'static Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        if matches!(word.value, Value::Count { .. }) && !Self::peek(input) {
+            return Err(input.error("expected a whole number"));
+        }
+        let quantity = Self::parse(input)?;
+        notes.give(word, &quantity);
+        Ok(quantity)
     }
 
     /// Reads a number, and the unit if one follows.

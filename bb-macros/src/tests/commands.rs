@@ -131,7 +131,7 @@ fn each_setting_stands_once() {
             allowed_states: [idle]; allowed_states: [idle];
          }",
     );
-    assert_eq!(places(&robot), ["concurrency", "allowed_states", "timeout", "category", "cancel", "x"]);
+    assert_eq!(places(&robot), ["concurrency", "timeout", "category", "cancel", "allowed_states", "x"]);
     let robot = estimator(
         "lost_after: 1 s; lost_after: 2 s; latency_budget: 1 s; recover_after: 1; recover_after: 2; on_lost: stop;
          on_lost: stop; on_degraded: stop; on_degraded: stop; on_recovered: stop; on_recovered: stop;
@@ -139,7 +139,7 @@ fn each_setting_stands_once() {
     );
     assert_eq!(
         places(&robot),
-        ["latency_budget", "lost_after", "recover_after", "on_degraded", "on_lost", "on_recovered", "runs_on"]
+        ["lost_after", "latency_budget", "recover_after", "on_lost", "on_degraded", "on_recovered", "runs_on"]
     );
 }
 

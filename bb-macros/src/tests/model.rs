@@ -47,8 +47,8 @@ fn commands_name_categories_and_estimators_name_commands() {
         (tilt.health.on_degraded, tilt.health.on_lost, tilt.health.on_recovered),
         (Some(2), Some(3), Some(4))
     );
-    assert_eq!((tilt.health.latency_budget_s, tilt.health.lost_after_s), (Some(0.001), Some(0.1)));
-    assert_eq!((tilt.health.recover_after, robot.estimators[1].health.recover_after), (10, 1));
+    assert_eq!((tilt.timing.latency_budget_s, tilt.timing.lost_after_s), (Some(0.001), Some(0.1)));
+    assert_eq!((tilt.timing.recover_after, robot.estimators[1].timing.recover_after), (10, 1));
     assert_eq!(tilt.worker, Some(Worker { priority: Some(80), core: Some(1) }));
 }
 

@@ -85,7 +85,7 @@ fn names_that_are_none() {
 fn brackets_for_braces() {
     wrong(
         &base("joint j: fixed { origin: [0 m, 0 m, 1 m]; link l; }"),
-        &[("[", "expected `{`, as in `{ xyz: [0 m, 0 m, 0.9 m], rpy: [0 deg, 0 deg, 90 deg] }`")],
+        &[("[", "expected `{`, as in `origin: { xyz: [0 m, 0 m, 0.9 m], rpy: [0 deg, 0 deg, 90 deg] };`")],
     );
     wrong("robot R; states: [parked]; link b;", &[(":", "expected `{`, as in `states { degraded; }`")]);
 }
@@ -142,7 +142,7 @@ fn components_made_as_in_rust() {
     assert_eq!(faults(&base("sensor e: E { rate: 5 Hz; }")), []);
     wrong(
         &base("sensor e: E { rat: 5 Hz; }"),
-        &[("rat", "unknown word `rat`; a sensor holds `rate` or `estimator`; did you mean `rate`?")],
+        &[("rat", "unknown word `rat`; a sensor holds `estimator` or `rate`; did you mean `rate`?")],
     );
 }
 

@@ -13,7 +13,7 @@ fn words() {
     );
     wrong(
         &base("sensor imu: A() { on_lost: stop; }"),
-        &[("on_lost", "`on_lost` does not belong in a sensor, which holds `rate` or `estimator`")],
+        &[("on_lost", "`on_lost` does not belong in a sensor, which holds `estimator` or `rate`")],
     );
     wrong(
         &base("rate: 5 Hz;"),
@@ -75,7 +75,7 @@ fn semicolons() {
         &base("sensor imu: A() 5 6 7; sensor mag: B() { rat: 5 Hz; }"),
         &[
             ("5", "expected `;` behind `imu`"),
-            ("rat", "unknown word `rat`; a sensor holds `rate` or `estimator`; did you mean `rate`?"),
+            ("rat", "unknown word `rat`; a sensor holds `estimator` or `rate`; did you mean `rate`?"),
         ],
     );
 }

@@ -98,7 +98,7 @@ fn dimensions() {
     let heading = "estimator h: H() { input imu: sensor::base::imu, driver; input mag: sensor::base::mag";
     wrong(
         &sensing(&format!("{heading}, within: 1e3 m; sync_tolerance: 20m; }}")),
-        &[("20m", time), ("1e3 m", time)],
+        &[("1e3 m", time), ("20m", time)],
     );
     for (rate, found) in [
         ("5 ms", "found a time"),
@@ -267,7 +267,7 @@ fn positive_values() {
             "estimator h: H() { input imu: sensor::base::imu, driver; input mag: sensor::base::mag, within: 0 s;
              sync_tolerance: -1 ms; }",
         ),
-        &[("-1 ms", positive), ("0 s", positive)],
+        &[("0 s", positive), ("-1 ms", positive)],
     );
     wrong(
         &base("joint j: continuous { axis: z; limit: { velocity: -1 deg/s, effort: 0 N*m }; link a; }"),
@@ -311,8 +311,8 @@ fn single_settings() {
     wrong(
         &base("joint j: continuous { axis: z; origin: {}; axis: x; origin: {}; link a; }"),
         &[
-            ("origin", "`origin` stands here twice; leave one out"),
             ("axis", "`axis` stands here twice; leave one out"),
+            ("origin", "`origin` stands here twice; leave one out"),
         ],
     );
     wrong(&base("sensor i: A(a = 1, b = 2, a = 3);"), &[("a", "`a` stands here twice; leave one out")]);

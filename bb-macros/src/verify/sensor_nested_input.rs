@@ -4,6 +4,7 @@
 //! Wrong: `sensor imu: A() { estimator tilt: Madgwick() { input imu: sensor::base::imu; } }`
 
 use crate::diagnostics::Diagnostics;
+use crate::language::EstimatorSetting;
 use crate::model::{Home, Robot};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
@@ -19,7 +20,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             );
             diagnostics.error(&input.word, message);
         }
-        for tolerance in &estimator.sync_tolerances {
+        for tolerance in estimator.settings.of(EstimatorSetting::SyncTolerance) {
             let message = "an estimator in a sensor has one input, and nothing to be in step with; leave it out";
             diagnostics.error(&tolerance.word, message.into());
         }

@@ -1,15 +1,17 @@
 //! A component that is made as Rust makes a value: `Encoder { port: 1 }`, `Encoder::new(1)`.
 
-use crate::diagnostics::{Diagnostics, Place};
+use crate::diagnostics::Place;
+use crate::language::{item_words, starts_item};
 use crate::names::nearest;
-use crate::parse::block::{WORDS, opened};
+use crate::parse::Notes;
+use crate::parse::block::opened;
 use proc_macro2::{Ident, TokenTree};
 use syn::Token;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
 /// Reports a function of a type, `Encoder::new`, and leaves the type.
-pub(super) fn constructor(kind: &mut syn::Path, diagnostics: &mut Diagnostics) -> bool {
+pub(super) fn constructor(kind: &mut syn::Path, notes: &mut Notes<'_>) -> bool {
     let starts = |segment: &syn::PathSegment, is: fn(char) -> bool| segment.ident.to_string().starts_with(is);
     let mut last = kind.segments.iter().rev();
     let (Some(function), Some(of)) = (last.next(), last.next()) else { return false };
@@ -21,7 +23,7 @@ pub(super) fn constructor(kind: &mut syn::Path, diagnostics: &mut Diagnostics) -
         "a component is named by its type, and made when the robot starts; leave `::{function}` out and give options by \
          name, as in `{of}(option = value)`"
     );
-    diagnostics.error(&function, message);
+    notes.error(&function, message);
     kind.segments.pop();
     kind.segments.pop_punct();
     true
@@ -55,8 +57,8 @@ fn names(input: ParseStream<'_>) -> Option<Vec<String>> {
     }
     let is_item = match &names[..] {
         [] => true,
-        [only] => nearest(only, WORDS.iter().copied()).is_some(),
-        several => several.iter().any(|name| WORDS.contains(&&**name)),
+        [only] => nearest(only, item_words()).is_some(),
+        several => several.iter().any(|name| starts_item(name)),
     };
     (!is_item).then_some(names)
 }
