@@ -8,7 +8,7 @@ use super::group;
 use super::literal::ident;
 use super::options::{parameter_type, place};
 use super::part::Part;
-use super::types::Types;
+use super::types::{Types, imports};
 use super::wiring::{topic, visit_function};
 use super::{docs, path_text};
 use crate::model::{
@@ -121,10 +121,11 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
     };
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
     let content = root.tokens(robot, name, accessors, 1);
+    let imports = imports(robot, name);
     quote! {
         #[doc = #text]
         #[allow(non_upper_case_globals, non_snake_case, dead_code, private_interfaces, unreachable_pub, clippy::all)]
-        #visibility mod #module { #content }
+        #visibility mod #module { #imports #content }
     }
 }
 

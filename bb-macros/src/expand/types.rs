@@ -8,8 +8,8 @@ use super::part::Part;
 use crate::diagnostics::Place;
 use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId};
 use crate::parse::Component;
-use proc_macro2::{Ident, TokenStream};
-use quote::quote;
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::{format_ident, quote};
 
 /// `type __RoverS0 = Bmi270;`, if it is a sensor, else `Unknown`; and as the user wrote it, `__RoverS0Given`.
 pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
@@ -28,7 +28,33 @@ pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
             }>>::Type;
         })
     });
-    aliases.collect()
+    let marker = marker(name);
+    let marker = quote! {
+        #[doc(hidden)]
+        #[allow(non_camel_case_types, dead_code)]
+        type #marker = #name;
+    };
+    aliases.chain([marker]).collect()
+}
+
+/// The robot's type in its module.
+const ROBOT: &str = "__Robot";
+
+/// `use super::{Rover as __Robot, __RoverS0, …};` in the robot's module.
+///
+/// One import, so that it is one error where there is nothing to import: in a function, whose items no module can name. The
+/// first name says so, since rustc writes it.
+pub(super) fn imports(robot: &Robot, name: &Ident) -> TokenStream {
+    let aliases = Part::all(robot).map(|part| part.alias(name));
+    let (marker, this) = (marker(name), ident(ROBOT));
+    let imports = quote!(use super::{#marker as _, #name as #this, #(#aliases),*};);
+    let imports = respan(imports, name.span());
+    quote!(#[allow(unused_imports)] #imports)
+}
+
+/// An item beside the robot's type that only its module imports.
+fn marker(name: &Ident) -> Ident {
+    format_ident!("__{name}_must_be_declared_outside_of_functions", span = Span::call_site())
 }
 
 /// The last name of a component's type, for messages: `Madgwick`.
@@ -41,14 +67,15 @@ pub(super) fn type_name(component: &Component) -> String {
 pub(super) struct Types<'a> {
     robot: &'a Robot,
     name: &'a Ident,
-    /// `super::super::`
+    /// `super::super::`, up to the robot's module, which imports what is named here.
     above: TokenStream,
+    is_in_module: bool,
 }
 
 impl<'a> Types<'a> {
     pub(super) fn new(robot: &'a Robot, name: &'a Ident, depth: usize) -> Self {
-        let above = (0..depth).map(|_| quote!(super::)).collect();
-        Self { robot, name, above }
+        let above = (1..depth).map(|_| quote!(super::)).collect();
+        Self { robot, name, above, is_in_module: depth > 0 }
     }
 
     pub(super) fn model(&self) -> &'a Robot {
@@ -72,7 +99,8 @@ impl<'a> Types<'a> {
 
     /// The robot's type.
     pub(super) fn robot(&self) -> TokenStream {
-        let (above, name) = (&self.above, ident(&self.name.to_string()));
+        let above = &self.above;
+        let name = if self.is_in_module { ident(ROBOT) } else { ident(&self.name.to_string()) };
         quote!(#above #name)
     }
 
