@@ -1,4 +1,4 @@
-//! The contents of braces, item by item, and how to go on behind one that cannot be read.
+//! The contents of braces, item by item, and how to go on after one that cannot be read.
 
 use super::name::{is_keyword, whole};
 use super::{Notes, Setting, Settings};
@@ -21,7 +21,7 @@ impl Head {
     pub(super) fn name(&self, input: ParseStream<'_>) -> syn::Result<Ident> {
         let text = self.word.to_string();
         if NO_WORDS.contains(&&*text) && input.peek(Ident::peek_any) {
-            let message = format!("what stands in this block starts with its name; leave `{text}` out");
+            let message = format!("an item of this block starts with its name; leave `{text}` out");
             return Err(syn::Error::new(self.word.span(), message));
         }
         whole(input, &self.word)?;
@@ -110,12 +110,12 @@ pub(super) fn opened<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>>
 }
 
 /// Reads `;`. If it is missing that is reported; if the next item follows at once, reading goes on there.
-pub(super) fn semicolon(input: ParseStream<'_>, behind: &str, notes: &mut Notes<'_>) {
+pub(super) fn semicolon(input: ParseStream<'_>, after: &str, notes: &mut Notes<'_>) {
     if input.peek(Token![;]) {
         let _: syn::Result<Token![;]> = input.parse();
         return;
     }
-    notes.at(input.span(), format!("expected `;` behind {behind}"));
+    notes.at(input.span(), format!("expected `;` after {after}"));
     skip_to_item(input);
 }
 
@@ -123,7 +123,7 @@ pub(super) fn semicolon(input: ParseStream<'_>, behind: &str, notes: &mut Notes<
 pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Result<()> {
     let place = input.span();
     let colon: syn::Result<Token![:]> = input.parse();
-    colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} behind `{name}`")))
+    colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }
 
 /// The tokens from `start` up to where `input` stands.
@@ -189,7 +189,7 @@ pub(super) fn attributes(input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::
     Ok(attributes)
 }
 
-/// Skips to behind the next `;` or `{ … }` of this level.
+/// Skips past the next `;` or `{ … }` of this level.
 fn skip(input: ParseStream<'_>) {
     while !input.is_empty() {
         let Ok(token) = input.parse::<TokenTree>() else {

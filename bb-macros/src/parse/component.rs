@@ -29,13 +29,13 @@ pub(crate) struct Declared<'a> {
 }
 
 impl<'a> Declared<'a> {
-    /// Reads what stands behind the word.
+    /// Reads what follows the word.
     pub(super) fn parse(head: Head, input: ParseStream<'a>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
         Self::named(head.attributes, name, input, notes)
     }
 
-    /// Reads what stands behind the name.
+    /// Reads what follows the name.
     pub(super) fn named(
         attributes: Vec<Attribute>,
         name: Ident,

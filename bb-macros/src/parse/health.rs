@@ -30,7 +30,7 @@ impl Reactions {
 }
 
 impl Reaction {
-    /// Reads what stands behind the word.
+    /// Reads what follows the word.
     pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "the name of a command")?;
         let place = input.span();

@@ -33,7 +33,7 @@ pub(super) fn record<F: Words>(
             return Err(syn::Error::new(name.span(), format!("{expected}{hint}")));
         };
         if seen.contains(&name) {
-            return Err(syn::Error::new(name.span(), format!("`{name}` stands here twice; leave one out")));
+            return Err(syn::Error::new(name.span(), format!("`{name}` is given twice; leave one out")));
         }
         colon(&content, &name, "a value")?;
         value(field, field_word, &name, &content, notes)?;

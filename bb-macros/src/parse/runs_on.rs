@@ -17,7 +17,7 @@ pub(crate) struct RunsOn {
 }
 
 impl RunsOn {
-    /// Reads what stands behind the word.
+    /// Reads what follows the word.
     pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         const EXPECTED: &str = "expected `worker`; without this setting it runs where its input is published";
         colon(input, &head.word, "`worker`")?;

@@ -18,7 +18,7 @@ pub(crate) struct Setting {
 pub(crate) struct Settings<S>(Vec<(S, Setting)>);
 
 impl Setting {
-    /// Reads what stands behind the word.
+    /// Reads what follows the word.
     pub(super) fn parse(
         word: &'static Word,
         head: Head,

@@ -50,7 +50,8 @@ impl JointAddition {
     pub(super) fn parse(head: &Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let mut joint = Self { name: name(input, &head.word)?, sensors: Vec::new(), actuators: Vec::new() };
         if input.peek(Token![:]) {
-            let message = "a joint stands in the link that it is mounted on; only joints of a URDF are named here";
+            let message =
+                "a joint is declared in the link that it is mounted on; only joints of a URDF are named here";
             return Err(input.error(message));
         }
         let body = braced(input, &words::JOINT_OF_URDF)?;

@@ -52,7 +52,7 @@ fn declared_states() {
                 "moving",
                 "there is no state `moving`; declare it in `states`, or name one of `disarmed`, `idle`, `executing`, `degraded`",
             ),
-            ("idle", "`idle` stands here twice; leave one out"),
+            ("idle", "`idle` is given twice; leave one out"),
         ],
     );
     wrong(
@@ -78,7 +78,7 @@ fn declared_categories() {
     wrong(
         &with("a: A { cancel: [motion, motion, all, b]; } b: B { category: speech; }"),
         &[
-            ("motion", "`motion` stands here twice; leave one out"),
+            ("motion", "`motion` is given twice; leave one out"),
             ("all", "`all` is no category; to end all commands write `cancel: all;`"),
             ("b", "`b` is a command, not a category; give it a `category` and name that"),
             (
@@ -177,9 +177,9 @@ fn paths_that_commands_and_parameters_have_are_taken() {
     };
     right(&robot("nav, go"));
     for (path, other) in [
-        ("command, go", "the command `go` stands at this path"),
-        ("param, imu, beta", "the parameter `beta` stands at this path"),
-        ("param, imu", "the group `imu` stands at this path"),
+        ("command, go", "the command `go` has this path already"),
+        ("param, imu, beta", "the parameter `beta` has this path already"),
+        ("param, imu", "the group `imu` has this path already"),
         ("controller, c", "something else publishes at `controller::c`"),
     ] {
         wrong(&robot(path), &[(path, &format!("{other}; choose another path"))]);

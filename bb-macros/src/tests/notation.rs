@@ -35,7 +35,7 @@ fn an_input_without_its_name() {
     );
     wrong(
         &base("estimator t: T() { input imu; }"),
-        &[(";", "expected `:` and the path of a publisher behind `imu`")],
+        &[(";", "expected `:` and the path of a publisher after `imu`")],
     );
 }
 

@@ -282,7 +282,7 @@ fn distinct_paths() {
     right(&sensing(&motion("m", "output a: [estimator, base, m];")));
     wrong(
         &sensing(&motion("m", "output a; output a;")),
-        &[("a", "an output `a` stands here already; leave one out")],
+        &[("a", "an output `a` is declared already; leave one out")],
     );
     let nav = "something else publishes at `nav::x`; choose another path";
     wrong(&sensing(&motion("m", "output a: [nav, x]; output b: [nav, x];")), &[("nav, x", nav)]);
@@ -295,7 +295,7 @@ fn distinct_paths() {
     );
     wrong(
         &sensing(&format!("{} {}", motion("m", "output a;"), motion("n", "output a: [estimator, base, m];"))),
-        &[("estimator, base, m", "the estimator `m` stands at this path; choose another path")],
+        &[("estimator, base, m", "the estimator `m` has this path already; choose another path")],
     );
     wrong(
         &sensing("estimator h: H() { input i: sensor::base::imu, driver; input i: sensor::base::mag; }"),
@@ -306,18 +306,15 @@ fn distinct_paths() {
 #[test]
 fn single_settings() {
     right(&sensing("joint j: continuous { axis: z; link a { sensor x: A(a = 1, b = 2) { rate: 1 Hz; } } }"));
-    let rate = "`rate` stands here twice; leave one out";
+    let rate = "`rate` is given twice; leave one out";
     wrong(&base("sensor i: A() { rate: 1 Hz; rate: 2 Hz; rate: 3 Hz; }"), &[("rate", rate), ("rate", rate)]);
     wrong(
         &base("joint j: continuous { axis: z; origin: {}; axis: x; origin: {}; link a; }"),
-        &[
-            ("axis", "`axis` stands here twice; leave one out"),
-            ("origin", "`origin` stands here twice; leave one out"),
-        ],
+        &[("axis", "`axis` is given twice; leave one out"), ("origin", "`origin` is given twice; leave one out")],
     );
-    wrong(&base("sensor i: A(a = 1, b = 2, a = 3);"), &[("a", "`a` stands here twice; leave one out")]);
+    wrong(&base("sensor i: A(a = 1, b = 2, a = 3);"), &[("a", "`a` is given twice; leave one out")]);
     wrong(
         &base("joint j: fixed { origin: { xyz: [0 m, 0 m, 0 m], xyz: [0 m, 0 m, 0 m] }; link a; }"),
-        &[("xyz", "`xyz` stands here twice; leave one out")],
+        &[("xyz", "`xyz` is given twice; leave one out")],
     );
 }

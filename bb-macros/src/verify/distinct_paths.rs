@@ -23,7 +23,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
                 diagnostics.at(place, format!("something else publishes at `{path}`; choose another path"));
             }
             (None, Some(output)) if estimator(publisher) == estimator(first) => {
-                let message = format!("an output `{}` stands here already; leave one out", output.name);
+                let message = format!("an output `{}` is declared already; leave one out", output.name);
                 diagnostics.error(&output.name, message);
             }
             (None, _) => {}
@@ -36,14 +36,14 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             && estimator(publisher) != Some(id)
             && !own.outputs.is_empty()
         {
-            let message = format!("the estimator `{}` stands at this path; choose another path", own.name);
+            let message = format!("the estimator `{}` has this path already; choose another path", own.name);
             diagnostics.at(place, message);
         }
     }
     let others = others(robot);
     for publisher in &robot.publishers {
         if let (Some(place), Some(other)) = (explicit(robot, publisher), others.get(&publisher.path[..])) {
-            diagnostics.at(place, format!("{other} stands at this path; choose another path"));
+            diagnostics.at(place, format!("{other} has this path already; choose another path"));
         }
     }
     for estimator in robot.estimators.iter().filter(|estimator| !estimator.is_nested()) {

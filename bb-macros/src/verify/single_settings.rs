@@ -24,5 +24,5 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
 }
 
 fn twice(word: &Ident) -> String {
-    format!("`{word}` stands here twice; leave one out")
+    format!("`{word}` is given twice; leave one out")
 }

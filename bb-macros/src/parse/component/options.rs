@@ -33,7 +33,7 @@ impl ComponentOption {
         let place = input.span();
         let equals: syn::Result<Token![=]> = input.parse();
         equals
-            .map_err(|_| syn::Error::new(place, format!("expected `=` and a value behind the option `{name}`")))?;
+            .map_err(|_| syn::Error::new(place, format!("expected `=` and a value after the option `{name}`")))?;
         Ok(Self { name, value: OptionValue::parse(input)? })
     }
 }
