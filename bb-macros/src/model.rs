@@ -1,4 +1,4 @@
-//! What a robot is once its names are resolved: plain data in lists, with numbers for references and spans kept.
+//! What a robot is once its names are resolved: plain data in lists, with ids for references and spans kept.
 
 mod commands;
 mod frames;
@@ -6,13 +6,17 @@ mod health;
 mod parameters;
 mod resolve;
 mod rigid;
+mod table;
 mod trigger;
 
-pub(crate) use commands::{BUILT_IN_STATES, Cancel, Category, Command, CommandId};
+pub(crate) use commands::{BUILT_IN_STATES, Cancel, Category, CategoryId, Command, CommandId};
 pub(crate) use health::{Health, Timing, Worker};
 pub(crate) use parameters::{Parameter, ParameterGroup, ParameterGroupId, ParameterId};
 pub(crate) use resolve::resolve;
 pub(crate) use rigid::Rigid;
+pub(crate) use table::{Id, Table};
+
+pub(crate) use table::ids;
 pub(crate) use trigger::Trigger;
 
 use crate::language::EstimatorSetting;
@@ -24,39 +28,33 @@ use proc_macro2::Ident;
 use std::collections::HashMap;
 use syn::{Attribute, Visibility};
 
-pub(crate) type LinkId = usize;
-pub(crate) type JointId = usize;
-pub(crate) type SensorId = usize;
-pub(crate) type EstimatorId = usize;
-pub(crate) type ServiceId = usize;
-pub(crate) type ActuatorId = usize;
-pub(crate) type PublisherId = usize;
+ids! { LinkId JointId SensorId EstimatorId ServiceId ActuatorId PublisherId }
 
-/// A robot. References between its parts are numbers in these lists.
+/// A robot. References between its parts are ids of these lists.
 #[derive(Clone, Debug)]
 pub(crate) struct Robot {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) visibility: Visibility,
     pub(crate) name: Option<Ident>,
     /// The roots, then in the order of declaration; a verified robot has one root, number 0.
-    pub(crate) links: Vec<Link>,
-    pub(crate) joints: Vec<Joint>,
-    pub(crate) sensors: Vec<Sensor>,
-    pub(crate) estimators: Vec<Estimator>,
-    pub(crate) actuators: Vec<Actuator>,
+    pub(crate) links: Table<LinkId, Link>,
+    pub(crate) joints: Table<JointId, Joint>,
+    pub(crate) sensors: Table<SensorId, Sensor>,
+    pub(crate) estimators: Table<EstimatorId, Estimator>,
+    pub(crate) actuators: Table<ActuatorId, Actuator>,
     /// Controllers and bridges.
-    pub(crate) services: Vec<Service>,
-    pub(crate) parameters: Vec<Parameter>,
-    pub(crate) parameter_groups: Vec<ParameterGroup>,
+    pub(crate) services: Table<ServiceId, Service>,
+    pub(crate) parameters: Table<ParameterId, Parameter>,
+    pub(crate) parameter_groups: Table<ParameterGroupId, ParameterGroup>,
     /// The number of the parameter at each path, with `::` between the names.
     parameter_paths: HashMap<String, ParameterId>,
     /// Beside the built-in ones.
     pub(crate) states: Vec<State>,
     /// The default one, then those that are declared.
-    pub(crate) categories: Vec<Category>,
-    pub(crate) commands: Vec<Command>,
+    pub(crate) categories: Table<CategoryId, Category>,
+    pub(crate) commands: Table<CommandId, Command>,
     /// Whatever can be subscribed to, sensors first.
-    pub(crate) publishers: Vec<Publisher>,
+    pub(crate) publishers: Table<PublisherId, Publisher>,
     /// All numbers that are given to words of the language.
     pub(crate) given: Vec<Given>,
     /// All words that are written more often than they may.
@@ -203,10 +201,10 @@ pub(crate) enum From {
 impl Robot {
     /// The frame in which a publisher's messages are.
     pub(crate) fn mount_of(&self, publisher: PublisherId) -> Mount {
-        match self.publishers.get(publisher).map(|publisher| publisher.from) {
-            Some(From::Sensor(sensor)) => self.mount_of_sensor(sensor),
-            Some(From::Estimator(estimator, _)) => self.mount_of_estimator(estimator),
-            Some(From::Service(_)) | None => Mount::Robot,
+        match self.publishers[publisher].from {
+            From::Sensor(sensor) => self.sensors[sensor].mount,
+            From::Estimator(estimator, _) => self.mount_of_estimator(estimator),
+            From::Service(_) => Mount::Robot,
         }
     }
 
@@ -220,24 +218,19 @@ impl Robot {
         sensors.chain(estimators).chain(actuators).chain(services).chain(commands)
     }
 
-    pub(crate) fn mount_of_sensor(&self, sensor: SensorId) -> Mount {
-        self.sensors.get(sensor).map_or(Mount::Robot, |sensor| sensor.mount)
-    }
-
     pub(crate) fn mount_of_estimator(&self, estimator: EstimatorId) -> Mount {
-        match self.estimators.get(estimator).map(|estimator| estimator.home) {
-            Some(Home::Sensor(sensor)) => self.mount_of_sensor(sensor),
-            Some(Home::Link(link)) => Mount::Link(link),
-            None => Mount::Robot,
+        match self.estimators[estimator].home {
+            Home::Sensor(sensor) => self.sensors[sensor].mount,
+            Home::Link(link) => Mount::Link(link),
         }
     }
 
     /// The name of the frame of a mount.
-    pub(crate) fn frame_name(&self, mount: Mount) -> String {
+    pub(crate) fn frame_name(&self, mount: Mount) -> &str {
         match mount {
-            Mount::Robot => String::new(),
-            Mount::Link(link) => self.links.get(link).map_or(String::new(), |link| link.label.clone()),
-            Mount::Joint(joint) => self.joints.get(joint).map_or(String::new(), |joint| joint.label.clone()),
+            Mount::Robot => "",
+            Mount::Link(link) => &self.links[link].label,
+            Mount::Joint(joint) => &self.joints[joint].label,
         }
     }
 }

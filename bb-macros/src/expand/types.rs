@@ -13,10 +13,10 @@ use quote::{format_ident, quote};
 
 /// `type __RoverS0 = Bmi270;`, if it is a sensor, else `Unknown`; and as the user wrote it, `__RoverS0Given`.
 pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
-    let aliases = Part::all(robot).filter_map(|part| {
-        let kind = &part.component(robot)?.kind;
+    let aliases = Part::all(robot).map(|part| {
+        let kind = &part.component(robot).kind;
         let (alias, given, (_, is_known)) = (part.alias(name), part.given(name), part.contract());
-        Some(quote! {
+        quote! {
             #[doc(hidden)]
             #[allow(non_camel_case_types, dead_code)]
             type #given = #kind;
@@ -26,7 +26,7 @@ pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
                 use ::bb_core::__private::NotProbed as _;
                 <::bb_core::__private::Probe<#given>>::#is_known
             }>>::Type;
-        })
+        }
     });
     let marker = marker(name);
     let marker = quote! {
@@ -83,18 +83,18 @@ impl<'a> Types<'a> {
     }
 
     /// Who publishes.
-    pub(super) fn from(&self, publisher: PublisherId) -> Option<From> {
-        self.robot.publishers.get(publisher).map(|publisher| publisher.from)
+    pub(super) fn from(&self, publisher: PublisherId) -> From {
+        self.robot.publishers[publisher].from
     }
 
     /// The path of a publisher.
     pub(super) fn path_of_publisher(&self, id: PublisherId) -> String {
-        self.robot.publishers.get(id).map_or(String::new(), |publisher| super::path_text(&publisher.path))
+        super::path_text(&self.robot.publishers[id].path)
     }
 
     /// The path of an estimator.
     pub(super) fn path_of_estimator(&self, id: EstimatorId) -> String {
-        self.robot.estimators.get(id).map_or(String::new(), |estimator| super::path_text(&estimator.path))
+        super::path_text(&self.robot.estimators[id].path)
     }
 
     /// The robot's type.
@@ -146,22 +146,21 @@ impl<'a> Types<'a> {
 
     /// The payload of a publisher. That of an estimator's output is named through its number, see `output_index`.
     pub(super) fn payload(&self, publisher: PublisherId) -> TokenStream {
-        match self.robot.publishers.get(publisher).map(|publisher| publisher.from) {
-            Some(From::Sensor(id)) => self.output(Part::Sensor(id)),
-            Some(From::Service(id)) => self.output(Part::Service(id)),
-            Some(From::Estimator(id, output)) => {
+        match self.from(publisher) {
+            From::Sensor(id) => self.output(Part::Sensor(id)),
+            From::Service(id) => self.output(Part::Service(id)),
+            From::Estimator(id, output) => {
                 let emitted = self.estimator_output(id);
                 let index = self.output_index(id, output);
                 self.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::Payload))
             }
-            None => quote!(()),
         }
     }
 
     /// The number of a declared output in the algorithm's output type, looked up by name at compile time. An
     /// estimator without declared outputs publishes its only one.
     pub(super) fn output_index(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
-        let Some(estimator) = self.robot.estimators.get(id) else { return quote!(0) };
+        let estimator = &self.robot.estimators[id];
         let output = output.and_then(|output| estimator.outputs.get(output));
         let name = output.map_or("out".to_owned(), |output| crate::names::text(&output.name));
         let emitted = self.estimator_output(id);
@@ -170,7 +169,7 @@ impl<'a> Types<'a> {
 
     /// The number of a declared input in the algorithm's input type, looked up by name at compile time.
     pub(super) fn input_index(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
-        let Some(estimator) = self.robot.estimators.get(id) else { return quote!(0) };
+        let estimator = &self.robot.estimators[id];
         let taken = self.estimator_input(id);
         let find = match input.and_then(|input| estimator.inputs.get(input)) {
             Some(input) => {
@@ -193,9 +192,6 @@ impl<'a> Types<'a> {
 
     /// The tokens at the span of the user's type.
     fn at(&self, part: Part, tokens: TokenStream) -> TokenStream {
-        match part.component(self.robot) {
-            Some(component) => respan(tokens, Place::of(&component.kind).start),
-            None => tokens,
-        }
+        respan(tokens, Place::of(&part.component(self.robot).kind).start)
     }
 }

@@ -1,14 +1,14 @@
 //! Commands, their categories, and the states in which they may run.
 
 use super::Robot;
+use super::table::ids;
 use crate::language::{CategorySetting, CommandSetting};
 use crate::names::text;
 use crate::parse::{self, Cancelled, CommandSettings, Component, Settings};
 use proc_macro2::{Ident, Span};
 use syn::Attribute;
 
-pub(crate) type CommandId = usize;
-pub(crate) type CategoryId = usize;
+ids! { CommandId CategoryId }
 
 /// The operational states that every robot has.
 pub(crate) const BUILT_IN_STATES: [&str; 3] = ["disarmed", "idle", "executing"];
@@ -47,13 +47,18 @@ pub(crate) enum Cancel {
     Categories(Vec<CategoryId>),
 }
 
+impl CategoryId {
+    /// That of commands that name none.
+    pub(crate) const DEFAULT: Self = Self(0);
+}
+
 impl Robot {
     pub(crate) fn command(&self, name: &Ident) -> Option<CommandId> {
-        self.commands.iter().position(|command| command.name == *name)
+        self.commands.position(|command| command.name == *name)
     }
 
     pub(crate) fn category(&self, name: &Ident) -> Option<CategoryId> {
-        self.categories.iter().position(|category| category.name == *name)
+        self.categories.position(|category| category.name == *name)
     }
 
     /// The default category gets the number 0, declared or not.
@@ -90,7 +95,7 @@ impl Robot {
             component,
             allowed_states: settings.allowed_states.first().map(|allowed| allowed.states.clone()),
             timeout_s,
-            category: category.unwrap_or(0),
+            category: category.unwrap_or(CategoryId::DEFAULT),
             cancel,
             settings,
         }

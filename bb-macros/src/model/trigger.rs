@@ -13,12 +13,12 @@ impl Robot {
     /// Whose message makes this publisher publish. None round a circle and where an input names nothing.
     pub(crate) fn trigger(&self, mut publisher: PublisherId) -> Option<Trigger> {
         for _ in 0..=self.estimators.len() {
-            let id = match self.publishers.get(publisher)?.from {
+            let id = match self.publishers[publisher].from {
                 From::Sensor(id) => return Some(Trigger::Sensor(id)),
                 From::Service(id) => return Some(Trigger::Service(id)),
                 From::Estimator(id, _) => id,
             };
-            let estimator = self.estimators.get(id)?;
+            let estimator = &self.estimators[id];
             match estimator.home {
                 Home::Sensor(sensor) => return Some(Trigger::Sensor(sensor)),
                 Home::Link(_) => publisher = estimator.driver()?.source?,
@@ -30,8 +30,8 @@ impl Robot {
     /// The time between two messages of a publisher, in s, if the rate behind it is declared.
     pub(crate) fn period_s(&self, publisher: PublisherId) -> Option<f64> {
         match self.trigger(publisher)? {
-            Trigger::Sensor(id) => self.sensors.get(id)?.period_s,
-            Trigger::Service(id) => self.services.get(id)?.period_s,
+            Trigger::Sensor(id) => self.sensors[id].period_s,
+            Trigger::Service(id) => self.services[id].period_s,
         }
     }
 }

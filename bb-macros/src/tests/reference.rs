@@ -2,6 +2,7 @@
 
 use super::{diagnostics, tokens};
 use crate::language::{FIELDS, ITEMS, Value, Word};
+use crate::model::Id as _;
 use crate::parse::{JointKind, Quantity};
 use crate::units::{Dimension, symbols};
 use syn::parse::Parser;
@@ -151,10 +152,16 @@ fn the_defaults_of_the_reference_hold() {
         tokens("robot Rover; commands { stop: Stop; } link base { sensor imu: A() { estimator tilt: B(); } }"),
         &mut crate::diagnostics::Diagnostics::default(),
     ));
-    let estimator = &robot.estimators[0];
+    let estimator = robot.estimators.at(0);
     assert_eq!((estimator.timing.recover_after, estimator.timing.latency_budget_s), (1, None));
     assert_eq!((estimator.timing.lost_after_s, estimator.worker.is_none()), (None, true));
-    let command = &robot.commands[0];
-    assert_eq!((command.timeout_s, command.category, &command.cancel), (None, 0, &crate::model::Cancel::Nothing));
-    assert_eq!((robot.categories[0].concurrency, robot.categories[0].name.to_string()), (1, "default".to_owned()));
+    let command = robot.commands.at(0);
+    assert_eq!(
+        (command.timeout_s, command.category.number(), &command.cancel),
+        (None, 0, &crate::model::Cancel::Nothing)
+    );
+    assert_eq!(
+        (robot.categories.at(0).concurrency, robot.categories.at(0).name.to_string()),
+        (1, "default".to_owned())
+    );
 }

@@ -12,7 +12,7 @@ use crate::model::Robot;
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // The sensor may be what could not be read.
     for actuator in robot.actuators.iter().filter(|_| robot.complete) {
-        let Some(joint) = robot.joints.get(actuator.joint) else { continue };
+        let joint = &robot.joints[actuator.joint];
         if robot.position_sources(actuator.joint).is_none_or(|sources| !sources.is_empty()) {
             continue;
         }

@@ -10,13 +10,13 @@ use crate::parse::Path;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // Inputs of nested estimators are a fault of their own; unread items may have declared the missing ones.
-    let estimators = robot.estimators.iter().enumerate();
+    let estimators = robot.estimators.enumerate();
     let estimators = estimators.filter(|(_, estimator)| !estimator.is_nested() && robot.complete);
     let inputs = estimators.flat_map(|(id, estimator)| estimator.inputs.iter().map(move |input| (id, input)));
     for (id, input) in inputs.filter(|(_, input)| input.source.is_none()) {
         let path = input.path.text();
         if !input.candidates.is_empty() {
-            let candidates = input.candidates.iter().filter_map(|id| robot.publishers.get(*id));
+            let candidates = input.candidates.iter().map(|id| &robot.publishers[*id]);
             let paths: Vec<String> =
                 candidates.take(8).map(|publisher| format!("`{}`", publisher.path.join("::"))).collect();
             let message = format!("`{path}` may be {}; write more of the path", paths.join(" or "));

@@ -31,7 +31,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
     // An estimator has a handle at its own path, even if it publishes below that path only.
     for publisher in &robot.publishers {
-        let own = robot.estimators.iter().enumerate().find(|(_, estimator)| estimator.path == publisher.path);
+        let own = robot.estimators.enumerate().find(|(_, estimator)| estimator.path == publisher.path);
         if let (Some((id, own)), Some(place)) = (own, explicit(robot, publisher))
             && estimator(publisher) != Some(id)
             && !own.outputs.is_empty()
@@ -72,7 +72,7 @@ fn output<'a>(robot: &'a Robot, publisher: &Publisher) -> Option<&'a Output> {
     let From::Estimator(estimator, Some(output)) = publisher.from else {
         return None;
     };
-    robot.estimators.get(estimator)?.outputs.get(output)
+    robot.estimators[estimator].outputs.get(output)
 }
 
 /// Where the path of a publisher is written out, if it is.

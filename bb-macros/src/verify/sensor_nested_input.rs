@@ -12,7 +12,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let Home::Sensor(sensor) = estimator.home else {
             continue;
         };
-        let sensor = robot.sensors.get(sensor).map_or(String::new(), |sensor| sensor.name.to_string());
+        let sensor = &robot.sensors[sensor].name;
         for input in &estimator.inputs {
             let message = format!(
                 "an estimator in a sensor takes that sensor, `{sensor}`, and no `input`; leave it out, or declare the \

@@ -4,7 +4,7 @@
 //! Wrong: `link base { sensor imu: A(); sensor imu: B(); }`
 
 use crate::diagnostics::{Diagnostics, Place};
-use crate::model::{Home, Mount, ParameterGroupId, Robot};
+use crate::model::{Home, JointId, LinkId, Mount, ParameterGroupId, Robot, SensorId};
 use crate::names::{module_name, snake_case};
 use crate::parse::ServiceKind;
 use proc_macro2::Ident;
@@ -61,9 +61,9 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Siblings {
     Robot,
-    Link(usize),
-    Joint(usize),
-    Sensor(usize),
+    Link(LinkId),
+    Joint(JointId),
+    Sensor(SensorId),
     Services(ServiceKind),
     /// In a group, or in `parameters` itself.
     Parameters(Option<ParameterGroupId>),
