@@ -6,6 +6,7 @@
 mod find;
 mod names;
 mod options;
+mod positions;
 mod roles;
 mod text;
 
@@ -14,4 +15,5 @@ pub use names::{
     check_dynamic, check_input, check_inputs, check_nested, check_optional, check_output, check_outputs,
 };
 pub use options::{Given, check_option, check_required};
-pub use roles::{check_divergence, check_reachable, check_role};
+pub use positions::check_position;
+pub use roles::{check_reachable, check_role};

@@ -104,9 +104,9 @@ pub mod prelude {
 pub mod __private {
     pub use crate::__stub_robot as stub_robot;
     pub use crate::check::{
-        Given, check_divergence, check_dynamic, check_input, check_inputs, check_nested, check_option,
-        check_optional, check_output, check_outputs, check_reachable, check_required, check_role, find_input,
-        find_nested, find_output,
+        Given, check_dynamic, check_input, check_inputs, check_nested, check_option, check_optional, check_output,
+        check_outputs, check_position, check_reachable, check_required, check_role, find_input, find_nested,
+        find_output,
     };
     pub use crate::component::{
         Binding, Command, FieldIndex, FromParameter, FromQuantity, FromText, Input, InputAt, InputField,

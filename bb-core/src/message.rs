@@ -52,7 +52,8 @@ pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a payload",
     label = "cannot be the payload of a message",
-    note = "derive it: `#[derive(Clone, Debug, Payload)]`"
+    note = "derive it: `#[derive(Clone, Debug, Payload)]`",
+    note = "messages cross threads: what they share is behind an `Arc`, not an `Rc`"
 )]
 pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     /// The type's name, for people: `Imu`.
@@ -61,6 +62,10 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     /// How ROS writes it, if ROS has a message for it.
     #[doc(hidden)]
     const ROS: Option<RosLayout<Self>> = None;
+
+    /// Whether it tells the position of the joint at which it is measured: `#[payload(joint_position)]` says so. Each joint
+    /// with an actuator needs a sensor, or an estimator in one, that publishes such a payload.
+    const TELLS_JOINT_POSITION: bool = false;
 
     /// False for the stand-in of a payload that is not known, in a robot that does not compile.
     #[doc(hidden)]

@@ -24,6 +24,25 @@ impl Place {
         let end = tokens.last().map_or(start, |token| token.span());
         Self { start, end }
     }
+
+    /// The error for these tokens, where reading fails.
+    pub(crate) fn syntax(self, message: impl std::fmt::Display) -> syn::Error {
+        let Self { start, end } = self;
+        let first = quote_spanned!(start=> _);
+        let last = quote_spanned!(end=> _);
+        syn::Error::new_spanned(quote::quote!(#first #last), message)
+    }
+
+    /// The line on which it starts.
+    pub(crate) fn line(self) -> usize {
+        self.start.start().line
+    }
+
+    /// Whether `next` follows without a blank.
+    pub(crate) fn touches(self, next: Span) -> bool {
+        let (end, start) = (self.end.end(), next.start());
+        end.line == start.line && end.column == start.column
+    }
 }
 
 impl From<Span> for Place {
@@ -48,12 +67,17 @@ impl Diagnostics {
     /// Adds all errors that syn has found.
     pub(crate) fn syntax(&mut self, error: &syn::Error) {
         for error in error.clone() {
-            self.at(error.span(), error.to_string());
+            // Its own span is the first token's alone on a stable compiler.
+            self.at(Place::of(&error.to_compile_error()), error.to_string());
         }
     }
 
     pub(crate) fn any(&self) -> bool {
         !self.0.is_empty()
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.0.len()
     }
 
     #[cfg(test)]

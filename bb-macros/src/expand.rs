@@ -54,7 +54,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let wiring = wiring::wiring(verified, &islands);
     let implementation = robot_impl::robot_impl(verified);
     let references = references::references(verified);
-    let handles = handles::handles(robot, name, handles::Accessors::Wired);
+    let handles = handles::handles(robot, name, &verified.module, handles::Accessors::Wired);
     quote! {
         #definition
         #aliases

@@ -13,6 +13,7 @@ use proc_macro::TokenStream;
 mod derive;
 mod diagnostics;
 mod expand;
+mod language;
 mod model;
 mod names;
 mod parse;
@@ -44,7 +45,8 @@ fn pipeline(tokens: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
 }
 
 /// Makes a struct or an enum the payload of messages; `#[payload(ros)]` if ROS has a message for it,
-/// `#[payload(name = "package/Name")]` for the name of its definition. `#[payload(non_finite)]` on a field that may hold
+/// `#[payload(name = "package/Name")]` for the name of its definition, `#[payload(joint_position)]` if it tells the position
+/// of the joint at which it is measured. `#[payload(non_finite)]` on a field that may hold
 /// NaN and infinities. See the trait.
 #[proc_macro_derive(Payload, attributes(payload))]
 pub fn payload(tokens: TokenStream) -> TokenStream {

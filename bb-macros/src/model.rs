@@ -1,4 +1,4 @@
-//! What a robot is once its names are resolved: plain data in lists, with numbers for references and spans kept.
+//! What a robot is once its names are resolved: plain data in lists, with ids for references and spans kept.
 
 mod commands;
 mod frames;
@@ -6,56 +6,59 @@ mod health;
 mod parameters;
 mod resolve;
 mod rigid;
+mod table;
 mod trigger;
 
-pub(crate) use commands::{BUILT_IN_STATES, Cancel, Category, Command, CommandId};
-pub(crate) use health::{Health, Worker};
+pub(crate) use commands::{BUILT_IN_STATES, Cancel, Category, CategoryId, Command, CommandId};
+pub(crate) use health::{Health, Timing, Worker};
 pub(crate) use parameters::{Parameter, ParameterGroup, ParameterGroupId, ParameterId};
 pub(crate) use resolve::resolve;
 pub(crate) use rigid::Rigid;
+pub(crate) use table::{Id, Table};
+
+pub(crate) use table::ids;
 pub(crate) use trigger::Trigger;
 
+use crate::language::EstimatorSetting;
 use crate::parse::{
-    self, Axis, Component, Dynamics, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity, RunsOn,
-    ServiceKind, Setting, Shape, State, Transmission,
+    self, Axis, Component, Dynamics, Given, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity,
+    Reactions, ServiceKind, Settings, Shape, State, Transmission,
 };
 use proc_macro2::Ident;
 use std::collections::HashMap;
 use syn::{Attribute, Visibility};
 
-pub(crate) type LinkId = usize;
-pub(crate) type JointId = usize;
-pub(crate) type SensorId = usize;
-pub(crate) type EstimatorId = usize;
-pub(crate) type ServiceId = usize;
-pub(crate) type ActuatorId = usize;
-pub(crate) type PublisherId = usize;
+ids! { LinkId JointId SensorId EstimatorId ServiceId ActuatorId PublisherId }
 
-/// A robot. References between its parts are numbers in these lists.
+/// A robot. References between its parts are ids of these lists.
 #[derive(Clone, Debug)]
 pub(crate) struct Robot {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) visibility: Visibility,
     pub(crate) name: Option<Ident>,
     /// The roots, then in the order of declaration; a verified robot has one root, number 0.
-    pub(crate) links: Vec<Link>,
-    pub(crate) joints: Vec<Joint>,
-    pub(crate) sensors: Vec<Sensor>,
-    pub(crate) estimators: Vec<Estimator>,
-    pub(crate) actuators: Vec<Actuator>,
+    pub(crate) links: Table<LinkId, Link>,
+    pub(crate) joints: Table<JointId, Joint>,
+    pub(crate) sensors: Table<SensorId, Sensor>,
+    pub(crate) estimators: Table<EstimatorId, Estimator>,
+    pub(crate) actuators: Table<ActuatorId, Actuator>,
     /// Controllers and bridges.
-    pub(crate) services: Vec<Service>,
-    pub(crate) parameters: Vec<Parameter>,
-    pub(crate) parameter_groups: Vec<ParameterGroup>,
+    pub(crate) services: Table<ServiceId, Service>,
+    pub(crate) parameters: Table<ParameterId, Parameter>,
+    pub(crate) parameter_groups: Table<ParameterGroupId, ParameterGroup>,
     /// The number of the parameter at each path, with `::` between the names.
     parameter_paths: HashMap<String, ParameterId>,
     /// Beside the built-in ones.
     pub(crate) states: Vec<State>,
     /// The default one, then those that are declared.
-    pub(crate) categories: Vec<Category>,
-    pub(crate) commands: Vec<Command>,
+    pub(crate) categories: Table<CategoryId, Category>,
+    pub(crate) commands: Table<CommandId, Command>,
     /// Whatever can be subscribed to, sensors first.
-    pub(crate) publishers: Vec<Publisher>,
+    pub(crate) publishers: Table<PublisherId, Publisher>,
+    /// All numbers that are given to words of the language.
+    pub(crate) given: Vec<Given>,
+    /// All words that are written more often than they may.
+    pub(crate) repeated: Vec<Ident>,
     /// Whether everything could be read; if not, what is missing may have been declared.
     pub(crate) complete: bool,
 }
@@ -109,7 +112,8 @@ pub(crate) struct Sensor {
     pub(crate) name: Ident,
     pub(crate) mount: Mount,
     pub(crate) component: Component,
-    pub(crate) rates: Vec<Setting>,
+    /// The time between two calls of `read`, in s; none if it does not say.
+    pub(crate) period_s: Option<f64>,
     pub(crate) publisher: PublisherId,
 }
 
@@ -130,7 +134,8 @@ pub(crate) struct Service {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     pub(crate) component: Component,
-    pub(crate) rates: Vec<Setting>,
+    /// The time between two calls of `update`, in s; none if it does not say.
+    pub(crate) period_s: Option<f64>,
     pub(crate) publisher: PublisherId,
     pub(crate) path: Vec<String>,
 }
@@ -150,10 +155,11 @@ pub(crate) struct Estimator {
     pub(crate) component: Component,
     pub(crate) inputs: Vec<Input>,
     pub(crate) outputs: Vec<Output>,
-    pub(crate) sync_tolerances: Vec<Setting>,
-    pub(crate) health: Health,
     /// As written.
-    pub(crate) runs_on: Vec<RunsOn>,
+    pub(crate) settings: Settings<EstimatorSetting>,
+    pub(crate) timing: Timing,
+    pub(crate) reactions: Reactions,
+    pub(crate) health: Health,
     /// None where its input's thread runs it.
     pub(crate) worker: Option<Worker>,
     /// Its own path.
@@ -195,17 +201,11 @@ pub(crate) enum From {
 impl Robot {
     /// The frame in which a publisher's messages are.
     pub(crate) fn mount_of(&self, publisher: PublisherId) -> Mount {
-        match self.publishers.get(publisher).map(|publisher| publisher.from) {
-            Some(From::Sensor(sensor)) => self.mount_of_sensor(sensor),
-            Some(From::Estimator(estimator, _)) => self.mount_of_estimator(estimator),
-            Some(From::Service(_)) | None => Mount::Robot,
+        match self.publishers[publisher].from {
+            From::Sensor(sensor) => self.sensors[sensor].mount,
+            From::Estimator(estimator, _) => self.mount_of_estimator(estimator),
+            From::Service(_) => Mount::Robot,
         }
-    }
-
-    /// The rates of sensors, controllers and bridges.
-    pub(crate) fn rates(&self) -> impl Iterator<Item = &Setting> {
-        let sensors = self.sensors.iter().flat_map(|sensor| &sensor.rates);
-        sensors.chain(self.services.iter().flat_map(|service| &service.rates))
     }
 
     /// All that is declared by a type of the user's.
@@ -218,24 +218,19 @@ impl Robot {
         sensors.chain(estimators).chain(actuators).chain(services).chain(commands)
     }
 
-    pub(crate) fn mount_of_sensor(&self, sensor: SensorId) -> Mount {
-        self.sensors.get(sensor).map_or(Mount::Robot, |sensor| sensor.mount)
-    }
-
     pub(crate) fn mount_of_estimator(&self, estimator: EstimatorId) -> Mount {
-        match self.estimators.get(estimator).map(|estimator| estimator.home) {
-            Some(Home::Sensor(sensor)) => self.mount_of_sensor(sensor),
-            Some(Home::Link(link)) => Mount::Link(link),
-            None => Mount::Robot,
+        match self.estimators[estimator].home {
+            Home::Sensor(sensor) => self.sensors[sensor].mount,
+            Home::Link(link) => Mount::Link(link),
         }
     }
 
     /// The name of the frame of a mount.
-    pub(crate) fn frame_name(&self, mount: Mount) -> String {
+    pub(crate) fn frame_name(&self, mount: Mount) -> &str {
         match mount {
-            Mount::Robot => String::new(),
-            Mount::Link(link) => self.links.get(link).map_or(String::new(), |link| link.label.clone()),
-            Mount::Joint(joint) => self.joints.get(joint).map_or(String::new(), |joint| joint.label.clone()),
+            Mount::Robot => "",
+            Mount::Link(link) => &self.links[link].label,
+            Mount::Joint(joint) => &self.joints[joint].label,
         }
     }
 }

@@ -21,7 +21,8 @@ pub(crate) fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = 
     nearest(name, candidates).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 
-/// The path whose names are all near to those of `path`; else one with the same last name.
+/// The path whose names are all near to those of `path`; else, of those with the same last name, the one that has most of
+/// its names: links may have been left out.
 pub(crate) fn nearest_path<'a>(path: &str, known: &'a [String]) -> Option<&'a str> {
     let names: Vec<&str> = path.split("::").collect();
     let known = || known.iter().map(String::as_str);
@@ -32,7 +33,15 @@ pub(crate) fn nearest_path<'a>(path: &str, known: &'a [String]) -> Option<&'a st
             && pairs.all(|(name, other)| name == other || nearest(name, [*other]).is_some())
     };
     let near = nearest(path, known().filter(is_near));
-    near.or_else(|| known().find(|candidate| candidate.rsplit("::").next() == names.last().copied()))
+    let same_end = known().filter(|candidate| candidate.rsplit("::").next() == names.last().copied());
+    // The first of those that are equally good.
+    near.or_else(|| same_end.rev().max_by_key(|candidate| in_order(&names, candidate)))
+}
+
+/// How many of the last names of a path are those of `candidate`, in the same order.
+fn in_order(names: &[&str], candidate: &str) -> usize {
+    let mut candidate = candidate.rsplit("::");
+    names.iter().rev().take_while(|name| candidate.any(|other| other == **name)).count()
 }
 
 /// The optimal string alignment distance in characters: insertions, deletions, replacements, and swaps of neighbours.
@@ -131,6 +140,16 @@ mod tests {
         assert_eq!(nearest("hz", ["h", "Hz"]), Some("Hz"));
         assert_eq!(distance("kitten", "sitting"), 3);
         assert_eq!(distance("dge", "deg"), 1);
+    }
+
+    #[test]
+    fn a_path_that_leaves_links_out_is_found_by_the_names_that_it_has() {
+        let known = ["sensor::base::imu", "sensor::base::arm::tool::imu", "sensor::base::arm::camera"];
+        let known = known.map(str::to_owned);
+        assert_eq!(nearest_path("sensor::tool::imu", &known), Some("sensor::base::arm::tool::imu"));
+        assert_eq!(nearest_path("sensor::head::imu", &known), Some("sensor::base::imu"));
+        assert_eq!(nearest_path("sensor::bsae::imu", &known), Some("sensor::base::imu"));
+        assert_eq!(nearest_path("gnss", &known), None);
     }
 
     #[test]

@@ -11,6 +11,8 @@ mod input;
 mod joint;
 mod link;
 mod literal;
+mod name;
+mod notes;
 mod output;
 mod parameters;
 mod path;
@@ -25,19 +27,18 @@ mod states;
 mod topology;
 
 pub(crate) use actuator::Actuator;
-#[cfg(test)]
-pub(crate) use block::WORDS;
 #[cfg(feature = "urdf")]
 pub(crate) use body::Material;
 pub(crate) use body::{Geometry, Inertial, Shape};
 pub(crate) use commands::{Cancelled, Category, Command, CommandSettings, Commands};
 pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
-pub(crate) use health::{HealthSettings, Reaction};
+pub(crate) use health::{Reaction, Reactions};
 pub(crate) use input::Input;
 pub(crate) use joint::{Axis, Dynamics, Joint, JointKind, Limit, Mimic, Origin, Transmission};
 pub(crate) use link::Link;
 pub(crate) use literal::{Literal, Value};
+pub(crate) use notes::Given;
 pub(crate) use output::Output;
 pub(crate) use parameters::{Parameter, ParameterItem, ParameterKind, ParameterRange};
 pub(crate) use path::Path;
@@ -46,9 +47,11 @@ pub(crate) use robot::Robot;
 pub(crate) use runs_on::RunsOn;
 pub(crate) use sensor::Sensor;
 pub(crate) use service::{Service, ServiceKind};
-pub(crate) use setting::Setting;
+pub(crate) use setting::{Setting, Settings};
 pub(crate) use states::State;
 pub(crate) use topology::{JointAddition, Topology};
+
+use notes::Notes;
 
 use crate::diagnostics::Diagnostics;
 use proc_macro2::{Delimiter, Group, Span, TokenStream, TokenTree};
@@ -61,12 +64,15 @@ pub(crate) fn robot(tokens: TokenStream, diagnostics: &mut Diagnostics) -> Robot
     let end = tokens.clone().into_iter().last().map_or_else(Span::call_site, |token| token.span());
     let mut whole = Group::new(Delimiter::Brace, tokens);
     whole.set_span(end);
+    let mut notes = Notes::new(diagnostics);
     let parser = |input: ParseStream<'_>| {
-        robot.parse(&block::braced(input)?, diagnostics);
+        robot.parse(&block::opened(input)?, &mut notes);
         Ok(())
     };
     // syn reports what is left unread in brackets; where reading it has failed is reported already.
-    if let Err(error) = parser.parse2(TokenTree::from(whole).into())
+    let result = parser.parse2(TokenTree::from(whole).into());
+    (robot.given, robot.repeated) = notes.into_given();
+    if let Err(error) = result
         && !diagnostics.any()
     {
         diagnostics.syntax(&error);

@@ -5,6 +5,7 @@ mod expansion;
 mod health;
 mod model;
 mod mutations;
+mod notation;
 mod parameters;
 mod recovery;
 mod reference;

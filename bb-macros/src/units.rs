@@ -1,6 +1,6 @@
 //! Units and their dimensions. Everything inside is SI; a unit is a factor to it.
 
-use proc_macro2::Ident;
+use proc_macro2::{Ident, Span};
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{LitInt, Token};
@@ -181,13 +181,13 @@ impl Unit {
 
     /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` belongs to the symbol behind it alone.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
-        let first = factor(input, symbol(input)?)?;
+        let first = power(input)?;
         Self::ONE.times(first, 1).rest(input)
     }
 
     /// The unit glued to a literal as its suffix, and what follows it: `60deg/s`.
-    pub(crate) fn with_suffix(suffix: &Ident, input: ParseStream<'_>) -> syn::Result<Self> {
-        Self::ONE.times(factor(input, suffix.clone())?, 1).rest(input)
+    pub(crate) fn with_suffix(suffix: &str, place: Span, input: ParseStream<'_>) -> syn::Result<Self> {
+        Self::ONE.times(factor(input, suffix, place)?, 1).rest(input)
     }
 
     fn rest(mut self, input: ParseStream<'_>) -> syn::Result<Self> {
@@ -201,7 +201,7 @@ impl Unit {
             } else {
                 return Ok(self);
             };
-            self = self.times(factor(input, symbol(input)?)?, sign);
+            self = self.times(power(input)?, sign);
         }
     }
 
@@ -216,15 +216,21 @@ fn symbol(input: ParseStream<'_>) -> syn::Result<Ident> {
     input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, "expected a unit, as in `m` or `deg/s`"))
 }
 
+fn power(input: ParseStream<'_>) -> syn::Result<Unit> {
+    let symbol = symbol(input)?;
+    factor(input, &symbol.to_string(), symbol.span())
+}
+
 /// A symbol with its exponent, if it has one: `s`, `s^2`.
-fn factor(input: ParseStream<'_>, symbol: Ident) -> syn::Result<Unit> {
-    let name = symbol.to_string();
+fn factor(input: ParseStream<'_>, name: &str, place: Span) -> syn::Result<Unit> {
+    // Keyboards have the micro sign, U+00B5, or the Greek letter, U+03BC.
+    let name = name.replace('\u{3bc}', "\u{b5}");
     let Some((_, dimension, factor)) = UNITS.iter().find(|(unit, ..)| *unit == name) else {
         let hint = match crate::names::nearest(&name, UNITS.iter().map(|(unit, ..)| *unit)) {
             Some(near) => format!("did you mean `{near}`?"),
             None => "units are symbols, as in `m`, `s`, `deg` or `Hz`".to_owned(),
         };
-        return Err(syn::Error::new(symbol.span(), format!("unknown unit `{name}`; {hint}")));
+        return Err(syn::Error::new(place, format!("unknown unit `{name}`; {hint}")));
     };
     let unit = Unit { dimension: Dimension(*dimension), factor: *factor };
     if !input.peek(Token![^]) {

@@ -39,7 +39,7 @@ pub(crate) fn graft(mut tree: Robot, diagnostics: &mut Diagnostics) -> (Robot, T
 /// Joints are named at the robot's level only where they come from a URDF.
 fn refuse_joints(tree: &Robot, diagnostics: &mut Diagnostics) {
     for joint in &tree.joints {
-        let message = "a joint stands in the link that it is mounted on; only joints of a URDF are named here";
+        let message = "a joint is declared in the link that it is mounted on; only joints of a URDF are named here";
         diagnostics.error(&joint.name, message.into());
     }
 }

@@ -28,7 +28,8 @@ mod single_settings;
 mod unique_names;
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{PublisherId, Robot};
+use crate::model::{EstimatorId, JointId, LinkId, PublisherId, Robot, Table};
+use crate::names::module_name;
 use proc_macro2::Ident;
 
 type Rule = fn(&Robot, &mut Diagnostics);
@@ -65,8 +66,12 @@ const RULES: &[Rule] = &[
 pub(crate) struct Verified<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) name: &'a Ident,
+    /// The name of the module with its handles.
+    pub(crate) module: String,
     /// The publisher of each input of each estimator.
-    pub(crate) sources: Vec<Vec<PublisherId>>,
+    pub(crate) sources: Table<EstimatorId, Vec<PublisherId>>,
+    /// The link that each joint carries.
+    pub(crate) children: Table<JointId, LinkId>,
 }
 
 /// Checks all rules; none if one does not hold, or if something could not be read.
@@ -79,5 +84,8 @@ pub(crate) fn verify<'a>(robot: &'a Robot, diagnostics: &mut Diagnostics) -> Opt
     }
     let sources =
         robot.estimators.iter().map(|estimator| estimator.inputs.iter().map(|input| input.source).collect());
-    Some(Verified { robot, name: robot.name.as_ref()?, sources: sources.collect::<Option<_>>()? })
+    let sources = sources.collect::<Option<_>>()?;
+    let children = robot.joints.iter().map(|joint| joint.children.first().copied()).collect::<Option<_>>()?;
+    let name = robot.name.as_ref()?;
+    Some(Verified { robot, name, module: module_name(name)?, sources, children })
 }

@@ -2,8 +2,9 @@
 
 use bb_core::prelude::*;
 
-/// A number.
+/// A number; at a joint, its position.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(joint_position)]
 pub(crate) struct Number(pub(crate) f64);
 
 /// Options of [`Counter`].

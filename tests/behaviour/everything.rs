@@ -20,7 +20,6 @@ impl Estimator for Lively {
     type Options = LivelyOptions;
     type Input = Number;
     type Output = Number;
-    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(options: LivelyOptions, context: &Context) -> Result<Self, Fault> {
         context.request(Request::Tick(Duration::from_millis(30)));

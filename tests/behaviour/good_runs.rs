@@ -13,7 +13,6 @@ impl Estimator for Busy {
     type Options = NoOptions;
     type Input = Number;
     type Output = Number;
-    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
         context.request(Request::Tick(Duration::from_millis(5)));

@@ -13,7 +13,6 @@ impl Estimator for Watch {
     type Options = NoOptions;
     type Input = Number;
     type Output = Number;
-    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
         Ok(Self)

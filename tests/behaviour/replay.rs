@@ -76,7 +76,6 @@ impl Estimator for Moody {
     type Options = MoodyOptions;
     type Input = Number;
     type Output = Number;
-    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(options: MoodyOptions, context: &Context) -> Result<Self, Fault> {
         context.request(Request::Tick(Duration::from_millis(70)));

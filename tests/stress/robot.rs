@@ -5,6 +5,7 @@ use bb_core::prelude::*;
 
 /// What happens where it arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(joint_position)]
 pub(crate) struct Dice(pub(crate) f64);
 
 /// Xorshift with a multiplier: good enough to throw dice.
@@ -97,7 +98,6 @@ impl Estimator for Fickle {
     type Options = FickleOptions;
     type Input = Dice;
     type Output = Dice;
-    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(options: FickleOptions, context: &Context) -> Result<Self, Fault> {
         context.request(Request::Continue(7));

@@ -82,6 +82,8 @@ const fn check_range(component: &str, field: OptionField, given: Given) {
         && !(number >= range.start && number <= range.end)
     {
         let text = Text::new("").name(field.name).push(" of ").name(component).push(" must be in ");
-        panic!("{}", text.push(range.text).push(" ").push(field.unit).as_str())
+        let text = text.push(range.text);
+        let text = if field.unit.is_empty() { text } else { text.push(" ").push(field.unit) };
+        panic!("{}", text.as_str())
     }
 }

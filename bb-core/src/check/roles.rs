@@ -1,4 +1,4 @@
-//! What commands do to the robot's safety, and what an estimator says of its own divergence.
+//! What commands do to the robot's safety.
 
 use super::text::{Text, equal};
 use crate::declaration::Role;
@@ -44,15 +44,5 @@ pub const fn check_reachable(command: &str, role: Role, allowed: &[&str]) {
             panic!("{}", text.push("add `idle` and `executing` to its states").as_str())
         }
         _ => {}
-    }
-}
-
-/// That the algorithm reports divergence, where nothing else gives `word` a meaning.
-#[track_caller]
-pub const fn check_divergence(estimator: &str, reports: bool, word: &str) {
-    if !reports {
-        let text = Text::new("").name(word).push(" can never take effect: nothing degrades this estimator; set a ");
-        let text = text.push("`latency_budget`, or `REPORTS_DIVERGENCE` in the `Estimator` of ").name(estimator);
-        panic!("{}", text.push(", or leave it out").as_str())
     }
 }

@@ -51,10 +51,6 @@ pub trait Estimator: Sized + Send + 'static {
     /// Whether it asks for the joints' positions itself, so that its inputs may span moving joints.
     const HANDLES_MOVING_JOINTS: bool = false;
 
-    /// Whether [`Reply::diverged`] may come of it. It says so here, so that `on_degraded` where nothing else can degrade it
-    /// is no mistake.
-    const REPORTS_DIVERGENCE: bool = false;
-
     /// Makes it, at the start and at every restart.
     ///
     /// # Errors

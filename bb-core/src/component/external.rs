@@ -12,7 +12,6 @@ use std::marker::PhantomData;
 #[derive(Debug)]
 pub struct External<T>(PhantomData<fn() -> T>);
 
-#[diagnostic::do_not_recommend]
 impl<T: Payload> Sensor for External<T> {
     type Options = NoOptions;
     type Output = T;

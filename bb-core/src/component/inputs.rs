@@ -31,6 +31,9 @@ use std::ops::Deref;
 ///     pub magnetic_field: Option<Input<'a, MagneticField>>,
 /// }
 /// ```
+///
+/// The estimator names it with the lifetime `'static`, `type Input = PoseInputs<'static>;`. Where that is missing rustc
+/// proposes a lifetime of the implementation, which does not compile either.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be the input of an estimator",
     label = "neither a payload nor a struct of inputs",

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 /// The state of one joint (one row of `sensor_msgs/JointState`; the message's frame names the joint).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
-#[payload(ros)]
+#[payload(ros, joint_position)]
 pub struct JointState {
     /// Angle in rad of a revolute or continuous joint; displacement in m of a prismatic one.
     pub position: f64,
@@ -18,7 +18,7 @@ pub struct JointState {
 /// The state of several joints (`sensor_msgs/JointState`). Each list is as long as the names, or empty where its quantity
 /// is not measured.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
-#[payload(ros)]
+#[payload(ros, joint_position)]
 pub struct JointStates {
     /// The joints.
     pub names: Arc<[String]>,

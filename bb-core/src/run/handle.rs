@@ -17,7 +17,9 @@ use std::marker::PhantomData;
 /// What can be subscribed to: the handle of a sensor, of an estimator of one output, or of an output.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be subscribed to",
-    label = "publishes nothing under this name",
+    label = "is no handle of a publisher",
+    note = "name a publisher by its handle, as in `rover::sensor::base::imu`; paths that are known at run time only go to \
+            `subscribe_any(Select::Path(path), …)`",
     note = "an estimator of several outputs is subscribed to output by output"
 )]
 pub trait Publisher<R: Robot>: Copy {
@@ -109,6 +111,7 @@ macro_rules! service_handle {
             $name<S: Service> { topic: TopicOf<R, S::Output>, options: OptionsOf<R, S::Options> }
         }
 
+        #[diagnostic::do_not_recommend]
         impl<R: Robot, S: Service> Publisher<R> for $name<R, S> {
             type Payload = S::Output;
             fn path(self) -> &'static str {
@@ -187,6 +190,7 @@ impl<R: Robot, T: ParameterType> ParameterHandle<R, T> {
 
 macro_rules! system_publisher {
     ($($handle:ident<$($component:ident: $bound:path),+> publishes $payload:ty, $list:ident;)*) => { $(
+        #[diagnostic::do_not_recommend]
         impl<R: Robot, $($component: $bound),+> Publisher<R> for $handle<R, $($component),+> {
             type Payload = $payload;
             fn path(self) -> &'static str {
@@ -210,6 +214,7 @@ macro_rules! system_topic {
         #[derive(Clone, Copy, Debug)]
         pub struct $name;
 
+        #[diagnostic::do_not_recommend]
         impl<R: Robot> Publisher<R> for $name {
             type Payload = $payload;
             fn path(self) -> &'static str {
@@ -249,6 +254,7 @@ impl<R: Robot, S: Sensor> SensorHandle<R, S> {
     }
 }
 
+#[diagnostic::do_not_recommend]
 impl<R: Robot, S: Sensor> Publisher<R> for SensorHandle<R, S> {
     type Payload = S::Output;
     fn path(self) -> &'static str {
@@ -259,6 +265,7 @@ impl<R: Robot, S: Sensor> Publisher<R> for SensorHandle<R, S> {
     }
 }
 
+#[diagnostic::do_not_recommend]
 impl<R: Robot, E: Estimator, T: Payload> Publisher<R> for EstimatorHandle<R, E, T> {
     type Payload = T;
     fn path(self) -> &'static str {
@@ -269,6 +276,7 @@ impl<R: Robot, E: Estimator, T: Payload> Publisher<R> for EstimatorHandle<R, E, 
     }
 }
 
+#[diagnostic::do_not_recommend]
 impl<R: Robot, T: Payload> Publisher<R> for OutputHandle<R, T> {
     type Payload = T;
     fn path(self) -> &'static str {

@@ -88,8 +88,25 @@ pub trait Robot: Sized + Send + Sync + 'static {
         graph(format, Self::TOPOLOGY, Self::SENSORS, Self::ESTIMATORS)
     }
 
+    /// Has rustc say how a robot is assembled where `new` is called.
+    #[doc(hidden)]
+    fn new() -> Builder<Self>
+    where
+        Self: MadeByNew,
+    {
+        Self::builder()
+    }
+
     /// Assembles the robot: options may be changed and topics subscribed to before it starts.
     fn builder() -> Builder<Self> {
         Builder::new()
     }
 }
+
+/// No robot is.
+#[doc(hidden)]
+#[diagnostic::on_unimplemented(
+    message = "a robot is assembled with `{Self}::builder()`, and there is no `new`",
+    label = "call `builder` instead"
+)]
+pub trait MadeByNew {}

@@ -46,6 +46,7 @@ impl Field for Unknown {
 impl Payload for Unknown {
     const NAME: &'static str = "unknown";
     const KNOWN: bool = false;
+    const TELLS_JOINT_POSITION: bool = true;
 }
 
 #[diagnostic::do_not_recommend]
@@ -68,7 +69,6 @@ impl Estimator for Unknown {
     type Input = UnknownInput;
     type Output = UnknownOutput;
     const HANDLES_MOVING_JOINTS: bool = true;
-    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
         stub()

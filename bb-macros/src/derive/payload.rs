@@ -3,21 +3,26 @@
 mod codec;
 
 use crate::diagnostics::Diagnostics;
-use proc_macro2::TokenStream;
-use quote::{format_ident, quote, quote_spanned};
+use proc_macro2::{Ident, TokenStream};
+use quote::{ToTokens, format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{Data, DeriveInput, Field, Fields, LitStr};
+use syn::{Data, DeriveInput, Field, Fields, Generics, LitStr};
 
 /// What `#[payload(…)]` says.
 #[derive(Default)]
 struct Attributes {
     /// ROS has a message for it.
     is_ros: bool,
+    /// It tells the position of a joint.
+    tells_position: bool,
     /// The name of its definition, where that is not its own.
     name: Option<LitStr>,
 }
 
 pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
+    if unbounded(&item.generics, diagnostics) {
+        return TokenStream::new();
+    }
     let attributes = attributes(item, diagnostics);
     let name = &item.ident;
     let text = crate::names::text(name);
@@ -46,11 +51,17 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
                 ::core::option::Option::Some(::bb_core::__private::RosLayout::of());
         )
     });
+    let position = attributes.tells_position.then(|| {
+        quote!(
+            const TELLS_JOINT_POSITION: bool = true;
+        )
+    });
     quote! {
         #[automatically_derived]
         impl #generics ::bb_core::Payload for #name #arguments #bounds {
             const NAME: &'static str = #text;
             #ros
+            #position
         }
         #[automatically_derived]
         impl #generics ::bb_core::Finite for #name #arguments #bounds {
@@ -62,16 +73,34 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     }
 }
 
+/// Reports the first type parameter of which nothing says that it can be recorded.
+fn unbounded(generics: &Generics, diagnostics: &mut Diagnostics) -> bool {
+    let in_clause = |name: &Ident| {
+        let predicates = generics.where_clause.iter().flat_map(|clause| &clause.predicates);
+        predicates
+            .into_iter()
+            .any(|predicate| predicate.to_token_stream().into_iter().any(|token| *name == token.to_string()))
+    };
+    let mut unbounded = generics.type_params().filter(|kind| kind.bounds.is_empty() && !in_clause(&kind.ident));
+    let Some(kind) = unbounded.next() else { return false };
+    let name = &kind.ident;
+    let message = format!("`{name}` is a field of a payload and must be one itself; write `{name}: Payload`");
+    diagnostics.error(name, message);
+    true
+}
+
 fn attributes(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Attributes {
     let mut attributes = Attributes::default();
     for attribute in item.attrs.iter().filter(|attribute| attribute.path().is_ident("payload")) {
         let parsed = attribute.parse_nested_meta(|meta| {
             if meta.path.is_ident("ros") {
                 attributes.is_ros = true;
+            } else if meta.path.is_ident("joint_position") {
+                attributes.tells_position = true;
             } else if meta.path.is_ident("name") {
                 attributes.name = Some(meta.value()?.parse()?);
             } else {
-                return Err(meta.error("expected `ros` or `name = \"package/Name\"`"));
+                return Err(meta.error("expected `ros`, `joint_position` or `name = \"package/Name\"`"));
             }
             Ok(())
         });

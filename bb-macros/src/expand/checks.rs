@@ -16,16 +16,14 @@ pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
     let types = Types::new(robot, verified.name, 0);
     let mut checks = TokenStream::new();
     for part in Part::all(robot) {
-        if let Some(component) = part.component(robot) {
-            checks.extend(options(robot, component, &types.options(part)));
-        }
+        checks.extend(options(robot, part.component(robot), &types.options(part)));
     }
-    for id in 0..robot.estimators.len() {
+    for id in robot.estimators.ids() {
         checks.extend(inputs(robot, &types, id));
         checks.extend(outputs(robot, &types, id));
-        checks.extend(divergence(robot, &types, id));
     }
     checks.extend(moving_joints(verified, &types));
+    checks.extend(positions(robot, &types));
     checks.extend(roles(robot, &types));
     checks
 }
@@ -61,7 +59,7 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenS
         }
         // Its default stands for it.
         OptionValue::Parameter(path) => {
-            let default = &robot.parameters.get(robot.parameter(path)?)?.default;
+            let default = &robot.parameters[robot.parameter(path)?].default;
             let unit = default.has_unit.then(|| dimension(default.dimension));
             let number = match default.value {
                 Value::Number(number) => number,
@@ -80,8 +78,8 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenS
 }
 
 /// All inputs that the algorithm needs are declared, and all that are declared are the algorithm's.
-fn inputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
+fn inputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
+    let estimator = &robot.estimators[id];
     let (name, taken) = (type_name(&estimator.component), types.estimator_input(id));
     let place = Place::of(&estimator.component.kind);
     if estimator.is_nested() {
@@ -104,8 +102,8 @@ fn inputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
 }
 
 /// The declared outputs are the algorithm's, and one of several outputs has some declared.
-fn outputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
+fn outputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
+    let estimator = &robot.estimators[id];
     let (name, emitted) = (type_name(&estimator.component), types.estimator_output(id));
     if estimator.outputs.is_empty() {
         let place = Place::of(&estimator.component.kind);
@@ -122,12 +120,10 @@ fn outputs(robot: &Robot, types: &Types<'_>, id: usize) -> TokenStream {
 fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let robot = verified.robot;
     let mut checks = TokenStream::new();
-    for (id, (estimator, sources)) in robot.estimators.iter().zip(&verified.sources).enumerate() {
-        for (input, source) in estimator.inputs.iter().zip(sources) {
+    for (id, estimator) in robot.estimators.enumerate() {
+        for (input, source) in estimator.inputs.iter().zip(&verified.sources[id]) {
             let route = robot.route(robot.mount_of(*source), robot.mount_of_estimator(id));
-            let Some(joint) = route.moving.first().and_then(|joint| robot.joints.get(*joint)) else {
-                continue;
-            };
+            let Some(joint) = route.moving.first().map(|joint| &robot.joints[*joint]) else { continue };
             let (name, kind) = (type_name(&estimator.component), types.estimator(id));
             let (input_name, joint_name) = (crate::names::text(&input.name), crate::names::text(&joint.name));
             let joint_kind = joint.kind_word.to_string();
@@ -147,26 +143,29 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     checks
 }
 
-/// Where only the algorithm's own report can degrade an estimator, it makes one.
-fn divergence(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
-    let (name, kind) = (type_name(&estimator.component), types.estimator(id));
-    let words = estimator.needs_divergence().map(|word| {
-        let text = word.to_string();
-        spanned_call(
-            Place::of(word),
-            quote!(::bb_core::__private::check_divergence),
-            quote!(#name, <#kind as ::bb_core::Estimator>::REPORTS_DIVERGENCE, #text),
-        )
+/// What measures the position of a joint that an actuator moves is known by its payload.
+fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
+    let checks = robot.actuators.iter().filter_map(|actuator| {
+        let sources = robot.position_sources(actuator.joint)?;
+        let (name, joint) = (crate::names::text(&actuator.name), &robot.joints[actuator.joint].label);
+        let payloads = sources.iter().map(|source| {
+            let payload = types.payload(*source);
+            quote!(<#payload as ::bb_core::Payload>::TELLS_JOINT_POSITION)
+        });
+        Some(spanned_call(
+            Place::of(&actuator.name),
+            quote!(::bb_core::__private::check_position),
+            quote!(#name, #joint, &[#(#payloads),*]),
+        ))
     });
-    words.collect()
+    checks.collect()
 }
 
 /// At most one command arms and one disarms, each in a state in which it can.
 fn roles(robot: &Robot, types: &Types<'_>) -> TokenStream {
     let mut checks = TokenStream::new();
     let mut before: Vec<TokenStream> = Vec::new();
-    for (id, command) in robot.commands.iter().enumerate() {
+    for (id, command) in robot.commands.enumerate() {
         let (name, kind) = (crate::names::text(&command.name), types.part(Part::Command(id)));
         let role = quote!(<#kind as ::bb_core::Command>::ROLE);
         checks.extend(spanned_call(

@@ -3,8 +3,7 @@
 use super::islands::Islands;
 use super::literal::{nanos, option, transform};
 use super::{control, path_text, topology};
-use crate::model::{Actuator, EstimatorId, Mount, Robot, Sensor, Service};
-use crate::parse::Setting;
+use crate::model::{Actuator, EstimatorId, Health, Home, Id as _, Mount, Robot, Sensor, Service, Timing};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
@@ -13,7 +12,7 @@ use quote::{format_ident, quote};
 pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenStream {
     let robot = verified.robot;
     let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor)).collect();
-    let estimators = (0..robot.estimators.len()).map(|id| estimator_declaration(verified, islands, id)).collect();
+    let estimators = robot.estimators.ids().map(|id| estimator_declaration(verified, islands, id)).collect();
     let actuators = robot.actuators.iter().map(|actuator| actuator_declaration(robot, actuator)).collect();
     let services = robot.services.iter().map(service_declaration).collect();
     let arrays = [
@@ -25,7 +24,7 @@ pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenS
         control::commands(robot),
         control::parameters(robot),
     ];
-    let topology = topology::topology(robot);
+    let topology = topology::topology(verified);
     quote! {
         #(#arrays)*
         static __TOPOLOGY: ::bb_core::__private::Topology = #topology;
@@ -44,9 +43,9 @@ pub(super) fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> 
 }
 
 fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
-    let path = robot.publishers.get(sensor.publisher).map_or(String::new(), |publisher| path_text(&publisher.path));
+    let path = path_text(&robot.publishers[sensor.publisher].path);
     let frame = robot.frame_name(sensor.mount);
-    let period = period(&sensor.rates);
+    let period = period(sensor.period_s);
     let root = root_from(robot, sensor.mount);
     let supervisor = supervisor(robot, sensor.mount);
     quote!(::bb_core::__private::SensorDeclaration {
@@ -64,40 +63,44 @@ pub(super) fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
     option(route.map(|route| transform(route.transform)))
 }
 
-fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: usize) -> TokenStream {
+fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
     let robot = verified.robot;
-    let (Some(estimator), Some(sources)) = (robot.estimators.get(id), verified.sources.get(id)) else {
-        return TokenStream::new();
-    };
+    let estimator = &robot.estimators[id];
     let mount = robot.mount_of_estimator(id);
     let (path, frame) = (path_text(&estimator.path), robot.frame_name(mount));
-    let island = islands.of.get(id).copied().unwrap_or(0);
+    let island = islands.of[id];
     let supervisor = supervisor(robot, mount);
-    let (health, worker) = (health(robot, id), worker(robot, id));
-    let nested = estimator.is_nested().then(|| nested_input(&estimator.path));
-    let synchronous = estimator.sync_tolerances.first().map(|tolerance| &tolerance.quantity);
+    // All of it is declared to the runtime.
+    let Timing { sync_tolerance_s, latency_budget_s, lost_after_s, recover_after } = estimator.timing;
+    let health = health(&estimator.health, latency_budget_s, lost_after_s, recover_after);
+    let worker = worker(robot, id);
+    let nested = match estimator.home {
+        Home::Sensor(sensor) => Some(nested_input(robot, &robot.sensors[sensor])),
+        Home::Link(_) => None,
+    };
     let several = estimator.inputs.len() > 1;
-    let declared = estimator.inputs.iter().zip(sources).enumerate().map(|(index, (input, source))| {
-        let name = crate::names::text(&input.name);
-        let path = robot.publishers.get(*source).map_or(String::new(), |publisher| path_text(&publisher.path));
-        let driver = input.driver.is_some() || !several;
-        let optional = input.optional.is_some();
-        let tolerance = option(input.within.as_ref().or(synchronous).map(|tolerance| {
-            let tolerance = nanos(tolerance.value);
-            quote!(#tolerance)
-        }));
-        // The driver has nothing to be compared with but the clock.
-        let stale = option(input.within.as_ref().filter(|_| driver).map(|limit| {
-            let limit = nanos(limit.value);
-            quote!(#limit)
-        }));
-        let route = robot.route(robot.mount_of(*source), mount);
-        let frame_from_input = option(route.moving.is_empty().then(|| transform(route.transform)));
-        input_declaration(index, &name, &path, driver, optional, [&tolerance, &stale], &frame_from_input)
-    });
+    let declared =
+        estimator.inputs.iter().zip(&verified.sources[id]).enumerate().map(|(index, (input, source))| {
+            let name = crate::names::text(&input.name);
+            let path = path_text(&robot.publishers[*source].path);
+            let driver = input.driver.is_some() || !several;
+            let optional = input.optional.is_some();
+            let within_s = input.within.as_ref().map(|within| within.value);
+            let tolerance = option(within_s.or(sync_tolerance_s).map(|tolerance_s| {
+                let tolerance = nanos(tolerance_s);
+                quote!(#tolerance)
+            }));
+            // The driver has nothing to be compared with but the clock.
+            let stale = option(within_s.filter(|_| driver).map(|limit_s| {
+                let limit = nanos(limit_s);
+                quote!(#limit)
+            }));
+            let route = robot.route(robot.mount_of(*source), mount);
+            let frame_from_input = option(route.moving.is_empty().then(|| transform(route.transform)));
+            input_declaration(index, &name, &path, driver, optional, [&tolerance, &stale], &frame_from_input)
+        });
     let inputs = nested.into_iter().chain(declared);
-    let outputs = estimator.publishers.iter().filter_map(|publisher| robot.publishers.get(*publisher));
-    let outputs = outputs.map(|publisher| path_text(&publisher.path));
+    let outputs = estimator.publishers.iter().map(|publisher| path_text(&robot.publishers[*publisher].path));
     quote!(::bb_core::__private::EstimatorDeclaration {
         path: #path,
         frame: ::bb_core::__private::Frame::new(#frame),
@@ -114,27 +117,27 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: usize) 
 pub(super) fn supervisor(robot: &Robot, mount: Mount) -> usize {
     match mount {
         Mount::Robot => 0,
-        Mount::Link(link) => 1 + link,
-        Mount::Joint(joint) => 1 + robot.links.len() + joint,
+        Mount::Link(link) => 1 + link.number(),
+        Mount::Joint(joint) => 1 + robot.links.len() + joint.number(),
     }
 }
 
-fn period(rates: &[Setting]) -> TokenStream {
-    option(rates.first().map(|rate| {
-        let period = nanos(1.0 / rate.quantity.value).max(1);
+fn period(period_s: Option<f64>) -> TokenStream {
+    option(period_s.map(|period_s| {
+        let period = nanos(period_s).max(1);
         quote!(#period)
     }))
 }
 
 fn actuator_declaration(robot: &Robot, actuator: &Actuator) -> TokenStream {
     let path = path_text(&actuator.path);
-    let joint = robot.joints.get(actuator.joint).map_or(String::new(), |joint| joint.label.clone());
+    let joint = &robot.joints[actuator.joint].label;
     let supervisor = supervisor(robot, Mount::Joint(actuator.joint));
     quote!(::bb_core::__private::ActuatorDeclaration { path: #path, joint: #joint, supervisor: #supervisor })
 }
 
 fn service_declaration(service: &Service) -> TokenStream {
-    let (path, period) = (path_text(&service.path), period(&service.rates));
+    let (path, period) = (path_text(&service.path), period(service.period_s));
     quote!(::bb_core::__private::SensorDeclaration {
         path: #path,
         frame: ::bb_core::__private::Frame::NONE,
@@ -144,16 +147,18 @@ fn service_declaration(service: &Service) -> TokenStream {
     })
 }
 
-fn health(robot: &Robot, id: EstimatorId) -> TokenStream {
-    let Some(estimator) = robot.estimators.get(id) else { return TokenStream::new() };
-    let health = &estimator.health;
-    let [budget, lost] = [health.latency_budget_s, health.lost_after_s].map(|time| {
+fn health(
+    health: &Health,
+    latency_budget_s: Option<f64>,
+    lost_after_s: Option<f64>,
+    recover_after: u32,
+) -> TokenStream {
+    let [budget, lost] = [latency_budget_s, lost_after_s].map(|time| {
         option(time.map(|time| {
             let time = nanos(time);
             quote!(#time)
         }))
     });
-    let recover_after = health.recover_after;
     let [degraded, lost_command, recovered] = [health.on_degraded, health.on_lost, health.on_recovered]
         .map(|command| option(command.map(|command| quote!(#command))));
     quote!(::bb_core::__private::HealthDeclaration {
@@ -168,7 +173,7 @@ fn health(robot: &Robot, id: EstimatorId) -> TokenStream {
 
 /// An `Option<WorkerDeclaration>`.
 pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
-    let worker = robot.estimators.get(id).and_then(|estimator| estimator.worker.as_ref());
+    let worker = robot.estimators[id].worker.as_ref();
     option(worker.map(|worker| {
         let priority = option(worker.priority.map(|priority| quote!(#priority)));
         let core = option(worker.core.map(|core| {
@@ -179,12 +184,12 @@ pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
     }))
 }
 
-/// The one input of a nested estimator: its sensor, whose path is all but the last name of its own.
-fn nested_input(estimator: &[String]) -> TokenStream {
-    let sensor = estimator.split_last().map_or(&[][..], |(_, sensor)| sensor);
-    let name = sensor.last().cloned().unwrap_or_default();
+/// The one input of a nested estimator: its sensor.
+fn nested_input(robot: &Robot, sensor: &Sensor) -> TokenStream {
+    let name = crate::names::text(&sensor.name);
+    let path = path_text(&robot.publishers[sensor.publisher].path);
     let identity = option(Some(quote!(::bb_core::__private::Transform::IDENTITY)));
-    input_declaration(0, &name, &path_text(sensor), true, false, [&option(None), &option(None)], &identity)
+    input_declaration(0, &name, &path, true, false, [&option(None), &option(None)], &identity)
 }
 
 fn input_declaration(

@@ -8,13 +8,13 @@ use super::group;
 use super::literal::ident;
 use super::options::{parameter_type, place};
 use super::part::Part;
-use super::types::Types;
+use super::types::{Types, imports};
 use super::wiring::{topic, visit_function};
 use super::{docs, path_text};
 use crate::model::{
-    ActuatorId, CommandId, EstimatorId, From, ParameterId, PublisherId, Robot, SensorId, ServiceId,
+    ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, Robot, SensorId,
+    ServiceId,
 };
-use crate::names::module_name;
 use crate::parse::ServiceKind;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::quote;
@@ -54,40 +54,34 @@ enum Handle {
     /// The name of a state, by its number.
     State(usize),
     /// The name of a category of commands.
-    Category(usize),
+    Category(CategoryId),
 }
 
-pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> TokenStream {
+pub(super) fn handles(robot: &Robot, name: &Ident, module: &str, accessors: Accessors) -> TokenStream {
     let mut root = Module::default();
-    for (id, sensor) in robot.sensors.iter().enumerate() {
-        if let Some(publisher) = robot.publishers.get(sensor.publisher) {
-            root.add(&publisher.path, &sensor.name, Handle::Sensor(id));
-        }
+    for (id, sensor) in robot.sensors.enumerate() {
+        root.add(&robot.publishers[sensor.publisher].path, &sensor.name, Handle::Sensor(id));
     }
-    for (id, estimator) in robot.estimators.iter().enumerate() {
-        let is_own = |publisher: &PublisherId| {
-            robot.publishers.get(*publisher).is_some_and(|publisher| publisher.path == estimator.path)
-        };
+    for (id, estimator) in robot.estimators.enumerate() {
+        let is_own = |publisher: &PublisherId| robot.publishers[*publisher].path == estimator.path;
         match estimator.publishers.iter().copied().find(is_own) {
             Some(publisher) => root.add(&estimator.path, &estimator.name, Handle::Estimator(id, publisher)),
             None => root.add(&estimator.path, &estimator.name, Handle::Several(id)),
         }
         for (output, publisher) in estimator.outputs.iter().zip(&estimator.publishers) {
-            if let Some(path) = robot.publishers.get(*publisher).map(|publisher| &publisher.path) {
-                root.add(path, &output.name, Handle::Output(id, *publisher));
-            }
+            root.add(&robot.publishers[*publisher].path, &output.name, Handle::Output(id, *publisher));
         }
     }
-    for (id, service) in robot.services.iter().enumerate() {
+    for (id, service) in robot.services.enumerate() {
         root.add(&service.path, &service.name, Handle::Service(id));
     }
-    for (id, actuator) in robot.actuators.iter().enumerate() {
+    for (id, actuator) in robot.actuators.enumerate() {
         root.add(&actuator.path, &actuator.name, Handle::Actuator(id));
     }
-    for (id, command) in robot.commands.iter().enumerate() {
+    for (id, command) in robot.commands.enumerate() {
         root.add(&command.path, &command.name, Handle::Command(id));
     }
-    for (id, parameter) in robot.parameters.iter().enumerate() {
+    for (id, parameter) in robot.parameters.enumerate() {
         root.add(&parameter.path, &parameter.name, Handle::Parameter(id));
     }
     for (path, place, attributes) in robot.places() {
@@ -101,9 +95,7 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
     }
     // Those of a sensor and of an estimator of several outputs are beside their handles.
     for sensor in &robot.sensors {
-        if let Some(publisher) = robot.publishers.get(sensor.publisher) {
-            root.describe(&publisher.path, &sensor.name, &[]);
-        }
+        root.describe(&robot.publishers[sensor.publisher].path, &sensor.name, &[]);
     }
     for estimator in &robot.estimators {
         root.describe(&estimator.path, &estimator.name, &[]);
@@ -112,19 +104,18 @@ pub(super) fn handles(robot: &Robot, name: &Ident, accessors: Accessors) -> Toke
         root.add(&["state".to_owned(), crate::names::text(&state.name)], &state.name, Handle::State(id));
     }
     // The first is the built-in one, declared or not.
-    for (id, category) in robot.categories.iter().enumerate().skip(1) {
+    for (id, category) in robot.categories.enumerate().skip(1) {
         let path = ["category".to_owned(), crate::names::text(&category.name)];
         root.add(&path, &category.name, Handle::Category(id));
     }
-    let Some(module) = module_name(name).map(|module| ident(&module)) else {
-        return TokenStream::new();
-    };
+    let module = ident(module);
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
     let content = root.tokens(robot, name, accessors, 1);
+    let imports = imports(robot, name);
     quote! {
         #[doc = #text]
         #[allow(non_upper_case_globals, non_snake_case, dead_code, private_interfaces, unreachable_pub, clippy::all)]
-        #visibility mod #module { #content }
+        #visibility mod #module { #imports #content }
     }
 }
 
@@ -183,27 +174,13 @@ impl Handle {
     /// `pub const imu: SensorHandle<Rover, Bmi270> = SensorHandle::new(…);`
     fn tokens(self, robot: &Robot, types: &Types<'_>, name: &Ident, accessors: Accessors) -> TokenStream {
         let this = types.robot();
-        let named = match self {
-            Self::State(id) => robot.states.get(id).map(|state| (&state.attributes, &state.name)),
-            Self::Category(id) => robot.categories.get(id).map(|category| (&category.attributes, &category.name)),
-            _ => None,
-        };
-        if let Some((attributes, named)) = named {
-            let (docs, text) = (docs(attributes), crate::names::text(named));
-            return quote! {
-                #(#docs)*
-                pub const #name: &str = #text;
-            };
-        }
         let (attributes, path, kind, function, arguments) = match self {
             Self::Sensor(id) => {
-                let Some(sensor) = robot.sensors.get(id) else {
-                    return TokenStream::new();
-                };
+                let sensor = &robot.sensors[id];
                 let (component, frame) = (types.sensor(id), robot.frame_name(sensor.mount));
-                let path = robot.publishers.get(sensor.publisher).map(|publisher| path_text(&publisher.path));
+                let path = path_text(&robot.publishers[sensor.publisher].path);
                 let (publish, options) = (topic(sensor.publisher), place(robot, Part::Sensor(id)));
-                let topic = group::path(sensor.publisher, &publish);
+                let topic = group::path(sensor.publisher.number(), &publish);
                 let arguments = match accessors {
                     Accessors::Wired => quote!(
                         |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
@@ -219,12 +196,10 @@ impl Handle {
                 (&sensor.attributes, path, kind, quote!(::bb_core::SensorHandle::new), arguments)
             }
             Self::Estimator(id, publisher) => {
-                let Some(estimator) = robot.estimators.get(id) else {
-                    return TokenStream::new();
-                };
+                let estimator = &robot.estimators[id];
                 let (component, payload) = (types.estimator(id), types.payload(publisher));
-                let path = Some(path_text(&estimator.path));
-                let topic = group::path(publisher, &topic(publisher));
+                let path = path_text(&estimator.path);
+                let topic = group::path(publisher.number(), &topic(publisher));
                 let options = place(robot, Part::Estimator(id));
                 let arguments = match accessors {
                     Accessors::Wired => {
@@ -244,10 +219,8 @@ impl Handle {
                 (&estimator.attributes, path, kind, quote!(::bb_core::EstimatorHandle::new), arguments)
             }
             Self::Several(id) => {
-                let Some(estimator) = robot.estimators.get(id) else {
-                    return TokenStream::new();
-                };
-                let (component, path) = (types.estimator(id), Some(path_text(&estimator.path)));
+                let estimator = &robot.estimators[id];
+                let (component, path) = (types.estimator(id), path_text(&estimator.path));
                 let options = place(robot, Part::Estimator(id));
                 let arguments = match accessors {
                     Accessors::Wired => {
@@ -264,33 +237,30 @@ impl Handle {
                 (&estimator.attributes, path, kind, quote!(::bb_core::EstimatorOfSeveralHandle::new), arguments)
             }
             Self::Output(id, publisher) => {
-                let Some(estimator) = robot.estimators.get(id) else {
-                    return TokenStream::new();
-                };
-                let path = robot.publishers.get(publisher).map(|publisher| path_text(&publisher.path));
-                let (payload, topic) = (types.payload(publisher), group::path(publisher, &topic(publisher)));
+                let estimator = &robot.estimators[id];
+                let path = path_text(&robot.publishers[publisher].path);
+                let (payload, topic) =
+                    (types.payload(publisher), group::path(publisher.number(), &topic(publisher)));
                 let arguments = match accessors {
                     Accessors::Wired => quote!(|topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic),
                     Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),
                 };
                 let kind = quote!(::bb_core::OutputHandle<#this, #payload>);
-                let output = match robot.publishers.get(publisher).map(|publisher| publisher.from) {
-                    Some(From::Estimator(_, output)) => output.and_then(|output| estimator.outputs.get(output)),
-                    _ => None,
+                let output = match robot.publishers[publisher].from {
+                    From::Estimator(_, output) => output.and_then(|output| estimator.outputs.get(output)),
+                    From::Sensor(_) | From::Service(_) => None,
                 };
                 let attributes = output.map_or(&estimator.attributes, |output| &output.attributes);
                 (attributes, path, kind, quote!(::bb_core::OutputHandle::new), arguments)
             }
             Self::Service(id) => {
-                let Some(service) = robot.services.get(id) else {
-                    return TokenStream::new();
-                };
+                let service = &robot.services[id];
                 let handle = match service.kind {
                     ServiceKind::Controller => quote!(ControllerHandle),
                     ServiceKind::Bridge => quote!(BridgeHandle),
                 };
                 let (component, options) = (types.part(Part::Service(id)), place(robot, Part::Service(id)));
-                let topic = group::path(service.publisher, &topic(service.publisher));
+                let topic = group::path(service.publisher.number(), &topic(service.publisher));
                 let arguments = match accessors {
                     Accessors::Wired => quote!(
                         |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
@@ -302,15 +272,13 @@ impl Handle {
                 };
                 let kind = quote!(::bb_core::__private::#handle<#this, #component>);
                 let function = quote!(::bb_core::__private::#handle::new);
-                (&service.attributes, Some(path_text(&service.path)), kind, function, arguments)
+                (&service.attributes, path_text(&service.path), kind, function, arguments)
             }
             Self::Actuator(id) => {
-                let Some(actuator) = robot.actuators.get(id) else {
-                    return TokenStream::new();
-                };
+                let actuator = &robot.actuators[id];
                 let part = Part::Actuator(id);
                 let (component, options, name) = (types.part(part), place(robot, part), part.name());
-                let node = group::path(id, &name);
+                let node = group::path(id.number(), &name);
                 let arguments = match accessors {
                     Accessors::Wired => quote!(
                         |wiring: &<#this as ::bb_core::Robot>::Wiring| &wiring.actuators.#node,
@@ -322,12 +290,10 @@ impl Handle {
                 };
                 let kind = quote!(::bb_core::ActuatorHandle<#this, #component>);
                 let function = quote!(::bb_core::ActuatorHandle::new);
-                (&actuator.attributes, Some(path_text(&actuator.path)), kind, function, arguments)
+                (&actuator.attributes, path_text(&actuator.path), kind, function, arguments)
             }
             Self::Command(id) => {
-                let Some(command) = robot.commands.get(id) else {
-                    return TokenStream::new();
-                };
+                let command = &robot.commands[id];
                 let (component, options) = (types.part(Part::Command(id)), place(robot, Part::Command(id)));
                 let arguments = match accessors {
                     Accessors::Wired => {
@@ -338,21 +304,20 @@ impl Handle {
                 let kind = quote!(::bb_core::CommandHandle<#this, #component>);
                 let arguments = quote!(#id, #arguments);
                 let function = quote!(::bb_core::CommandHandle::new);
-                (&command.attributes, Some(path_text(&command.path)), kind, function, arguments)
+                (&command.attributes, path_text(&command.path), kind, function, arguments)
             }
-            Self::State(_) | Self::Category(_) => return TokenStream::new(),
+            Self::State(id) => return text(name, &robot.states[id].attributes, &robot.states[id].name),
+            Self::Category(id) => return text(name, &robot.categories[id].attributes, &robot.categories[id].name),
             Self::Parameter(id) => {
-                let Some(parameter) = robot.parameters.get(id) else {
-                    return TokenStream::new();
-                };
+                let parameter = &robot.parameters[id];
                 let value = parameter_type(parameter.kind);
                 let kind = quote!(::bb_core::ParameterHandle<#this, #value>);
                 let arguments = quote!(#id, ::core::marker::PhantomData);
                 let function = quote!(::bb_core::ParameterHandle::new);
-                (&parameter.attributes, Some(path_text(&parameter.path)), kind, function, arguments)
+                (&parameter.attributes, path_text(&parameter.path), kind, function, arguments)
             }
         };
-        let (docs, path) = (docs(attributes), path.unwrap_or_default());
+        let docs = docs(attributes);
         let text = format!("`{path}`");
         quote! {
             #(#docs)*
@@ -360,5 +325,15 @@ impl Handle {
             #[doc = #text]
             pub const #name: #kind = #function(#path, #arguments);
         }
+    }
+}
+
+/// The constant of what has no handle but a name: `pub const moving: &str = "moving";`
+fn text(constant: &Ident, attributes: &[Attribute], name: &Ident) -> TokenStream {
+    let docs = docs(attributes);
+    let text = crate::names::text(name);
+    quote! {
+        #(#docs)*
+        pub const #constant: &str = #text;
     }
 }

@@ -4,11 +4,11 @@
 //! sensors feed begins an island of its own, as does one with `runs_on: worker`.
 
 use super::order;
-use crate::model::{EstimatorId, From, PublisherId, Robot};
+use crate::model::{EstimatorId, From, Home, Id as _, PublisherId, Robot, Table, ids};
 use crate::verify::Verified;
 use std::collections::HashMap;
 
-pub(super) type IslandId = usize;
+ids! { IslandId }
 
 /// Estimators behind one lock, in the order in which a message reaches them.
 #[derive(Clone, Debug, Default)]
@@ -19,9 +19,9 @@ pub(super) struct Island {
 /// The islands of a robot.
 #[derive(Clone, Debug)]
 pub(super) struct Islands {
-    pub(super) all: Vec<Island>,
+    pub(super) all: Table<IslandId, Island>,
     /// The island of each estimator.
-    pub(super) of: Vec<IslandId>,
+    pub(super) of: Table<EstimatorId, IslandId>,
 }
 
 /// What feeds an input.
@@ -36,9 +36,11 @@ impl Islands {
     pub(super) fn of(verified: &Verified<'_>) -> Self {
         let robot = verified.robot;
         let depths = order::depths(verified);
-        let mut order: Vec<EstimatorId> = (0..robot.estimators.len()).collect();
-        order.sort_by_key(|id| (depths.get(*id).copied(), *id));
-        let mut islands = Self { all: Vec::new(), of: vec![0; order.len()] };
+        let mut order: Vec<EstimatorId> = robot.estimators.ids().collect();
+        order.sort_by_key(|id| (depths[*id], *id));
+        // Each gets its own before what it feeds is looked at.
+        let of = robot.estimators.map(|_| IslandId::new(0));
+        let mut islands = Self { all: Table::new(), of };
         let mut begun: HashMap<Feed, IslandId> = HashMap::new();
         for id in order {
             let mut feeds = sources(verified, id).map(|source| {
@@ -53,25 +55,20 @@ impl Islands {
                 Some(feed) => *begun.entry(feed).or_insert_with(|| islands.begin()),
                 None => islands.begin(),
             };
-            if let Some(slot) = islands.of.get_mut(id) {
-                *slot = island;
-            }
-            if let Some(island) = islands.all.get_mut(island) {
-                island.estimators.push(id);
-            }
+            islands.of[id] = island;
+            islands.all[island].estimators.push(id);
         }
         islands
     }
 
     fn begin(&mut self) -> IslandId {
-        self.all.push(Island::default());
-        self.all.len() - 1
+        self.all.push(Island::default())
     }
 
     fn feed(&self, robot: &Robot, publisher: PublisherId) -> Feed {
-        match robot.publishers.get(publisher).map(|publisher| publisher.from) {
-            Some(From::Estimator(id, _)) => Feed::Island(self.of.get(id).copied().unwrap_or(0)),
-            _ => Feed::Outside(publisher),
+        match robot.publishers[publisher].from {
+            From::Estimator(id, _) => Feed::Island(self.of[id]),
+            From::Sensor(_) | From::Service(_) => Feed::Outside(publisher),
         }
     }
 }
@@ -82,13 +79,13 @@ pub(super) fn sources<'a>(
     id: EstimatorId,
 ) -> impl Iterator<Item = PublisherId> + use<'a> {
     let robot = verified.robot;
-    let nested = robot.estimators.get(id).and_then(|estimator| match estimator.home {
-        crate::model::Home::Sensor(sensor) => robot.sensors.get(sensor).map(|sensor| sensor.publisher),
-        crate::model::Home::Link(_) => None,
-    });
-    nested.into_iter().chain(verified.sources.get(id).into_iter().flatten().copied())
+    let nested = match robot.estimators[id].home {
+        Home::Sensor(sensor) => Some(robot.sensors[sensor].publisher),
+        Home::Link(_) => None,
+    };
+    nested.into_iter().chain(verified.sources[id].iter().copied())
 }
 
 fn is_worker(robot: &Robot, id: EstimatorId) -> bool {
-    robot.estimators.get(id).is_some_and(|estimator| estimator.worker.is_some())
+    robot.estimators[id].worker.is_some()
 }

@@ -45,21 +45,27 @@ pub(super) fn ident(text: &str) -> Ident {
 }
 
 /// `const _: () = function(arguments);`, spanned so that rustc underlines all of `place`.
+///
+/// It has no local names, so that it may be as if the user had written it: rustc then leaves out that the error
+/// originates in a macro.
 pub(super) fn spanned_call(place: Place, function: TokenStream, arguments: TokenStream) -> TokenStream {
-    let head = respan(quote!(const _: () = #function), place.start);
-    let tail = respan(quote!((#arguments);), place.end);
+    let head = at(quote!(const _: () = #function), place.start);
+    let tail = at(quote!((#arguments);), place.end);
     quote!(#head #tail)
 }
 
 /// The same tokens, all at `span`. Names are looked up as in the expansion, wherever `span` comes from: a robot may be
 /// declared through a `macro_rules!` of the user's.
 pub(super) fn respan(tokens: TokenStream, span: Span) -> TokenStream {
-    let span = span.resolved_at(Span::call_site());
+    at(tokens, span.resolved_at(Span::call_site()))
+}
+
+fn at(tokens: TokenStream, span: Span) -> TokenStream {
     tokens
         .into_iter()
         .map(|mut token| {
             if let TokenTree::Group(group) = &token {
-                let mut inner = Group::new(group.delimiter(), respan(group.stream(), span));
+                let mut inner = Group::new(group.delimiter(), at(group.stream(), span));
                 inner.set_span(span);
                 token = inner.into();
             } else {

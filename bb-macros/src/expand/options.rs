@@ -16,7 +16,7 @@ pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     let types = Types::new(robot, name, 0);
     let (mut fields, mut functions) = (Vec::new(), TokenStream::new());
     for part in Part::all(robot) {
-        let Some(component) = part.component(robot) else { continue };
+        let component = part.component(robot);
         let (options, given) = (types.options(part), types.given_options(part));
         // Values are expressions of the user's, so the names around them must be none of his.
         let (field, function) = (part.name(), format_ident!("__{}", part.name()));
@@ -72,12 +72,12 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
 /// A `bb_core::control::Binding`: which parameters the options of a part are bound to.
 pub(super) fn binding(types: &Types<'_>, part: Part) -> TokenStream {
     let robot = types.model();
-    let bound = part.component(robot).into_iter().flat_map(|component| &component.options);
+    let bound = part.component(robot).options.iter();
     let bound: Vec<_> = bound
         .filter_map(|option| match &option.value {
             OptionValue::Parameter(path) => {
                 let id = robot.parameter(path)?;
-                Some((&option.name, path, id, robot.parameters.get(id)?.kind))
+                Some((&option.name, path, id, robot.parameters[id].kind))
             }
             OptionValue::Quantity(_) | OptionValue::Expression { .. } => None,
         })

@@ -1,29 +1,26 @@
 //! In which order what is due at one instant happens, so that every estimator gets the newest of all its inputs.
 
-use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId, Trigger};
+use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId, Table, Trigger};
 use crate::verify::Verified;
 
 /// How many estimators stand above each one on the longest way to a sensor. Consumers of one publisher are called in
 /// this order: one that also takes what another makes of the same message comes after it.
-pub(super) fn depths(verified: &Verified<'_>) -> Vec<usize> {
-    let mut depths = vec![None; verified.robot.estimators.len()];
-    (0..depths.len()).map(|id| depth(verified, id, &mut depths)).collect()
+pub(super) fn depths(verified: &Verified<'_>) -> Table<EstimatorId, usize> {
+    let mut known = verified.robot.estimators.map(|_| None);
+    verified.robot.estimators.map(|id| depth(verified, id, &mut known))
 }
 
-fn depth(verified: &Verified<'_>, id: EstimatorId, depths: &mut [Option<usize>]) -> usize {
-    if let Some(Some(known)) = depths.get(id) {
-        return *known;
+fn depth(verified: &Verified<'_>, id: EstimatorId, known: &mut Table<EstimatorId, Option<usize>>) -> usize {
+    if let Some(known) = known[id] {
+        return known;
     }
-    let above = verified.sources.get(id).into_iter().flatten().filter_map(|source| {
-        match verified.robot.publishers.get(*source)?.from {
-            From::Estimator(above, _) => Some(depth(verified, above, depths) + 1),
-            From::Sensor(_) | From::Service(_) => None,
+    let mut deepest = 0;
+    for source in &verified.sources[id] {
+        if let From::Estimator(above, _) = verified.robot.publishers[*source].from {
+            deepest = deepest.max(depth(verified, above, known) + 1);
         }
-    });
-    let deepest = above.max().unwrap_or(0);
-    if let Some(slot) = depths.get_mut(id) {
-        *slot = Some(deepest);
     }
+    known[id] = Some(deepest);
     deepest
 }
 
@@ -31,21 +28,19 @@ fn depth(verified: &Verified<'_>, id: EstimatorId, depths: &mut [Option<usize>])
 /// run comes after those that the estimator takes besides it. Otherwise, and round a circle, by declaration.
 pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
     let robot = verified.robot;
-    let mut before: Vec<Vec<SensorId>> = vec![Vec::new(); robot.sensors.len()];
+    let mut before: Table<SensorId, Vec<SensorId>> = robot.sensors.map(|_| Vec::new());
     for (estimator, sources) in robot.estimators.iter().zip(&verified.sources) {
         let driver = estimator.inputs.iter().zip(sources).find(|(input, _)| input.driver.is_some());
         let Some(driver) = driver.and_then(|(_, source)| trigger(robot, *source)) else { continue };
         let others = sources.iter().filter_map(|source| trigger(robot, *source)).filter(|other| *other != driver);
-        if let Some(list) = before.get_mut(driver) {
-            list.extend(others);
-        }
+        before[driver].extend(others);
     }
     let mut order: Vec<SensorId> = Vec::new();
-    let mut left: Vec<SensorId> = (0..robot.sensors.len()).collect();
+    let mut left: Vec<SensorId> = robot.sensors.ids().collect();
     while !left.is_empty() {
-        let is_free =
-            |id: &SensorId| before.get(*id).is_none_or(|list| list.iter().all(|other| !left.contains(other)));
-        let next = left.iter().position(is_free).unwrap_or(0);
+        let is_free = |id: &SensorId| before[*id].iter().all(|other| !left.contains(other));
+        // Round a circle none is free; the first goes first.
+        let next = left.iter().position(is_free).unwrap_or_default();
         order.push(left.remove(next));
     }
     order

@@ -1,5 +1,6 @@
 //! The parts of a robot that are declared by a type of the user's, numbered through.
 
+use crate::model::Id as _;
 use crate::model::{ActuatorId, CommandId, EstimatorId, Robot, SensorId, ServiceId};
 use crate::parse::Component;
 use proc_macro2::{Ident, Span, TokenStream};
@@ -18,34 +19,36 @@ pub(super) enum Part {
 impl Part {
     /// All of a robot, in the order in which their options stand.
     pub(super) fn all(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
-        let sensors = (0..robot.sensors.len()).map(Self::Sensor);
-        let estimators = (0..robot.estimators.len()).map(Self::Estimator);
-        let actuators = (0..robot.actuators.len()).map(Self::Actuator);
-        let services = (0..robot.services.len()).map(Self::Service);
-        let commands = (0..robot.commands.len()).map(Self::Command);
+        let sensors = robot.sensors.ids().map(Self::Sensor);
+        let estimators = robot.estimators.ids().map(Self::Estimator);
+        let actuators = robot.actuators.ids().map(Self::Actuator);
+        let services = robot.services.ids().map(Self::Service);
+        let commands = robot.commands.ids().map(Self::Command);
         sensors.chain(estimators).chain(actuators).chain(services).chain(commands)
     }
 
     /// Its place among all.
     pub(super) fn position(self, robot: &Robot) -> usize {
-        let (sensors, estimators) = (robot.sensors.len(), robot.estimators.len());
-        let (actuators, services) = (robot.actuators.len(), robot.services.len());
+        let sensors = robot.sensors.len();
+        let estimators = sensors + robot.estimators.len();
+        let actuators = estimators + robot.actuators.len();
+        let services = actuators + robot.services.len();
         match self {
-            Self::Sensor(id) => id,
-            Self::Estimator(id) => sensors + id,
-            Self::Actuator(id) => sensors + estimators + id,
-            Self::Service(id) => sensors + estimators + actuators + id,
-            Self::Command(id) => sensors + estimators + actuators + services + id,
+            Self::Sensor(id) => id.number(),
+            Self::Estimator(id) => sensors + id.number(),
+            Self::Actuator(id) => estimators + id.number(),
+            Self::Service(id) => actuators + id.number(),
+            Self::Command(id) => services + id.number(),
         }
     }
 
-    pub(super) fn component(self, robot: &Robot) -> Option<&Component> {
+    pub(super) fn component(self, robot: &Robot) -> &Component {
         match self {
-            Self::Sensor(id) => robot.sensors.get(id).map(|sensor| &sensor.component),
-            Self::Estimator(id) => robot.estimators.get(id).map(|estimator| &estimator.component),
-            Self::Actuator(id) => robot.actuators.get(id).map(|actuator| &actuator.component),
-            Self::Service(id) => robot.services.get(id).map(|service| &service.component),
-            Self::Command(id) => robot.commands.get(id).map(|command| &command.component),
+            Self::Sensor(id) => &robot.sensors[id].component,
+            Self::Estimator(id) => &robot.estimators[id].component,
+            Self::Actuator(id) => &robot.actuators[id].component,
+            Self::Service(id) => &robot.services[id].component,
+            Self::Command(id) => &robot.commands[id].component,
         }
     }
 
@@ -62,14 +65,13 @@ impl Part {
 
     /// `s0`, `e3`: unique in the robot.
     pub(super) fn name(self) -> Ident {
-        let (letter, id) = match self {
-            Self::Sensor(id) => ('s', id),
-            Self::Estimator(id) => ('e', id),
-            Self::Actuator(id) => ('a', id),
-            Self::Service(id) => ('v', id),
-            Self::Command(id) => ('c', id),
-        };
-        format_ident!("{letter}{id}")
+        match self {
+            Self::Sensor(id) => format_ident!("s{id}"),
+            Self::Estimator(id) => format_ident!("e{id}"),
+            Self::Actuator(id) => format_ident!("a{id}"),
+            Self::Service(id) => format_ident!("v{id}"),
+            Self::Command(id) => format_ident!("c{id}"),
+        }
     }
 
     /// `__RoverS0`: the alias of its type.

@@ -6,18 +6,17 @@
 //! ```
 
 use super::literal::ident;
-use crate::model::Robot;
-use crate::names::module_name;
+use crate::model::{CategoryId, Robot};
 use crate::parse::{OptionValue, Path};
 use crate::verify::Verified;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 pub(super) fn references(verified: &Verified<'_>) -> TokenStream {
-    let (robot, name) = (verified.robot, verified.name);
-    let Some(module) = module_name(name).map(|module| ident(&module)) else { return TokenStream::new() };
+    let robot = verified.robot;
+    let module = ident(&verified.module);
     let paths: Vec<Vec<Ident>> = inputs(robot).chain(parameters(robot)).chain(control(robot)).collect();
-    let names = robot.estimators.iter().enumerate().map(|(id, estimator)| {
+    let names = robot.estimators.enumerate().map(|(id, estimator)| {
         let names = estimator.inputs.iter().map(|input| &input.name);
         quote!({ #(let #names = #id;)* })
     });
@@ -39,7 +38,7 @@ pub(super) fn references(verified: &Verified<'_>) -> TokenStream {
 fn inputs(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     let inputs = robot.estimators.iter().flat_map(|estimator| &estimator.inputs);
     inputs.filter_map(|input| {
-        let whole = &robot.publishers.get(input.source?)?.path;
+        let whole = &robot.publishers[input.source?].path;
         Some(spelt(whole, &input.path))
     })
 }
@@ -48,24 +47,22 @@ fn inputs(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
 fn parameters(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     let options = robot.components().flat_map(|component| &component.options);
     options.filter_map(|option| match &option.value {
-        OptionValue::Parameter(path) => Some(spelt(&robot.parameters.get(robot.parameter(path)?)?.path, path)),
+        OptionValue::Parameter(path) => Some(spelt(&robot.parameters[robot.parameter(path)?].path, path)),
         OptionValue::Quantity(_) | OptionValue::Expression { .. } => None,
     })
 }
 
 /// Commands of `on_…`, states, categories.
 fn control(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
-    let reactions = robot.estimators.iter().flat_map(|estimator| {
-        let settings = &estimator.health.settings;
-        settings.on_degraded.iter().chain(&settings.on_lost).chain(&settings.on_recovered)
-    });
+    let reactions = robot.estimators.iter().flat_map(|estimator| estimator.reactions.all());
     let reactions = reactions.map(|reaction| vec![at_none("command"), reaction.command.clone()]);
     let states = robot.commands.iter().filter_map(|command| command.allowed_states.as_ref()).flatten();
     let states = states.filter(|state| robot.states.iter().any(|declared| declared.name == **state));
     let states = states.map(|state| vec![at_none("state"), state.clone()]);
     let categories = robot.commands.iter().flat_map(|command| &command.settings.categories);
     // The built-in one, declared or not, has no handle.
-    let categories = categories.filter(|category| robot.category(&category.name) > Some(0));
+    let categories =
+        categories.filter(|category| robot.category(&category.name).is_some_and(|id| id != CategoryId::DEFAULT));
     let categories = categories.map(|category| vec![at_none("category"), category.name.clone()]);
     reactions.chain(states).chain(categories)
 }

@@ -16,7 +16,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
     let types = Types::new(robot, name, 0);
     // A function for each component: one for all would have a way out behind every one of them, and the time to check it
     // would grow with their square.
-    let starts = robot.estimators.iter().enumerate().map(|(id, estimator)| {
+    let starts = robot.estimators.enumerate().map(|(id, estimator)| {
         let part = Part::Estimator(id);
         let (function, options, kind) = (start_function(id), place(robot, part), types.estimator(id));
         let (taken, binding) = (types.estimator_input(id), binding(&types, part));
@@ -44,17 +44,17 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             }
         }
     });
-    let sensors = robot.sensors.iter().enumerate().map(|(id, sensor)| {
+    let sensors = robot.sensors.enumerate().map(|(id, sensor)| {
         source(&types, Part::Sensor(id), sensor.publisher, quote!(AsSensor), quote!(&__SENSORS[#id]))
     });
-    let services = robot.services.iter().enumerate().map(|(id, service)| {
+    let services = robot.services.enumerate().map(|(id, service)| {
         source(&types, Part::Service(id), service.publisher, quote!(AsService), quote!(&__SERVICES[#id]))
     });
     let sources = sensors.chain(services);
     let functions: TokenStream = starts.chain(sources).collect();
     // In groups, for the same reason.
     let sensors = order::sensors(verified).into_iter().map(Part::Sensor);
-    let order: Vec<Part> = sensors.chain((0..robot.services.len()).map(Part::Service)).collect();
+    let order: Vec<Part> = sensors.chain(robot.services.ids().map(Part::Service)).collect();
     let groups = order.chunks(16).enumerate().map(|(number, parts)| {
         let (group, functions) =
             (format_ident!("__open_group_{number}"), parts.iter().map(|part| source_function(*part)));
@@ -75,7 +75,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
         quote!(#group(wiring, options, assembly, &mut sources);)
     });
     let states = control::states(robot);
-    let commands = (0..robot.commands.len()).map(|id| {
+    let commands = robot.commands.ids().map(|id| {
         let part = Part::Command(id);
         let (kind, options, binding) = (types.part(part), place(robot, part), binding(&types, part));
         quote!(::bb_core::__private::Prepared::new::<#kind>(&options.#options, #binding))

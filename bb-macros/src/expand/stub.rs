@@ -3,6 +3,7 @@
 use super::handles::{Accessors, handles};
 use super::{definition, types};
 use crate::model::Robot;
+use crate::names::module_name;
 use proc_macro2::TokenStream;
 use quote::quote;
 
@@ -13,7 +14,8 @@ pub(crate) fn stub(robot: &Robot) -> TokenStream {
     };
     let definition = definition(robot, name);
     let aliases = types::aliases(robot, name);
-    let handles = handles(robot, name, Accessors::Stub);
+    // A name that leaves none for the module is what failed.
+    let handles = module_name(name).map(|module| handles(robot, name, &module, Accessors::Stub));
     let text = name.to_string();
     quote! {
         #[allow(non_camel_case_types)]

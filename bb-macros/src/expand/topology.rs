@@ -2,20 +2,22 @@
 
 use super::declarations::root_from;
 use super::literal::option;
-use crate::model::{Joint, Link, Mount, Robot};
+use crate::model::{Joint, Link, LinkId, Mount, Robot};
 use crate::parse::{Dynamics, Geometry, Inertial, JointKind, Limit, Mimic, Origin, Quantity, Shape};
+use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::quote;
 use syn::LitStr;
 
 /// A `bb_core::topology::Topology`.
-pub(super) fn topology(robot: &Robot) -> TokenStream {
-    let links = robot.links.iter().enumerate().map(|(id, data)| link(robot, id, data));
-    let joints = robot.joints.iter().map(|data| joint(robot, data));
+pub(super) fn topology(verified: &Verified<'_>) -> TokenStream {
+    let robot = verified.robot;
+    let links = robot.links.enumerate().map(|(id, data)| link(robot, id, data));
+    let joints = robot.joints.enumerate().map(|(id, data)| joint(robot, data, verified.children[id]));
     quote!(::bb_core::__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
 }
 
-fn link(robot: &Robot, id: usize, link: &Link) -> TokenStream {
+fn link(robot: &Robot, id: LinkId, link: &Link) -> TokenStream {
     let name = &link.label;
     let joint = option(link.joint.map(|joint| quote!(#joint)));
     let root = root_from(robot, Mount::Link(id));
@@ -32,11 +34,10 @@ fn link(robot: &Robot, id: usize, link: &Link) -> TokenStream {
     })
 }
 
-fn joint(robot: &Robot, joint: &Joint) -> TokenStream {
+fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
     let name = &joint.label;
     let kind = joint_kind(joint.kind);
     let parent = joint.parent;
-    let child = joint.children.first().copied().unwrap_or_default();
     let parent_from_joint = origin(joint.origins.first());
     let axis = option(joint.axes.first().map(|axis| {
         let direction = axis.unit();
@@ -89,7 +90,7 @@ fn dynamics(dynamics: &Dynamics) -> TokenStream {
 }
 
 fn mimic(robot: &Robot, mimic: &Mimic) -> Option<TokenStream> {
-    let joint = robot.joints.iter().position(|joint| Some(&joint.name) == mimic.joint.as_ref())?;
+    let joint = robot.joints.position(|joint| Some(&joint.name) == mimic.joint.as_ref())?;
     let (multiplier, offset) = (value(mimic.multiplier.as_ref(), 1.0), value(mimic.offset.as_ref(), 0.0));
     Some(quote!(::bb_core::__private::Mimic { joint: #joint, multiplier: #multiplier, offset: #offset }))
 }

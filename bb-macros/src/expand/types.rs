@@ -8,15 +8,15 @@ use super::part::Part;
 use crate::diagnostics::Place;
 use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId};
 use crate::parse::Component;
-use proc_macro2::{Ident, TokenStream};
-use quote::quote;
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::{format_ident, quote};
 
 /// `type __RoverS0 = Bmi270;`, if it is a sensor, else `Unknown`; and as the user wrote it, `__RoverS0Given`.
 pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
-    let aliases = Part::all(robot).filter_map(|part| {
-        let kind = &part.component(robot)?.kind;
+    let aliases = Part::all(robot).map(|part| {
+        let kind = &part.component(robot).kind;
         let (alias, given, (_, is_known)) = (part.alias(name), part.given(name), part.contract());
-        Some(quote! {
+        quote! {
             #[doc(hidden)]
             #[allow(non_camel_case_types, dead_code)]
             type #given = #kind;
@@ -26,9 +26,35 @@ pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
                 use ::bb_core::__private::NotProbed as _;
                 <::bb_core::__private::Probe<#given>>::#is_known
             }>>::Type;
-        })
+        }
     });
-    aliases.collect()
+    let marker = marker(name);
+    let marker = quote! {
+        #[doc(hidden)]
+        #[allow(non_camel_case_types, dead_code)]
+        type #marker = #name;
+    };
+    aliases.chain([marker]).collect()
+}
+
+/// The robot's type in its module.
+const ROBOT: &str = "__Robot";
+
+/// `use super::{Rover as __Robot, __RoverS0, …};` in the robot's module.
+///
+/// One import, so that it is one error where there is nothing to import: in a function, whose items no module can name. The
+/// first name says so, since rustc writes it.
+pub(super) fn imports(robot: &Robot, name: &Ident) -> TokenStream {
+    let aliases = Part::all(robot).map(|part| part.alias(name));
+    let (marker, this) = (marker(name), ident(ROBOT));
+    let imports = quote!(use super::{#marker as _, #name as #this, #(#aliases),*};);
+    let imports = respan(imports, name.span());
+    quote!(#[allow(unused_imports)] #imports)
+}
+
+/// An item beside the robot's type that only its module imports.
+fn marker(name: &Ident) -> Ident {
+    format_ident!("__{name}_must_be_declared_outside_of_functions", span = Span::call_site())
 }
 
 /// The last name of a component's type, for messages: `Madgwick`.
@@ -41,14 +67,15 @@ pub(super) fn type_name(component: &Component) -> String {
 pub(super) struct Types<'a> {
     robot: &'a Robot,
     name: &'a Ident,
-    /// `super::super::`
+    /// `super::super::`, up to the robot's module, which imports what is named here.
     above: TokenStream,
+    is_in_module: bool,
 }
 
 impl<'a> Types<'a> {
     pub(super) fn new(robot: &'a Robot, name: &'a Ident, depth: usize) -> Self {
-        let above = (0..depth).map(|_| quote!(super::)).collect();
-        Self { robot, name, above }
+        let above = (1..depth).map(|_| quote!(super::)).collect();
+        Self { robot, name, above, is_in_module: depth > 0 }
     }
 
     pub(super) fn model(&self) -> &'a Robot {
@@ -56,23 +83,24 @@ impl<'a> Types<'a> {
     }
 
     /// Who publishes.
-    pub(super) fn from(&self, publisher: PublisherId) -> Option<From> {
-        self.robot.publishers.get(publisher).map(|publisher| publisher.from)
+    pub(super) fn from(&self, publisher: PublisherId) -> From {
+        self.robot.publishers[publisher].from
     }
 
     /// The path of a publisher.
     pub(super) fn path_of_publisher(&self, id: PublisherId) -> String {
-        self.robot.publishers.get(id).map_or(String::new(), |publisher| super::path_text(&publisher.path))
+        super::path_text(&self.robot.publishers[id].path)
     }
 
     /// The path of an estimator.
     pub(super) fn path_of_estimator(&self, id: EstimatorId) -> String {
-        self.robot.estimators.get(id).map_or(String::new(), |estimator| super::path_text(&estimator.path))
+        super::path_text(&self.robot.estimators[id].path)
     }
 
     /// The robot's type.
     pub(super) fn robot(&self) -> TokenStream {
-        let (above, name) = (&self.above, ident(&self.name.to_string()));
+        let above = &self.above;
+        let name = if self.is_in_module { ident(ROBOT) } else { ident(&self.name.to_string()) };
         quote!(#above #name)
     }
 
@@ -118,22 +146,21 @@ impl<'a> Types<'a> {
 
     /// The payload of a publisher. That of an estimator's output is named through its number, see `output_index`.
     pub(super) fn payload(&self, publisher: PublisherId) -> TokenStream {
-        match self.robot.publishers.get(publisher).map(|publisher| publisher.from) {
-            Some(From::Sensor(id)) => self.output(Part::Sensor(id)),
-            Some(From::Service(id)) => self.output(Part::Service(id)),
-            Some(From::Estimator(id, output)) => {
+        match self.from(publisher) {
+            From::Sensor(id) => self.output(Part::Sensor(id)),
+            From::Service(id) => self.output(Part::Service(id)),
+            From::Estimator(id, output) => {
                 let emitted = self.estimator_output(id);
                 let index = self.output_index(id, output);
                 self.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::Payload))
             }
-            None => quote!(()),
         }
     }
 
     /// The number of a declared output in the algorithm's output type, looked up by name at compile time. An
     /// estimator without declared outputs publishes its only one.
     pub(super) fn output_index(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
-        let Some(estimator) = self.robot.estimators.get(id) else { return quote!(0) };
+        let estimator = &self.robot.estimators[id];
         let output = output.and_then(|output| estimator.outputs.get(output));
         let name = output.map_or("out".to_owned(), |output| crate::names::text(&output.name));
         let emitted = self.estimator_output(id);
@@ -142,7 +169,7 @@ impl<'a> Types<'a> {
 
     /// The number of a declared input in the algorithm's input type, looked up by name at compile time.
     pub(super) fn input_index(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
-        let Some(estimator) = self.robot.estimators.get(id) else { return quote!(0) };
+        let estimator = &self.robot.estimators[id];
         let taken = self.estimator_input(id);
         let find = match input.and_then(|input| estimator.inputs.get(input)) {
             Some(input) => {
@@ -165,9 +192,6 @@ impl<'a> Types<'a> {
 
     /// The tokens at the span of the user's type.
     fn at(&self, part: Part, tokens: TokenStream) -> TokenStream {
-        match part.component(self.robot) {
-            Some(component) => respan(tokens, Place::of(&component.kind).start),
-            None => tokens,
-        }
+        respan(tokens, Place::of(&part.component(self.robot).kind).start)
     }
 }

@@ -24,7 +24,7 @@ use super::options::{self, binding};
 use super::part::Part;
 use super::types::Types;
 use super::{order, path_text};
-use crate::model::{EstimatorId, From, Home, PublisherId};
+use crate::model::{EstimatorId, From, Home, Id as _, PublisherId, Table};
 use crate::verify::Verified;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{format_ident, quote};
@@ -37,29 +37,29 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
     let mut functions = TokenStream::new();
     let mut states = TokenStream::new();
     let mut topics = Vec::new();
-    for (id, publisher) in robot.publishers.iter().enumerate() {
+    for (id, publisher) in robot.publishers.enumerate() {
         let (payload, path) = (types.payload(id), path_text(&publisher.path));
         topics.push(Field {
             name: topic(id),
             kind: quote!(::bb_core::__private::Topic<#payload>),
             value: quote!(::bb_core::__private::Topic::new(#path)),
         });
-        functions.extend(published(&types, islands, id, consumers.get(id).map_or(&[], Vec::as_slice)));
+        functions.extend(published(&types, islands, id, &consumers[id]));
     }
-    for (id, estimator) in robot.estimators.iter().enumerate() {
+    for (id, estimator) in robot.estimators.enumerate() {
         let inputs: Vec<Option<usize>> =
             if estimator.is_nested() { vec![None] } else { (0..estimator.inputs.len()).map(Some).collect() };
         for input in inputs {
             let (name, index) = (index_name(id, input), types.input_index(id, input));
             indices.extend(quote!(const #name: usize = #index;));
         }
-        functions.extend(emitted(&types, islands, id, &estimator.publishers, robot.publishers.as_slice()));
+        functions.extend(emitted(&types, islands, id, &estimator.publishers));
         functions.extend(turn(&types, islands, id));
     }
     let mut places = Vec::new();
-    for number in 0..islands.all.len() {
+    for (number, data) in islands.all.enumerate() {
         let name = island_struct(number);
-        let nodes = islands.all.get(number).into_iter().flat_map(|island| &island.estimators).map(|id| {
+        let nodes = data.estimators.iter().map(|id| {
             let (node, start) = (node(*id), start_function(*id));
             quote!(#node: #start(options, assembly),)
         });
@@ -76,8 +76,8 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
         group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, assembly));
     let list_topics =
         group::list("__Topics", "__list_topics", &topics, &quote!(dyn ::bb_core::__private::AnyTopic));
-    let finders = (0..islands.all.len()).map(|number| {
-        let place = group::path(number, &island(number));
+    let finders = islands.all.ids().map(|number| {
+        let place = group::path(number.number(), &island(number));
         quote!(|wiring| &wiring.islands.#place)
     });
     let count = islands.all.len();
@@ -113,8 +113,8 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
 /// `static __FEEDS`: how a message of each publisher outside is published again.
 fn feeds(types: &Types<'_>) -> TokenStream {
     let count = types.model().publishers.len();
-    let feeds = (0..count).map(|id| match types.from(id) {
-        Some(From::Sensor(_) | From::Service(_)) => {
+    let feeds = types.model().publishers.ids().map(|id| match types.from(id) {
+        From::Sensor(_) | From::Service(_) => {
             let (name, payload) = (topic(id), types.payload(id));
             let feed = quote!(|wiring, message, now| {
                 let message = message.downcast::<#payload>();
@@ -122,7 +122,7 @@ fn feeds(types: &Types<'_>) -> TokenStream {
             });
             super::literal::option(Some(feed))
         }
-        _ => super::literal::option(None),
+        From::Estimator(..) => super::literal::option(None),
     });
     quote! {
         static __FEEDS: [::core::option::Option<::bb_core::__private::FeedOf<__Wiring>>; #count] = [#(#feeds),*];
@@ -132,7 +132,9 @@ fn feeds(types: &Types<'_>) -> TokenStream {
 /// `struct __Actuators`.
 fn actuators(types: &Types<'_>) -> TokenStream {
     let robot = types.model();
-    let fields: Vec<Field> = (0..robot.actuators.len())
+    let fields: Vec<Field> = robot
+        .actuators
+        .ids()
         .map(|id| {
             let part = Part::Actuator(id);
             let (kind, options, binding) = (types.part(part), options::place(robot, part), binding(types, part));
@@ -163,29 +165,30 @@ pub(super) struct Consumer {
 }
 
 /// Who takes what each publisher publishes, in the order in which they are called.
-fn consumers(verified: &Verified<'_>) -> Vec<Vec<Consumer>> {
+fn consumers(verified: &Verified<'_>) -> Table<PublisherId, Vec<Consumer>> {
     let robot = verified.robot;
-    let mut consumers: Vec<Vec<Consumer>> = robot.publishers.iter().map(|_| Vec::new()).collect();
-    for (id, (estimator, sources)) in robot.estimators.iter().zip(&verified.sources).enumerate() {
-        if let Home::Sensor(sensor) = estimator.home
-            && let Some(list) = robot.sensors.get(sensor).and_then(|sensor| consumers.get_mut(sensor.publisher))
-        {
+    let mut consumers: Table<PublisherId, Vec<Consumer>> = robot.publishers.map(|_| Vec::new());
+    for (id, estimator) in robot.estimators.enumerate() {
+        if let Home::Sensor(sensor) = estimator.home {
             let span = crate::diagnostics::Place::of(&estimator.component.kind).start;
-            list.push(Consumer { estimator: id, input: None, runs: true, span });
+            consumers[robot.sensors[sensor].publisher].push(Consumer {
+                estimator: id,
+                input: None,
+                runs: true,
+                span,
+            });
         }
-        for (number, (input, source)) in estimator.inputs.iter().zip(sources).enumerate() {
-            if let Some(list) = consumers.get_mut(*source) {
-                let span = input.path.0.last().map_or_else(Span::call_site, Ident::span);
-                let runs = estimator.inputs.len() < 2 || input.driver.is_some();
-                list.push(Consumer { estimator: id, input: Some(number), runs, span });
-            }
+        for (number, (input, source)) in estimator.inputs.iter().zip(&verified.sources[id]).enumerate() {
+            let span = input.path.0.last().map_or_else(Span::call_site, Ident::span);
+            let runs = estimator.inputs.len() < 2 || input.driver.is_some();
+            consumers[*source].push(Consumer { estimator: id, input: Some(number), runs, span });
         }
     }
     // What is kept for later comes first; then the estimators run, those that take what others make of the same message
     // after these.
     let depths = order::depths(verified);
     for list in &mut consumers {
-        list.sort_by_key(|consumer| (consumer.runs, depths.get(consumer.estimator).copied(), consumer.estimator));
+        list.sort_by_key(|consumer| (consumer.runs, depths[consumer.estimator], consumer.estimator));
     }
     consumers
 }
@@ -195,10 +198,10 @@ fn consumers(verified: &Verified<'_>) -> Vec<Vec<Consumer>> {
 /// One that an estimator publishes is called with the estimator's island open. There, what other islands keep for later
 /// goes first, then its own estimators run, then those of the others.
 fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &[Consumer]) -> TokenStream {
-    let (name, payload, topic) = (topic(id), types.payload(id), group::path(id, &topic(id)));
+    let (name, payload, topic) = (topic(id), types.payload(id), group::path(id.number(), &topic(id)));
     let own = match types.from(id) {
-        Some(From::Estimator(estimator, _)) => islands.of.get(estimator).copied(),
-        _ => None,
+        From::Estimator(estimator, _) => Some(islands.of[estimator]),
+        From::Sensor(_) | From::Service(_) => None,
     };
     let path = types.path_of_publisher(id);
     let message = quote!(message: &::bb_core::__private::Stamped<#payload>);
@@ -218,9 +221,9 @@ fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &
             if own == Some(*island) {
                 return quote!(self.#deliver(island, message, turn););
             }
-            let (place, kind) = (group::path(*island, &self::island(*island)), message_enum(*island));
+            let (place, kind) = (group::path(island.number(), &self::island(*island)), message_enum(*island));
             let variant = variant(id, *runs);
-            let entry = 2 * id + usize::from(*runs);
+            let entry = 2 * id.number() + usize::from(*runs);
             quote! {
                 self.islands.#place.enter(
                     self,
@@ -266,7 +269,7 @@ struct Visit<'a> {
 fn visits<'a>(consumers: &'a [Consumer], islands: &Islands) -> Vec<Visit<'a>> {
     let mut visits: Vec<Visit<'_>> = Vec::new();
     for consumer in consumers {
-        let island = islands.of.get(consumer.estimator).copied().unwrap_or(0);
+        let island = islands.of[consumer.estimator];
         match visits.iter_mut().find(|visit| visit.island == island && visit.runs == consumer.runs) {
             Some(visit) => visit.consumers.push(consumer),
             None => visits.push(Visit { island, runs: consumer.runs, consumers: vec![consumer] }),
@@ -279,7 +282,7 @@ fn visits<'a>(consumers: &'a [Consumer], islands: &Islands) -> Vec<Visit<'a>> {
 fn receive(types: &Types<'_>, payload: &TokenStream, consumer: &Consumer) -> TokenStream {
     let Consumer { estimator, input, span, .. } = consumer;
     let (node, emit, turn) = (node(*estimator), emit_function(*estimator), turn_function(*estimator));
-    let (index, number) = (index_name(*estimator, *input), input.unwrap_or(0));
+    let (index, number) = (index_name(*estimator, *input), input_number(*input));
     let taken = types.estimator_input(*estimator);
     let taken = quote!(<#taken as ::bb_core::__private::InputAt<{ #index }>>::Payload);
     let known = quote!({ ::bb_core::__private::both_known::<#payload, #taken>() });
@@ -299,19 +302,11 @@ fn receive(types: &Types<'_>, payload: &TokenStream, consumer: &Consumer) -> Tok
 }
 
 /// `fn e0`: publishes what an estimator has emitted, output by output.
-fn emitted(
-    types: &Types<'_>,
-    islands: &Islands,
-    id: EstimatorId,
-    publishers: &[PublisherId],
-    all: &[crate::model::Publisher],
-) -> TokenStream {
+fn emitted(types: &Types<'_>, islands: &Islands, id: EstimatorId, publishers: &[PublisherId]) -> TokenStream {
     let (name, emitted) = (emit_function(id), types.estimator_output(id));
-    let island = island_struct(islands.of.get(id).copied().unwrap_or(0));
+    let island = island_struct(islands.of[id]);
     let outputs = publishers.iter().filter_map(|publisher| {
-        let Some(From::Estimator(_, output)) = all.get(*publisher).map(|publisher| publisher.from) else {
-            return None;
-        };
+        let From::Estimator(_, output) = types.from(*publisher) else { return None };
         let (index, publish) = (types.output_index(id, output), topic(*publisher));
         let take = types.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::take));
         Some(quote! {
@@ -336,8 +331,8 @@ fn emitted(
 
 /// `fn t0`: does all that is due in an estimator; `fn h0`: hands it an entry; `fn v0`: lets a caller reach it.
 fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
-    let number = islands.of.get(id).copied().unwrap_or(0);
-    let (island, place) = (island_struct(number), group::path(number, &self::island(number)));
+    let number = islands.of[id];
+    let (island, place) = (island_struct(number), group::path(number.number(), &self::island(number)));
     let (node, emit, turn, visit) = (node(id), emit_function(id), turn_function(id), visit_function(id));
     let handle = handle_function(id);
     let kind = types.estimator(id);
@@ -391,9 +386,9 @@ fn island_state(
     types: &Types<'_>,
     islands: &Islands,
     number: IslandId,
-    consumers: &[Vec<Consumer>],
+    consumers: &Table<PublisherId, Vec<Consumer>>,
 ) -> TokenStream {
-    let Some(island) = islands.all.get(number) else { return TokenStream::new() };
+    let island = &islands.all[number];
     let (name, message) = (island_struct(number), message_enum(number));
     let fields = island.estimators.iter().map(|id| {
         let (node, kind) = (node(*id), types.estimator(*id));
@@ -403,10 +398,10 @@ fn island_state(
     let mut deliveries = TokenStream::new();
     let mut drops = TokenStream::new();
     let mut emissions = TokenStream::new();
-    for (publisher, consumers) in consumers.iter().enumerate() {
+    for (publisher, consumers) in consumers.enumerate() {
         let is_inside = match types.from(publisher) {
-            Some(From::Estimator(id, _)) => islands.of.get(id) == Some(&number),
-            _ => false,
+            From::Estimator(id, _) => islands.of[id] == number,
+            From::Sensor(_) | From::Service(_) => false,
         };
         if is_inside {
             let (publish, payload) = (topic(publisher), types.payload(publisher));
@@ -422,7 +417,7 @@ fn island_state(
             let (variant, payload) = (variant(publisher, visit.runs), types.payload(publisher));
             let deliver = deliver_function(publisher, number, visit.runs);
             let counts = visit.consumers.iter().map(|Consumer { estimator, input, .. }| {
-                let input = input.unwrap_or(0);
+                let input = input_number(*input);
                 quote!(wiring.environment.overflow(#estimator, #input);)
             });
             variants.extend(quote!(#variant(::bb_core::__private::Stamped<#payload>),));
@@ -440,10 +435,8 @@ fn island_state(
     let path = first.map_or(String::new(), |id| types.path_of_estimator(*id));
     let worker = first.map_or_else(TokenStream::new, |id| super::declarations::worker(types.model(), *id));
     let numbers = &island.estimators;
-    let is_measured = island.estimators.iter().any(|id| {
-        let estimator = types.model().estimators.get(*id);
-        estimator.is_some_and(|estimator| estimator.health.latency_budget_s.is_some())
-    });
+    let is_measured =
+        island.estimators.iter().any(|id| types.model().estimators[*id].timing.latency_budget_s.is_some());
     quote! {
         pub struct #name { #(#fields)* }
 
@@ -520,7 +513,12 @@ pub(super) fn node(id: EstimatorId) -> Ident {
 
 /// The constant that holds the number of an input in the algorithm's input type.
 pub(super) fn index_name(id: EstimatorId, input: Option<usize>) -> Ident {
-    format_ident!("__E{id}_INPUT_{}", input.unwrap_or(0))
+    format_ident!("__E{id}_INPUT_{}", input_number(input))
+}
+
+/// The number of an input in its estimator's declaration; the implicit one of a nested estimator is the only one.
+fn input_number(input: Option<usize>) -> usize {
+    input.unwrap_or_default()
 }
 
 fn emit_function(id: EstimatorId) -> Ident {

@@ -1,13 +1,14 @@
 //! Commands, their categories, and the states in which they may run.
 
 use super::Robot;
+use super::table::ids;
+use crate::language::{CategorySetting, CommandSetting};
 use crate::names::text;
-use crate::parse::{self, Cancelled, CommandSettings, Component, Setting};
+use crate::parse::{self, Cancelled, CommandSettings, Component, Settings};
 use proc_macro2::{Ident, Span};
 use syn::Attribute;
 
-pub(crate) type CommandId = usize;
-pub(crate) type CategoryId = usize;
+ids! { CommandId CategoryId }
 
 /// The operational states that every robot has.
 pub(crate) const BUILT_IN_STATES: [&str; 3] = ["disarmed", "idle", "executing"];
@@ -19,8 +20,6 @@ pub(crate) const DEFAULT_CATEGORY: &str = "default";
 pub(crate) struct Category {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// As written.
-    pub(crate) concurrencies: Vec<Setting>,
     /// How many of its commands run at once.
     pub(crate) concurrency: u32,
 }
@@ -48,13 +47,18 @@ pub(crate) enum Cancel {
     Categories(Vec<CategoryId>),
 }
 
+impl CategoryId {
+    /// That of commands that name none.
+    pub(crate) const DEFAULT: Self = Self(0);
+}
+
 impl Robot {
     pub(crate) fn command(&self, name: &Ident) -> Option<CommandId> {
-        self.commands.iter().position(|command| command.name == *name)
+        self.commands.position(|command| command.name == *name)
     }
 
     pub(crate) fn category(&self, name: &Ident) -> Option<CategoryId> {
-        self.categories.iter().position(|category| category.name == *name)
+        self.categories.position(|category| category.name == *name)
     }
 
     /// The default category gets the number 0, declared or not.
@@ -69,7 +73,13 @@ impl Robot {
     }
 
     fn resolve_command(&self, command: parse::Command) -> Command {
-        let parse::Command { attributes, name, component, settings } = command;
+        let parse::Command { attributes, name, component, settings, numbers } = command;
+        let mut timeout_s = None;
+        for (setting, quantity) in numbers.each() {
+            match setting {
+                CommandSetting::Timeout => timeout_s = Some(quantity.value),
+            }
+        }
         let category = settings.categories.first().and_then(|category| self.category(&category.name));
         let cancel = match settings.cancels.first().map(|cancel| &cancel.cancelled) {
             None => Cancel::Nothing,
@@ -84,8 +94,8 @@ impl Robot {
             name,
             component,
             allowed_states: settings.allowed_states.first().map(|allowed| allowed.states.clone()),
-            timeout_s: settings.timeouts.first().map(|timeout| timeout.quantity.value),
-            category: category.unwrap_or(0),
+            timeout_s,
+            category: category.unwrap_or(CategoryId::DEFAULT),
             cancel,
             settings,
         }
@@ -94,14 +104,19 @@ impl Robot {
 
 fn built_in_category() -> parse::Category {
     let name = Ident::new(DEFAULT_CATEGORY, Span::call_site());
-    parse::Category { attributes: Vec::new(), name, concurrencies: Vec::new() }
+    parse::Category { attributes: Vec::new(), name, settings: Settings::default() }
 }
 
 impl std::convert::From<parse::Category> for Category {
     fn from(category: parse::Category) -> Self {
-        let parse::Category { attributes, name, concurrencies } = category;
-        // A value that is no such number is refused; a cast saturates all the same.
-        let concurrency = concurrencies.first().map_or(1, |concurrency| concurrency.quantity.value as u32);
-        Self { attributes, name, concurrencies, concurrency }
+        let parse::Category { attributes, name, settings } = category;
+        let mut concurrency = 1;
+        for (setting, quantity) in settings.each() {
+            match setting {
+                // A value that is no such number is refused; a cast saturates all the same.
+                CategorySetting::Concurrency => concurrency = quantity.value as u32,
+            }
+        }
+        Self { attributes, name, concurrency }
     }
 }

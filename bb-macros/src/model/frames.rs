@@ -1,6 +1,6 @@
 //! How one frame is reached from another: the joints between, and the transform if all of them are fixed.
 
-use super::{JointId, LinkId, Mount, Rigid, Robot};
+use super::{JointId, LinkId, Mount, PublisherId, Rigid, Robot};
 use crate::names::text;
 use crate::parse::JointKind;
 use proc_macro2::Ident;
@@ -16,6 +16,15 @@ pub(crate) struct Route {
 }
 
 impl Robot {
+    /// What publishes at a joint and may tell its position; `None` where none is needed.
+    pub(crate) fn position_sources(&self, id: JointId) -> Option<Vec<PublisherId>> {
+        let joint = &self.joints[id];
+        if joint.kind == JointKind::Fixed || !joint.mimics.is_empty() {
+            return None;
+        }
+        Some(self.publishers.ids().filter(|publisher| self.mount_of(*publisher) == Mount::Joint(id)).collect())
+    }
+
     /// The way from the frame of `source` to that of `target`. What has no frame needs no way.
     pub(crate) fn route(&self, source: Mount, target: Mount) -> Route {
         let (Some((source, link_from_source)), Some((target, link_from_target))) =
@@ -37,12 +46,13 @@ impl Robot {
 
     /// The way from a frame to the root's.
     pub(crate) fn route_to_root(&self, source: Mount) -> Option<Route> {
-        (source != Mount::Robot && !self.links.is_empty()).then(|| self.route(source, Mount::Link(0)))
+        let root = self.links.ids().next()?;
+        (source != Mount::Robot).then(|| self.route(source, Mount::Link(root)))
     }
 
     /// `parent_from_joint` of the joint's origin.
     pub(crate) fn parent_from_joint(&self, joint: JointId) -> Rigid {
-        let origin = self.joints.get(joint).and_then(|joint| joint.origins.first());
+        let origin = self.joints[joint].origins.first();
         let values = |triple: Option<&[crate::parse::Quantity; 3]>| {
             triple.map_or([0.0; 3], |triple| triple.each_ref().map(|quantity| quantity.value))
         };
@@ -52,13 +62,13 @@ impl Robot {
     }
 
     fn moves(&self, joint: JointId) -> bool {
-        self.joints.get(joint).is_some_and(|joint| joint.kind != JointKind::Fixed)
+        self.joints[joint].kind != JointKind::Fixed
     }
 
     /// Every link and joint: the names from the root down to it, its own, and its docs.
     pub(crate) fn places(&self) -> impl Iterator<Item = (Vec<String>, &Ident, &[Attribute])> {
         let links =
-            self.links.iter().enumerate().map(|(id, link)| (self.place_of_link(id), &link.name, &*link.attributes));
+            self.links.enumerate().map(|(id, link)| (self.place_of_link(id), &link.name, &*link.attributes));
         let joints = self.joints.iter().map(|joint| {
             let mut place = self.place_of_link(joint.parent);
             place.push(text(&joint.name));
@@ -70,12 +80,13 @@ impl Robot {
     /// `base`, `mount`, `mast`: the names of links and joints from the root on.
     fn place_of_link(&self, link: LinkId) -> Vec<String> {
         let mut place: Vec<String> = Vec::new();
-        let mut current = self.links.get(link);
-        while let Some(link) = current {
+        let mut current = Some(link);
+        while let Some(id) = current {
+            let link = &self.links[id];
             place.push(text(&link.name));
-            let joint = link.joint.and_then(|joint| self.joints.get(joint));
+            let joint = link.joint.map(|joint| &self.joints[joint]);
             place.extend(joint.map(|joint| text(&joint.name)));
-            current = joint.and_then(|joint| self.links.get(joint.parent));
+            current = joint.map(|joint| joint.parent);
         }
         place.reverse();
         place
@@ -86,17 +97,17 @@ impl Robot {
         match mount {
             Mount::Robot => None,
             Mount::Link(link) => Some((link, Rigid::IDENTITY)),
-            Mount::Joint(joint) => Some((self.joints.get(joint)?.parent, self.parent_from_joint(joint))),
+            Mount::Joint(joint) => Some((self.joints[joint].parent, self.parent_from_joint(joint))),
         }
     }
 
     /// The joints from a link up to the root.
     fn ancestry(&self, link: LinkId) -> Vec<JointId> {
         let mut joints = Vec::new();
-        let mut link = self.links.get(link);
-        while let Some(joint) = link.and_then(|link| link.joint) {
+        let mut link = link;
+        while let Some(joint) = self.links[link].joint {
             joints.push(joint);
-            link = self.joints.get(joint).and_then(|joint| self.links.get(joint.parent));
+            link = self.joints[joint].parent;
         }
         joints
     }

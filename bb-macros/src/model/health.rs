@@ -1,18 +1,22 @@
-//! When an estimator counts as degraded or lost, and what can make it so.
+//! When an estimator counts as degraded or lost, and what that calls.
 
-use super::{CommandId, Estimator, Robot};
-use crate::parse::{HealthSettings, Reaction, RunsOn};
-use proc_macro2::Ident;
+use super::{CommandId, Robot};
+use crate::language::EstimatorSetting;
+use crate::parse::{Reaction, Reactions, RunsOn, Settings};
 
-#[derive(Clone, Debug)]
-pub(crate) struct Health {
-    /// As written.
-    pub(crate) settings: HealthSettings,
+/// The numbers that an estimator is declared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Timing {
+    pub(crate) sync_tolerance_s: Option<f64>,
     pub(crate) latency_budget_s: Option<f64>,
     pub(crate) lost_after_s: Option<f64>,
     /// How many good completions in a row end a degradation.
     pub(crate) recover_after: u32,
-    /// None where nothing is to be called, or where no command has the name.
+}
+
+/// What is called when its health changes: none where nothing is, or where no command has the name.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Health {
     pub(crate) on_degraded: Option<CommandId>,
     pub(crate) on_lost: Option<CommandId>,
     pub(crate) on_recovered: Option<CommandId>,
@@ -27,26 +31,29 @@ pub(crate) struct Worker {
     pub(crate) core: Option<u32>,
 }
 
-impl Robot {
-    pub(super) fn resolve_health(&self, settings: HealthSettings) -> Health {
-        let command = |reactions: &[Reaction]| self.command(&reactions.first()?.command);
-        Health {
-            latency_budget_s: settings.latency_budgets.first().map(|budget| budget.quantity.value),
-            lost_after_s: settings.lost_afters.first().map(|time| time.quantity.value),
-            // A value that is no such number is refused; a cast saturates all the same.
-            recover_after: settings.recover_afters.first().map_or(1, |count| count.quantity.value as u32),
-            on_degraded: command(&settings.on_degraded),
-            on_lost: command(&settings.on_lost),
-            on_recovered: command(&settings.on_recovered),
-            settings,
+impl Timing {
+    pub(super) fn of(settings: &Settings<EstimatorSetting>) -> Self {
+        let mut timing =
+            Self { sync_tolerance_s: None, latency_budget_s: None, lost_after_s: None, recover_after: 1 };
+        for (setting, quantity) in settings.each() {
+            let value = quantity.value;
+            match setting {
+                EstimatorSetting::SyncTolerance => timing.sync_tolerance_s = Some(value),
+                EstimatorSetting::LatencyBudget => timing.latency_budget_s = Some(value),
+                EstimatorSetting::LostAfter => timing.lost_after_s = Some(value),
+                // A value that is no such number is refused; a cast saturates all the same.
+                EstimatorSetting::RecoverAfter => timing.recover_after = value as u32,
+            }
         }
+        timing
     }
 }
 
-impl HealthSettings {
-    /// All reactions, in the order of their words.
-    pub(crate) fn all_reactions(&self) -> impl Iterator<Item = &Reaction> {
-        self.on_degraded.iter().chain(&self.on_lost).chain(&self.on_recovered)
+impl Robot {
+    pub(super) fn resolve_health(&self, reactions: &Reactions) -> Health {
+        let command = |reactions: &[Reaction]| self.command(&reactions.first()?.command);
+        let Reactions { on_degraded, on_lost, on_recovered } = reactions;
+        Health { on_degraded: command(on_degraded), on_lost: command(on_lost), on_recovered: command(on_recovered) }
     }
 }
 
@@ -57,20 +64,5 @@ impl Worker {
             priority: priority.as_ref().map(|priority| priority.value as u8),
             core: core.as_ref().map(|core| core.value as u32),
         })
-    }
-}
-
-impl Estimator {
-    /// The words that are of use only if the algorithm reports divergence, since nothing else can degrade this
-    /// estimator: no budget to overrun, and no input that may be missing. (Recovery is from a loss, too.)
-    pub(crate) fn needs_divergence(&self) -> impl Iterator<Item = &Ident> {
-        let Health { settings, latency_budget_s, lost_after_s, .. } = &self.health;
-        let may_miss = self.inputs.iter().any(|input| input.driver.is_none() && input.optional.is_none());
-        let degrades = latency_budget_s.is_some() || self.inputs.len() > 1 && may_miss;
-        let recovers = degrades || lost_after_s.is_some();
-        let degraded = settings.on_degraded.iter().map(|reaction| &reaction.word).filter(move |_| !degrades);
-        let recovered = settings.on_recovered.iter().map(|reaction| &reaction.word);
-        let recovered = recovered.chain(settings.recover_afters.iter().map(|count| &count.word));
-        degraded.chain(recovered.filter(move |_| !recovers))
     }
 }

@@ -1,13 +1,13 @@
 //! Parameters: values that can be changed while the robot runs, in groups.
 
 use super::Robot;
+use super::table::ids;
 use crate::names::text;
 use crate::parse::{self, Literal, ParameterItem, ParameterKind, ParameterRange, Path, Value};
 use proc_macro2::Ident;
 use syn::Attribute;
 
-pub(crate) type ParameterId = usize;
-pub(crate) type ParameterGroupId = usize;
+ids! { ParameterId ParameterGroupId }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Parameter {
@@ -52,8 +52,9 @@ impl Robot {
         for item in items {
             match item {
                 ParameterItem::Group { attributes, name, items } => {
-                    let (id, path) = (self.parameter_groups.len(), below(above, &name));
-                    self.parameter_groups.push(ParameterGroup { attributes, name, path: path.clone(), group });
+                    let path = below(above, &name);
+                    let id =
+                        self.parameter_groups.push(ParameterGroup { attributes, name, path: path.clone(), group });
                     self.add_group_items(items, Some(id), &path);
                 }
                 ParameterItem::Parameter(parameter) => {
@@ -64,7 +65,7 @@ impl Robot {
                         start: of_kind(start, kind),
                         end: of_kind(end, kind),
                     });
-                    self.parameter_paths.entry(path.join("::")).or_insert(self.parameters.len());
+                    self.parameter_paths.entry(path.join("::")).or_insert(self.parameters.next_id());
                     self.parameters.push(Parameter { attributes, name, path, group, kind, default, range });
                 }
             }

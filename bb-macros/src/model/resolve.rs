@@ -1,11 +1,13 @@
 //! The tree to lists: every part gets its number and its path, every input its publisher.
 
 use super::{
-    Actuator, Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, Robot, Sensor,
-    SensorId, Service, Worker,
+    Actuator, Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, PublisherId, Robot,
+    Sensor, Service, Table, Timing, Worker,
 };
+use crate::language::{SensorSetting, ServiceSetting};
 use crate::names::text;
-use crate::parse;
+use crate::parse::{self, Quantity};
+use crate::units::Dimension;
 use proc_macro2::Ident;
 use std::collections::HashMap;
 use syn::Visibility;
@@ -24,25 +26,29 @@ pub(crate) fn resolve(tree: parse::Robot) -> Robot {
         links,
         topologies: _,
         joints: _,
+        given,
+        repeated,
         complete,
     } = tree;
     let mut robot = Robot {
         attributes,
         visibility: visibility.unwrap_or(Visibility::Inherited),
         name,
-        links: Vec::new(),
-        joints: Vec::new(),
-        sensors: Vec::new(),
-        estimators: Vec::new(),
-        actuators: Vec::new(),
-        services: Vec::new(),
-        parameters: Vec::new(),
-        parameter_groups: Vec::new(),
+        links: Table::new(),
+        joints: Table::new(),
+        sensors: Table::new(),
+        estimators: Table::new(),
+        actuators: Table::new(),
+        services: Table::new(),
+        parameters: Table::new(),
+        parameter_groups: Table::new(),
         parameter_paths: HashMap::new(),
         states,
-        categories: Vec::new(),
-        commands: Vec::new(),
-        publishers: Vec::new(),
+        categories: Table::new(),
+        commands: Table::new(),
+        publishers: Table::new(),
+        given,
+        repeated,
         complete,
     };
     // Before what refers to them.
@@ -63,12 +69,11 @@ pub(crate) fn resolve(tree: parse::Robot) -> Robot {
 
 impl Robot {
     fn add_link(&mut self, link: parse::Link, joint: Option<JointId>, above: &[Ident]) -> LinkId {
-        let id = self.links.len();
         let path = below(above, &link.name);
         let parse::Link { attributes, name, label, sensors, estimators, joints, inertials, visuals, collisions } =
             link;
         let label = label.unwrap_or_else(|| text(&name));
-        self.links.push(Link { attributes, name, label, joint, inertials, visuals, collisions });
+        let id = self.links.push(Link { attributes, name, label, joint, inertials, visuals, collisions });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Link(id), &path);
         }
@@ -83,7 +88,6 @@ impl Robot {
     }
 
     fn add_joint(&mut self, joint: parse::Joint, parent: LinkId, above: &[Ident]) {
-        let id = self.joints.len();
         let path = below(above, &joint.name);
         let parse::Joint {
             attributes,
@@ -103,7 +107,7 @@ impl Robot {
         } = joint;
         let from_urdf = label.is_some();
         let label = label.unwrap_or_else(|| text(&name));
-        self.joints.push(Joint {
+        let id = self.joints.push(Joint {
             attributes,
             name,
             label,
@@ -127,17 +131,21 @@ impl Robot {
             self.actuators.push(Actuator { attributes, name, joint: id, component, path });
         }
         let children = links.into_iter().map(|link| self.add_link(link, Some(id), &path)).collect();
-        if let Some(joint) = self.joints.get_mut(id) {
-            joint.children = children;
-        }
+        self.joints[id].children = children;
     }
 
     fn add_sensor(&mut self, sensor: parse::Sensor, mount: Mount, above: &[Ident]) {
-        let id: SensorId = self.sensors.len();
+        let id = self.sensors.next_id();
         let path = texts("sensor", &below(above, &sensor.name));
-        let parse::Sensor { attributes, name, component, rates, estimators } = sensor;
+        let parse::Sensor { attributes, name, component, settings, estimators } = sensor;
+        let mut period_s = None;
+        for (setting, quantity) in settings.each() {
+            match setting {
+                SensorSetting::Rate => period_s = period(quantity),
+            }
+        }
         let publisher = self.add_publisher(path.clone(), From::Sensor(id));
-        self.sensors.push(Sensor { attributes, name, mount, component, rates, publisher });
+        self.sensors.push(Sensor { attributes, name, mount, component, period_s, publisher });
         for estimator in estimators {
             let mut own = path.clone();
             own.push(text(&estimator.name));
@@ -146,15 +154,21 @@ impl Robot {
     }
 
     fn add_service(&mut self, service: parse::Service) {
-        let parse::Service { kind, attributes, name, component, rates } = service;
+        let parse::Service { kind, attributes, name, component, settings } = service;
+        let mut period_s = None;
+        for (setting, quantity) in settings.each() {
+            match setting {
+                ServiceSetting::Rate => period_s = period(quantity),
+            }
+        }
         let path = vec![kind.word().to_owned(), text(&name)];
-        let publisher = self.add_publisher(path.clone(), From::Service(self.services.len()));
-        self.services.push(Service { kind, attributes, name, component, rates, publisher, path });
+        let publisher = self.add_publisher(path.clone(), From::Service(self.services.next_id()));
+        self.services.push(Service { kind, attributes, name, component, period_s, publisher, path });
     }
 
     fn add_estimator(&mut self, estimator: parse::Estimator, home: Home, path: Vec<String>) {
-        let id = self.estimators.len();
-        let parse::Estimator { attributes, name, component, inputs, outputs, sync_tolerances, health, runs_on } =
+        let id = self.estimators.next_id();
+        let parse::Estimator { attributes, name, component, inputs, outputs, settings, reactions, runs_on } =
             estimator;
         let publishers = if outputs.is_empty() {
             vec![self.add_publisher(path.clone(), From::Estimator(id, None))]
@@ -175,25 +189,25 @@ impl Robot {
             component,
             inputs,
             outputs,
-            sync_tolerances,
-            health: self.resolve_health(health),
+            timing: Timing::of(&settings),
+            settings,
+            health: self.resolve_health(&reactions),
+            reactions,
             worker: Worker::of(&runs_on),
-            runs_on,
             path,
             publishers,
         });
     }
 
-    fn add_publisher(&mut self, path: Vec<String>, from: From) -> usize {
-        self.publishers.push(Publisher { path, from });
-        self.publishers.len() - 1
+    fn add_publisher(&mut self, path: Vec<String>, from: From) -> PublisherId {
+        self.publishers.push(Publisher { path, from })
     }
 
     /// Finds what each input names: by its whole path, or by the end of one that no other has.
     fn resolve_inputs(&mut self) {
-        let mut by_path: HashMap<String, Vec<usize>> = HashMap::new();
-        let mut whole: HashMap<String, usize> = HashMap::new();
-        for (id, publisher) in self.publishers.iter().enumerate() {
+        let mut by_path: HashMap<String, Vec<PublisherId>> = HashMap::new();
+        let mut whole: HashMap<String, PublisherId> = HashMap::new();
+        for (id, publisher) in self.publishers.enumerate() {
             whole.entry(publisher.path.join("::")).or_insert(id);
             for start in 0..publisher.path.len() {
                 by_path.entry(publisher.path[start..].join("::")).or_default().push(id);
@@ -226,4 +240,9 @@ fn below(above: &[Ident], name: &Ident) -> Vec<Ident> {
 
 fn texts(root: &str, path: &[Ident]) -> Vec<String> {
     std::iter::once(root.to_owned()).chain(path.iter().map(text)).collect()
+}
+
+/// Of a rate that is none, none: it is refused.
+fn period(rate: &Quantity) -> Option<f64> {
+    (rate.dimension == Dimension::FREQUENCY && rate.value > 0.0).then(|| 1.0 / rate.value)
 }

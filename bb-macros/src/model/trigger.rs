@@ -1,8 +1,6 @@
 //! What makes a publisher publish, followed back through estimators, and how often that is.
 
 use super::{From, Home, PublisherId, Robot, SensorId, ServiceId};
-use crate::parse::Setting;
-use crate::units::Dimension;
 
 /// Where a chain of messages starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,12 +13,12 @@ impl Robot {
     /// Whose message makes this publisher publish. None round a circle and where an input names nothing.
     pub(crate) fn trigger(&self, mut publisher: PublisherId) -> Option<Trigger> {
         for _ in 0..=self.estimators.len() {
-            let id = match self.publishers.get(publisher)?.from {
+            let id = match self.publishers[publisher].from {
                 From::Sensor(id) => return Some(Trigger::Sensor(id)),
                 From::Service(id) => return Some(Trigger::Service(id)),
                 From::Estimator(id, _) => id,
             };
-            let estimator = self.estimators.get(id)?;
+            let estimator = &self.estimators[id];
             match estimator.home {
                 Home::Sensor(sensor) => return Some(Trigger::Sensor(sensor)),
                 Home::Link(_) => publisher = estimator.driver()?.source?,
@@ -31,11 +29,9 @@ impl Robot {
 
     /// The time between two messages of a publisher, in s, if the rate behind it is declared.
     pub(crate) fn period_s(&self, publisher: PublisherId) -> Option<f64> {
-        let rates: &[Setting] = match self.trigger(publisher)? {
-            Trigger::Sensor(id) => &self.sensors.get(id)?.rates,
-            Trigger::Service(id) => &self.services.get(id)?.rates,
-        };
-        let rate = &rates.first()?.quantity;
-        (rate.dimension == Dimension::FREQUENCY && rate.value > 0.0).then(|| 1.0 / rate.value)
+        match self.trigger(publisher)? {
+            Trigger::Sensor(id) => self.sensors[id].period_s,
+            Trigger::Service(id) => self.services[id].period_s,
+        }
     }
 }

@@ -1,9 +1,11 @@
 //! `actuator servo: Dynamixel(id = 3);`
 
 use super::Component;
-use super::block::{Head, items, unexpected};
+use super::Notes;
+use super::Settings;
+use super::block::{Head, items};
 use super::component::Declared;
-use crate::diagnostics::Diagnostics;
+use crate::language::{ActuatorItem, Nothing};
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::parse::ParseStream;
@@ -16,10 +18,10 @@ pub(crate) struct Actuator {
 }
 
 impl Actuator {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let Declared { attributes, name, component, body } = Declared::parse(head, input, diagnostics)?;
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        let Declared { attributes, name, component, body } = Declared::parse(head, input, notes)?;
         if let Some(body) = body {
-            items(&body, diagnostics, |head, _, _| Err(unexpected(&head.word, "an actuator", &[])));
+            items::<ActuatorItem, Nothing>(&body, notes, &mut Settings::default(), |item, _, _, _| match item {});
         }
         Ok(Self { attributes, name, component })
     }

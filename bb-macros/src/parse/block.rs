@@ -1,55 +1,14 @@
-//! The contents of braces, item by item, and how to go on behind one that cannot be read.
+//! The contents of braces, item by item, and how to go on after one that cannot be read.
 
-use crate::diagnostics::{Diagnostics, Place};
-use crate::names::{did_you_mean, one_of};
+use super::name::{is_keyword, whole};
+use super::{Notes, Setting, Settings};
+use crate::diagnostics::Place;
+use crate::language::{self, Occurs, Word, Words, unexpected};
 use proc_macro2::{Delimiter, Ident, TokenTree};
 use syn::buffer::Cursor;
 use syn::ext::IdentExt;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{Attribute, Token};
-
-/// All words of the language that start an item: where reading can restart.
-pub(crate) const WORDS: &[&str] = &[
-    "parameters",
-    "states",
-    "commands",
-    "category",
-    "sensors",
-    "controllers",
-    "controller",
-    "bridges",
-    "bridge",
-    "topology",
-    "link",
-    "joint",
-    "sensor",
-    "actuator",
-    "estimator",
-    "input",
-    "output",
-    "rate",
-    "sync_tolerance",
-    "latency_budget",
-    "lost_after",
-    "recover_after",
-    "on_degraded",
-    "on_lost",
-    "on_recovered",
-    "runs_on",
-    "allowed_states",
-    "timeout",
-    "cancel",
-    "concurrency",
-    "origin",
-    "axis",
-    "limit",
-    "dynamics",
-    "mimic",
-    "transmission",
-    "inertial",
-    "visual",
-    "collision",
-];
 
 /// An item's attributes and its first word.
 pub(super) struct Head {
@@ -62,10 +21,11 @@ impl Head {
     pub(super) fn name(&self, input: ParseStream<'_>) -> syn::Result<Ident> {
         let text = self.word.to_string();
         if NO_WORDS.contains(&&*text) && input.peek(Ident::peek_any) {
-            let message = format!("what stands in this block starts with its name; leave `{text}` out");
+            let message = format!("an item of this block starts with its name; leave `{text}` out");
             return Err(syn::Error::new(self.word.span(), message));
         }
-        if syn::parse_str::<Ident>(&text).is_err() {
+        whole(input, &self.word)?;
+        if is_keyword(&self.word) {
             let message = format!("`{text}` is a keyword of Rust; choose another name");
             return Err(syn::Error::new(self.word.span(), message));
         }
@@ -76,23 +36,43 @@ impl Head {
 /// What those may write in front of a name who know that other blocks have a word there.
 const NO_WORDS: [&str; 5] = ["command", "state", "parameter", "param", "group"];
 
-/// Reads items until the end. `item` gets each head and reads the rest; an item that it cannot read is reported and
-/// skipped.
-pub(super) fn items(
+/// Reads the items of a place until the end: the settings among them to `settings`, of any other `item` gets the head and
+/// reads the rest. An item that cannot be read is reported and skipped.
+pub(super) fn items<I: Words, S: Words>(
     input: ParseStream<'_>,
-    diagnostics: &mut Diagnostics,
-    item: impl FnMut(Head, ParseStream<'_>, &mut Diagnostics) -> syn::Result<()>,
+    notes: &mut Notes<'_>,
+    settings: &mut Settings<S>,
+    mut item: impl FnMut(I, Head, ParseStream<'_>, &mut Notes<'_>) -> syn::Result<()>,
 ) {
     let expected = "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`";
-    items_of(input, expected, diagnostics, item);
+    let mut seen: Vec<&str> = Vec::new();
+    items_of(input, expected, notes, |head, input, notes| {
+        let ident = head.word.clone();
+        let text = ident.to_string();
+        let word = if let Some((word, key)) = S::of(&text) {
+            settings.push(key, Setting::parse(word, head, input, notes)?);
+            word
+        } else if let Some((word, key)) = I::of(&text) {
+            item(key, head, input, notes)?;
+            word
+        } else {
+            return Err(unexpected::<I, S>(&ident));
+        };
+        if seen.contains(&word.text) {
+            notes.repeat(ident);
+        } else if word.occurs == Occurs::Once {
+            seen.push(word.text);
+        }
+        Ok(())
+    });
 }
 
 /// The same where items start with a name; `expected` is the error for what is none.
 pub(super) fn items_of(
     input: ParseStream<'_>,
     expected: &str,
-    diagnostics: &mut Diagnostics,
-    mut item: impl FnMut(Head, ParseStream<'_>, &mut Diagnostics) -> syn::Result<()>,
+    notes: &mut Notes<'_>,
+    mut item: impl FnMut(Head, ParseStream<'_>, &mut Notes<'_>) -> syn::Result<()>,
 ) {
     while !input.is_empty() {
         if input.peek(Token![;]) {
@@ -100,28 +80,42 @@ pub(super) fn items_of(
             let _: syn::Result<Token![;]> = input.parse();
             continue;
         }
-        let result = head(input, expected, diagnostics).and_then(|head| item(head, input, diagnostics));
+        let result = match head(input, expected, notes) {
+            Ok(Some(head)) => item(head, input, notes),
+            // Nothing follows a comment that is none.
+            Ok(None) => return,
+            Err(error) => Err(error),
+        };
         if let Err(error) = result {
-            diagnostics.syntax(&error);
+            notes.syntax(&error);
             skip(input);
         }
     }
 }
 
-/// Opens `{ … }`.
-pub(super) fn braced<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>> {
+/// Opens the `{ … }` that must follow `word`.
+pub(super) fn braced<'a>(input: ParseStream<'a>, word: &Word) -> syn::Result<ParseBuffer<'a>> {
+    if !input.peek(syn::token::Brace) {
+        let message = format!("expected `{{`, as in `{}{}`", word.text, word.example);
+        return Err(syn::Error::new(input.span(), message));
+    }
+    opened(input)
+}
+
+/// Opens a `{ … }` that is known to come next.
+pub(super) fn opened<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>> {
     let content;
     syn::braced!(content in input);
     Ok(content)
 }
 
 /// Reads `;`. If it is missing that is reported; if the next item follows at once, reading goes on there.
-pub(super) fn semicolon(input: ParseStream<'_>, behind: &str, diagnostics: &mut Diagnostics) {
+pub(super) fn semicolon(input: ParseStream<'_>, after: &str, notes: &mut Notes<'_>) {
     if input.peek(Token![;]) {
         let _: syn::Result<Token![;]> = input.parse();
         return;
     }
-    diagnostics.at(input.span(), format!("expected `;` behind {behind}"));
+    notes.at(input.span(), format!("expected `;` after {after}"));
     skip_to_item(input);
 }
 
@@ -129,7 +123,7 @@ pub(super) fn semicolon(input: ParseStream<'_>, behind: &str, diagnostics: &mut 
 pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Result<()> {
     let place = input.span();
     let colon: syn::Result<Token![:]> = input.parse();
-    colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} behind `{name}`")))
+    colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }
 
 /// The tokens from `start` up to where `input` stands.
@@ -155,37 +149,47 @@ pub(super) fn skip_to_item(input: ParseStream<'_>) {
 
 /// Whether an item starts here: with a word of the language, or a name with a `:` or with braces behind it.
 pub(super) fn starts_item(input: ParseStream<'_>) -> bool {
-    let is_word = input.fork().call(Ident::parse_any).map(|word| WORDS.contains(&&*word.to_string()));
+    let is_word = input.fork().call(Ident::parse_any).map(|word| language::starts_item(&word.to_string()));
     let is_name = input.peek2(Token![:]) && !input.peek2(Token![::]) || input.peek2(syn::token::Brace);
     is_word.is_ok_and(|is_word| is_word || is_name)
 }
 
-/// The error for a word that does not belong here.
-pub(super) fn unexpected(word: &Ident, place: &str, allowed: &[&str]) -> syn::Error {
-    let name = word.to_string();
-    let message = if allowed.is_empty() {
-        format!("{place} holds nothing; leave this out")
-    } else if WORDS.contains(&&*name) {
-        format!("`{name}` does not belong in {place}, which holds {}", one_of(allowed))
-    } else {
-        let hint = did_you_mean(&name, allowed.iter().copied());
-        format!("unknown word `{name}`; {place} holds {}{hint}", one_of(allowed))
-    };
-    syn::Error::new(word.span(), message)
-}
-
-fn head(input: ParseStream<'_>, expected: &str, diagnostics: &mut Diagnostics) -> syn::Result<Head> {
-    let attributes = input.call(Attribute::parse_outer)?;
+fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::Result<Option<Head>> {
+    let before = notes.count();
+    let attributes = attributes(input, notes)?;
+    if input.is_empty() && attributes.is_empty() && notes.count() > before {
+        return Ok(None);
+    }
     for attribute in attributes.iter().filter(|attribute| !attribute.path().is_ident("doc")) {
         let message = "only doc comments can stand before a part of a robot; leave this attribute out";
-        diagnostics.error(attribute, message.into());
+        notes.error(attribute, message.into());
     }
     let place = input.span();
     let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, expected))?;
-    Ok(Head { attributes, word })
+    Ok(Some(Head { attributes, word }))
 }
 
-/// Skips to behind the next `;` or `{ … }` of this level.
+/// Reads attributes and doc comments; what is a comment in other languages is reported and passed over.
+pub(super) fn attributes(input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Vec<Attribute>> {
+    let mut attributes = Vec::new();
+    while input.peek(Token![#]) {
+        if input.peek2(syn::token::Bracket) {
+            attributes.extend(input.call(Attribute::parse_outer)?);
+            continue;
+        }
+        let place = input.span();
+        let message = if input.peek2(Token![!]) {
+            "`//!` and `#![…]` cannot stand in a robot; write `///` before what it documents"
+        } else {
+            "`#` starts no comment; write `//`"
+        };
+        notes.at(place, message.into());
+        while input.span().start().line == place.start().line && input.parse::<TokenTree>().is_ok() {}
+    }
+    Ok(attributes)
+}
+
+/// Skips past the next `;` or `{ … }` of this level.
 fn skip(input: ParseStream<'_>) {
     while !input.is_empty() {
         let Ok(token) = input.parse::<TokenTree>() else {

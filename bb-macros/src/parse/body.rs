@@ -1,9 +1,13 @@
 //! What a link weighs, looks like and occupies: `inertial`, `visual` and `collision`, with URDF's meaning.
 
+use super::Notes;
 use super::block::{Head, colon, semicolon};
 use super::record::{array, record};
 use super::{Origin, Quantity};
-use crate::diagnostics::Diagnostics;
+use crate::language::{
+    CollisionField, CylinderField, InertiaField, InertialField, MaterialField, MeshField, SphereField, VisualField,
+    Word, words,
+};
 use proc_macro2::Ident;
 use syn::LitStr;
 use syn::parse::ParseStream;
@@ -44,93 +48,147 @@ pub(crate) struct Material {
     pub(crate) texture: Option<LitStr>,
 }
 
-/// The moments of inertia, in the order in which they are kept.
-const MOMENTS: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
-
 impl Inertial {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut inertial = Self { word: head.word, origin: None, mass: None, inertia: Default::default() };
-        record(input, &["mass", "origin", "inertia"], |field, input| {
-            match &*field.to_string() {
-                "mass" => inertial.mass = Some(Quantity::parse(input)?),
-                "origin" => inertial.origin = Some(Origin::parse_value(field.clone(), input)?),
-                _ => record(input, &MOMENTS, |moment, input| {
-                    let quantity = Quantity::parse(input)?;
-                    for (slot, name) in inertial.inertia.iter_mut().zip(MOMENTS) {
-                        if moment == name {
-                            *slot = Some(quantity.clone());
-                        }
-                    }
-                    Ok(())
-                })?,
+        record(&words::INERTIAL, input, notes, |field, word, _, input, notes| {
+            match field {
+                InertialField::Mass => inertial.mass = Some(Quantity::of(word, input, notes)?),
+                InertialField::Origin => {
+                    inertial.origin = Some(Origin::parse_value(word, input, notes)?);
+                }
+                InertialField::Inertia => inertia(word, &mut inertial.inertia, input, notes)?,
             }
             Ok(())
         })?;
-        semicolon(input, "`inertial`", diagnostics);
+        semicolon(input, "`inertial`", notes);
         Ok(inertial)
     }
 }
 
+fn inertia(
+    word: &Word,
+    moments: &mut [Option<Quantity>; 6],
+    input: ParseStream<'_>,
+    notes: &mut Notes<'_>,
+) -> syn::Result<()> {
+    let [xx, xy, xz, yy, yz, zz] = moments;
+    record(word, input, notes, |field, word, _, input, notes| {
+        let slot = match field {
+            InertiaField::Xx => &mut *xx,
+            InertiaField::Xy => &mut *xy,
+            InertiaField::Xz => &mut *xz,
+            InertiaField::Yy => &mut *yy,
+            InertiaField::Yz => &mut *yz,
+            InertiaField::Zz => &mut *zz,
+        };
+        *slot = Some(Quantity::of(word, input, notes)?);
+        Ok(())
+    })
+}
+
 impl Shape {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn visual(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
-        let fields = ["origin", "box", "cylinder", "sphere", "mesh", "material"];
-        // A collision is not to be seen.
-        let fields = if head.word == "visual" { &fields[..] } else { &fields[..5] };
-        let mut shape = Self { word: head.word, origin: None, geometries: Vec::new(), material: None };
-        record(input, fields, |field, input| {
-            match &*field.to_string() {
-                "origin" => shape.origin = Some(Origin::parse_value(field.clone(), input)?),
-                "material" => shape.material = Some(Material::parse(input)?),
-                kind => shape.geometries.push((field.clone(), Geometry::parse(kind, input)?)),
+        let mut shape = Self::new(head.word);
+        record(&words::VISUAL, input, notes, |field, word, ident, input, notes| {
+            match field {
+                VisualField::Origin => {
+                    shape.origin = Some(Origin::parse_value(word, input, notes)?);
+                }
+                VisualField::Box => shape.add(ident, Geometry::cuboid(word, input, notes)?),
+                VisualField::Cylinder => shape.add(ident, Geometry::cylinder(word, input, notes)?),
+                VisualField::Sphere => shape.add(ident, Geometry::sphere(word, input, notes)?),
+                VisualField::Mesh => shape.add(ident, Geometry::mesh(word, input, notes)?),
+                VisualField::Material => shape.material = Some(Material::parse(word, input, notes)?),
             }
             Ok(())
         })?;
-        semicolon(input, &format!("`{}`", shape.word), diagnostics);
+        semicolon(input, "`visual`", notes);
         Ok(shape)
+    }
+
+    pub(super) fn collision(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        colon(input, &head.word, "its fields in braces")?;
+        let mut shape = Self::new(head.word);
+        record(&words::COLLISION, input, notes, |field, word, ident, input, notes| {
+            match field {
+                CollisionField::Origin => {
+                    shape.origin = Some(Origin::parse_value(word, input, notes)?);
+                }
+                CollisionField::Box => shape.add(ident, Geometry::cuboid(word, input, notes)?),
+                CollisionField::Cylinder => shape.add(ident, Geometry::cylinder(word, input, notes)?),
+                CollisionField::Sphere => shape.add(ident, Geometry::sphere(word, input, notes)?),
+                CollisionField::Mesh => shape.add(ident, Geometry::mesh(word, input, notes)?),
+            }
+            Ok(())
+        })?;
+        semicolon(input, "`collision`", notes);
+        Ok(shape)
+    }
+
+    fn new(word: Ident) -> Self {
+        Self { word, origin: None, geometries: Vec::new(), material: None }
+    }
+
+    fn add(&mut self, word: &Ident, geometry: Geometry) {
+        self.geometries.push((word.clone(), geometry));
     }
 }
 
 impl Geometry {
-    fn parse(kind: &str, input: ParseStream<'_>) -> syn::Result<Self> {
-        let (mut radius, mut length, mut file, mut scale) = (None, None, None, None);
-        match kind {
-            "box" => return array(input).map(Self::Box),
-            "cylinder" => record(input, &["radius", "length"], |field, input| {
-                let slot = if field == "radius" { &mut radius } else { &mut length };
-                *slot = Some(Quantity::parse(input)?);
-                Ok(())
-            })?,
-            "sphere" => record(input, &["radius"], |_, input| {
-                radius = Some(Quantity::parse(input)?);
-                Ok(())
-            })?,
-            _ => record(input, &["file", "scale"], |field, input| {
-                if field == "file" {
-                    file = Some(input.parse()?);
-                } else {
-                    scale = Some(array(input)?);
-                }
-                Ok(())
-            })?,
-        }
-        Ok(match kind {
-            "cylinder" => Self::Cylinder { radius, length },
-            "sphere" => Self::Sphere { radius },
-            _ => Self::Mesh { file, scale },
-        })
+    fn cuboid(word: &'static Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        array(word, input, notes).map(Self::Box)
+    }
+
+    fn cylinder(word: &Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        let mut radius = None;
+        let mut length = None;
+        record(word, input, notes, |field, word, _, input, notes| {
+            let slot = match field {
+                CylinderField::Radius => &mut radius,
+                CylinderField::Length => &mut length,
+            };
+            *slot = Some(Quantity::of(word, input, notes)?);
+            Ok(())
+        })?;
+        Ok(Self::Cylinder { radius, length })
+    }
+
+    fn sphere(word: &Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        let mut radius = None;
+        record(word, input, notes, |field, word, _, input, notes| {
+            match field {
+                SphereField::Radius => radius = Some(Quantity::of(word, input, notes)?),
+            }
+            Ok(())
+        })?;
+        Ok(Self::Sphere { radius })
+    }
+
+    fn mesh(word: &Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        let mut file = None;
+        let mut scale = None;
+        record(word, input, notes, |field, word, _, input, notes| {
+            match field {
+                MeshField::File => file = Some(input.parse()?),
+                MeshField::Scale => scale = Some(array(word, input, notes)?),
+            }
+            Ok(())
+        })?;
+        Ok(Self::Mesh { file, scale })
     }
 }
 
 impl Material {
-    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+    fn parse(word: &Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let mut material = Self::default();
-        record(input, &["name", "color", "texture"], |field, input| {
-            match &*field.to_string() {
-                "name" => material.name = Some(input.parse()?),
-                "color" => material.color = Some(array(input)?),
-                _ => material.texture = Some(input.parse()?),
+        record(word, input, notes, |field, word, _, input, notes| {
+            match field {
+                MaterialField::Name => material.name = Some(input.parse()?),
+                MaterialField::Color => material.color = Some(array(word, input, notes)?),
+                MaterialField::Texture => material.texture = Some(input.parse()?),
             }
             Ok(())
         })?;

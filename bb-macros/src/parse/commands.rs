@@ -4,10 +4,12 @@ mod settings;
 
 pub(crate) use settings::{Cancelled, CommandSettings};
 
-use super::block::{Head, braced, items, items_of, semicolon, unexpected};
-use super::component::{Declared, name};
-use super::{Component, Setting};
-use crate::diagnostics::Diagnostics;
+use super::Notes;
+use super::block::{Head, braced, items, items_of, opened, semicolon};
+use super::component::Declared;
+use super::name::name;
+use super::{Component, Settings};
+use crate::language::{CategoryItem, CategorySetting, CommandSetting, CommandsItem, Words, words};
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
@@ -24,7 +26,7 @@ pub(crate) struct Commands {
 pub(crate) struct Category {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    pub(crate) concurrencies: Vec<Setting>,
+    pub(crate) settings: Settings<CategorySetting>,
 }
 
 /// `stop: Stop { cancel: all; }`
@@ -34,19 +36,20 @@ pub(crate) struct Command {
     pub(crate) name: Ident,
     pub(crate) component: Component,
     pub(crate) settings: CommandSettings,
+    pub(crate) numbers: Settings<CommandSetting>,
 }
 
 impl Commands {
     /// Reads the braces.
-    pub(super) fn parse(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+    pub(super) fn parse(&mut self, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<()> {
         const EXPECTED: &str = "expected a command, as in `arm: Arm;`, or a `category`";
-        let body = braced(input)?;
-        items_of(&body, EXPECTED, diagnostics, |head, input, diagnostics| {
+        let body = braced(input, &words::COMMANDS)?;
+        items_of(&body, EXPECTED, notes, |head, input, notes| {
             // A command may have that name.
-            if head.word == "category" && !input.peek(Token![:]) {
-                self.categories.push(Category::parse(head, input, diagnostics)?);
+            if CommandsItem::of(&head.word.to_string()).is_some() && !input.peek(Token![:]) {
+                self.categories.push(Category::parse(head, input, notes)?);
             } else {
-                self.commands.push(Command::parse(head, input, diagnostics)?);
+                self.commands.push(Command::parse(head, input, notes)?);
             }
             Ok(())
         });
@@ -55,34 +58,29 @@ impl Commands {
 }
 
 impl Category {
-    fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        let mut category = Self { attributes: head.attributes, name, concurrencies: Vec::new() };
+        let mut category = Self { attributes: head.attributes, name, settings: Settings::default() };
         if !input.peek(syn::token::Brace) {
-            semicolon(input, &format!("the category `{}`", category.name), diagnostics);
+            semicolon(input, &format!("the category `{}`", category.name), notes);
             return Ok(category);
         }
-        let body = braced(input)?;
-        items(&body, diagnostics, |head, input, diagnostics| {
-            if head.word != "concurrency" {
-                return Err(unexpected(&head.word, "a category", &["concurrency"]));
-            }
-            category.concurrencies.push(Setting::parse_count(head, input, diagnostics)?);
-            Ok(())
-        });
+        let body = opened(input)?;
+        items::<CategoryItem, _>(&body, notes, &mut category.settings, |item, _, _, _| match item {});
         Ok(category)
     }
 }
 
 impl Command {
-    fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = head.name(input)?;
-        let declared = Declared::named(head.attributes, name, input, diagnostics)?;
+        let declared = Declared::named(head.attributes, name, input, notes)?;
         let Declared { attributes, name, component, body } = declared;
         let mut settings = CommandSettings::default();
+        let mut numbers = Settings::default();
         if let Some(body) = body {
-            items(&body, diagnostics, |head, input, diagnostics| settings.item(head, input, diagnostics));
+            items(&body, notes, &mut numbers, |item, head, input, notes| settings.item(item, head, input, notes));
         }
-        Ok(Self { attributes, name, component, settings })
+        Ok(Self { attributes, name, component, settings, numbers })
     }
 }

@@ -2,10 +2,11 @@
 //!
 //! Both forms are read alike; that a nested one takes no `input` is a rule, so that the error can say why.
 
-use super::block::{Head, items, unexpected};
+use super::Notes;
+use super::block::{Head, items};
 use super::component::Declared;
-use super::{Component, HealthSettings, Input, Output, RunsOn, Setting};
-use crate::diagnostics::Diagnostics;
+use super::{Component, Input, Output, Reaction, Reactions, RunsOn, Settings};
+use crate::language::{EstimatorItem, EstimatorSetting};
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::parse::ParseStream;
@@ -17,53 +18,38 @@ pub(crate) struct Estimator {
     pub(crate) component: Component,
     pub(crate) inputs: Vec<Input>,
     pub(crate) outputs: Vec<Output>,
-    pub(crate) sync_tolerances: Vec<Setting>,
-    pub(crate) health: HealthSettings,
+    pub(crate) settings: Settings<EstimatorSetting>,
+    pub(crate) reactions: Reactions,
     pub(crate) runs_on: Vec<RunsOn>,
 }
 
-/// What an estimator holds.
-const WORDS: &[&str] = &[
-    "input",
-    "output",
-    "sync_tolerance",
-    "latency_budget",
-    "lost_after",
-    "recover_after",
-    "on_degraded",
-    "on_lost",
-    "on_recovered",
-    "runs_on",
-];
-
 impl Estimator {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let Declared { attributes, name, component, body } = Declared::parse(head, input, diagnostics)?;
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        let Declared { attributes, name, component, body } = Declared::parse(head, input, notes)?;
         let mut estimator = Self {
             attributes,
             name,
             component,
             inputs: Vec::new(),
             outputs: Vec::new(),
-            sync_tolerances: Vec::new(),
-            health: HealthSettings::default(),
+            settings: Settings::default(),
+            reactions: Reactions::default(),
             runs_on: Vec::new(),
         };
         if let Some(body) = body {
-            items(&body, diagnostics, |head, input, diagnostics| estimator.item(head, input, diagnostics));
+            let Self { inputs, outputs, settings, reactions, runs_on, .. } = &mut estimator;
+            items(&body, notes, settings, |item, head, input, notes| {
+                match item {
+                    EstimatorItem::Input => inputs.push(Input::parse(head, input, notes)?),
+                    EstimatorItem::Output => outputs.push(Output::parse(head, input, notes)?),
+                    EstimatorItem::RunsOn => runs_on.push(RunsOn::parse(head, input, notes)?),
+                    EstimatorItem::OnDegraded => reactions.on_degraded.push(Reaction::parse(head, input, notes)?),
+                    EstimatorItem::OnLost => reactions.on_lost.push(Reaction::parse(head, input, notes)?),
+                    EstimatorItem::OnRecovered => reactions.on_recovered.push(Reaction::parse(head, input, notes)?),
+                }
+                Ok(())
+            });
         }
         Ok(estimator)
-    }
-
-    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
-        let Some(head) = self.health.item(head, input, diagnostics)? else { return Ok(()) };
-        match &*head.word.to_string() {
-            "input" => self.inputs.push(Input::parse(head, input, diagnostics)?),
-            "output" => self.outputs.push(Output::parse(head, input, diagnostics)?),
-            "sync_tolerance" => self.sync_tolerances.push(Setting::parse(head, input, diagnostics)?),
-            "runs_on" => self.runs_on.push(RunsOn::parse(head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "an estimator", WORDS)),
-        }
-        Ok(())
     }
 }

@@ -1,13 +1,13 @@
 //! `input gnss: sensor::base_link::gnss, optional, within: 250 ms;`
 
+use super::Notes;
 use super::block::{Head, colon, semicolon};
-use super::component::name;
+use super::name::name;
+use super::record::properties;
 use super::{Path, Quantity};
-use crate::diagnostics::Diagnostics;
-use crate::names::did_you_mean;
+use crate::language::InputField;
 use proc_macro2::Ident;
 use syn::Token;
-use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
 #[derive(Clone, Debug)]
@@ -23,37 +23,41 @@ pub(crate) struct Input {
 }
 
 impl Input {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        unnamed(&input.fork())?;
         let name = name(input, &head.word)?;
         colon(input, &name, "the path of a publisher")?;
-        let path = Path::parse(input, "the path of a publisher, as in `sensor::base_link::imu`")?;
+        let path = Path::parse_publisher(input)?;
         let mut parsed = Self { word: head.word, name, path, driver: None, optional: None, within: None };
-        while input.peek(Token![,]) {
-            input.parse::<Token![,]>()?;
-            parsed.property(input, diagnostics)?;
-        }
-        semicolon(input, &format!("`{}`", parsed.name), diagnostics);
-        Ok(parsed)
-    }
-
-    fn property(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
-        const EXPECTED: &str = "expected `driver`, `optional` or `within: …`";
-        let place = input.span();
-        let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, EXPECTED))?;
-        match &*word.to_string() {
-            "driver" => self.driver = Some(word),
-            "optional" => self.optional = Some(word),
-            "within" => {
-                colon(input, &word, "a time")?;
-                if self.within.replace(Quantity::parse(input)?).is_some() {
-                    diagnostics.error(&word, "`within` stands here twice; leave one out".into());
+        properties(input, notes, |field, word, ident, input, notes| {
+            match field {
+                InputField::Driver => parsed.driver = Some(ident.clone()),
+                InputField::Optional => parsed.optional = Some(ident.clone()),
+                InputField::Within => {
+                    if parsed.within.replace(Quantity::of(word, input, notes)?).is_some() {
+                        notes.repeat(ident.clone());
+                    }
                 }
             }
-            other => {
-                let hint = did_you_mean(other, ["driver", "optional", "within"]);
-                return Err(syn::Error::new(word.span(), format!("{EXPECTED}{hint}")));
-            }
+            Ok(())
+        })?;
+        semicolon(input, &format!("`{}`", parsed.name), notes);
+        Ok(parsed)
+    }
+}
+
+/// That no path stands where the name is expected.
+fn unnamed(input: ParseStream<'_>) -> syn::Result<()> {
+    let Ok(path) = Path::parse(input, "") else { return Ok(()) };
+    match &path.0[..] {
+        [_, .., last] if input.peek(Token![;]) || input.peek(Token![,]) => {
+            let (path_text, last) = (path.text(), crate::names::text(last));
+            let message = format!(
+                "expected the name of this `input` before the path, as in `input {last}: {path_text};`; the algorithm \
+                 says what its inputs are called"
+            );
+            Err(path.place().syntax(message))
         }
-        Ok(())
+        _ => Ok(()),
     }
 }

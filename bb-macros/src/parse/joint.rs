@@ -6,10 +6,11 @@ mod mechanics;
 pub(crate) use geometry::{Axis, Limit, Origin};
 pub(crate) use mechanics::{Dynamics, Mimic, Transmission};
 
-use super::block::{Head, braced, colon, items, semicolon, unexpected};
-use super::component::name;
-use super::{Actuator, Link, Sensor};
-use crate::diagnostics::Diagnostics;
+use super::Notes;
+use super::block::{Head, colon, items, opened, semicolon};
+use super::name::name;
+use super::{Actuator, Link, Sensor, Settings};
+use crate::language::{JointItem, Nothing};
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::Ident;
 use syn::Attribute;
@@ -61,6 +62,11 @@ impl JointKind {
         Self::ALL.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind)
     }
 
+    /// Whether it turns about an axis, so that its position is an angle.
+    pub(crate) fn turns(self) -> bool {
+        matches!(self, Self::Revolute | Self::Continuous)
+    }
+
     fn parse(word: &Ident) -> syn::Result<Self> {
         let name = word.to_string();
         Self::of(&name).ok_or_else(|| {
@@ -71,12 +77,8 @@ impl JointKind {
     }
 }
 
-/// What a joint holds.
-const WORDS: &[&str] =
-    &["origin", "axis", "limit", "dynamics", "mimic", "transmission", "sensor", "actuator", "link"];
-
 impl Joint {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
         colon(input, &name, "the type of the joint")?;
         let place = input.span();
@@ -101,34 +103,41 @@ impl Joint {
             links: Vec::new(),
         };
         if input.peek(syn::token::Brace) {
-            let body = braced(input)?;
-            items(&body, diagnostics, |head, input, diagnostics| joint.item(head, input, diagnostics));
+            let body = opened(input)?;
+            let around = std::mem::replace(&mut notes.joint, kind.clone().ok());
+            items(&body, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
+                joint.item(item, head, input, notes)
+            });
+            notes.joint = around;
         } else {
-            semicolon(input, &format!("`{}`", joint.name), diagnostics);
+            semicolon(input, &format!("`{}`", joint.name), notes);
         }
         if let Err(error) = kind {
             // What it carries is known all the same; whether it needs an axis and a limit is not.
-            diagnostics.syntax(&error);
+            notes.syntax(&error);
             joint.axes.clear();
             joint.limits.clear();
         }
         Ok(joint)
     }
 
-    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
-        match &*head.word.to_string() {
-            "origin" => self.origins.push(Origin::parse(head, input, diagnostics)?),
-            "axis" => self.axes.push(Axis::parse(head, input, diagnostics)?),
-            "limit" => self.limits.push(Limit::parse(head, input, diagnostics)?),
-            "dynamics" => self.dynamics.push(Dynamics::parse(head, input, diagnostics)?),
-            "mimic" => self.mimics.push(Mimic::parse(head, input, diagnostics)?),
-            "transmission" => self.transmissions.push(Transmission::parse(head, input, diagnostics)?),
-            "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
-            "actuator" => self.actuators.push(Actuator::parse(head, input, diagnostics)?),
-            "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
-            _ => {
-                return Err(unexpected(&head.word, "a joint", WORDS));
-            }
+    fn item(
+        &mut self,
+        item: JointItem,
+        head: Head,
+        input: ParseStream<'_>,
+        notes: &mut Notes<'_>,
+    ) -> syn::Result<()> {
+        match item {
+            JointItem::Origin => self.origins.push(Origin::parse(head, input, notes)?),
+            JointItem::Axis => self.axes.push(Axis::parse(head, input, notes)?),
+            JointItem::Limit => self.limits.push(Limit::parse(head, input, notes)?),
+            JointItem::Dynamics => self.dynamics.push(Dynamics::parse(head, input, notes)?),
+            JointItem::Mimic => self.mimics.push(Mimic::parse(head, input, notes)?),
+            JointItem::Transmission => self.transmissions.push(Transmission::parse(head, input, notes)?),
+            JointItem::Sensor => self.sensors.push(Sensor::parse(head, input, notes)?),
+            JointItem::Actuator => self.actuators.push(Actuator::parse(head, input, notes)?),
+            JointItem::Link => self.links.push(Link::parse(&head, input, notes)?),
         }
         Ok(())
     }

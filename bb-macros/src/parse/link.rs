@@ -1,9 +1,10 @@
 //! `link base { sensor … estimator … joint … }`
 
-use super::block::{Head, braced, items, semicolon, unexpected};
-use super::component::name;
-use super::{Estimator, Inertial, Joint, Sensor, Shape};
-use crate::diagnostics::Diagnostics;
+use super::Notes;
+use super::block::{Head, items, opened, semicolon};
+use super::name::name;
+use super::{Estimator, Inertial, Joint, Sensor, Settings, Shape};
+use crate::language::{LinkItem, Nothing};
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::parse::ParseStream;
@@ -22,11 +23,8 @@ pub(crate) struct Link {
     pub(crate) collisions: Vec<Shape>,
 }
 
-/// What a link holds.
-const WORDS: &[&str] = &["sensor", "estimator", "joint", "inertial", "visual", "collision"];
-
 impl Link {
-    pub(super) fn parse(head: &Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: &Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
         let mut link = Self {
             attributes: head.attributes.clone(),
@@ -40,23 +38,30 @@ impl Link {
             collisions: Vec::new(),
         };
         if input.peek(syn::token::Brace) {
-            let body = braced(input)?;
-            items(&body, diagnostics, |head, input, diagnostics| link.item(head, input, diagnostics));
+            let body = opened(input)?;
+            items(&body, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
+                link.item(item, head, input, notes)
+            });
         } else {
-            semicolon(input, &format!("`{}`", link.name), diagnostics);
+            semicolon(input, &format!("`{}`", link.name), notes);
         }
         Ok(link)
     }
 
-    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
-        match &*head.word.to_string() {
-            "sensor" => self.sensors.push(Sensor::parse(head, input, diagnostics)?),
-            "estimator" => self.estimators.push(Estimator::parse(head, input, diagnostics)?),
-            "joint" => self.joints.push(Joint::parse(head, input, diagnostics)?),
-            "inertial" => self.inertials.push(Inertial::parse(head, input, diagnostics)?),
-            "visual" => self.visuals.push(Shape::parse(head, input, diagnostics)?),
-            "collision" => self.collisions.push(Shape::parse(head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "a link", WORDS)),
+    fn item(
+        &mut self,
+        item: LinkItem,
+        head: Head,
+        input: ParseStream<'_>,
+        notes: &mut Notes<'_>,
+    ) -> syn::Result<()> {
+        match item {
+            LinkItem::Sensor => self.sensors.push(Sensor::parse(head, input, notes)?),
+            LinkItem::Estimator => self.estimators.push(Estimator::parse(head, input, notes)?),
+            LinkItem::Joint => self.joints.push(Joint::parse(head, input, notes)?),
+            LinkItem::Inertial => self.inertials.push(Inertial::parse(head, input, notes)?),
+            LinkItem::Visual => self.visuals.push(Shape::visual(head, input, notes)?),
+            LinkItem::Collision => self.collisions.push(Shape::collision(head, input, notes)?),
         }
         Ok(())
     }

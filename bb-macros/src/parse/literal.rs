@@ -2,6 +2,7 @@
 
 use super::Quantity;
 use super::block::{place_since, starts_item};
+use super::quantity::decimal_comma;
 use crate::diagnostics::Place;
 use crate::units::Dimension;
 use proc_macro2::Ident;
@@ -33,6 +34,7 @@ pub(crate) enum Value {
 impl Literal {
     pub(super) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let (start, place) = (input.cursor(), input.span());
+        decimal_comma(&input.fork()).map_or(Ok(()), Err)?;
         let value = if let Some(integer) = integer(input) {
             input.parse::<Option<Token![-]>>()?;
             input.parse::<Lit>()?;

@@ -1,9 +1,9 @@
 //! `output pose;` or `output velocity: [nav, velocity];`
 
+use super::Notes;
 use super::block::{Head, semicolon};
-use super::component::name;
+use super::name::name;
 use super::record::names;
-use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
@@ -17,14 +17,14 @@ pub(crate) struct Output {
 }
 
 impl Output {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
         let mut path = None;
         if input.peek(Token![:]) {
             input.parse::<Token![:]>()?;
             path = Some(names(input, "a path has at least one name, as in `[nav, velocity]`")?);
         }
-        semicolon(input, &format!("`{name}`"), diagnostics);
+        semicolon(input, &format!("`{name}`"), notes);
         Ok(Self { attributes: head.attributes, name, path })
     }
 }

@@ -1,8 +1,10 @@
 //! `parameters { imu { beta: f64 = 0.1, range: 0.0..=1.0; } }`
 
 use super::Literal;
-use super::block::{Head, braced, colon, items_of, semicolon};
-use crate::diagnostics::Diagnostics;
+use super::Notes;
+use super::block::{Head, colon, items_of, opened, semicolon};
+use super::record::properties;
+use crate::language::ParameterField;
 use crate::names::did_you_mean;
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
@@ -45,24 +47,24 @@ pub(crate) struct ParameterRange {
 
 impl ParameterItem {
     /// Reads the content of the braces.
-    pub(super) fn parse_all(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> Vec<Self> {
+    pub(super) fn parse_all(input: ParseStream<'_>, notes: &mut Notes<'_>) -> Vec<Self> {
         const EXPECTED: &str =
             "expected a parameter, as in `gain: f64 = 0.1;`, or a group of them, as in `imu { }`";
         let mut parsed = Vec::new();
-        items_of(input, EXPECTED, diagnostics, |head, input, diagnostics| {
-            parsed.push(Self::parse(head, input, diagnostics)?);
+        items_of(input, EXPECTED, notes, |head, input, notes| {
+            parsed.push(Self::parse(head, input, notes)?);
             Ok(())
         });
         parsed
     }
 
-    fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = head.name(input)?;
         if input.peek(syn::token::Brace) {
-            let items = Self::parse_all(&braced(input)?, diagnostics);
+            let items = Self::parse_all(&opened(input)?, notes);
             return Ok(Self::Group { attributes: head.attributes, name, items });
         }
-        Parameter::parse(head.attributes, name, input, diagnostics).map(Self::Parameter)
+        Parameter::parse(head.attributes, name, input, notes).map(Self::Parameter)
     }
 }
 
@@ -71,7 +73,7 @@ impl Parameter {
         attributes: Vec<Attribute>,
         name: Ident,
         input: ParseStream<'_>,
-        diagnostics: &mut Diagnostics,
+        notes: &mut Notes<'_>,
     ) -> syn::Result<Self> {
         colon(input, &name, "the type of the parameter")?;
         let kind = ParameterKind::parse(input)?;
@@ -80,11 +82,17 @@ impl Parameter {
         equals.map_err(|_| syn::Error::new(place, format!("expected `=` and the default of `{name}`")))?;
         let default = Literal::parse(input)?;
         let mut range = None;
-        if input.peek(Token![,]) {
-            input.parse::<Token![,]>()?;
-            range = Some(ParameterRange::parse(input)?);
-        }
-        semicolon(input, &format!("`{name}`"), diagnostics);
+        properties(input, notes, |field, _, ident, input, notes| {
+            match field {
+                ParameterField::Range => {
+                    if range.replace(ParameterRange::parse(ident.clone(), input)?).is_some() {
+                        notes.repeat(ident.clone());
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        semicolon(input, &format!("`{name}`"), notes);
         Ok(Self { attributes, name, kind, default, range })
     }
 }
@@ -112,14 +120,7 @@ impl ParameterKind {
 }
 
 impl ParameterRange {
-    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
-        const EXPECTED: &str = "expected `range: …`, as in `range: 0.0..=1.0`";
-        let place = input.span();
-        let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, EXPECTED))?;
-        if word != "range" {
-            return Err(syn::Error::new(word.span(), EXPECTED));
-        }
-        colon(input, &word, "its ends, as in `0.0..=1.0`,")?;
+    fn parse(word: Ident, input: ParseStream<'_>) -> syn::Result<Self> {
         let start = Literal::parse(input)?;
         let place = input.span();
         let dots: syn::Result<Token![..=]> = input.parse();

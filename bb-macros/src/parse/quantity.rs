@@ -1,12 +1,14 @@
 //! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also glued, `20ms`.
 
+use super::Notes;
 use super::block::{place_since, starts_item};
 use crate::diagnostics::Place;
+use crate::language::{Value, Word};
 use crate::units::{Dimension, Unit};
-use proc_macro2::{Ident, Span};
+use proc_macro2::Ident;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
-use syn::{Lit, Token};
+use syn::{Lit, LitInt, Token};
 
 /// A literal number with its unit, if it has one.
 #[derive(Clone, Debug)]
@@ -31,13 +33,24 @@ impl Quantity {
         is_number(input)
     }
 
-    /// Reads a number of which the rules will say that it is whole and has no unit.
-    pub(crate) fn parse_count(input: ParseStream<'_>) -> syn::Result<Self> {
-        if Self::peek(input) { Self::parse(input) } else { Err(input.error("expected a whole number")) }
+    /// Reads the number that is given to a word; the rules say whether it is one that the word takes.
+    pub(super) fn of(word: &'static Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        if matches!(word.value, Value::Count { .. }) && !Self::peek(input) {
+            return Err(input.error("expected a whole number"));
+        }
+        let quantity = Self::parse(input)?;
+        notes.give(word, &quantity);
+        Ok(quantity)
     }
 
     /// Reads a number, and the unit if one follows.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        decimal_comma(&input.fork()).map_or(Ok(()), Err)?;
+        Self::parse_element(input)
+    }
+
+    /// The same in a list, where a number may follow a comma.
+    pub(crate) fn parse_element(input: ParseStream<'_>) -> syn::Result<Self> {
         let start = input.cursor();
         let sign = if input.peek(Token![-]) {
             input.parse::<Token![-]>()?;
@@ -63,7 +76,7 @@ impl Quantity {
         let number = digits.parse::<f64>().ok().filter(|number| number.is_finite());
         let number = number.ok_or_else(|| syn::Error::new(literal.span(), "this number is too large"))?;
         let unit = if !suffix.is_empty() {
-            Some(Unit::with_suffix(&suffix_ident(&suffix, literal.span())?, input)?)
+            Some(Unit::with_suffix(&suffix, literal.span(), input)?)
         } else if input.peek(Ident::peek_any) && !starts_item(input) {
             Some(Unit::parse(input)?)
         } else {
@@ -78,6 +91,20 @@ impl Quantity {
     }
 }
 
+/// The error for a number that is written with a comma, `0,5`, if one starts here.
+pub(super) fn decimal_comma(input: ParseStream<'_>) -> Option<syn::Error> {
+    let start = input.cursor();
+    input.parse::<Option<Token![-]>>().ok()?;
+    let whole: LitInt = input.parse().ok()?;
+    input.parse::<Token![,]>().ok()?;
+    let digits: LitInt = input.parse().ok()?;
+    if !whole.suffix().is_empty() {
+        return None;
+    }
+    let message = format!("a decimal point is written `.`; try `{whole}.{digits}`");
+    Some(place_since(start, input).syntax(message))
+}
+
 /// Divides where the factor is the inverse of a whole number, so that `20 ms` is the double nearest to 0.02.
 fn scaled(number: f64, factor: f64) -> f64 {
     let inverse = (1.0 / factor).round();
@@ -86,13 +113,6 @@ fn scaled(number: f64, factor: f64) -> f64 {
     } else {
         number * factor
     }
-}
-
-fn suffix_ident(suffix: &str, span: Span) -> syn::Result<Ident> {
-    let mut ident: Ident =
-        syn::parse_str(suffix).map_err(|_| syn::Error::new(span, format!("unknown unit `{suffix}`")))?;
-    ident.set_span(span);
-    Ok(ident)
 }
 
 #[cfg(test)]

@@ -1,8 +1,11 @@
 //! `robot Rover; parameters { … } states { … } commands { … } sensors { … } link base { … }`
 
-use super::block::{Head, braced, items, semicolon, skip_to_item, unexpected};
-use super::{Commands, JointAddition, Link, ParameterItem, Sensor, Service, ServiceKind, State, Topology};
-use crate::diagnostics::Diagnostics;
+use super::Notes;
+use super::block::{Head, attributes, braced, items, semicolon, skip_to_item};
+use super::{
+    Commands, Given, JointAddition, Link, ParameterItem, Sensor, Service, ServiceKind, Settings, State, Topology,
+};
+use crate::language::{Nothing, RobotItem, SensorsItem, words};
 use proc_macro2::{Ident, Span};
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
@@ -25,68 +28,79 @@ pub(crate) struct Robot {
     pub(crate) topologies: Vec<Topology>,
     /// What is declared onto joints of the URDF.
     pub(crate) joints: Vec<JointAddition>,
+    /// All numbers that are given to words of the language.
+    pub(crate) given: Vec<Given>,
+    /// All words that are written more often than they may.
+    pub(crate) repeated: Vec<Ident>,
     /// Whether everything could be read; if not, what is missing may have been declared.
     pub(crate) complete: bool,
 }
 
-/// What a robot holds.
-const WORDS: &[&str] =
-    &["parameters", "states", "commands", "sensors", "controllers", "bridges", "link", "topology"];
-
 impl Robot {
-    pub(super) fn parse(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) {
-        if let Err(error) = self.header(input, diagnostics) {
-            diagnostics.syntax(&error);
+    pub(super) fn parse(&mut self, input: ParseStream<'_>, notes: &mut Notes<'_>) {
+        if let Err(error) = self.header(input, notes) {
+            notes.syntax(&error);
             skip_to_item(input);
         }
-        items(input, diagnostics, |head, input, diagnostics| self.item(head, input, diagnostics));
+        items(input, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
+            self.item(item, head, input, notes)
+        });
     }
 
-    /// `pub robot Rover;` If it is not there, nothing is consumed.
-    fn header(&mut self, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
+    /// `pub robot Rover;` If it is not there, its attributes alone are consumed.
+    fn header(&mut self, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<()> {
         const EXPECTED: &str = "expected the robot's name first, as in `robot Rover;`";
         if input.is_empty() {
             return Err(syn::Error::new(Span::call_site(), EXPECTED));
         }
+        let comments = attributes(input, notes)?;
         let ahead = input.fork();
-        ahead.call(Attribute::parse_outer)?;
         ahead.parse::<Visibility>()?;
         let place = ahead.span();
         if ahead.call(Ident::parse_any).ok().is_none_or(|word| word != "robot") {
             return Err(syn::Error::new(place, EXPECTED));
         }
-        self.attributes = input.call(Attribute::parse_outer)?;
+        self.attributes = comments;
         self.visibility = Some(input.parse()?);
         let word = input.call(Ident::parse_any)?;
-        self.name = Some(super::component::name(input, &word)?);
-        semicolon(input, "the robot's name", diagnostics);
+        self.name = Some(super::name::name(input, &word)?);
+        semicolon(input, "the robot's name", notes);
         Ok(())
     }
 
-    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
-        match &*head.word.to_string() {
-            "parameters" => {
-                let body = braced(input)?;
-                self.parameters.extend(ParameterItem::parse_all(&body, diagnostics));
+    fn item(
+        &mut self,
+        item: RobotItem,
+        head: Head,
+        input: ParseStream<'_>,
+        notes: &mut Notes<'_>,
+    ) -> syn::Result<()> {
+        match item {
+            RobotItem::Topology => self.topologies.push(Topology::parse(head, input, notes)?),
+            RobotItem::Parameters => {
+                let body = braced(input, &words::PARAMETERS)?;
+                self.parameters.extend(ParameterItem::parse_all(&body, notes));
             }
-            "states" => self.states.extend(State::parse_all(input, diagnostics)?),
-            "commands" => self.commands.parse(input, diagnostics)?,
-            "controllers" => self.services.extend(Service::parse_all(ServiceKind::Controller, input, diagnostics)?),
-            "bridges" => self.services.extend(Service::parse_all(ServiceKind::Bridge, input, diagnostics)?),
-            "link" => self.links.push(Link::parse(&head, input, diagnostics)?),
-            "sensors" => {
-                let body = braced(input)?;
-                items(&body, diagnostics, |head, input, diagnostics| {
-                    if head.word != "sensor" {
-                        return Err(unexpected(&head.word, "`sensors`", &["sensor"]));
+            RobotItem::States => self.states.extend(State::parse_all(input, notes)?),
+            RobotItem::Commands => self.commands.parse(input, notes)?,
+            RobotItem::Controllers => {
+                let word = &words::CONTROLLERS;
+                self.services.extend(Service::parse_all(ServiceKind::Controller, word, input, notes)?);
+            }
+            RobotItem::Bridges => {
+                self.services.extend(Service::parse_all(ServiceKind::Bridge, &words::BRIDGES, input, notes)?);
+            }
+            RobotItem::Sensors => {
+                let body = braced(input, &words::SENSORS)?;
+                items(&body, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
+                    match item {
+                        SensorsItem::Sensor => self.sensors.push(Sensor::parse(head, input, notes)?),
                     }
-                    self.sensors.push(Sensor::parse(head, input, diagnostics)?);
                     Ok(())
                 });
             }
-            "topology" => self.topologies.push(Topology::parse(head, input, diagnostics)?),
-            "joint" => self.joints.push(JointAddition::parse(&head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "a robot", WORDS)),
+            RobotItem::Link => self.links.push(Link::parse(&head, input, notes)?),
+            RobotItem::Joint => self.joints.push(JointAddition::parse(&head, input, notes)?),
         }
         Ok(())
     }

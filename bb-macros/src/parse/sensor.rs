@@ -1,9 +1,10 @@
 //! `sensor imu: Bmi270(bus = 1) { rate: 200 Hz; estimator … }`
 
-use super::block::{Head, items, unexpected};
+use super::Notes;
+use super::block::{Head, items};
 use super::component::Declared;
-use super::{Component, Estimator, Setting};
-use crate::diagnostics::Diagnostics;
+use super::{Component, Estimator, Settings};
+use crate::language::{SensorItem, SensorSetting};
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::parse::ParseStream;
@@ -13,26 +14,24 @@ pub(crate) struct Sensor {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     pub(crate) component: Component,
-    pub(crate) rates: Vec<Setting>,
+    pub(crate) settings: Settings<SensorSetting>,
     pub(crate) estimators: Vec<Estimator>,
 }
 
 impl Sensor {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        let Declared { attributes, name, component, body } = Declared::parse(head, input, diagnostics)?;
-        let mut sensor = Self { attributes, name, component, rates: Vec::new(), estimators: Vec::new() };
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        let Declared { attributes, name, component, body } = Declared::parse(head, input, notes)?;
+        let mut sensor =
+            Self { attributes, name, component, settings: Settings::default(), estimators: Vec::new() };
         if let Some(body) = body {
-            items(&body, diagnostics, |head, input, diagnostics| sensor.item(head, input, diagnostics));
+            let Self { settings, estimators, .. } = &mut sensor;
+            items(&body, notes, settings, |item, head, input, notes| {
+                match item {
+                    SensorItem::Estimator => estimators.push(Estimator::parse(head, input, notes)?),
+                }
+                Ok(())
+            });
         }
         Ok(sensor)
-    }
-
-    fn item(&mut self, head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<()> {
-        match &*head.word.to_string() {
-            "rate" => self.rates.push(Setting::parse(head, input, diagnostics)?),
-            "estimator" => self.estimators.push(Estimator::parse(head, input, diagnostics)?),
-            _ => return Err(unexpected(&head.word, "a sensor", &["rate", "estimator"])),
-        }
-        Ok(())
     }
 }

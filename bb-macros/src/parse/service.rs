@@ -1,9 +1,10 @@
 //! `controller stability: Stability() { rate: 100 Hz; }`, and a `bridge` alike: what runs beside the topology.
 
-use super::block::{Head, braced, items, unexpected};
+use super::Notes;
+use super::block::{Head, braced, items};
 use super::component::Declared;
-use super::{Component, Setting};
-use crate::diagnostics::Diagnostics;
+use super::{Component, Settings};
+use crate::language::{BridgeItem, BridgesItem, ControllerItem, ControllersItem, Nothing, ServiceSetting, Word};
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::parse::ParseStream;
@@ -14,7 +15,7 @@ pub(crate) struct Service {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     pub(crate) component: Component,
-    pub(crate) rates: Vec<Setting>,
+    pub(crate) settings: Settings<ServiceSetting>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -31,52 +32,45 @@ impl ServiceKind {
             Self::Bridge => "bridge",
         }
     }
-
-    /// The word of the block in which it stands.
-    fn block(self) -> &'static str {
-        match self {
-            Self::Controller => "controllers",
-            Self::Bridge => "bridges",
-        }
-    }
 }
 
 impl Service {
-    /// Reads the braces of `controllers` or `bridges`.
+    /// Reads the braces of `controllers` or `bridges`, the `word`.
     pub(super) fn parse_all(
         kind: ServiceKind,
+        word: &Word,
         input: ParseStream<'_>,
-        diagnostics: &mut Diagnostics,
+        notes: &mut Notes<'_>,
     ) -> syn::Result<Vec<Self>> {
-        let body = braced(input)?;
+        let body = braced(input, word)?;
         let mut services = Vec::new();
-        items(&body, diagnostics, |head, input, diagnostics| {
-            if head.word != kind.word() {
-                return Err(unexpected(&head.word, &format!("`{}`", kind.block()), &[kind.word()]));
-            }
-            services.push(Self::parse(kind, head, input, diagnostics)?);
-            Ok(())
-        });
+        let none = &mut Settings::<Nothing>::default();
+        match kind {
+            ServiceKind::Controller => items(&body, notes, none, |item, head, input, notes| match item {
+                ControllersItem::Controller => {
+                    Self::parse(kind, head, input, notes).map(|service| services.push(service))
+                }
+            }),
+            ServiceKind::Bridge => items(&body, notes, none, |item, head, input, notes| match item {
+                BridgesItem::Bridge => Self::parse(kind, head, input, notes).map(|service| services.push(service)),
+            }),
+        }
         Ok(services)
     }
 
-    fn parse(
-        kind: ServiceKind,
-        head: Head,
-        input: ParseStream<'_>,
-        diagnostics: &mut Diagnostics,
-    ) -> syn::Result<Self> {
-        let Declared { attributes, name, component, body } = Declared::parse(head, input, diagnostics)?;
-        let mut rates = Vec::new();
+    fn parse(kind: ServiceKind, head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
+        let Declared { attributes, name, component, body } = Declared::parse(head, input, notes)?;
+        let mut settings = Settings::default();
         if let Some(body) = body {
-            items(&body, diagnostics, |head, input, diagnostics| {
-                if head.word != "rate" {
-                    return Err(unexpected(&head.word, &format!("a {}", kind.word()), &["rate"]));
+            match kind {
+                ServiceKind::Controller => {
+                    items::<ControllerItem, _>(&body, notes, &mut settings, |item, _, _, _| match item {});
                 }
-                rates.push(Setting::parse(head, input, diagnostics)?);
-                Ok(())
-            });
+                ServiceKind::Bridge => {
+                    items::<BridgeItem, _>(&body, notes, &mut settings, |item, _, _, _| match item {});
+                }
+            }
         }
-        Ok(Self { kind, attributes, name, component, rates })
+        Ok(Self { kind, attributes, name, component, settings })
     }
 }

@@ -1,8 +1,8 @@
-//! A setting: a word, a colon and a quantity.
+//! A setting: a word, a colon and a number.
 
-use super::Quantity;
 use super::block::{Head, colon, semicolon};
-use crate::diagnostics::Diagnostics;
+use super::{Notes, Quantity};
+use crate::language::Word;
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
 
@@ -13,30 +13,43 @@ pub(crate) struct Setting {
     pub(crate) quantity: Quantity,
 }
 
+/// The settings of a block, each with its word, as they are written.
+#[derive(Clone, Debug)]
+pub(crate) struct Settings<S>(Vec<(S, Setting)>);
+
 impl Setting {
-    /// Reads what stands behind the word.
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
-        Self::parse_with(Quantity::parse, head, input, diagnostics)
-    }
-
-    /// The same for a number that counts.
-    pub(super) fn parse_count(
+    /// Reads what follows the word.
+    pub(super) fn parse(
+        word: &'static Word,
         head: Head,
         input: ParseStream<'_>,
-        diagnostics: &mut Diagnostics,
-    ) -> syn::Result<Self> {
-        Self::parse_with(Quantity::parse_count, head, input, diagnostics)
-    }
-
-    fn parse_with(
-        quantity: impl FnOnce(ParseStream<'_>) -> syn::Result<Quantity>,
-        head: Head,
-        input: ParseStream<'_>,
-        diagnostics: &mut Diagnostics,
+        notes: &mut Notes<'_>,
     ) -> syn::Result<Self> {
         colon(input, &head.word, "a value")?;
-        let quantity = quantity(input)?;
-        semicolon(input, &format!("`{}`", head.word), diagnostics);
+        let quantity = Quantity::of(word, input, notes)?;
+        semicolon(input, &format!("`{}`", head.word), notes);
         Ok(Self { word: head.word, quantity })
+    }
+}
+
+impl<S> Default for Settings<S> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<S: Copy + PartialEq> Settings<S> {
+    pub(super) fn push(&mut self, word: S, setting: Setting) {
+        self.0.push((word, setting));
+    }
+
+    /// All that are written, by their words; a rule reports one that is written twice.
+    pub(crate) fn each(&self) -> impl Iterator<Item = (S, &Quantity)> {
+        self.0.iter().map(|(word, setting)| (*word, &setting.quantity))
+    }
+
+    /// Those of one word.
+    pub(crate) fn of(&self, word: S) -> impl Iterator<Item = &Setting> {
+        self.0.iter().filter(move |(other, _)| *other == word).map(|(_, setting)| setting)
     }
 }

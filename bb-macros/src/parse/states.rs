@@ -1,7 +1,7 @@
 //! `states { degraded; moving; }`
 
+use super::Notes;
 use super::block::{braced, items_of, semicolon};
-use crate::diagnostics::Diagnostics;
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::parse::ParseStream;
@@ -16,20 +16,15 @@ pub(crate) struct State {
 
 impl State {
     /// Reads the braces.
-    pub(super) fn parse_all(input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Vec<Self>> {
-        let body = braced(input)?;
+    pub(super) fn parse_all(input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Vec<Self>> {
+        let body = braced(input, &crate::language::words::STATES)?;
         let mut states = Vec::new();
-        items_of(
-            &body,
-            "expected the name of a state, as in `degraded;`",
-            diagnostics,
-            |head, input, diagnostics| {
-                let name = head.name(input)?;
-                semicolon(input, &format!("the state `{name}`"), diagnostics);
-                states.push(Self { attributes: head.attributes, name });
-                Ok(())
-            },
-        );
+        items_of(&body, "expected the name of a state, as in `degraded;`", notes, |head, input, notes| {
+            let name = head.name(input)?;
+            semicolon(input, &format!("the state `{name}`"), notes);
+            states.push(Self { attributes: head.attributes, name });
+            Ok(())
+        });
         Ok(states)
     }
 }

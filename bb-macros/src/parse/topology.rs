@@ -1,9 +1,11 @@
 //! `topology: urdf("robot.urdf");`, and what is declared onto the joints that it brings: `joint elbow { sensor … }`.
 
-use super::block::{Head, braced, items, semicolon, unexpected};
-use super::component::name;
-use super::{Actuator, Sensor};
-use crate::diagnostics::{Diagnostics, Place};
+use super::Notes;
+use super::block::{Head, braced, items, semicolon};
+use super::name::name;
+use super::{Actuator, Sensor, Settings};
+use crate::diagnostics::Place;
+use crate::language::{Nothing, UrdfJointItem, words};
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
@@ -29,7 +31,7 @@ pub(crate) struct JointAddition {
 }
 
 impl Topology {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         input.parse::<Token![:]>()?;
         let format = input.call(Ident::parse_any)?;
         if format != "urdf" {
@@ -39,24 +41,24 @@ impl Topology {
         let parenthesis = syn::parenthesized!(content in input);
         let file: LitStr = content.parse()?;
         let place = Place { start: format.span(), end: parenthesis.span.close() };
-        semicolon(input, "`topology`", diagnostics);
+        semicolon(input, "`topology`", notes);
         Ok(Self { word: head.word, file, place })
     }
 }
 
 impl JointAddition {
-    pub(super) fn parse(head: &Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: &Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let mut joint = Self { name: name(input, &head.word)?, sensors: Vec::new(), actuators: Vec::new() };
         if input.peek(Token![:]) {
-            let message = "a joint stands in the link that it is mounted on; only joints of a URDF are named here";
+            let message =
+                "a joint is declared in the link that it is mounted on; only joints of a URDF are named here";
             return Err(input.error(message));
         }
-        let body = braced(input)?;
-        items(&body, diagnostics, |head, input, diagnostics| {
-            match &*head.word.to_string() {
-                "sensor" => joint.sensors.push(Sensor::parse(head, input, diagnostics)?),
-                "actuator" => joint.actuators.push(Actuator::parse(head, input, diagnostics)?),
-                _ => return Err(unexpected(&head.word, "a joint of a URDF", &["sensor", "actuator"])),
+        let body = braced(input, &words::JOINT_OF_URDF)?;
+        items(&body, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
+            match item {
+                UrdfJointItem::Sensor => joint.sensors.push(Sensor::parse(head, input, notes)?),
+                UrdfJointItem::Actuator => joint.actuators.push(Actuator::parse(head, input, notes)?),
             }
             Ok(())
         });

@@ -52,14 +52,13 @@ fn declared_states() {
                 "moving",
                 "there is no state `moving`; declare it in `states`, or name one of `disarmed`, `idle`, `executing`, `degraded`",
             ),
-            ("idle", "`idle` stands here twice; leave one out"),
+            ("idle", "`idle` is given twice; leave one out"),
         ],
     );
     wrong(
         "robot R; states { idle; moving; moving; } link b;",
         &[
-            ("moving", "the name `moving` is taken among its siblings; choose another"),
-            ("moving", "`moving` is declared here first"),
+            ("moving", "the name `moving` is taken among its siblings, on line 1; choose another"),
             ("idle", "every robot has the state `idle`; leave it out"),
         ],
     );
@@ -79,7 +78,7 @@ fn declared_categories() {
     wrong(
         &with("a: A { cancel: [motion, motion, all, b]; } b: B { category: speech; }"),
         &[
-            ("motion", "`motion` stands here twice; leave one out"),
+            ("motion", "`motion` is given twice; leave one out"),
             ("all", "`all` is no category; to end all commands write `cancel: all;`"),
             ("b", "`b` is a command, not a category; give it a `category` and name that"),
             (
@@ -118,11 +117,8 @@ fn names_are_unique_among_their_kind() {
             "l",
         ),
     ] {
-        let (taken, first) = (
-            format!("the name `{name}` is taken among its siblings; choose another"),
-            format!("`{name}` is declared here first"),
-        );
-        wrong(&robot, &[(name, &taken), (name, &first)]);
+        let taken = format!("the name `{name}` is taken among its siblings, on line 1; choose another");
+        wrong(&robot, &[(name, &taken)]);
     }
 }
 
@@ -135,7 +131,7 @@ fn each_setting_stands_once() {
             allowed_states: [idle]; allowed_states: [idle];
          }",
     );
-    assert_eq!(places(&robot), ["concurrency", "allowed_states", "timeout", "category", "cancel", "x"]);
+    assert_eq!(places(&robot), ["concurrency", "timeout", "category", "cancel", "allowed_states", "x"]);
     let robot = estimator(
         "lost_after: 1 s; lost_after: 2 s; latency_budget: 1 s; recover_after: 1; recover_after: 2; on_lost: stop;
          on_lost: stop; on_degraded: stop; on_degraded: stop; on_recovered: stop; on_recovered: stop;
@@ -143,7 +139,7 @@ fn each_setting_stands_once() {
     );
     assert_eq!(
         places(&robot),
-        ["latency_budget", "lost_after", "recover_after", "on_degraded", "on_lost", "on_recovered", "runs_on"]
+        ["lost_after", "latency_budget", "recover_after", "on_lost", "on_degraded", "on_recovered", "runs_on"]
     );
 }
 
@@ -181,9 +177,9 @@ fn paths_that_commands_and_parameters_have_are_taken() {
     };
     right(&robot("nav, go"));
     for (path, other) in [
-        ("command, go", "the command `go` stands at this path"),
-        ("param, imu, beta", "the parameter `beta` stands at this path"),
-        ("param, imu", "the group `imu` stands at this path"),
+        ("command, go", "the command `go` has this path already"),
+        ("param, imu, beta", "the parameter `beta` has this path already"),
+        ("param, imu", "the group `imu` has this path already"),
         ("controller, c", "something else publishes at `controller::c`"),
     ] {
         wrong(&robot(path), &[(path, &format!("{other}; choose another path"))]);

@@ -12,7 +12,7 @@ fn nested(settings: &str) -> String {
 #[test]
 fn reachable_reactions() {
     right(&nested("lost_after: 1 s; on_lost: stop;"));
-    // Whether the algorithm reports divergence is a fact about its type.
+    // A restart degrades any estimator.
     right(&nested("on_degraded: stop; on_recovered: stop; recover_after: 3;"));
     wrong(
         &nested("on_lost: stop; latency_budget: 1 ms;"),

@@ -3,6 +3,7 @@
 use super::expansion::ACTING;
 use super::tokens;
 use crate::diagnostics::Diagnostics;
+use crate::model::Id;
 use crate::model::{self, Robot, Worker};
 use crate::parse::{self, Value};
 
@@ -36,19 +37,19 @@ fn commands_name_categories_and_estimators_name_commands() {
     let robot = robot(ACTING);
     let categories = robot.categories.iter().map(|category| (category.name.to_string(), category.concurrency));
     assert_eq!(categories.collect::<Vec<_>>(), [("default".into(), 3), ("motion".into(), 2)]);
-    let of_commands = robot.commands.iter().map(|command| command.category);
+    let of_commands = robot.commands.iter().map(|command| command.category.number());
     assert_eq!(of_commands.collect::<Vec<_>>(), [0, 1, 0, 0, 0]);
     let cancels = robot.commands.iter().map(|command| format!("{:?}", command.cancel));
     assert_eq!(cancels.collect::<Vec<_>>(), ["Nothing", "Nothing", "Categories([1, 0])", "All", "Nothing"]);
     let timeouts = robot.commands.iter().map(|command| command.timeout_s);
     assert_eq!(timeouts.collect::<Vec<_>>(), [None, Some(2.0), None, None, None]);
-    let tilt = &robot.estimators[0];
+    let tilt = robot.estimators.at(0);
     assert_eq!(
-        (tilt.health.on_degraded, tilt.health.on_lost, tilt.health.on_recovered),
-        (Some(2), Some(3), Some(4))
+        [tilt.health.on_degraded, tilt.health.on_lost, tilt.health.on_recovered].map(|id| id.map(Id::number)),
+        [Some(2), Some(3), Some(4)]
     );
-    assert_eq!((tilt.health.latency_budget_s, tilt.health.lost_after_s), (Some(0.001), Some(0.1)));
-    assert_eq!((tilt.health.recover_after, robot.estimators[1].health.recover_after), (10, 1));
+    assert_eq!((tilt.timing.latency_budget_s, tilt.timing.lost_after_s), (Some(0.001), Some(0.1)));
+    assert_eq!((tilt.timing.recover_after, robot.estimators.at(1).timing.recover_after), (10, 1));
     assert_eq!(tilt.worker, Some(Worker { priority: Some(80), core: Some(1) }));
 }
 
@@ -70,28 +71,10 @@ fn docs_are_kept() {
 #[test]
 fn paths_of_what_acts() {
     let robot = robot(ACTING);
-    assert_eq!(robot.actuators[0].path.join("/"), "actuator/base/pan/servo");
+    assert_eq!(robot.actuators.at(0).path.join("/"), "actuator/base/pan/servo");
     let services: Vec<String> = robot.services.iter().map(|service| service.path.join("/")).collect();
     assert_eq!(services, ["controller/stability", "bridge/ros", "bridge/log"]);
     let sources =
-        robot.estimators[1].inputs.iter().map(|input| robot.publishers[input.source?].path.last().cloned());
+        robot.estimators.at(1).inputs.iter().map(|input| robot.publishers[input.source?].path.last().cloned());
     assert_eq!(sources.collect::<Option<Vec<_>>>(), Some(vec!["imu".into(), "stability".into(), "log".into()]));
-}
-
-#[test]
-fn words_that_wait_for_divergence() {
-    let waiting = |inputs: &str, settings: &str| {
-        let text = format!(
-            "robot R; commands {{ c: C; }} link b {{ sensor i: S(); estimator e: E() {{ {inputs} {settings} }} }}"
-        );
-        let robot = robot(&text);
-        robot.estimators[0].needs_divergence().map(ToString::to_string).collect::<Vec<_>>().join(" ")
-    };
-    let all = "on_degraded: c; on_lost: c; on_recovered: c; recover_after: 2;";
-    let one = "input a: i;";
-    assert_eq!(waiting(one, all), "on_degraded on_recovered recover_after");
-    assert_eq!(waiting(one, &format!("{all} lost_after: 1 s;")), "on_degraded");
-    assert_eq!(waiting(one, &format!("{all} latency_budget: 1 s;")), "");
-    assert_eq!(waiting("input a: i, driver; input b: i;", all), "");
-    assert_eq!(waiting("input a: i, driver; input b: i, optional;", "on_degraded: c;"), "on_degraded");
 }

@@ -13,7 +13,7 @@ fn words() {
     );
     wrong(
         &base("sensor imu: A() { on_lost: stop; }"),
-        &[("on_lost", "`on_lost` does not belong in a sensor, which holds `rate` or `estimator`")],
+        &[("on_lost", "`on_lost` does not belong in a sensor, which holds `estimator` or `rate`")],
     );
     wrong(
         &base("rate: 5 Hz;"),
@@ -50,7 +50,7 @@ fn headers() {
     wrong("robo Rover; link base;", &[("robo", expected)]);
     wrong("robot; link base;", &[(";", "expected the name of this `robot`")]);
     wrong("robot 5; link base;", &[("5", "expected the name of this `robot`")]);
-    wrong("robot Rover { link base; }", &[("{", "expected `;` behind the robot's name")]);
+    wrong("robot Rover { link base; }", &[("{", "expected `;` after the robot's name")]);
     // What is missing at the end is missing at the last token, of which a group is known by its last character.
     for robot in ["robot", "robot Rover", "pub", "#[doc = \"\"]", "robot Rover; link"] {
         let places = places(robot);
@@ -66,16 +66,16 @@ fn semicolons() {
     wrong(
         "robot Rover link base { sensor imu: A() { rate: 5 Hz } sensor mag: B() sensor other: C(); }",
         &[
-            ("link", "expected `;` behind the robot's name"),
-            ("}", "expected `;` behind `rate`"),
-            ("sensor", "expected `;` behind `mag`"),
+            ("link", "expected `;` after the robot's name"),
+            ("}", "expected `;` after `rate`"),
+            ("sensor", "expected `;` after `mag`"),
         ],
     );
     wrong(
         &base("sensor imu: A() 5 6 7; sensor mag: B() { rat: 5 Hz; }"),
         &[
-            ("5", "expected `;` behind `imu`"),
-            ("rat", "unknown word `rat`; a sensor holds `rate` or `estimator`; did you mean `rate`?"),
+            ("5", "expected `;` after `imu`"),
+            ("rat", "unknown word `rat`; a sensor holds `estimator` or `rate`; did you mean `rate`?"),
         ],
     );
 }
@@ -85,22 +85,22 @@ fn declarations() {
     wrong(
         &base("sensor imu; sensor mag: ; sensor: A(); joint j; joint k: spin { link a; } estimator t = T();"),
         &[
-            (";", "expected `:` and a type behind `imu`"),
+            (";", "expected `:` and a type after `imu`"),
             (";", "expected the type of `mag`"),
             (":", "expected the name of this `sensor`"),
-            (";", "expected `:` and the type of the joint behind `j`"),
+            (";", "expected `:` and the type of the joint after `j`"),
             (
                 "spin",
                 "unknown type of joint; expected `fixed`, `revolute`, `continuous`, `prismatic`, `planar` or `floating`",
             ),
-            ("=", "expected `:` and a type behind `t`"),
+            ("=", "expected `:` and a type after `t`"),
         ],
     );
     wrong(
         &base("sensor a: A(5); sensor b: A(x: 5); sensor c: A(x = K y = 6); sensor d: A(,);"),
         &[
             ("5", "expected an option, as in `name = value`"),
-            (":", "expected `=` and a value behind the option `x`"),
+            (":", "expected `=` and a value after the option `x`"),
             ("y", "expected `,`"),
             (",", "expected an option, as in `name = value`"),
         ],
@@ -145,8 +145,8 @@ fn geometry() {
     wrong(&joint("axis: [1, 2];"), &[("[1, 2]", "expected 3 values, found 2")]);
     wrong(&joint("origin: { xzy: [0 m, 0 m, 0 m] };"), &[("xzy", "expected `xyz` or `rpy`; did you mean `xyz`?")]);
     wrong(&joint("limit: { lower: -1 rad; upper: 1 rad };"), &[(";", "expected `,`")]);
-    wrong(&joint("limit: { lower = -1 rad };"), &[("=", "expected `:` and a value behind `lower`")]);
-    wrong(&joint("limit { lower: -1 rad };"), &[("{", "expected `:` and its fields in braces behind `limit`")]);
+    wrong(&joint("limit: { lower = -1 rad };"), &[("=", "expected `:` and a value after `lower`")]);
+    wrong(&joint("limit { lower: -1 rad };"), &[("{", "expected `:` and its fields in braces after `limit`")]);
 }
 
 #[test]
@@ -282,7 +282,7 @@ fn settings_of_estimators() {
         &nested("runs_on: worker, proirity: 3;"),
         &[("proirity", &format!("{property}; did you mean `priority`?"))],
     );
-    wrong(&nested("runs_on: worker, core: 1, core: 2;"), &[("core", "`core` stands here twice; leave one out")]);
+    wrong(&nested("runs_on: worker, core: 1, core: 2;"), &[("core", "`core` is given twice; leave one out")]);
     wrong(&nested("on_lost: \"stop\";"), &[("\"stop\"", "expected the name of a command")]);
     wrong(&nested("recover_after: ten;"), &[("ten", "expected a whole number")]);
 }

@@ -1,12 +1,16 @@
 //! The language reference against the grammar: what is read is described, and what is described is read.
 
 use super::{diagnostics, tokens};
-use crate::parse::WORDS;
-use crate::units::symbols;
+use crate::language::{FIELDS, ITEMS, Value, Word};
+use crate::model::Id as _;
+use crate::parse::{JointKind, Quantity};
+use crate::units::{Dimension, symbols};
+use syn::parse::Parser;
+
+const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../bb-core/src/robot.md");
 
 fn reference() -> String {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../bb-core/src/robot.md");
-    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{path}: {error}"))
+    std::fs::read_to_string(PATH).unwrap_or_else(|error| panic!("{PATH}: {error}"))
 }
 
 /// The texts between backticks, outside of code blocks.
@@ -15,34 +19,94 @@ fn quoted(text: &str) -> Vec<String> {
     prose.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
+/// The places with words, each with all of its words.
+fn places() -> Vec<(&'static str, Vec<&'static Word>)> {
+    let mut places: Vec<(&str, Vec<&Word>)> = Vec::new();
+    for (place, words) in ITEMS.iter().chain(FIELDS).filter(|(_, words)| !words.is_empty()) {
+        match places.iter_mut().find(|(known, _)| known == place) {
+            Some((_, known)) => known.extend(*words),
+            None => places.push((place, words.to_vec())),
+        }
+    }
+    places
+}
+
+/// A place as it is named in the column `where`: `link` of `a link`.
+fn short(place: &str) -> &str {
+    place.trim_start_matches("a ").trim_start_matches("an ")
+}
+
+/// The table of the words of some places.
+fn table(of: &[&str]) -> String {
+    let same = |a: &Word, b: &Word| a.text == b.text && a.doc == b.doc;
+    let places = places();
+    let mut table = "| word | where | meaning |\n|---|---|---|\n".to_owned();
+    let mut shown: Vec<&Word> = Vec::new();
+    for place in of {
+        let words = places.iter().find(|(known, _)| known == place).map(|(_, words)| words);
+        for word in words.unwrap_or_else(|| panic!("`{place}` has no words")) {
+            if shown.iter().any(|other| same(word, other)) {
+                continue;
+            }
+            shown.push(word);
+            let holds = |words: &[&Word]| words.iter().any(|other| same(word, other));
+            let places: Vec<&str> =
+                places.iter().filter(|(_, words)| holds(words)).map(|(place, _)| short(place)).collect();
+            let Word { text, example, doc, .. } = word;
+            table.push_str(&format!("| `{text}{example}` | {} | {doc} |\n", places.join(", ")));
+        }
+    }
+    table
+}
+
+/// The reference with its tables made of the language, and the places whose words they have.
+fn generated(reference: &str) -> (String, Vec<String>) {
+    const START: &str = "<!-- words: ";
+    const END: &str = "<!-- end of words -->";
+    let (mut text, mut covered) = (String::new(), Vec::new());
+    let mut parts = reference.split(START);
+    text.push_str(parts.next().unwrap_or(""));
+    for part in parts {
+        let (list, rest) = part.split_once(" -->").expect("the comment ends");
+        let (_, after) = rest.split_once(END).expect("the table ends");
+        let places: Vec<&str> = list.split(", ").collect();
+        text.push_str(&format!("{START}{list} -->\n\n{}\n{END}{after}", table(&places)));
+        covered.extend(places.into_iter().map(str::to_owned));
+    }
+    (text, covered)
+}
+
 #[test]
-fn every_word_that_starts_an_item_is_described() {
-    let quoted = quoted(&reference());
-    for word in WORDS {
-        let starts =
-            |text: &&String| text.strip_prefix(word).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric));
-        let is_abbreviated = word.starts_with("on_") && quoted.iter().any(|text| text.starts_with(word));
-        assert!(quoted.iter().any(|text| starts(&text)) || is_abbreviated, "`{word}` is not in the reference");
+fn the_tables_of_the_reference_are_those_of_the_language() {
+    let reference = reference();
+    let (generated, covered) = generated(&reference);
+    for (place, _) in places() {
+        assert!(
+            covered.iter().any(|covered| covered == place),
+            "the reference has no table of the words of {place}"
+        );
+    }
+    if std::env::var_os("UPDATE_REFERENCE").is_some() {
+        std::fs::write(PATH, &generated).unwrap_or_else(|error| panic!("{PATH}: {error}"));
+    } else {
+        assert!(reference == generated, "run this test with UPDATE_REFERENCE=1, and read what has changed");
     }
 }
 
 #[test]
-fn every_setting_that_is_described_is_read() {
-    // The first word of what stands in the first column of a table, where it has the form of a setting.
-    let reference = reference();
-    let rows = reference.lines().filter(|line| line.starts_with("| `"));
-    let mut settings = 0;
-    for row in rows {
-        let first = row.split('|').nth(1).unwrap_or("");
-        for text in first.split('`').skip(1).step_by(2) {
-            let word: String = text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            if text.ends_with(';') && text.contains(':') && !text.contains("Type") && !text.contains(" name") {
-                settings += 1;
-                assert!(WORDS.contains(&&*word), "the reference describes `{text}`, which is not read");
-            }
-        }
+fn every_number_has_an_example_that_it_takes() {
+    for word in places().into_iter().flat_map(|(_, words)| words) {
+        let dimension = match word.value {
+            Value::Number(measure, _) => match measure.in_joint(Some(JointKind::Revolute)) {
+                Some((dimension, _)) => dimension,
+                None => continue,
+            },
+            Value::Count { .. } => Dimension::NONE,
+            Value::Other => continue,
+        };
+        let example: Quantity = Quantity::parse.parse_str(word.number()).expect("it is a number");
+        assert_eq!(example.dimension, dimension, "the example of `{}`", word.text);
     }
-    assert!(settings > 15, "only {settings} settings were found");
 }
 
 #[test]
@@ -88,10 +152,16 @@ fn the_defaults_of_the_reference_hold() {
         tokens("robot Rover; commands { stop: Stop; } link base { sensor imu: A() { estimator tilt: B(); } }"),
         &mut crate::diagnostics::Diagnostics::default(),
     ));
-    let estimator = &robot.estimators[0];
-    assert_eq!((estimator.health.recover_after, estimator.health.latency_budget_s), (1, None));
-    assert_eq!((estimator.health.lost_after_s, estimator.worker.is_none()), (None, true));
-    let command = &robot.commands[0];
-    assert_eq!((command.timeout_s, command.category, &command.cancel), (None, 0, &crate::model::Cancel::Nothing));
-    assert_eq!((robot.categories[0].concurrency, robot.categories[0].name.to_string()), (1, "default".to_owned()));
+    let estimator = robot.estimators.at(0);
+    assert_eq!((estimator.timing.recover_after, estimator.timing.latency_budget_s), (1, None));
+    assert_eq!((estimator.timing.lost_after_s, estimator.worker.is_none()), (None, true));
+    let command = robot.commands.at(0);
+    assert_eq!(
+        (command.timeout_s, command.category.number(), &command.cancel),
+        (None, 0, &crate::model::Cancel::Nothing)
+    );
+    assert_eq!(
+        (robot.categories.at(0).concurrency, robot.categories.at(0).name.to_string()),
+        (1, "default".to_owned())
+    );
 }

@@ -6,32 +6,19 @@ use super::{base, places, right, sensing, wrong};
 fn unique_names() {
     right(&base("sensor imu: A() { estimator imu: T(); } joint j: fixed { link mast { sensor imu: A(); } }"));
     right("robot Rover; sensors { sensor imu: A(); } link base { sensor imu: A(); }");
-    let taken = "the name `imu` is taken among its siblings; choose another";
-    let first = "`imu` is declared here first";
-    wrong(&base("sensor imu: A(); sensor imu: B();"), &[("imu", taken), ("imu", first)]);
-    wrong(
-        &base("sensor imu: A(); sensor imu: B(); sensor imu: C();"),
-        &[("imu", taken), ("imu", first), ("imu", taken)],
-    );
-    wrong(
-        &base("sensor imu: A(); estimator imu: T() { input imu: sensor::base::imu; }"),
-        &[("imu", taken), ("imu", first)],
-    );
-    wrong(&base("sensor imu: A(); joint imu: fixed { link mast; }"), &[("imu", taken), ("imu", first)]);
-    wrong(&base("sensor a: A() { estimator imu: T(); estimator imu: T(); }"), &[("imu", taken), ("imu", first)]);
+    let taken = "the name `imu` is taken among its siblings, on line 1; choose another";
+    wrong(&base("sensor imu: A(); sensor imu: B();"), &[("imu", taken)]);
+    wrong(&base("sensor imu: A(); sensor imu: B(); sensor imu: C();"), &[("imu", taken), ("imu", taken)]);
+    wrong(&base("sensor imu: A(); estimator imu: T() { input imu: sensor::base::imu; }"), &[("imu", taken)]);
+    wrong(&base("sensor imu: A(); joint imu: fixed { link mast; }"), &[("imu", taken)]);
+    wrong(&base("sensor a: A() { estimator imu: T(); estimator imu: T(); }"), &[("imu", taken)]);
     wrong(
         "robot Rover; sensors { sensor base: A() { estimator imu: T(); } } link base { sensor imu: B(); }",
-        &[
-            ("base", "the name `base` is taken among its siblings; choose another"),
-            ("base", "`base` is declared here first"),
-        ],
+        &[("base", "the name `base` is taken among its siblings, on line 1; choose another")],
     );
     wrong(
         &base("joint a: fixed { link m; } joint b: fixed { link m; }"),
-        &[
-            ("m", "the name `m` is taken among the links and joints of the robot; choose another"),
-            ("m", "`m` is declared here first"),
-        ],
+        &[("m", "the name `m` is taken among the links and joints of the robot, on line 1; choose another")],
     );
     wrong(
         "robot rover; link base;",
@@ -111,7 +98,7 @@ fn dimensions() {
     let heading = "estimator h: H() { input imu: sensor::base::imu, driver; input mag: sensor::base::mag";
     wrong(
         &sensing(&format!("{heading}, within: 1e3 m; sync_tolerance: 20m; }}")),
-        &[("20m", time), ("1e3 m", time)],
+        &[("1e3 m", time), ("20m", time)],
     );
     for (rate, found) in [
         ("5 ms", "found a time"),
@@ -280,7 +267,7 @@ fn positive_values() {
             "estimator h: H() { input imu: sensor::base::imu, driver; input mag: sensor::base::mag, within: 0 s;
              sync_tolerance: -1 ms; }",
         ),
-        &[("-1 ms", positive), ("0 s", positive)],
+        &[("0 s", positive), ("-1 ms", positive)],
     );
     wrong(
         &base("joint j: continuous { axis: z; limit: { velocity: -1 deg/s, effort: 0 N*m }; link a; }"),
@@ -295,7 +282,7 @@ fn distinct_paths() {
     right(&sensing(&motion("m", "output a: [estimator, base, m];")));
     wrong(
         &sensing(&motion("m", "output a; output a;")),
-        &[("a", "an output `a` stands here already; leave one out")],
+        &[("a", "an output `a` is declared already; leave one out")],
     );
     let nav = "something else publishes at `nav::x`; choose another path";
     wrong(&sensing(&motion("m", "output a: [nav, x]; output b: [nav, x];")), &[("nav, x", nav)]);
@@ -308,7 +295,7 @@ fn distinct_paths() {
     );
     wrong(
         &sensing(&format!("{} {}", motion("m", "output a;"), motion("n", "output a: [estimator, base, m];"))),
-        &[("estimator, base, m", "the estimator `m` stands at this path; choose another path")],
+        &[("estimator, base, m", "the estimator `m` has this path already; choose another path")],
     );
     wrong(
         &sensing("estimator h: H() { input i: sensor::base::imu, driver; input i: sensor::base::mag; }"),
@@ -319,18 +306,15 @@ fn distinct_paths() {
 #[test]
 fn single_settings() {
     right(&sensing("joint j: continuous { axis: z; link a { sensor x: A(a = 1, b = 2) { rate: 1 Hz; } } }"));
-    let rate = "`rate` stands here twice; leave one out";
+    let rate = "`rate` is given twice; leave one out";
     wrong(&base("sensor i: A() { rate: 1 Hz; rate: 2 Hz; rate: 3 Hz; }"), &[("rate", rate), ("rate", rate)]);
     wrong(
         &base("joint j: continuous { axis: z; origin: {}; axis: x; origin: {}; link a; }"),
-        &[
-            ("origin", "`origin` stands here twice; leave one out"),
-            ("axis", "`axis` stands here twice; leave one out"),
-        ],
+        &[("axis", "`axis` is given twice; leave one out"), ("origin", "`origin` is given twice; leave one out")],
     );
-    wrong(&base("sensor i: A(a = 1, b = 2, a = 3);"), &[("a", "`a` stands here twice; leave one out")]);
+    wrong(&base("sensor i: A(a = 1, b = 2, a = 3);"), &[("a", "`a` is given twice; leave one out")]);
     wrong(
         &base("joint j: fixed { origin: { xyz: [0 m, 0 m, 0 m], xyz: [0 m, 0 m, 0 m] }; link a; }"),
-        &[("xyz", "`xyz` stands here twice; leave one out")],
+        &[("xyz", "`xyz` is given twice; leave one out")],
     );
 }

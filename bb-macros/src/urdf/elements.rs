@@ -94,7 +94,6 @@ impl<'a, 'input> Reader<'a, 'input> {
             self.range(node, kind_text, &limits);
         }
         let dynamics = self.children(node, "dynamics").into_iter().filter(|_| has_axis).map(|dynamics| Dynamics {
-            word: self.word("dynamics"),
             damping: self.number(dynamics, "damping", damping),
             friction: self.number(dynamics, "friction", effort),
         });
@@ -175,7 +174,7 @@ impl<'a, 'input> Reader<'a, 'input> {
                 None => 1.0,
             };
             let reduction = Some(self.quantity(reduction, Dimension::NONE));
-            Transmission { word: self.word("transmission"), reduction }
+            Transmission { reduction }
         });
         // A joint has one; further ones of other interfaces say the same.
         reductions.take(1).collect()
@@ -250,7 +249,7 @@ impl<'a, 'input> Reader<'a, 'input> {
     fn origin(&mut self, node: Node<'_, '_>) -> Origin {
         let xyz = node.has_attribute("xyz").then(|| self.triple(node, "xyz", Dimension::LENGTH)).flatten();
         let rpy = node.has_attribute("rpy").then(|| self.triple(node, "rpy", Dimension::ANGLE)).flatten();
-        Origin { word: self.word("origin"), xyz, rpy }
+        Origin { xyz, rpy }
     }
 
     /// The only child of that name, which must be there.

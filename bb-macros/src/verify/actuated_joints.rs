@@ -1,19 +1,19 @@
-//! A joint with an actuator has a source of its position: a sensor of its own, or another joint that it follows. (A fixed
-//! one has no position.)
+//! A joint with an actuator has a source of its position: a sensor of its own, or an estimator in one, that publishes a
+//! payload which tells it, or another joint that it follows. (A fixed one has no position.)
 //!
 //! Right: `joint pan: revolute { …; actuator servo: Servo(); sensor encoder: Encoder(); link head { } }`
 //! Wrong: `joint pan: revolute { …; actuator servo: Servo(); link head { } }`
+//!
+//! What a sensor publishes is a fact about its type: `expand::checks` has `bb_core` compare that.
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{Mount, Robot};
-use crate::parse::JointKind;
+use crate::model::Robot;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // The sensor may be what could not be read.
     for actuator in robot.actuators.iter().filter(|_| robot.complete) {
-        let Some(joint) = robot.joints.get(actuator.joint) else { continue };
-        let has_position = joint.kind == JointKind::Fixed || !joint.mimics.is_empty();
-        if has_position || robot.sensors.iter().any(|sensor| sensor.mount == Mount::Joint(actuator.joint)) {
+        let joint = &robot.joints[actuator.joint];
+        if robot.position_sources(actuator.joint).is_none_or(|sources| !sources.is_empty()) {
             continue;
         }
         let message = format!(

@@ -24,7 +24,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             let mut seen = HashSet::new();
             for name in names {
                 if declared(robot, name, diagnostics) && !seen.insert(name.to_string()) {
-                    diagnostics.error(name, format!("`{name}` stands here twice; leave one out"));
+                    diagnostics.error(name, format!("`{name}` is given twice; leave one out"));
                 }
             }
         }

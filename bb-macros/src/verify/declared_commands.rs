@@ -13,7 +13,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         return;
     }
     let declared: Vec<String> = robot.commands.iter().map(|command| text(&command.name)).collect();
-    for reaction in robot.estimators.iter().flat_map(|estimator| estimator.health.settings.all_reactions()) {
+    for reaction in robot.estimators.iter().flat_map(|estimator| estimator.reactions.all()) {
         let name = &reaction.command;
         if robot.command(name).is_some() {
             continue;

@@ -2,11 +2,14 @@
 //!
 //! Right: `Madgwick(beta = param::imu::beta)` where `parameters` has `imu { beta: f64 = 0.1; }`
 //! Wrong: `Madgwick(beta = param::imu::gain)`
+//! Wrong: `Madgwick(beta = 2.0 * param::imu::beta)`, since it is bound, not read
 
-use crate::diagnostics::Diagnostics;
+use crate::diagnostics::{Diagnostics, Place};
 use crate::model::Robot;
 use crate::names::{declare, nearest_path, some_of};
 use crate::parse::OptionValue;
+use proc_macro2::{Spacing, TokenStream, TokenTree};
+use quote::ToTokens;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // Unread items may have declared the missing ones.
@@ -15,7 +18,18 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
     let known: Vec<String> = robot.parameters.iter().map(|parameter| parameter.path.join("::")).collect();
     for option in robot.components().flat_map(|component| &component.options) {
-        let OptionValue::Parameter(path) = &option.value else { continue };
+        let path = match &option.value {
+            OptionValue::Parameter(path) => path,
+            OptionValue::Expression { expression, .. } => {
+                if let Some(place) = inside(expression.to_token_stream()) {
+                    let message = "an option is bound to a parameter as it is, and a parameter is no value that can be \
+                                   computed with; compute in the component, or declare a parameter of its own";
+                    diagnostics.at(place, message.into());
+                }
+                continue;
+            }
+            OptionValue::Quantity(_) => continue,
+        };
         if robot.parameter(path).is_some() {
             continue;
         }
@@ -35,4 +49,39 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         };
         diagnostics.at(path.place(), message);
     }
+}
+
+/// The first path that starts with `param::` in an expression.
+fn inside(expression: TokenStream) -> Option<Place> {
+    let is_colon =
+        |token: Option<&TokenTree>| matches!(token, Some(TokenTree::Punct(punct)) if punct.as_char() == ':');
+    let tokens: Vec<TokenTree> = expression.into_iter().collect();
+    for (index, token) in tokens.iter().enumerate() {
+        match token {
+            TokenTree::Group(group) => {
+                if let Some(place) = inside(group.stream()) {
+                    return Some(place);
+                }
+            }
+            TokenTree::Ident(word) if *word == "param" => {
+                let follows_colon = index > 0 && is_colon(tokens.get(index - 1));
+                let is_path = matches!(
+                    tokens.get(index + 1),
+                    Some(TokenTree::Punct(punct)) if punct.as_char() == ':' && punct.spacing() == Spacing::Joint
+                );
+                if is_path && !follows_colon {
+                    let rest = tokens[index + 1..].iter();
+                    let path =
+                        rest.take_while(|token| is_colon(Some(token)) || matches!(token, TokenTree::Ident(_)));
+                    let (count, end) = path.fold((0, word.span()), |(count, _), token| (count + 1, token.span()));
+                    // A function is of a module of the user's.
+                    if !matches!(tokens.get(index + 1 + count), Some(TokenTree::Group(_))) {
+                        return Some(Place { start: word.span(), end });
+                    }
+                }
+            }
+            TokenTree::Punct(_) | TokenTree::Ident(_) | TokenTree::Literal(_) => {}
+        }
+    }
+    None
 }

@@ -5,20 +5,25 @@
 
 use crate::diagnostics::Diagnostics;
 use crate::model::{From, Robot};
-use crate::names::{nearest_path, some_of};
+use crate::names::{nearest, nearest_path, some_of, text};
+use crate::parse::Path;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // Inputs of nested estimators are a fault of their own; unread items may have declared the missing ones.
-    let estimators = robot.estimators.iter().enumerate();
+    let estimators = robot.estimators.enumerate();
     let estimators = estimators.filter(|(_, estimator)| !estimator.is_nested() && robot.complete);
     let inputs = estimators.flat_map(|(id, estimator)| estimator.inputs.iter().map(move |input| (id, input)));
     for (id, input) in inputs.filter(|(_, input)| input.source.is_none()) {
         let path = input.path.text();
         if !input.candidates.is_empty() {
-            let candidates = input.candidates.iter().filter_map(|id| robot.publishers.get(*id));
+            let candidates = input.candidates.iter().map(|id| &robot.publishers[*id]);
             let paths: Vec<String> =
                 candidates.take(8).map(|publisher| format!("`{}`", publisher.path.join("::"))).collect();
             let message = format!("`{path}` may be {}; write more of the path", paths.join(" or "));
+            diagnostics.at(input.path.place(), message);
+            continue;
+        }
+        if let Some(message) = undeclared_output(robot, &input.path) {
             diagnostics.at(input.path.place(), message);
             continue;
         }
@@ -36,4 +41,21 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         };
         diagnostics.at(input.path.place(), message);
     }
+}
+
+/// The message for a path below an estimator: the output may be missing there or misspelt, which only its type tells.
+fn undeclared_output(robot: &Robot, path: &Path) -> Option<String> {
+    let (output, above) = path.0.split_last()?;
+    let above: Vec<String> = above.iter().map(text).collect();
+    let is_below = |path: &[String]| !above.is_empty() && path.ends_with(&above);
+    let mut below = robot.estimators.iter().filter(|estimator| is_below(&estimator.path));
+    let (Some(estimator), None) = (below.next(), below.next()) else { return None };
+    let (estimator_name, output) = (text(&estimator.name), text(output));
+    let start = format!("`{estimator_name}` declares no output `{output}`");
+    let declared: Vec<String> = estimator.outputs.iter().map(|output| text(&output.name)).collect();
+    let way_out = match nearest(&output, declared.iter().map(String::as_str)) {
+        Some(near) => format!("it declares `{near}`; give it the algorithm's name in both places"),
+        None => format!("if the algorithm has it, add `output {output};` there"),
+    };
+    Some(format!("{start}; {way_out}"))
 }

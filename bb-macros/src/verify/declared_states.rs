@@ -25,7 +25,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
                 let way_out = way_out(&name, known(), "states");
                 diagnostics.error(state, format!("there is no state `{name}`; {way_out}"));
             } else if !seen.insert(name) {
-                diagnostics.error(state, format!("`{state}` stands here twice; leave one out"));
+                diagnostics.error(state, format!("`{state}` is given twice; leave one out"));
             }
         }
     }

@@ -23,7 +23,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
                 diagnostics.at(place, format!("something else publishes at `{path}`; choose another path"));
             }
             (None, Some(output)) if estimator(publisher) == estimator(first) => {
-                let message = format!("an output `{}` stands here already; leave one out", output.name);
+                let message = format!("an output `{}` is declared already; leave one out", output.name);
                 diagnostics.error(&output.name, message);
             }
             (None, _) => {}
@@ -31,19 +31,19 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
     // An estimator has a handle at its own path, even if it publishes below that path only.
     for publisher in &robot.publishers {
-        let own = robot.estimators.iter().enumerate().find(|(_, estimator)| estimator.path == publisher.path);
+        let own = robot.estimators.enumerate().find(|(_, estimator)| estimator.path == publisher.path);
         if let (Some((id, own)), Some(place)) = (own, explicit(robot, publisher))
             && estimator(publisher) != Some(id)
             && !own.outputs.is_empty()
         {
-            let message = format!("the estimator `{}` stands at this path; choose another path", own.name);
+            let message = format!("the estimator `{}` has this path already; choose another path", own.name);
             diagnostics.at(place, message);
         }
     }
     let others = others(robot);
     for publisher in &robot.publishers {
         if let (Some(place), Some(other)) = (explicit(robot, publisher), others.get(&publisher.path[..])) {
-            diagnostics.at(place, format!("{other} stands at this path; choose another path"));
+            diagnostics.at(place, format!("{other} has this path already; choose another path"));
         }
     }
     for estimator in robot.estimators.iter().filter(|estimator| !estimator.is_nested()) {
@@ -72,7 +72,7 @@ fn output<'a>(robot: &'a Robot, publisher: &Publisher) -> Option<&'a Output> {
     let From::Estimator(estimator, Some(output)) = publisher.from else {
         return None;
     };
-    robot.estimators.get(estimator)?.outputs.get(output)
+    robot.estimators[estimator].outputs.get(output)
 }
 
 /// Where the path of a publisher is written out, if it is.

@@ -5,6 +5,7 @@
 //! Wrong: `input gnss: sensor::base::gnss, within: 20 ms;`
 
 use crate::diagnostics::Diagnostics;
+use crate::language::EstimatorSetting;
 use crate::model::{Estimator, Input, PublisherId, Robot};
 use crate::parse::Quantity;
 use crate::units::{Dimension, time_text};
@@ -20,7 +21,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
                 report(estimator, within, &[late], diagnostics);
             }
         }
-        if let Some(tolerance) = estimator.sync_tolerances.first() {
+        if let Some(tolerance) = estimator.settings.of(EstimatorSetting::SyncTolerance).next() {
             report(estimator, &tolerance.quantity, &shared, diagnostics);
         }
     }

@@ -12,7 +12,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         .sensors
         .iter()
         .find(|sensor| sensor.mount != Mount::Robot)
-        .and_then(|sensor| robot.publishers.get(sensor.publisher));
+        .map(|sensor| &robot.publishers[sensor.publisher]);
     let example = example.map_or("sensor::base::imu".to_owned(), |publisher| publisher.path.join("::"));
     for estimator in missing.filter(|_| robot.complete) {
         let name = &estimator.name;

@@ -10,7 +10,7 @@ use crate::parse::{JointKind, Mimic};
 use proc_macro2::Ident;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    for (id, joint) in robot.joints.iter().enumerate() {
+    for (id, joint) in robot.joints.enumerate() {
         let Some(mimic) = joint.mimics.first() else { continue };
         match &mimic.joint {
             None => diagnostics.error(&mimic.word, "the joint to follow is missing, as in `joint: other`".into()),
@@ -47,18 +47,14 @@ fn followed(robot: &Robot, id: JointId, joint: &Joint, name: &Ident, diagnostics
 }
 
 fn find<'a>(robot: &'a Robot, name: &Ident) -> Option<(JointId, &'a Joint)> {
-    robot.joints.iter().enumerate().find(|(_, joint)| joint.name == *name)
+    robot.joints.enumerate().find(|(_, joint)| joint.name == *name)
 }
 
 /// Whether following leads back to the start; each circle is reported at its first joint only.
 fn is_circle(robot: &Robot, start: JointId) -> bool {
     let mut id = start;
-    for _ in 0..robot.joints.len() {
-        let name = robot
-            .joints
-            .get(id)
-            .and_then(|joint| joint.mimics.first())
-            .and_then(|Mimic { joint, .. }| joint.as_ref());
+    for _ in robot.joints.ids() {
+        let name = robot.joints[id].mimics.first().and_then(|Mimic { joint, .. }| joint.as_ref());
         let Some((next, _)) = name.and_then(|name| find(robot, name)) else { return false };
         if next == start {
             return true;

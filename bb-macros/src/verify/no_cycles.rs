@@ -3,11 +3,11 @@
 //! Wrong: `estimator a: A() { input b: estimator::base::b; } estimator b: B() { input a: estimator::base::a; }`
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{EstimatorId, From, Robot};
+use crate::model::{EstimatorId, From, Robot, Table};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    let mut state = vec![State::New; robot.estimators.len()];
-    for id in 0..robot.estimators.len() {
+    let mut state = robot.estimators.map(|_| State::New);
+    for id in robot.estimators.ids() {
         visit(robot, id, &mut state, &mut Vec::new(), diagnostics);
     }
 }
@@ -24,28 +24,28 @@ enum State {
 fn visit(
     robot: &Robot,
     id: EstimatorId,
-    state: &mut [State],
+    state: &mut Table<EstimatorId, State>,
     path: &mut Vec<EstimatorId>,
     diagnostics: &mut Diagnostics,
 ) {
-    let (Some(estimator), Some(State::New)) = (robot.estimators.get(id), state.get(id)) else {
+    if state[id] != State::New {
         return;
-    };
+    }
+    let estimator = &robot.estimators[id];
     state[id] = State::Open;
     path.push(id);
     for input in &estimator.inputs {
-        let publisher = input.source.and_then(|source| robot.publishers.get(source));
+        let publisher = input.source.map(|source| &robot.publishers[source]);
         let Some(From::Estimator(source, _)) = publisher.map(|publisher| publisher.from) else {
             continue;
         };
-        if state.get(source) == Some(&State::Open) {
-            let start = path.iter().position(|open| *open == source).unwrap_or(0);
+        if state[source] == State::Open {
             let name = &estimator.name;
             let message = if source == id {
                 format!("`{name}` takes what it publishes; name another publisher")
             } else {
                 // The path leads from consumer to publisher; messages flow the other way.
-                let cycle = cycle(robot, path.iter().skip(start).rev().copied());
+                let cycle = cycle(robot, path.iter().skip_while(|open| **open != source).copied().collect());
                 format!("`{name}` depends on itself: {cycle}; leave out one of these inputs")
             };
             diagnostics.at(input.path.place(), message);
@@ -58,8 +58,8 @@ fn visit(
 }
 
 /// `` `a` → `b` → `a` ``, in the direction in which messages flow.
-fn cycle(robot: &Robot, estimators: impl Iterator<Item = EstimatorId>) -> String {
-    let names: Vec<String> =
-        estimators.filter_map(|id| Some(format!("`{}`", robot.estimators.get(id)?.name))).collect();
+fn cycle(robot: &Robot, against_the_flow: Vec<EstimatorId>) -> String {
+    let estimators = against_the_flow.into_iter().rev();
+    let names: Vec<String> = estimators.map(|id| format!("`{}`", robot.estimators[id].name)).collect();
     names.iter().chain(names.first()).cloned().collect::<Vec<_>>().join(" → ")
 }

@@ -25,7 +25,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
     for joint in &robot.joints {
         let name = &joint.name;
-        for extra in joint.children.iter().skip(1).filter_map(|child| robot.links.get(*child)) {
+        for extra in joint.children.iter().skip(1).map(|child| &robot.links[*child]) {
             diagnostics.error(
                 &extra.name,
                 format!("`{}` is a second link of the joint `{name}`, which carries one", extra.name),

@@ -3,8 +3,7 @@
 //! Right: `lost_after: 100 ms; on_lost: stop;`
 //! Wrong: `on_lost: stop;` alone
 //!
-//! Whether an estimator without `latency_budget` and with one input can degrade is a fact about its type, see
-//! `Estimator::needs_divergence`.
+//! `on_degraded` needs nothing: any estimator degrades when it is restarted.
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
@@ -12,11 +11,10 @@ use crate::model::Robot;
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // The time may be what could not be read.
     for estimator in robot.estimators.iter().filter(|_| robot.complete) {
-        let settings = &estimator.health.settings;
-        if !settings.lost_afters.is_empty() {
+        if estimator.timing.lost_after_s.is_some() {
             continue;
         }
-        for reaction in &settings.on_lost {
+        for reaction in &estimator.reactions.on_lost {
             let message = format!(
                 "`{}` is never lost, since it has no `lost_after`; say how long it may wait for its input, as in \
                  `lost_after: 100 ms;`",

@@ -4,6 +4,7 @@
 //! Wrong: `sensor imu: A() { estimator tilt: Madgwick() { input imu: sensor::base::imu; } }`
 
 use crate::diagnostics::Diagnostics;
+use crate::language::EstimatorSetting;
 use crate::model::{Home, Robot};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
@@ -11,7 +12,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let Home::Sensor(sensor) = estimator.home else {
             continue;
         };
-        let sensor = robot.sensors.get(sensor).map_or(String::new(), |sensor| sensor.name.to_string());
+        let sensor = &robot.sensors[sensor].name;
         for input in &estimator.inputs {
             let message = format!(
                 "an estimator in a sensor takes that sensor, `{sensor}`, and no `input`; leave it out, or declare the \
@@ -19,7 +20,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             );
             diagnostics.error(&input.word, message);
         }
-        for tolerance in &estimator.sync_tolerances {
+        for tolerance in estimator.settings.of(EstimatorSetting::SyncTolerance) {
             let message = "an estimator in a sensor has one input, and nothing to be in step with; leave it out";
             diagnostics.error(&tolerance.word, message.into());
         }

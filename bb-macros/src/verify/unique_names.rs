@@ -3,12 +3,12 @@
 //! Right: `link base { sensor imu: A(); sensor mag: B(); }`
 //! Wrong: `link base { sensor imu: A(); sensor imu: B(); }`
 
-use crate::diagnostics::Diagnostics;
-use crate::model::{Home, Mount, ParameterGroupId, Robot};
+use crate::diagnostics::{Diagnostics, Place};
+use crate::model::{Home, JointId, LinkId, Mount, ParameterGroupId, Robot, SensorId};
 use crate::names::{module_name, snake_case};
 use crate::parse::ServiceKind;
 use proc_macro2::Ident;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     if let Some(name) = &robot.name
@@ -26,43 +26,44 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for name in robot.links.iter().map(|link| &link.name).chain(robot.joints.iter().map(|joint| &joint.name)) {
         bodies.add(name, diagnostics);
     }
-    let mut siblings: HashMap<Place, Names> = HashMap::new();
+    let mut siblings: HashMap<Siblings, Names> = HashMap::new();
     // Joints are siblings of the sensors and estimators of their link, links of the sensors of their joint, and the
     // root of the sensors of the robot: what is below them shares their path.
     for joint in &robot.joints {
-        siblings.entry(Place::Link(joint.parent)).or_insert_with(Names::of_siblings).know(&joint.name);
+        siblings.entry(Siblings::Link(joint.parent)).or_insert_with(Names::of_siblings).know(&joint.name);
     }
     for link in &robot.links {
-        let place = link.joint.map_or(Place::Robot, Place::Joint);
+        let place = link.joint.map_or(Siblings::Robot, Siblings::Joint);
         siblings.entry(place).or_insert_with(Names::of_siblings).know(&link.name);
     }
     for group in &robot.parameter_groups {
         siblings
-            .entry(Place::Parameters(group.group))
+            .entry(Siblings::Parameters(group.group))
             .or_insert_with(Names::of_siblings)
             .add(&group.name, diagnostics);
     }
-    let sensors = robot.sensors.iter().map(|sensor| (Place::of_mount(sensor.mount), &sensor.name));
-    let estimators = robot.estimators.iter().map(|estimator| (Place::of_home(estimator.home), &estimator.name));
-    let actuators = robot.actuators.iter().map(|actuator| (Place::Joint(actuator.joint), &actuator.name));
-    let services = robot.services.iter().map(|service| (Place::Services(service.kind), &service.name));
-    let parameters = robot.parameters.iter().map(|parameter| (Place::Parameters(parameter.group), &parameter.name));
-    let states = robot.states.iter().map(|state| (Place::States, &state.name));
-    let categories = robot.categories.iter().map(|category| (Place::Categories, &category.name));
-    let commands = robot.commands.iter().map(|command| (Place::Commands, &command.name));
+    let sensors = robot.sensors.iter().map(|sensor| (Siblings::of_mount(sensor.mount), &sensor.name));
+    let estimators = robot.estimators.iter().map(|estimator| (Siblings::of_home(estimator.home), &estimator.name));
+    let actuators = robot.actuators.iter().map(|actuator| (Siblings::Joint(actuator.joint), &actuator.name));
+    let services = robot.services.iter().map(|service| (Siblings::Services(service.kind), &service.name));
+    let parameters =
+        robot.parameters.iter().map(|parameter| (Siblings::Parameters(parameter.group), &parameter.name));
+    let states = robot.states.iter().map(|state| (Siblings::States, &state.name));
+    let categories = robot.categories.iter().map(|category| (Siblings::Categories, &category.name));
+    let commands = robot.commands.iter().map(|command| (Siblings::Commands, &command.name));
     let of_robot = services.chain(parameters).chain(states).chain(categories).chain(commands);
     for (place, name) in sensors.chain(actuators).chain(estimators).chain(of_robot) {
         siblings.entry(place).or_insert_with(Names::of_siblings).add(name, diagnostics);
     }
 }
 
-/// Where siblings stand.
+/// Where siblings are declared.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Place {
+enum Siblings {
     Robot,
-    Link(usize),
-    Joint(usize),
-    Sensor(usize),
+    Link(LinkId),
+    Joint(JointId),
+    Sensor(SensorId),
     Services(ServiceKind),
     /// In a group, or in `parameters` itself.
     Parameters(Option<ParameterGroupId>),
@@ -71,7 +72,7 @@ enum Place {
     Commands,
 }
 
-impl Place {
+impl Siblings {
     fn of_mount(mount: Mount) -> Self {
         match mount {
             Mount::Robot => Self::Robot,
@@ -91,13 +92,11 @@ impl Place {
 struct Names<'a> {
     scope: &'static str,
     first: HashMap<String, &'a Ident>,
-    /// The names whose first place has been reported.
-    reported: HashSet<String>,
 }
 
 impl<'a> Names<'a> {
     fn new(scope: &'static str) -> Self {
-        Self { scope, first: HashMap::new(), reported: HashSet::new() }
+        Self { scope, first: HashMap::new() }
     }
 
     fn of_siblings() -> Self {
@@ -113,11 +112,9 @@ impl<'a> Names<'a> {
         match self.first.get(&name.to_string()) {
             None => self.know(name),
             Some(first) => {
-                let message = format!("the name `{name}` is taken among {}; choose another", self.scope);
+                let (scope, line) = (self.scope, Place::from(first.span()).line());
+                let message = format!("the name `{name}` is taken among {scope}, on line {line}; choose another");
                 diagnostics.error(name, message);
-                if self.reported.insert(name.to_string()) {
-                    diagnostics.error(first, format!("`{name}` is declared here first"));
-                }
             }
         }
     }

@@ -9,7 +9,7 @@ robot! {
         joint left: continuous {
             axis: z;
             actuator motor: Servo();
-            sensor encoder: Magnetometer();
+            sensor encoder: Encoder();
             link left_finger { }
         }
         joint right: continuous {

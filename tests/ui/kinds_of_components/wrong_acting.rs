@@ -11,7 +11,7 @@ robot! {
         joint pan: continuous {
             axis: z;
             actuator servo: Stop();
-            sensor encoder: Bmi270(bus = "i2c-1");
+            sensor encoder: Encoder();
             link head { }
         }
     }

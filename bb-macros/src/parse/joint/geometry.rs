@@ -1,6 +1,8 @@
 //! Where a joint stands, about what it moves, and how far.
 
-use crate::diagnostics::{Diagnostics, Place};
+use crate::diagnostics::Place;
+use crate::language::{LimitField, OriginField, Word, words};
+use crate::parse::Notes;
 use crate::parse::Quantity;
 use crate::parse::block::{Head, colon, place_since, semicolon};
 use crate::parse::record::{array, record};
@@ -12,7 +14,6 @@ use syn::parse::ParseStream;
 /// `origin: { xyz: [0 m, 0 m, 0.9 m], rpy: [0 deg, 0 deg, 45 deg] };`
 #[derive(Clone, Debug)]
 pub(crate) struct Origin {
-    pub(crate) word: Ident,
     pub(crate) xyz: Option<[Quantity; 3]>,
     pub(crate) rpy: Option<[Quantity; 3]>,
 }
@@ -39,22 +40,24 @@ pub(crate) struct Limit {
 }
 
 impl Origin {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
-        let origin = Self::parse_value(head.word, input)?;
-        semicolon(input, "`origin`", diagnostics);
+        let origin = Self::parse_value(&words::ORIGIN, input, notes)?;
+        semicolon(input, "`origin`", notes);
         Ok(origin)
     }
 
     /// Reads `{ xyz: […], rpy: […] }`.
-    pub(in crate::parse) fn parse_value(word: Ident, input: ParseStream<'_>) -> syn::Result<Self> {
-        let mut origin = Self { word, xyz: None, rpy: None };
-        record(input, &["xyz", "rpy"], |field, input| {
-            let triple = array(input)?;
-            if field == "xyz" {
-                origin.xyz = Some(triple);
-            } else {
-                origin.rpy = Some(triple);
+    pub(in crate::parse) fn parse_value(
+        word: &Word,
+        input: ParseStream<'_>,
+        notes: &mut Notes<'_>,
+    ) -> syn::Result<Self> {
+        let mut origin = Self { xyz: None, rpy: None };
+        record(word, input, notes, |field, word, _, input, notes| {
+            match field {
+                OriginField::Xyz => origin.xyz = Some(array(word, input, notes)?),
+                OriginField::Rpy => origin.rpy = Some(array(word, input, notes)?),
             }
             Ok(())
         })?;
@@ -69,11 +72,11 @@ impl Axis {
         if (length - 1.0).abs() < 1e-12 { self.direction } else { self.direction.map(|value| value / length) }
     }
 
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "a direction")?;
         let (start, place) = (input.cursor(), input.span());
         let (direction, components) = if input.peek(syn::token::Bracket) {
-            let components = array::<3>(input)?;
+            let components = array::<3>(&words::AXIS_COMPONENT, input, notes)?;
             let direction = components.each_ref().map(|component| component.value);
             (direction, components.to_vec())
         } else {
@@ -93,7 +96,7 @@ impl Axis {
             (direction, Vec::new())
         };
         let place = place_since(start, input);
-        semicolon(input, "`axis`", diagnostics);
+        semicolon(input, "`axis`", notes);
         Ok(Self { word: head.word, direction, components, place })
     }
 }
@@ -101,20 +104,20 @@ impl Axis {
 const AXIS: &str = "expected `x`, `y`, `z`, one of them with `-`, or `[a, b, c]`";
 
 impl Limit {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut limit = Self { word: head.word, lower: None, upper: None, velocity: None, effort: None };
-        record(input, &["lower", "upper", "velocity", "effort"], |field, input| {
-            let quantity = Some(Quantity::parse(input)?);
-            match &*field.to_string() {
-                "lower" => limit.lower = quantity,
-                "upper" => limit.upper = quantity,
-                "velocity" => limit.velocity = quantity,
-                _ => limit.effort = quantity,
-            }
+        record(&words::LIMIT, input, notes, |field, word, _, input, notes| {
+            let slot = match field {
+                LimitField::Lower => &mut limit.lower,
+                LimitField::Upper => &mut limit.upper,
+                LimitField::Velocity => &mut limit.velocity,
+                LimitField::Effort => &mut limit.effort,
+            };
+            *slot = Some(Quantity::of(word, input, notes)?);
             Ok(())
         })?;
-        semicolon(input, "`limit`", diagnostics);
+        semicolon(input, "`limit`", notes);
         Ok(limit)
     }
 }

@@ -1,6 +1,7 @@
 //! How a joint resists, what it follows, and the gear before it.
 
-use crate::diagnostics::Diagnostics;
+use crate::language::{DynamicsField, MimicField, TransmissionField, words};
+use crate::parse::Notes;
 use crate::parse::Quantity;
 use crate::parse::block::{Head, colon, semicolon};
 use crate::parse::record::record;
@@ -10,7 +11,6 @@ use syn::parse::ParseStream;
 /// `dynamics: { damping: 0.1 N*m*s/rad, friction: 0.2 N*m };`
 #[derive(Clone, Debug)]
 pub(crate) struct Dynamics {
-    pub(crate) word: Ident,
     pub(crate) damping: Option<Quantity>,
     pub(crate) friction: Option<Quantity>,
 }
@@ -28,54 +28,54 @@ pub(crate) struct Mimic {
 /// `transmission: { reduction: 50 };`
 #[derive(Clone, Debug)]
 pub(crate) struct Transmission {
-    pub(crate) word: Ident,
     pub(crate) reduction: Option<Quantity>,
 }
 
 impl Dynamics {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
-        let mut dynamics = Self { word: head.word, damping: None, friction: None };
-        record(input, &["damping", "friction"], |field, input| {
-            let quantity = Some(Quantity::parse(input)?);
-            if field == "damping" {
-                dynamics.damping = quantity;
-            } else {
-                dynamics.friction = quantity;
-            }
+        let mut dynamics = Self { damping: None, friction: None };
+        record(&words::DYNAMICS, input, notes, |field, word, _, input, notes| {
+            let slot = match field {
+                DynamicsField::Damping => &mut dynamics.damping,
+                DynamicsField::Friction => &mut dynamics.friction,
+            };
+            *slot = Some(Quantity::of(word, input, notes)?);
             Ok(())
         })?;
-        semicolon(input, "`dynamics`", diagnostics);
+        semicolon(input, "`dynamics`", notes);
         Ok(dynamics)
     }
 }
 
 impl Mimic {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
         let mut mimic = Self { word: head.word, joint: None, multiplier: None, offset: None };
-        record(input, &["joint", "multiplier", "offset"], |field, input| {
-            match &*field.to_string() {
-                "joint" => mimic.joint = Some(input.parse()?),
-                "multiplier" => mimic.multiplier = Some(Quantity::parse(input)?),
-                _ => mimic.offset = Some(Quantity::parse(input)?),
+        record(&words::MIMIC, input, notes, |field, word, _, input, notes| {
+            match field {
+                MimicField::Joint => mimic.joint = Some(input.parse()?),
+                MimicField::Multiplier => mimic.multiplier = Some(Quantity::of(word, input, notes)?),
+                MimicField::Offset => mimic.offset = Some(Quantity::of(word, input, notes)?),
             }
             Ok(())
         })?;
-        semicolon(input, "`mimic`", diagnostics);
+        semicolon(input, "`mimic`", notes);
         Ok(mimic)
     }
 }
 
 impl Transmission {
-    pub(super) fn parse(head: Head, input: ParseStream<'_>, diagnostics: &mut Diagnostics) -> syn::Result<Self> {
+    pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
-        let mut transmission = Self { word: head.word, reduction: None };
-        record(input, &["reduction"], |_, input| {
-            transmission.reduction = Some(Quantity::parse(input)?);
+        let mut transmission = Self { reduction: None };
+        record(&words::TRANSMISSION, input, notes, |field, word, _, input, notes| {
+            match field {
+                TransmissionField::Reduction => transmission.reduction = Some(Quantity::of(word, input, notes)?),
+            }
             Ok(())
         })?;
-        semicolon(input, "`transmission`", diagnostics);
+        semicolon(input, "`transmission`", notes);
         Ok(transmission)
     }
 }

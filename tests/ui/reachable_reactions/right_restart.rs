@@ -1,3 +1,5 @@
+//! Any estimator can degrade: it does when it is restarted.
+
 use bb_core::prelude::*;
 use bb_ui_tests::*;
 

@@ -1,0 +1,98 @@
+//! What a component is given: `beta = 0.1`, `gain = param::gain`.
+
+use crate::parse::name::whole;
+use crate::parse::quantity::decimal_comma;
+use crate::parse::{Path, Quantity};
+use proc_macro2::Ident;
+use syn::parse::ParseStream;
+use syn::{Expr, Token};
+
+/// `beta = 0.1`
+#[derive(Clone, Debug)]
+pub(crate) struct ComponentOption {
+    pub(crate) name: Ident,
+    pub(crate) value: OptionValue,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum OptionValue {
+    /// A literal number with a unit.
+    Quantity(Quantity),
+    /// `param::imu::beta`: whatever the parameter is at the time.
+    Parameter(Path),
+    /// Any expression; with its number, if it is a literal one.
+    Expression { expression: Box<Expr>, number: Option<f64> },
+}
+
+impl ComponentOption {
+    pub(super) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        let place = input.span();
+        let name: Ident =
+            input.parse().map_err(|_| syn::Error::new(place, "expected an option, as in `name = value`"))?;
+        whole(input, &name)?;
+        let place = input.span();
+        let equals: syn::Result<Token![=]> = input.parse();
+        equals
+            .map_err(|_| syn::Error::new(place, format!("expected `=` and a value after the option `{name}`")))?;
+        Ok(Self { name, value: OptionValue::parse(input)? })
+    }
+}
+
+impl OptionValue {
+    /// A number with a unit, or any expression: tried as a quantity first, since `0.42 m` is no expression.
+    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        if let Some(parameter) = Self::parameter(input)? {
+            return Ok(parameter);
+        }
+        if !Quantity::peek(input) {
+            return Ok(Self::Expression { expression: Box::new(input.parse()?), number: None });
+        }
+        decimal_comma(&input.fork()).map_or(Ok(()), Err)?;
+        let ahead = input.fork();
+        if let Ok(expression) = ahead.parse::<Expr>()
+            && (ahead.is_empty() || ahead.peek(Token![,]))
+            && let Some(number) = plain_number(&expression)
+        {
+            let expression = Box::new(input.parse()?);
+            return Ok(Self::Expression { expression, number });
+        }
+        Quantity::parse(input).map(Self::Quantity)
+    }
+
+    /// A path that starts with `param::`, unless it is part of a larger expression.
+    fn parameter(input: ParseStream<'_>) -> syn::Result<Option<Self>> {
+        let starts = input.fork().parse::<Ident>().is_ok_and(|word| word == "param") && input.peek2(Token![::]);
+        if !starts {
+            return Ok(None);
+        }
+        const EXPECTED: &str = "the path of a parameter, as in `param::imu::beta`";
+        let ahead = input.fork();
+        Path::parse(&ahead, EXPECTED)?;
+        if !(ahead.is_empty() || ahead.peek(Token![,])) {
+            return Ok(None);
+        }
+        Path::parse(input, EXPECTED).map(|path| Some(Self::Parameter(path)))
+    }
+}
+
+/// `Some(Some(number))` for a literal without a unit, `Some(None)` for an expression of several terms, and none where a
+/// suffix may be a unit.
+fn plain_number(expression: &Expr) -> Option<Option<f64>> {
+    const RUST: [&str; 15] =
+        ["", "i8", "i16", "i32", "i64", "i128", "isize", "u8", "u16", "u32", "u64", "u128", "usize", "f32", "f64"];
+    match expression {
+        Expr::Unary(unary) => plain_number(&unary.expr).map(|number| number.map(|number| -number)),
+        Expr::Lit(literal) => match &literal.lit {
+            syn::Lit::Int(number) if RUST.contains(&number.suffix()) => Some(finite(number.base10_digits())),
+            syn::Lit::Float(number) if RUST.contains(&number.suffix()) => Some(finite(number.base10_digits())),
+            _ => None,
+        },
+        Expr::Binary(binary) => plain_number(&binary.left).map(|_| None),
+        _ => Some(None),
+    }
+}
+
+/// The number, if it is one that a double can hold.
+fn finite(digits: &str) -> Option<f64> {
+    digits.parse().ok().filter(|number: &f64| number.is_finite())
+}

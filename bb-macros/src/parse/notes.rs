@@ -1,0 +1,58 @@
+//! What is collected beside the tree while a robot is read: for the rules that hold for all words alike.
+
+use super::{JointKind, Quantity};
+use crate::diagnostics::Diagnostics;
+use crate::language::Word;
+use proc_macro2::Ident;
+use std::ops::{Deref, DerefMut};
+
+/// A number, and the word that it was given to.
+#[derive(Clone, Debug)]
+pub(crate) struct Given {
+    pub(crate) word: &'static Word,
+    /// The joint in which it is written: its dimension may depend on that.
+    pub(crate) joint: Option<JointKind>,
+    pub(crate) quantity: Quantity,
+}
+
+/// Errors, numbers and repetitions.
+pub(super) struct Notes<'a> {
+    diagnostics: &'a mut Diagnostics,
+    given: Vec<Given>,
+    repeated: Vec<Ident>,
+    /// The kind of the joint that is being read, if it is known.
+    pub(super) joint: Option<JointKind>,
+}
+
+impl<'a> Notes<'a> {
+    pub(super) fn new(diagnostics: &'a mut Diagnostics) -> Self {
+        Self { diagnostics, given: Vec::new(), repeated: Vec::new(), joint: None }
+    }
+
+    /// All numbers, and all words that were written too often.
+    pub(super) fn into_given(self) -> (Vec<Given>, Vec<Ident>) {
+        (self.given, self.repeated)
+    }
+
+    pub(super) fn give(&mut self, word: &'static Word, quantity: &Quantity) {
+        self.given.push(Given { word, joint: self.joint, quantity: quantity.clone() });
+    }
+
+    pub(super) fn repeat(&mut self, word: Ident) {
+        self.repeated.push(word);
+    }
+}
+
+impl Deref for Notes<'_> {
+    type Target = Diagnostics;
+
+    fn deref(&self) -> &Diagnostics {
+        self.diagnostics
+    }
+}
+
+impl DerefMut for Notes<'_> {
+    fn deref_mut(&mut self) -> &mut Diagnostics {
+        self.diagnostics
+    }
+}

@@ -1,0 +1,18 @@
+//! Payloads with type parameters.
+
+use bb_core::prelude::*;
+
+/// Nothing says that `T` can be recorded.
+#[derive(Clone, Debug, Payload)]
+pub struct Pair<T> {
+    pub first: T,
+    pub second: T,
+}
+
+/// This one can.
+#[derive(Clone, Debug, Payload)]
+pub struct Timed<T: Payload> {
+    pub value: T,
+}
+
+fn main() {}
