@@ -109,6 +109,8 @@ impl<T: Real> FieldReference<T> {
 
         if distance(field, self.candidate) < same {
             self.candidate_s += dt;
+            // Only while alike: the age is that of the field that the candidate is the mean of.
+            approach(&mut self.candidate, field, (dt / T::of(CANDIDATE_TIME_CONSTANT_S)).min(T::ONE));
         } else {
             self.candidate_s -= T::of(3.0) * dt;
         }
@@ -116,7 +118,10 @@ impl<T: Real> FieldReference<T> {
             self.candidate_s = T::ZERO;
             self.candidate = field;
         }
-        approach(&mut self.candidate, field, (dt / T::of(CANDIDATE_TIME_CONSTANT_S)).min(T::ONE));
+        if distance(self.candidate, self.reference) < same {
+            // The reference itself, whose age says nothing of the field that comes next.
+            self.candidate_s = self.candidate_s.min(T::of(LEAST_EVIDENCE_S));
+        }
 
         let undisturbed = distance(field, self.reference) < same;
         if undisturbed {
@@ -163,4 +168,33 @@ fn approach<T: Real>(mean: &mut Plane<T>, value: Plane<T>, gain: T) {
 fn shortened<T: Real>(field: Plane<T>, longest: T) -> Plane<T> {
     let norm = norm(field);
     if norm > longest { field.map(|part| part * (longest / norm)) } else { field }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOW_S: f64 = 0.03;
+
+    /// How long a field lasts before it makes the heading unknown, s; none if it does not within `most_s`.
+    fn believed_after(reference: &mut FieldReference<f64>, field: Plane<f64>, most_s: f64) -> Option<f64> {
+        let windows = (most_s / WINDOW_S) as i32;
+        (1..=windows)
+            .find(|_| reference.observe(WINDOW_S, field, false) == Verdict::HeadingUnknown)
+            .map(|window| f64::from(window) * WINDOW_S)
+    }
+
+    #[test]
+    fn a_new_field_needs_evidence_of_its_own() {
+        for steady_s in [1.0, 5.0, 40.0, 300.0] {
+            for jump in [0.12, 0.3, 1.0] {
+                let mut reference = FieldReference::new([20.0, -45.0]);
+                assert_eq!(believed_after(&mut reference, [20.0, -45.0], steady_s), None);
+                let needed = (LEAST_EVIDENCE_S + EVIDENCE_RATIO * steady_s).min(MOST_EVIDENCE_S);
+                let believed = believed_after(&mut reference, [20.0 + 49.0 * jump, -45.0], 100.0);
+                let believed = believed.expect("a field that lasts is believed");
+                assert!(believed > 0.9 * needed && believed < needed + 5.0, "{steady_s} s, {jump}: {believed} s");
+            }
+        }
+    }
 }
