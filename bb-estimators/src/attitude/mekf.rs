@@ -47,6 +47,7 @@ mod params;
 mod rest;
 #[cfg(test)]
 mod tests;
+mod vertical;
 mod window;
 
 pub use filter::MekfFilter;

@@ -2,12 +2,12 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::GRAVITY;
 use super::errors::{BIAS, CALIBRATION, Errors, FORCE_LATENCY, LATENCY, ProcessNoise, ROTATION, VELOCITY};
 use super::field::{FieldReference, Verdict};
 use super::measurement::{Heading, Measurements};
 use super::params::MekfParams;
 use super::rest::Rest;
+use super::vertical::{Contradiction, Vertical};
 use super::window::Window;
 use crate::attitude::initial::heading_error;
 use crate::attitude::rotation::{turn, turn_heading, turn_upright};
@@ -16,7 +16,7 @@ use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError}
 
 /// Standard deviation of the tilt that one accelerometer sample shows in motion, rad. At rest it is forgotten
 /// within a second.
-const INITIAL_TILT: f64 = 0.35;
+pub(super) const INITIAL_TILT: f64 = 0.35;
 
 /// Standard deviation of an orientation that was given, about every axis, rad.
 const GIVEN: f64 = 0.087;
@@ -51,12 +51,6 @@ const MAX_REST_BIAS: f64 = 0.035;
 /// How long a disturbance of the field lasts for a body that moves, s.
 const FIELD_TIME_S: f64 = 0.5;
 
-/// The specific force in the world is the vertical in the mean over this time, s.
-const FORCE_MEAN_S: f64 = 2.0;
-
-/// The slope of that mean beyond which the tilt is wrong: 30°, more than any motion of that time accelerates by.
-const MAX_FORCE_SLOPE: f64 = 0.577;
-
 /// A heading this far from an undisturbed field contradicts it, rad and standard deviations.
 const CONTRADICTION: f64 = 0.35;
 const CONTRADICTION_DEVIATIONS: f64 = 4.0;
@@ -80,9 +74,7 @@ pub struct MekfFilter<T: Real = f64> {
     field: Option<FieldReference<T>>,
     last_field: Vector3<T>,
     squared_acceleration: T,
-    /// ∫ R f dt, m/s, since the mean began, and how long ago that is.
-    mean_force: Vector3<T>,
-    mean_force_s: T,
+    vertical: Vertical<T>,
 }
 
 impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
@@ -104,8 +96,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             field: None,
             last_field: Vector3::zeros(),
             squared_acceleration: T::ZERO,
-            mean_force: Vector3::zeros(),
-            mean_force_s: T::ZERO,
+            vertical: Vertical::new(false),
         };
         filter.forget_sensors();
         Ok(filter)
@@ -218,7 +209,9 @@ impl<T: Real> MekfFilter<T> {
         let direction = sample.magnetic_field.filter(|_| self.params.magnetometer).map(|field| field.normalize());
         self.heading_known = direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
         self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
+        self.last_field = sample.magnetic_field.unwrap_or_default();
         self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
+        self.vertical = Vertical::new(true);
     }
 
     /// Resets the orientation's errors; what is known of the sensors stays.
@@ -235,8 +228,7 @@ impl<T: Real> MekfFilter<T> {
         self.rotation = *orientation.to_rotation_matrix().matrix();
         self.window = Window::new();
         self.measurements = Measurements::none();
-        self.mean_force = Vector3::zeros();
-        self.mean_force_s = T::ZERO;
+        self.vertical = Vertical::new(false);
     }
 
     /// Doubts what is known of the sensors as at the start.
@@ -273,16 +265,10 @@ impl<T: Real> MekfFilter<T> {
         let orientation = correction * orientation;
         self.rotation = *orientation.to_rotation_matrix().matrix();
         let force = correction * window.force;
-        self.mean_force = correction * self.mean_force + force;
-        self.mean_force_s += dt;
-        if self.mean_force_s > T::of(FORCE_MEAN_S) {
-            let sum = core::mem::replace(&mut self.mean_force, Vector3::zeros());
-            self.mean_force_s = T::ZERO;
-            if sum.x.hypot(sum.y) > T::of(MAX_FORCE_SLOPE) * sum.z
-                && sum.norm() > T::HALF * T::of(GRAVITY) * T::of(FORCE_MEAN_S)
-            {
-                return self.level(orientation, &sum);
-            }
+        match self.vertical.add(dt, &correction, &force) {
+            Some(Contradiction::Start(up, deviation)) => return self.level_start(orientation, &up, deviation),
+            Some(Contradiction::Tilt(up)) => return self.level(orientation, &up),
+            None => {}
         }
         self.measure(&window, &correction, &force);
         orientation
@@ -363,6 +349,25 @@ impl<T: Real> MekfFilter<T> {
             rate,
             variance: T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance) / (dt * horizontal * horizontal),
         })
+    }
+
+    /// The body accelerated at the start: levels it by the mean specific force since, known up to `deviation`, rad.
+    /// The heading is that of the last field; what is known of the sensors stays.
+    #[cold]
+    fn level_start(&mut self, orientation: UnitQuaternion<T>, up: &Vector3<T>, deviation: T) -> UnitQuaternion<T> {
+        let mut orientation = turn_upright(&orientation, up);
+        if self.params.magnetometer
+            && let Some(field) = self.last_field.try_normalize(T::ZERO)
+            && let Some(error) = heading_error(&(orientation * field))
+        {
+            orientation = turn_heading(&orientation, error);
+            self.field = None;
+        }
+        let vertical = self.vertical.clone();
+        self.begin(&orientation, deviation, T::of(INITIAL_HEADING));
+        self.vertical = vertical;
+        self.vertical.levelled();
+        orientation
     }
 
     /// The tilt contradicts the mean specific force: restarts it, and the heading with the next field.

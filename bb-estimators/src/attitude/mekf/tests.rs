@@ -140,6 +140,27 @@ fn a_magnet_on_the_body_is_recognised() {
 }
 
 #[test]
+fn a_start_in_motion_is_levelled_within_two_seconds() {
+    for magnetometer in [true, false] {
+        for start in 0..20 {
+            let (mut world, mut filter) = (World::new(), filter(magnetometer));
+            for _ in 0..37 * start {
+                world.sample(true);
+            }
+            // A hand that throws: for a tenth of a second the specific force points anywhere.
+            for i in 0..10 {
+                let sample = world.sample(true);
+                let push = Vector3::new(12.0, -9.0, 4.0) * (f64::from(i) * 0.63).cos();
+                filter.update(&ImuSample { specific_force: sample.specific_force + push, ..sample }).unwrap();
+            }
+            world.run(&mut filter, 3, true);
+            let error = world.error_of(&filter);
+            assert!(error.inclination < 8.0, "start {start}: {error:?}");
+        }
+    }
+}
+
+#[test]
 fn a_new_field_that_lasts_is_believed() {
     let (mut world, mut filter) = (World::new(), filter(true));
     world.run(&mut filter, 30, true);
