@@ -20,6 +20,7 @@ mod progress;
 mod recording;
 mod report;
 mod score;
+mod variants;
 
 pub use averages::Averages;
 pub use evaluate::{Evaluation, Evaluator, Run, evaluate};
@@ -31,6 +32,7 @@ pub use plot::{Line, Panel, Picture};
 pub use progress::Progress;
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
+pub use variants::{Field, Offset, Starts, Variants};
 
 use arguments::{Attitude, Job, Navigation};
 use std::ffi::OsString;

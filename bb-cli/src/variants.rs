@@ -73,9 +73,13 @@ impl Variants {
 
     pub(crate) fn check(&self, axes: crate::Axes) -> Result<(), String> {
         if self.count() > MOST {
-            return Err(format!("{} variants of each recording are asked for, but at most {MOST} are made", self.count()));
+            return Err(format!(
+                "{} variants of each recording are asked for, but at most {MOST} are made",
+                self.count()
+            ));
         }
-        let field = self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some();
+        let field =
+            self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some();
         if field && axes == crate::Axes::Six {
             return Err("--axes six takes no magnetometer, so --offset, --magnet, --disturb and --drift change \
                         nothing; leave them out"
@@ -145,9 +149,9 @@ impl Variant {
                 Some((random(3, index).direction() * size, at(-MAGNET_ON_S), at(MAGNET_OFF_S)))
             }
         };
-        let offset = variants.offset.map_or_else(Vector3::zeros, |Offset(Field(size), _)| {
-            random(2, index / starts).direction() * size
-        });
+        let offset = variants
+            .offset
+            .map_or_else(Vector3::zeros, |Offset(Field(size), _)| random(2, index / starts).direction() * size);
         let pulses = variants.disturb.map(|Field(size)| Pulses {
             size,
             random: random(4, index),
@@ -383,13 +387,8 @@ mod tests {
 
     #[test]
     fn disturbances_come_and_go() {
-        let mut pulses = Pulses {
-            size: 2.0,
-            random: Random(1),
-            field: Vector3::zeros(),
-            is_on: false,
-            change_ns: None,
-        };
+        let mut pulses =
+            Pulses { size: 2.0, random: Random(1), field: Vector3::zeros(), is_on: false, change_ns: None };
         let sizes: Vec<_> = (0..10_000).map(|i| pulses.at(i * 10_000_000).norm()).collect();
         let on = sizes.iter().filter(|size| **size > 1.0).count();
         assert_eq!(sizes[0], 0.0);
