@@ -42,6 +42,7 @@
 mod errors;
 mod field;
 mod filter;
+mod iron;
 mod measurement;
 mod params;
 mod rest;

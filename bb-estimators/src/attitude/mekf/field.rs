@@ -4,6 +4,8 @@
 //! changes the dip. The third, which turns the heading, cannot be told from a wrong heading. But all three are
 //! of one size, so the two that show tell how wrong the heading may be.
 
+use nalgebra::Vector3;
+
 use crate::attitude::Real;
 use crate::attitude::initial::MIN_HORIZONTAL_FRACTION;
 
@@ -40,7 +42,7 @@ const CONTRADICTION_S: f64 = 10.0;
 const LARGEST: f64 = 10.0;
 
 /// The field in the vertical plane: horizontal and vertical part.
-type Plane<T> = [T; 2];
+pub(super) type Plane<T> = [T; 2];
 
 /// What a window's field means for the heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +77,21 @@ impl<T: Real> FieldReference<T> {
             disturbance: T::ZERO,
             contradicted_s: T::ZERO,
         }
+    }
+
+    /// A reference that has been seen for so long, s.
+    pub(super) fn seen(field: Plane<T>, seen_s: T) -> Self {
+        Self { seen_s: seen_s.min(T::of(MOST_EVIDENCE_S)), ..Self::new(field) }
+    }
+
+    /// How long the field has been like the reference, s.
+    pub(super) fn seen_s(&self) -> T {
+        self.seen_s
+    }
+
+    /// Whether a field in the world has norm and dip of the reference, up to a part of its norm.
+    pub(super) fn is_like(&self, field: &Vector3<T>, part: T) -> bool {
+        distance(in_plane(field), self.reference) < (part * self.norm()) * (part * self.norm())
     }
 
     fn norm(&self) -> T {
@@ -149,6 +166,11 @@ impl<T: Real> FieldReference<T> {
         }
         verdict
     }
+}
+
+/// Horizontal and vertical part of a field in the world.
+pub(super) fn in_plane<T: Real>(field: &Vector3<T>) -> Plane<T> {
+    [(field.x * field.x + field.y * field.y).sqrt(), field.z]
 }
 
 fn norm<T: Real>([horizontal, vertical]: Plane<T>) -> T {

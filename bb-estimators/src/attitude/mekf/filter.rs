@@ -2,8 +2,9 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::errors::{BIAS, CALIBRATION, Errors, FORCE_LATENCY, LATENCY, ProcessNoise, ROTATION, VELOCITY};
-use super::field::{FieldReference, Verdict};
+use super::errors::{BIAS, CALIBRATION, Errors, FORCE_LATENCY, ProcessNoise, ROTATION, VELOCITY};
+use super::field::{FieldReference, Verdict, in_plane};
+use super::iron::{Adoption, FieldMeans, HardIron};
 use super::measurement::{Heading, Measurements};
 use super::params::MekfParams;
 use super::rest::Rest;
@@ -51,6 +52,9 @@ const MAX_REST_BIAS: f64 = 0.035;
 /// How long a disturbance of the field lasts for a body that moves, s.
 const FIELD_TIME_S: f64 = 0.5;
 
+/// A heading that is known from before is turned to the field beyond this difference, rad, and two standard deviations.
+const REOPENED: f64 = 0.15;
+
 /// A heading this far from an undisturbed field contradicts it, rad and standard deviations.
 const CONTRADICTION: f64 = 0.35;
 const CONTRADICTION_DEVIATIONS: f64 = 4.0;
@@ -72,6 +76,7 @@ pub struct MekfFilter<T: Real = f64> {
     measurements: Measurements<T>,
     rest: Rest<T>,
     field: Option<FieldReference<T>>,
+    iron: HardIron<T>,
     last_field: Vector3<T>,
     squared_acceleration: T,
     vertical: Vertical<T>,
@@ -94,6 +99,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             measurements: Measurements::none(),
             rest: Rest::new(&Vector3::zeros(), &Vector3::zeros()),
             field: None,
+            iron: HardIron::new(params.magnetometer_latency),
             last_field: Vector3::zeros(),
             squared_acceleration: T::ZERO,
             vertical: Vertical::new(false),
@@ -127,7 +133,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             && (field != self.last_field || self.rest.is_detected())
         {
             // A driver that is faster than the magnetometer repeats its last value, which is then a stale one.
-            self.window.add_field(&self.rotation, &rate, &field);
+            self.window.add_field(&self.rotation, &rate, &field, &self.iron.offset);
             self.last_field = field;
         }
 
@@ -153,6 +159,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         self.heading_known = true;
         if let Some(orientation) = self.state.world_from_body() {
             self.begin(&orientation, T::of(GIVEN), T::of(GIVEN));
+            self.iron.begin(false);
         }
         Ok(())
     }
@@ -169,7 +176,9 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     /// right by definition at the start, and what it drifts by since is in here.
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
-        Some(self.rotation.transpose() * self.errors.rotation() * self.rotation)
+        let mut in_world = self.errors.rotation();
+        in_world[(2, 2)] += self.iron.heading_variance();
+        Some(self.rotation.transpose() * in_world * self.rotation)
     }
 
     fn is_at_rest(&self) -> Option<bool> {
@@ -197,7 +206,7 @@ impl<T: Real> MekfFilter<T> {
 
     /// How much the magnetometer lags the gyroscope, s.
     pub fn magnetometer_latency(&self) -> T {
-        self.errors.mean[LATENCY]
+        self.iron.lag()
     }
 
     /// After a start from a sample, the first one or the one after a gap.
@@ -229,15 +238,14 @@ impl<T: Real> MekfFilter<T> {
         self.window = Window::new();
         self.measurements = Measurements::none();
         self.vertical = Vertical::new(false);
+        self.iron.begin(true);
     }
 
     /// Doubts what is known of the sensors as at the start.
     fn forget_sensors(&mut self) {
         let params = &self.params;
-        let latency = if params.magnetometer { T::of(params.magnetometer_latency) } else { T::ZERO };
         self.errors.forget::<3>(BIAS, T::of(params.initial_bias * params.initial_bias));
         self.errors.forget::<9>(CALIBRATION, T::of(params.calibration_error * params.calibration_error));
-        self.errors.forget::<1>(LATENCY, latency * latency);
         let latency = T::of(params.accelerometer_latency);
         self.errors.forget::<1>(FORCE_LATENCY, latency * latency);
     }
@@ -270,8 +278,16 @@ impl<T: Real> MekfFilter<T> {
             Some(Contradiction::Tilt(up)) => return self.level(orientation, &up),
             None => {}
         }
-        self.measure(&window, &correction, &force);
-        orientation
+        self.iron.correct(&correction);
+        let fields = window.mean_field(&correction);
+        let adoption = fields
+            .as_ref()
+            .and_then(|fields| self.iron.observe(dt, fields, self.rest.is_detected(), self.field.as_ref()));
+        self.measure(dt, fields.as_ref(), &force);
+        match adoption {
+            Some(adoption) => self.adopt(orientation, &adoption),
+            None => orientation,
+        }
     }
 
     /// Moves the mean errors into what they are errors of; returns the rotation.
@@ -289,8 +305,7 @@ impl<T: Real> MekfFilter<T> {
     }
 
     /// Looks at what a window says, for the samples of the next one to take.
-    fn measure(&mut self, window: &Window<T>, correction: &UnitQuaternion<T>, force: &Vector3<T>) {
-        let dt = window.duration;
+    fn measure(&mut self, dt: T, fields: Option<&FieldMeans<T>>, force: &Vector3<T>) {
         let resting = self.rest.is_detected();
         let squared = (force.x * force.x + force.y * force.y) / (dt * dt);
         let gain = (dt / T::of(ACCELERATION_TIME_CONSTANT_S)).min(T::ONE);
@@ -303,10 +318,7 @@ impl<T: Real> MekfFilter<T> {
             squared * T::TWO * T::of(VELOCITY_TIME_S) / dt
         };
         let bias = resting.then(|| self.rest_bias(dt));
-        let heading = window.mean_field().and_then(|(field, rate)| {
-            let latency = self.errors.mean[LATENCY];
-            self.heading(dt, &(correction * (field - rate * latency)), &(correction * rate))
-        });
+        let heading = fields.map(|fields| self.heading(dt, fields));
         self.measurements = Measurements::new(velocity_variance, heading, bias);
     }
 
@@ -324,10 +336,12 @@ impl<T: Real> MekfFilter<T> {
         (difference * most, T::of(REST_BIAS * REST_BIAS) / dt)
     }
 
-    /// What the field says about the heading; `field` and what it changes by with the lag are in the world.
-    fn heading(&mut self, dt: T, field: &Vector3<T>, rate: &Vector3<T>) -> Option<Heading<T>> {
-        let squared = field.x * field.x + field.y * field.y;
-        let plane = [squared.sqrt(), field.z];
+    /// What the field says about the heading, less the offset and the lag.
+    fn heading(&mut self, dt: T, fields: &FieldMeans<T>) -> Heading<T> {
+        let FieldMeans { rotation, field, rate } = fields;
+        let field = field - rotation * self.iron.offset - rate * self.iron.lag();
+        let plane = in_plane(&field);
+        let squared = plane[0] * plane[0];
         let reference = self.field.get_or_insert_with(|| FieldReference::new(plane));
         let angle = field.x.atan2(field.y);
         let deviation = self.errors.variance(ROTATION + 2).max(T::ZERO).sqrt();
@@ -343,12 +357,41 @@ impl<T: Real> MekfFilter<T> {
         let usual = T::of(self.params.field_disturbance * self.params.field_disturbance);
         let least = T::of(0.25) * horizontal * horizontal * reference.squared_norm();
         let rate = (rate.x * field.y - rate.y * field.x) / squared.max(least);
-        Some(Heading {
-            angle: angle + rate * self.errors.mean[LATENCY],
+        // What is not known of the offset, across the field, as a fraction of its norm.
+        let across = rotation.tr_mul(&Vector3::new(field.y, -field.x, T::ZERO)) / squared.max(least).sqrt();
+        let unknown = across.dot(&(self.iron.covariance() * across)) / reference.squared_norm();
+        let disturbed = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown) / (horizontal * horizontal);
+        Heading {
+            angle,
             slope: reference.vertical() / horizontal,
-            rate,
-            variance: T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance) / (dt * horizontal * horizontal),
-        })
+            variance: disturbed / dt + rate * rate * self.iron.lag_variance(),
+        }
+    }
+
+    /// Takes an offset that the field has shown, and the heading where the fields are all that shows it.
+    #[cold]
+    fn adopt(&mut self, orientation: UnitQuaternion<T>, adoption: &Adoption<T>) -> UnitQuaternion<T> {
+        let Adoption { field, variance, is_heading, is_other_field, duration } = adoption;
+        // What the window says about the heading was with the offset before.
+        self.measurements.forget_heading();
+        if *is_heading || *is_other_field {
+            self.field = Some(FieldReference::seen(in_plane(field), *duration));
+        }
+        let Some(angle) = heading_error(&field.normalize()) else { return orientation };
+        let known = self.errors.variance(ROTATION + 2) + *variance;
+        let is_evident = angle.abs() > T::of(REOPENED) && angle * angle > T::of(4.0) * known;
+        if !is_heading && !is_evident {
+            return orientation;
+        }
+        let turned = turn_heading(&orientation, angle);
+        let rotation = turn_heading(&UnitQuaternion::identity(), angle);
+        let (sin, cos) = angle.sin_cos();
+        self.errors.turn_heading([cos, sin]);
+        self.errors.doubt(ROTATION + 2, if *is_heading { *variance } else { *variance + angle * angle });
+        self.vertical.turn(&rotation);
+        self.iron.turn(&rotation);
+        self.rotation = *turned.to_rotation_matrix().matrix();
+        turned
     }
 
     /// The body accelerated at the start: levels it by the mean specific force since, known up to `deviation`, rad.

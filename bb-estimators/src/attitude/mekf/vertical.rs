@@ -76,6 +76,11 @@ impl<T: Real> Vertical<T> {
         (is_complete && leans(T::of(MAX_SLOPE))).then_some(Contradiction::Tilt(sum))
     }
 
+    /// The world was turned.
+    pub(super) fn turn(&mut self, rotation: &UnitQuaternion<T>) {
+        self.sum = rotation * self.sum;
+    }
+
     /// The world was levelled by the mean, so that it is the vertical from now on.
     pub(super) fn levelled(&mut self) {
         self.sum = Vector3::new(T::ZERO, T::ZERO, self.sum.norm());
