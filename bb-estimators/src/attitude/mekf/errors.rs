@@ -70,9 +70,9 @@ impl<T: Real> Errors<T> {
         self.covariance[state][state]
     }
 
-    /// Covariance of the rotation error, world axes, rad².
-    pub(super) fn rotation(&self) -> Matrix3<T> {
-        Matrix3::from_fn(|i, k| self.covariance[ROTATION + i][ROTATION + k])
+    /// Covariance of the three states from `first` on; of the rotation error in world axes, rad².
+    pub(super) fn block(&self, first: usize) -> Matrix3<T> {
+        Matrix3::from_fn(|i, k| self.covariance[first + i][first + k])
     }
 
     /// Whether every mean and variance is a number to compute with.

@@ -55,6 +55,9 @@ const FIELD_TIME_S: f64 = 0.5;
 /// A heading that is known from before is turned to the field beyond this difference, rad, and two standard deviations.
 const REOPENED: f64 = 0.15;
 
+/// A heading known up to this standard deviation is trusted, rad: 10°.
+const TRUSTED_HEADING: f64 = 0.175;
+
 /// A heading this far from an undisturbed field contradicts it, rad and standard deviations.
 const CONTRADICTION: f64 = 0.35;
 const CONTRADICTION_DEVIATIONS: f64 = 4.0;
@@ -176,7 +179,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     /// right by definition at the start, and what it drifts by since is in here.
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
-        let mut in_world = self.errors.rotation();
+        let mut in_world = self.errors.block(ROTATION);
         in_world[(2, 2)] += self.iron.heading_variance();
         Some(self.rotation.transpose() * in_world * self.rotation)
     }
@@ -188,6 +191,14 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     /// By norm and dip: a field that differs from the reference by more than a tenth of its norm.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         self.params.magnetometer.then(|| self.field.as_ref().is_some_and(FieldReference::is_disturbed))
+    }
+
+    /// Up to a standard deviation of 10°. An unknown offset of the magnetometer is part of it: a sensor that has not
+    /// turned since the start has no heading to be trusted.
+    fn is_heading_trusted(&self) -> Option<bool> {
+        let variance = self.errors.variance(ROTATION + 2) + self.iron.heading_variance();
+        let is_trusted = self.heading_known && variance < T::of(TRUSTED_HEADING * TRUSTED_HEADING);
+        self.params.magnetometer.then_some(is_trusted)
     }
 
     fn reset(&mut self) {
@@ -204,9 +215,31 @@ impl<T: Real> MekfFilter<T> {
         self.calibration
     }
 
+    /// What the magnetometer reads beside the field: by iron on the body, in the body frame and the field's unit. Zero
+    /// as long as nothing speaks for another.
+    pub fn magnetometer_offset(&self) -> Vector3<T> {
+        self.iron.offset
+    }
+
+    /// Covariance of the offset in the body frame, the field's unit squared, by what was seen since the offset or the
+    /// field last changed.
+    pub fn magnetometer_offset_uncertainty(&self) -> Matrix3<T> {
+        self.iron.offset_covariance()
+    }
+
     /// How much the magnetometer lags the gyroscope, s.
     pub fn magnetometer_latency(&self) -> T {
         self.iron.lag()
+    }
+
+    /// Variance of that, s².
+    pub fn magnetometer_latency_variance(&self) -> T {
+        self.iron.lag_variance()
+    }
+
+    /// Covariance of the gyroscope's bias, body frame, (rad/s)².
+    pub fn gyroscope_bias_uncertainty(&self) -> Matrix3<T> {
+        self.errors.block(BIAS)
     }
 
     /// After a start from a sample, the first one or the one after a gap.

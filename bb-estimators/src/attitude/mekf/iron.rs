@@ -62,6 +62,15 @@ const SAME_FIELD: f64 = 0.12;
 /// A fit is an improvement if the variance of the offset is less than this part of that adopted.
 const IMPROVEMENT: f64 = 0.9;
 
+/// The heading of a field that was seen for this many times as long as the one before replaces it, as in `field.rs`.
+const OUTLASTS: f64 = 2.0;
+
+/// And for so long, s.
+const OUTLASTS_S: f64 = 1.0;
+
+/// A heading known up to this standard deviation, rad, is worth turning to.
+const KNOWN_HEADING: f64 = 0.1;
+
 /// What the offset and the field are now known to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Adoption<T> {
@@ -93,9 +102,14 @@ pub(super) struct HardIron<T> {
     /// Mean square of how far predictions miss.
     miss: T,
     windows: u32,
-    rest_s: T,
+    /// How long the sums are over, s, without fading.
+    seen_s: T,
     /// Whether the sums go back to when the heading was last unknown.
     is_heading: bool,
+    /// How long those were over, s.
+    heading_s: T,
+    /// Whether the field or the offset has changed since the start, so that the offset may be any.
+    is_doubted: bool,
     home: Vector3<T>,
     held_s: T,
 }
@@ -115,8 +129,10 @@ impl<T: Real> HardIron<T> {
             lag_before: lag,
             miss: T::ZERO,
             windows: 0,
-            rest_s: T::ZERO,
+            seen_s: T::ZERO,
             is_heading: true,
+            heading_s: T::ZERO,
+            is_doubted: false,
             home: Vector3::zeros(),
             held_s: T::ZERO,
         }
@@ -134,13 +150,17 @@ impl<T: Real> HardIron<T> {
 
     /// Starts the sums; `is_heading` if the heading is unknown but for what they will show.
     pub(super) fn begin(&mut self, is_heading: bool) {
+        if self.is_heading {
+            self.heading_s = self.seen_s;
+        }
+        self.seen_s = T::ZERO;
         self.sums = Sums::new();
         self.fit = None;
         self.adopted = None;
         self.lag_before = self.lag;
         self.miss = T::ZERO;
-        self.rest_s = T::ZERO;
         self.is_heading = is_heading;
+        self.is_doubted = false;
         self.held_s = T::ZERO;
     }
 
@@ -158,7 +178,7 @@ impl<T: Real> HardIron<T> {
     /// Covariance of what is not known of the offset, as far as it disturbs the heading: before there was a reason
     /// to doubt it, an offset of zero is believed.
     pub(super) fn covariance(&self) -> Matrix3<T> {
-        if self.is_heading && self.adopted.is_none() {
+        if !self.is_doubted && self.adopted.is_none() {
             return Matrix3::zeros();
         }
         self.offset_covariance()
@@ -197,9 +217,10 @@ impl<T: Real> HardIron<T> {
         }
         if self.misses(dt, means) {
             self.begin(false);
+            self.is_doubted = true;
         }
-        self.rest_s = if is_at_rest { self.rest_s + dt } else { T::ZERO };
         self.held_s += dt;
+        self.seen_s += dt;
         if self.held_s > T::of(HOME_S) {
             self.home = self.offset;
         }
@@ -265,11 +286,22 @@ impl<T: Real> HardIron<T> {
             adopted = Some(fit.offset);
         }
         self.lag = Lag { mean: lag, variance: fit.covariance[(3, 3)] };
-        self.offset = adopted?;
-        if !improves {
-            self.held_s = T::ZERO;
+        let outlasts = !self.is_heading
+            && is_good
+            && self.seen_s > T::of(OUTLASTS_S) + T::of(OUTLASTS) * self.heading_s
+            && fit.heading_variance() < T::of(KNOWN_HEADING * KNOWN_HEADING);
+        if outlasts {
+            self.is_heading = true;
+        } else if adopted.is_none() {
+            return None;
         }
-        self.adopted = Some(trace);
+        if let Some(offset) = adopted {
+            self.offset = offset;
+            self.adopted = Some(trace);
+            if !improves {
+                self.held_s = T::ZERO;
+            }
+        }
         Some(Adoption {
             field: fit.field_of(&self.offset, lag),
             variance: fit.heading_variance(),

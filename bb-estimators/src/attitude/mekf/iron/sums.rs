@@ -8,6 +8,11 @@ use nalgebra::{Matrix3, Matrix4, UnitQuaternion, Vector3, Vector4};
 
 use crate::attitude::Real;
 
+/// The errors of a field before any are seen, as a fraction of its norm, and how long that is worth, s: seven numbers fit
+/// the first second too well.
+const PRIOR_ERROR: f64 = 0.02;
+const PRIOR_S: f64 = 2.0;
+
 /// What the errors of the field, which last for some time, are taken to be correlated over, s.
 const CORRELATION_S: f64 = 0.25;
 
@@ -156,7 +161,8 @@ impl<T: Real> Sums<T> {
             rate: mean_rate,
             noise: T::ZERO,
         };
-        let error = (fit.cost(&solution) * scale).max(least);
+        let prior = T::of(PRIOR_ERROR * PRIOR_ERROR) * unit * unit * T::of(PRIOR_S);
+        let error = ((fit.cost(&solution) + prior) / (self.duration + T::of(PRIOR_S))).max(least);
         fit.noise = error * correlation;
         fit.covariance = inverse * fit.noise;
         Some(fit)
