@@ -106,7 +106,9 @@ pub fn evaluate(file: &Path, evaluator: &Evaluator, progress: &Progress) -> Eval
     evaluate_variant(file, 0, evaluator, progress)
 }
 
-fn evaluate_variant(file: &Path, variant: u32, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
+/// Plays one variant of a recording through the filters, by its index below [`Variants::count`]. Moves the progress by
+/// 1,000.
+pub fn evaluate_variant(file: &Path, variant: u32, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
     let mut shown = 0;
     let mut show = |part: u64| {
         progress.add(part.min(BAR).saturating_sub(shown));

@@ -23,7 +23,7 @@ mod score;
 mod variants;
 
 pub use averages::Averages;
-pub use evaluate::{Evaluation, Evaluator, Run, evaluate};
+pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_variant};
 pub use filters::{Axes, Chosen, FILTERS, Filter, Refused, Running, Setting};
 pub use navigation::{
     DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
