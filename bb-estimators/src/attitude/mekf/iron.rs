@@ -232,8 +232,13 @@ impl<T: Real> HardIron<T> {
         }
         self.windows = 0;
         let fit = self.sums.fit(self.unit, self.lag_before)?;
-        self.fit = Some(fit);
         let norm = fit.field.norm();
+        if !(norm + fit.noise + fit.offset_trace()).is_finite() {
+            // Absurd samples overflowed the sums.
+            self.begin(false);
+            return None;
+        }
+        self.fit = Some(fit);
         if norm > T::of(0.1) * means.field.norm() {
             self.unit = norm;
         }

@@ -241,6 +241,28 @@ fn headings_are_within_two_sigma_whatever_the_offset() {
 }
 
 #[test]
+fn any_start_is_recovered_from() {
+    // Free fall for half a second, fast rotation at once, any orientation, and a magnet that is taken off later.
+    for case in 0..24 {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        let angle = f64::from(case);
+        world.truth = UnitQuaternion::from_euler_angles(2.0 * angle, 1.3 * angle, angle);
+        world.i = i64::from(case) * 53;
+        world.magnet = Vector3::new((3.1 * angle).sin(), angle.cos(), (5.3 * angle).sin()) * 25e-6;
+        for _ in 0..if case % 2 == 0 { 50 } else { 0 } {
+            let sample = world.sample(true);
+            filter.update(&ImuSample { specific_force: Vector3::zeros(), ..sample }).unwrap();
+        }
+        world.run(&mut filter, 30, true);
+        assert!(world.error_of(&filter).total < 3.0, "case {case}: {:?}", world.error_of(&filter));
+        world.magnet = Vector3::zeros();
+        world.run(&mut filter, 30, true);
+        assert!(world.error_of(&filter).total < 3.0, "case {case}, magnet off: {:?}", world.error_of(&filter));
+        assert!(filter.magnetometer_offset().norm() < 2e-6, "{}", filter.magnetometer_offset());
+    }
+}
+
+#[test]
 fn a_disturbance_of_the_world_is_no_offset() {
     let (mut world, mut filter) = (World::new(), filter(true));
     world.run(&mut filter, 5, false);
