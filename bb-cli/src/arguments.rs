@@ -5,6 +5,7 @@ use crate::filters::{Axes, Chosen, FILTERS, Filter, Setting};
 use crate::navigation::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
 use crate::plot::Picture;
 use crate::recording::{MovingTopic, Topics};
+use crate::variants::{Field, Offset, Starts, Variants};
 use crate::{files, filters};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -44,7 +45,8 @@ const EXAMPLES: &str =
 Examples:
   bb eval attitude walk.mcap
   bb eval attitude recordings/ --filter mekf,madgwick --axes six --plot errors.svg
-  bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json";
+  bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json
+  bb eval attitude walk.mcap --filter mekf,vqf --start random:8 --offset 30uT:4";
 
 const NAVIGATION_EXAMPLES: &str = "Exit code: 0; 1 if a data set could not be evaluated; 2 for a wrong use.
 
@@ -88,6 +90,24 @@ struct AttitudeArguments {
     /// Starts the filters so many seconds before the first motion, instead of at the first sample.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     start_before_motion: Option<f64>,
+    /// Starts the filters so many times at random in the first 60 % of the motion: random:COUNT.
+    #[arg(long, value_name = "random:COUNT", conflicts_with = "start_before_motion")]
+    start: Option<Starts>,
+    /// Adds a constant to the magnetometer, in so many random directions, each by itself: 30uT:4.
+    #[arg(long, value_name = "FIELD:COUNT")]
+    offset: Option<Offset>,
+    /// Puts a magnet on the body 4 s before the first motion, and takes it off 55 s after it: 30uT.
+    #[arg(long, value_name = "FIELD")]
+    magnet: Option<Field>,
+    /// Disturbs the field in the world for 1 to 3 s at a time, 2 to 8 s apart. Needs the truth.
+    #[arg(long, value_name = "FIELD")]
+    disturb: Option<Field>,
+    /// Lets the field in the world change slowly, as a sine of 60 to 120 s. Needs the truth.
+    #[arg(long, value_name = "FIELD")]
+    drift: Option<Field>,
+    /// What all that is random comes from: the same seed, the same figures.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    seed: u64,
     /// The topic of the IMU, where several fit (sensor_msgs/Imu).
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
@@ -169,6 +189,15 @@ impl AttitudeArguments {
         if let Some(plot) = &self.plot {
             Picture::check(plot, "--plot").map_err(invalid)?;
         }
+        let variants = Variants {
+            starts: self.start,
+            offset: self.offset,
+            magnet: self.magnet,
+            disturb: self.disturb,
+            drift: self.drift,
+            seed: self.seed,
+        };
+        variants.check(self.axes).map_err(invalid)?;
         let evaluator = Evaluator {
             filters: Chosen::all(&filters, self.axes, &self.settings).map_err(invalid)?,
             axes: self.axes,
@@ -183,6 +212,7 @@ impl AttitudeArguments {
                 },
             },
             before_motion_s: self.start_before_motion,
+            variants,
             keep_errors: self.plot.is_some(),
         };
         Ok(Attitude { paths: self.files, evaluator, json: self.json, plot: self.plot })

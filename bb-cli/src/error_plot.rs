@@ -46,5 +46,5 @@ fn panel(evaluation: &Evaluation, all: &[Evaluation]) -> Option<Panel> {
         Line::peaks(run.filter, colour, 1, &run.errors)
     };
     let lines = runs.iter().enumerate().map(line).collect();
-    has_errors.then(|| Panel { name: name(&evaluation.file, all), lines })
+    has_errors.then(|| Panel { name: name(evaluation, all), lines })
 }

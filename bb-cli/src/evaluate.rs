@@ -4,6 +4,8 @@ use crate::filters::{Axes, Chosen, Refused, Running};
 use crate::progress::Progress;
 use crate::recording::{End, Recording, Topics};
 use crate::score::Score;
+use crate::variants::{Variant, Variants, moving_times};
+use bb_estimators::attitude::OrientationError;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,6 +14,9 @@ use std::time::{Duration, Instant};
 
 /// Samples that are read, then played: enough that the clock costs nothing, few enough to stay in the cache.
 const BLOCK: usize = 1024;
+
+/// Whether the heading is within two sigma is asked once in so many samples.
+const ASKED: usize = 64;
 
 /// The length of the progress bar for one recording.
 const BAR: u64 = 1000;
@@ -27,6 +32,8 @@ pub struct Evaluator {
     pub topics: Topics,
     /// Starts the filters so many seconds before the first motion, instead of at the first sample.
     pub before_motion_s: Option<f64>,
+    /// How the recordings are changed.
+    pub variants: Variants,
     /// Whether to keep the errors over time.
     pub keep_errors: bool,
 }
@@ -36,6 +43,8 @@ pub struct Evaluator {
 pub struct Evaluation {
     /// The recording.
     pub file: PathBuf,
+    /// Which variant of it, from 0; none if the recording is not changed.
+    pub variant: Option<u32>,
     /// One run a filter, in the order of the filters; or why there is none.
     pub runs: Result<Vec<Run>, String>,
     /// What broke the recording off, if it did; the runs are of what came before.
@@ -51,6 +60,8 @@ pub struct Run {
     pub filter: &'static str,
     /// Its errors.
     pub score: Score,
+    /// Of how many headings it told the standard deviation, and how many were within two of them.
+    pub within_two_sigma: (u64, u64),
     /// How long it took for a sample, on average, with reading its orientation; ns.
     pub ns_per_update: f64,
     /// Error over time: seconds since the first sample, degrees; none where the truth is unknown. Total with nine axes,
@@ -60,18 +71,22 @@ pub struct Run {
 
 /// Evaluates recordings on all cores, with a progress bar on the terminal; gives them in their order.
 pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &Evaluator) -> Vec<Evaluation> {
-    let progress = Progress::new("evaluating", BAR * files.len() as u64);
+    let variants = evaluator.variants.count() as usize;
+    let progress = Progress::new("evaluating", BAR * (files.len() * variants) as u64);
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());
     let cores = thread::available_parallelism().map_or(1, usize::from);
     thread::scope(|scope| {
-        for _ in 0..cores.min(files.len()) {
+        for _ in 0..cores.min(files.len() * variants) {
             scope.spawn(|| {
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some((file, found)) = files.get(index) else { break };
+                    let variant = (index % variants) as u32;
+                    let Some((file, found)) = files.get(index / variants) else { break };
                     let evaluation = match found {
-                        Ok(()) => evaluate(file, evaluator, &progress),
+                        Ok(()) => evaluate_variant(file, variant, evaluator, &progress),
+                        // Once is enough.
+                        Err(_) if variant > 0 => continue,
                         Err(fault) => Evaluation::failed(file, fault.clone()),
                     };
                     // A thread that panicked leaves the list whole.
@@ -86,26 +101,42 @@ pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &
     done.into_iter().map(|(_, evaluation)| evaluation).collect()
 }
 
-/// Plays one recording through the filters. Moves the progress by 1,000.
+/// Plays one recording through the filters, or the first of its variants. Moves the progress by 1,000.
 pub fn evaluate(file: &Path, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
+    evaluate_variant(file, 0, evaluator, progress)
+}
+
+/// Plays one variant of a recording through the filters, by its index below [`Variants::count`]. Moves the progress by
+/// 1,000.
+pub fn evaluate_variant(file: &Path, variant: u32, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
     let mut shown = 0;
     let mut show = |part: u64| {
         progress.add(part.min(BAR).saturating_sub(shown));
         shown = shown.max(part.min(BAR));
     };
-    let evaluation = play(file, evaluator, &mut show).unwrap_or_else(|fault| Evaluation::failed(file, fault));
+    let evaluation =
+        play(file, variant, evaluator, &mut show).unwrap_or_else(|fault| Evaluation::failed(file, fault));
     show(BAR);
     evaluation
 }
 
 impl Evaluation {
     fn failed(file: &Path, fault: String) -> Self {
-        Self { file: file.to_owned(), runs: Err(fault), broken: None, notes: Vec::new() }
+        Self { file: file.to_owned(), variant: None, runs: Err(fault), broken: None, notes: Vec::new() }
     }
 }
 
-fn play(file: &Path, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result<Evaluation, String> {
-    let mut recording = Recording::open(file, &evaluator.topics, evaluator.axes, evaluator.before_motion_s)?;
+fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result<Evaluation, String> {
+    let open = || Recording::open(file, &evaluator.topics, evaluator.axes, evaluator.before_motion_s);
+    let mut recording = open()?;
+    let moving_ns = match evaluator.variants.starts {
+        Some(_) => moving_times(&mut open()?)?,
+        None => Vec::new(),
+    };
+    let mut variant = Variant::new(&evaluator.variants, index, file, &moving_ns, &recording.truth)?;
+    if let Some(start_ns) = variant.start_ns {
+        recording.start_at(start_ns);
+    }
     let mut players = evaluator.filters.iter().map(Player::new).collect::<Result<Vec<_>, _>>()?;
     let mut samples = Vec::with_capacity(BLOCK);
     let mut start_ns = None;
@@ -113,6 +144,7 @@ fn play(file: &Path, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result
     let broken = loop {
         samples.clear();
         let end = recording.read(&mut samples, BLOCK)?;
+        variant.apply(&mut samples, &recording.truth);
         if let Some(first) = samples.first() {
             let start_ns = *start_ns.get_or_insert(first.time_ns);
             for player in &mut players {
@@ -140,7 +172,8 @@ fn play(file: &Path, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result
         );
     }
     let runs = Ok(players.into_iter().map(|player| player.finish(played)).collect());
-    Ok(Evaluation { file: file.to_owned(), runs, broken, notes })
+    let variant = evaluator.variants.is_changed().then_some(index);
+    Ok(Evaluation { file: file.to_owned(), variant, runs, broken, notes })
 }
 
 /// A filter under way.
@@ -149,6 +182,7 @@ struct Player {
     filter: Box<dyn Running>,
     score: Score,
     refused: Refused,
+    within_two_sigma: (u64, u64),
     time: Duration,
     estimates: Vec<Option<bb_core::nalgebra::UnitQuaternion<f64>>>,
     errors: Vec<(f64, Option<f64>)>,
@@ -161,6 +195,7 @@ impl Player {
             filter: chosen.start()?,
             score: Score::default(),
             refused: Refused::default(),
+            within_two_sigma: (0, 0),
             time: Duration::ZERO,
             estimates: Vec::with_capacity(BLOCK),
             errors: Vec::new(),
@@ -174,12 +209,25 @@ impl Player {
         start_ns: i64,
         evaluator: &Evaluator,
     ) {
+        for samples in samples.chunks(ASKED) {
+            self.play_some(samples, recording, start_ns, evaluator);
+        }
+    }
+
+    fn play_some(
+        &mut self,
+        samples: &[bb_estimators::attitude::ImuSample],
+        recording: &Recording,
+        start_ns: i64,
+        evaluator: &Evaluator,
+    ) {
         self.estimates.clear();
         let started = Instant::now();
         let refused = self.filter.run(samples, &mut self.estimates);
         self.time += started.elapsed();
         self.refused.count += refused.count;
         self.refused.first = self.refused.first.or(refused.first);
+        self.ask(samples, recording);
         for (sample, estimate) in samples.iter().zip(&self.estimates) {
             let Some(estimate) = estimate else { continue };
             let error = self.score.add_at(&recording.truth, sample.time_ns, estimate);
@@ -193,6 +241,17 @@ impl Player {
         }
     }
 
+    /// Whether the heading after the last sample is within two standard deviations, where it counts.
+    fn ask(&mut self, samples: &[bb_estimators::attitude::ImuSample], recording: &Recording) {
+        let Some(sample) = samples.last() else { return };
+        let Some(estimate) = self.estimates.last().copied().flatten() else { return };
+        let Some(deviation) = self.filter.heading_deviation() else { return };
+        let (Some(truth), true) = recording.truth.at(sample.time_ns) else { return };
+        let Some(error) = OrientationError::between(&estimate, &truth) else { return };
+        self.within_two_sigma.0 += 1;
+        self.within_two_sigma.1 += u64::from(error.heading <= 2.0 * deviation);
+    }
+
     fn refusals(&self, played: u64) -> Option<String> {
         let Refused { count, first } = self.refused;
         first.map(|first| format!("{} refused {count} of {played} samples: {first}", self.name))
@@ -200,6 +259,7 @@ impl Player {
 
     fn finish(self, played: u64) -> Run {
         let ns_per_update = self.time.as_secs_f64() * 1e9 / played as f64;
-        Run { filter: self.name, score: self.score, ns_per_update, errors: self.errors }
+        let (score, within_two_sigma) = (self.score, self.within_two_sigma);
+        Run { filter: self.name, score, within_two_sigma, ns_per_update, errors: self.errors }
     }
 }

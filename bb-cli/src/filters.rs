@@ -129,6 +129,11 @@ impl Chosen {
 pub trait Running {
     /// Takes samples, and gives the orientation after each: none where there is none yet, or the sample was refused.
     fn run(&mut self, samples: &[ImuSample], estimates: &mut Vec<Option<UnitQuaternion<f64>>>) -> Refused;
+
+    /// Standard deviation of the heading, rad, if the filter tells.
+    fn heading_deviation(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// The samples that a filter refused.
@@ -154,6 +159,12 @@ impl<F: AttitudeFilter> Running for F {
             });
         }
         refused
+    }
+
+    fn heading_deviation(&self) -> Option<f64> {
+        let world_from_body = self.world_from_body()?.to_rotation_matrix();
+        let variance = world_from_body * self.orientation_uncertainty()? * world_from_body.transpose();
+        Some(variance[(2, 2)].max(0.0).sqrt())
     }
 }
 

@@ -20,9 +20,10 @@ mod progress;
 mod recording;
 mod report;
 mod score;
+mod variants;
 
 pub use averages::Averages;
-pub use evaluate::{Evaluation, Evaluator, Run, evaluate};
+pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_variant};
 pub use filters::{Axes, Chosen, FILTERS, Filter, Refused, Running, Setting};
 pub use navigation::{
     DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
@@ -31,6 +32,7 @@ pub use plot::{Line, Panel, Picture};
 pub use progress::Progress;
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
+pub use variants::{Field, Offset, Starts, Variants};
 
 use arguments::{Attitude, Job, Navigation};
 use std::ffi::OsString;

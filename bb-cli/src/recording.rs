@@ -92,6 +92,11 @@ impl Recording {
         Ok(Self { truth, note, samples, magnetometer, start_ns, expected: imu.messages.unwrap_or(0) })
     }
 
+    /// Leaves out the samples before this time, nanoseconds.
+    pub(crate) fn start_at(&mut self, time_ns: i64) {
+        self.start_ns = self.start_ns.max(time_ns);
+    }
+
     /// Adds the next samples, as many as there are, until there are `most`. A recorder that was stopped is an end like
     /// any other, but for what is said of it.
     ///

@@ -13,11 +13,15 @@ use std::path::Path;
 #[derive(Serialize)]
 struct Row {
     file: String,
+    /// From 0; null if the recording is not changed.
+    variant: Option<u32>,
     filter: &'static str,
     axes: &'static str,
     total_deg: Option<f64>,
     heading_deg: Option<f64>,
     inclination_deg: Option<f64>,
+    /// Which part of the headings was within two of the standard deviations that the filter told.
+    heading_within_two_sigma: Option<f64>,
     /// How many samples were scored.
     samples: u64,
     ns_per_update: f64,
@@ -30,11 +34,13 @@ pub(crate) fn json(evaluations: &[Evaluation], axes: Axes) -> Result<String, Str
         let whole = rms.filter(|_| axes == Axes::Nine);
         Row {
             file: evaluation.file.display().to_string(),
+            variant: evaluation.variant,
             filter: run.filter,
             axes: axes.name(),
             total_deg: whole.map(|rms| rms.total),
             heading_deg: whole.map(|rms| rms.heading),
             inclination_deg: rms.map(|rms| rms.inclination),
+            heading_within_two_sigma: within(&[run], axes),
             samples: run.score.count(),
             ns_per_update: run.ns_per_update,
         }
@@ -46,17 +52,18 @@ pub(crate) fn json(evaluations: &[Evaluation], axes: Axes) -> Result<String, Str
 
 /// A line a recording and filter, then the averages of each filter.
 pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
-    let mut lines: Vec<[String; 7]> = Vec::new();
+    let mut lines: Vec<[String; 8]> = Vec::new();
     for (evaluation, run) in runs(evaluations) {
         let [total, heading, inclination] = angles(run.score.rms(), axes);
         let cost = format!("{:.0}", run.ns_per_update);
         let count = run.score.count().to_string();
         lines.push([
-            name(&evaluation.file, evaluations),
+            name(evaluation, evaluations),
             run.filter.into(),
             total,
             heading,
             inclination,
+            percent(within(&[run], axes)),
             count,
             cost,
         ]);
@@ -73,14 +80,17 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
     }
     for filter in filters {
         let of_filter = runs(evaluations).filter(|(_, run)| run.filter == filter);
+        let all: Vec<_> = of_filter.clone().map(|(_, run)| run).collect();
+        let share = percent(within(&all, axes));
         let Some(averages) = Averages::of(of_filter.filter_map(|(_, run)| run.score.rms())) else { continue };
         for (what, score) in [("mean of", averages.mean), ("worst of", averages.worst)] {
             let [total, heading, inclination] = angles(Some(score), axes);
             let what = format!("{what} {}", averages.count);
-            lines.push([what, filter.into(), total, heading, inclination, String::new(), String::new()]);
+            let share = if what.starts_with("mean") { share.clone() } else { String::new() };
+            lines.push([what, filter.into(), total, heading, inclination, share, String::new(), String::new()]);
         }
     }
-    let head = ["recording", "filter", "total", "heading", "inclination", "samples", "ns/update"];
+    let head = ["recording", "filter", "total", "heading", "inclination", "in 2σ", "samples", "ns/update"];
     lines.insert(0, head.map(String::from));
     let mut text = format!("Error against the truth, {} axes, RMS in degrees:\n\n", axes.name());
     text += &aligned(&lines, rows + 1);
@@ -110,15 +120,31 @@ pub(crate) fn complain(evaluations: &[Evaluation]) -> bool {
     bad == 0
 }
 
-fn runs(evaluations: &[Evaluation]) -> impl Iterator<Item = (&Evaluation, &Run)> {
+/// Which part of the headings is within two standard deviations; none where no filter tells them.
+fn within(runs: &[&Run], axes: Axes) -> Option<f64> {
+    let (told, within) =
+        runs.iter().fold((0, 0), |sum, run| (sum.0 + run.within_two_sigma.0, sum.1 + run.within_two_sigma.1));
+    (told > 0 && axes == Axes::Nine).then(|| within as f64 / told as f64)
+}
+
+fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
+}
+
+fn runs(evaluations: &[Evaluation]) -> impl Clone + Iterator<Item = (&Evaluation, &Run)> {
     evaluations.iter().flat_map(|evaluation| evaluation.runs.iter().flatten().map(move |run| (evaluation, run)))
 }
 
 /// A recording in a table or a picture: without folder and ending, where that is only one.
-pub(crate) fn name(file: &Path, evaluations: &[Evaluation]) -> String {
-    let alike = evaluations.iter().filter(|other| other.file.file_stem() == file.file_stem()).count();
+pub(crate) fn name(evaluation: &Evaluation, evaluations: &[Evaluation]) -> String {
+    let file: &Path = &evaluation.file;
+    // Variants of one recording are named by their number.
+    let is_alike =
+        |other: &&Evaluation| other.file.file_stem() == file.file_stem() && other.variant == evaluation.variant;
+    let alike = evaluations.iter().filter(is_alike).count();
     let short = file.file_stem().filter(|_| alike == 1);
-    short.unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
+    let name = short.unwrap_or(file.as_os_str()).to_string_lossy();
+    evaluation.variant.map_or_else(|| name.clone().into_owned(), |variant| format!("{name} #{variant}"))
 }
 
 /// With six axes the heading starts anywhere, so only the inclination is a result.
@@ -133,9 +159,9 @@ fn angles(rms: Option<Degrees>, axes: Axes) -> [String; 3] {
 }
 
 /// Columns: the first two are words, the others numbers. An empty line before line `gap`.
-fn aligned(lines: &[[String; 7]], gap: usize) -> String {
+fn aligned(lines: &[[String; 8]], gap: usize) -> String {
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
-    let widths: [usize; 7] = std::array::from_fn(width);
+    let widths: [usize; 8] = std::array::from_fn(width);
     let mut text = String::new();
     for (index, line) in lines.iter().enumerate() {
         if index == gap {

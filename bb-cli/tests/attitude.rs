@@ -19,8 +19,18 @@ fn json_has_these_fields() {
     let row = rows[0].as_object().expect("an object");
     let mut fields: Vec<_> = row.keys().map(String::as_str).collect();
     fields.sort_unstable();
-    let known =
-        ["axes", "file", "filter", "heading_deg", "inclination_deg", "ns_per_update", "samples", "total_deg"];
+    let known = [
+        "axes",
+        "file",
+        "filter",
+        "heading_deg",
+        "heading_within_two_sigma",
+        "inclination_deg",
+        "ns_per_update",
+        "samples",
+        "total_deg",
+        "variant",
+    ];
     assert_eq!(fields, known);
     assert_eq!(row["file"], file.to_str().expect("is text"));
     assert_eq!((&row["filter"], &row["axes"]), (&"madgwick".into(), &"nine".into()));
@@ -174,6 +184,35 @@ fn a_start_before_the_motion_leaves_out_the_rest() {
     }
     let output = eval(&[&file], &["--start-before-motion", "-1"]);
     assert_eq!(output.code, Some(2), "{}", output.err);
+}
+
+#[test]
+fn variants_are_seeded_and_told_apart() {
+    let file = Walk::default().file("variants.mcap");
+    let variants = |more: &[&str]| {
+        let options = ["--json", "--filter", "mekf", "--start", "random:3", "--offset", "30uT:2"];
+        let output = eval(&[&file], &[&options, more].concat());
+        assert_eq!((output.code, &*output.err), (Some(0), ""));
+        let row = |row: Value| (row["variant"].clone(), row["total_deg"].clone(), row["samples"].clone());
+        rows(&output.out).into_iter().map(row).collect::<Vec<_>>()
+    };
+    let one = variants(&[]);
+    assert_eq!(
+        one.iter().map(|(variant, ..)| variant.as_u64()).collect::<Vec<_>>(),
+        (0..6).map(Some).collect::<Vec<_>>()
+    );
+    assert_eq!(one, variants(&["--seed", "1"]));
+    assert_ne!(one, variants(&["--seed", "2"]));
+    assert!(one.iter().all(|(_, total, samples)| total.is_number() && samples.as_u64() > Some(0)));
+    for field in ["--magnet", "--disturb", "--drift"] {
+        let output = eval(&[&file], &["--filter", "mekf", field, "20uT"]);
+        assert_eq!((output.code, &*output.err), (Some(0), ""), "{field}");
+    }
+    let output = eval(&[&file], &["--axes", "six", "--offset", "30uT"]);
+    assert_eq!(output.code, Some(2));
+    assert!(output.err.contains("leave them out"), "{}", output.err);
+    let output = eval(&[&file], &["--magnet", "30"]);
+    assert!(output.code == Some(2) && output.err.contains("write a number with nT, uT, mT or T"), "{}", output.err);
 }
 
 #[test]

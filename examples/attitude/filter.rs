@@ -145,6 +145,10 @@ impl AttitudeFilter for ChosenFilter {
         running!(&self.running, filter => filter.is_at_rest())
     }
 
+    fn is_heading_trusted(&self) -> Option<bool> {
+        running!(&self.running, filter => filter.is_heading_trusted())
+    }
+
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         running!(&self.running, filter => filter.is_magnetically_disturbed())
     }

@@ -2,7 +2,7 @@
 
 use crate::attitude;
 use crate::recordings::broad;
-use bb_cli::{Axes, Chosen, Evaluator, FILTERS, Progress, Setting, Topics, evaluate};
+use bb_cli::{Axes, Chosen, Evaluator, FILTERS, Progress, Setting, Topics, Variants, evaluate};
 use std::error::Error;
 
 #[test]
@@ -32,7 +32,8 @@ fn the_command_and_a_robot_agree() -> Result<(), Box<dyn Error>> {
             let settings = setting.split_whitespace().map(str::parse::<Setting>).collect::<Result<Vec<_>, _>>()?;
             let filters = Chosen::all(&[filter], axes, &settings)?;
             let (topics, before_motion_s, keep_errors) = (Topics::default(), None, false);
-            let evaluator = Evaluator { filters, axes, topics, before_motion_s, keep_errors };
+            let variants = Variants::default();
+            let evaluator = Evaluator { filters, axes, topics, before_motion_s, variants, keep_errors };
             let evaluation = evaluate(&file, &evaluator, &Progress::new("", 0));
             let command = evaluation.runs?.first().and_then(|run| run.score.rms()).ok_or("no score")?;
             assert_eq!(command, robot, "{name}, {axes:?} axes, {}", file.display());

@@ -8,3 +8,4 @@ mod command;
 mod navigation;
 mod recordings;
 mod single;
+mod variants;

@@ -78,6 +78,11 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
         None
     }
 
+    /// Whether the heading is known well enough to act on. `None` if the filter does not tell, or uses no magnetometer.
+    fn is_heading_trusted(&self) -> Option<bool> {
+        None
+    }
+
     /// Forgets every sample; the parameters stay.
     fn reset(&mut self);
 }

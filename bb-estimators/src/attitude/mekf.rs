@@ -12,7 +12,7 @@
 //! * θ, the rotation error in the world: `R_true = exp(θ) R`,
 //! * b and E, the gyroscope's bias and its scale and misalignment: `ω_true = ω - b - E ω`,
 //! * v, the horizontal velocity,
-//! * the lags of accelerometer and magnetometer behind the gyroscope.
+//! * the lag of the accelerometer behind the gyroscope.
 //!
 //! # Prediction
 //!
@@ -29,8 +29,8 @@
 //!
 //! # Heading
 //!
-//! The angle of the field to north. It sees θ about the vertical, tilt by the field's slope, and the lag times
-//! `R (ω × m)`. Its error is a disturbance that lasts as long as the body takes to pass it, and is as great as the
+//! The angle of the field to north, less the magnetometer's offset and lag, which least squares beside the filter give;
+//! see `iron.rs`. It sees θ about the vertical, and tilt by the field's slope. Its error is a disturbance that lasts as long as the body takes to pass it, and is as great as the
 //! field's norm and dip show; see `field.rs`.
 //!
 //! # Work
@@ -42,11 +42,13 @@
 mod errors;
 mod field;
 mod filter;
+mod iron;
 mod measurement;
 mod params;
 mod rest;
 #[cfg(test)]
 mod tests;
+mod vertical;
 mod window;
 
 pub use filter::MekfFilter;

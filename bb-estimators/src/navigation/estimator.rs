@@ -91,7 +91,6 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
     type Options = NavigationOptions;
     type Input = NavigationInputs<'static>;
     type Output = O;
-    const REPORTS_DIVERGENCE: bool = true;
 
     fn init(options: NavigationOptions, context: &Context) -> Result<Self, Fault> {
         options.params().check()?;

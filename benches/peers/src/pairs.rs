@@ -20,8 +20,8 @@ impl Pair {
     }
 }
 
-/// Madgwick's parameter is the same on both sides. Ours run with their defaults else; the peers with what is best for
-/// them on BROAD, VQF with its defaults.
+/// Where both sides are one algorithm, they have the same settings. Else ours run with their defaults and the peers with
+/// what is best for them on BROAD; VQF has its defaults.
 pub const PAIRS: &[Pair] = &[
     Pair {
         name: "madgwick/ahrs_madgwick/nine",
@@ -58,13 +58,27 @@ pub const PAIRS: &[Pair] = &[
         axes: Axes::Six,
         peer: || peers::mahony(0.18, 0.0015),
     },
-    Pair { name: "fusion/fusion_ahrs/nine", ours: "fusion", settings: &[], axes: Axes::Nine, peer: peers::fusion },
+    Pair {
+        name: "fusion/fusion_ahrs/nine",
+        ours: "fusion",
+        // 40° and 20°.
+        settings: &["gain=0.1", "acceleration_rejection=0.698132", "magnetic_rejection=0.349066"],
+        axes: Axes::Nine,
+        peer: peers::fusion_best,
+    },
+    Pair {
+        name: "fusion_published/fusion_ahrs/nine",
+        ours: "fusion",
+        settings: &[],
+        axes: Axes::Nine,
+        peer: peers::fusion_published,
+    },
     Pair {
         name: "complementary/fusion_ahrs/nine",
         ours: "complementary",
         settings: &[],
         axes: Axes::Nine,
-        peer: peers::fusion,
+        peer: peers::fusion_best,
     },
     Pair { name: "vqf/vqf_rs/nine", ours: "vqf", settings: &[], axes: Axes::Nine, peer: peers::vqf },
     Pair { name: "vqf/vqf_rs/six", ours: "vqf", settings: &[], axes: Axes::Six, peer: peers::vqf },

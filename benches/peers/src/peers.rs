@@ -15,8 +15,8 @@ const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// A peer, made with the first sample.
 struct Peer<F> {
-    make: fn(&ImuSample, f64, f64) -> F,
-    parameters: (f64, f64),
+    make: fn(&ImuSample, [f64; 3]) -> F,
+    parameters: [f64; 3],
     step: fn(&mut F, &ImuSample) -> UnitQuaternion<f64>,
     filter: Option<F>,
 }
@@ -24,8 +24,7 @@ struct Peer<F> {
 impl<F> Running for Peer<F> {
     fn run(&mut self, samples: &[ImuSample], estimates: &mut Vec<Option<UnitQuaternion<f64>>>) -> Refused {
         let Some(first) = samples.first() else { return Refused::default() };
-        let (a, b) = self.parameters;
-        let filter = self.filter.get_or_insert_with(|| (self.make)(first, a, b));
+        let filter = self.filter.get_or_insert_with(|| (self.make)(first, self.parameters));
         for sample in samples {
             estimates.push(Some((self.step)(filter, sample)));
         }
@@ -35,8 +34,8 @@ impl<F> Running for Peer<F> {
 
 pub fn madgwick(beta: f64) -> Box<dyn Running> {
     Box::new(Peer {
-        make: |first, beta, _| ahrs::Madgwick::new_with_quat(PERIOD_S, beta, nwu_start(first)),
-        parameters: (beta, 0.0),
+        make: |first, [beta, ..]| ahrs::Madgwick::new_with_quat(PERIOD_S, beta, nwu_start(first)),
+        parameters: [beta, 0.0, 0.0],
         step: step_of_ahrs,
         filter: None,
     })
@@ -44,8 +43,8 @@ pub fn madgwick(beta: f64) -> Box<dyn Running> {
 
 pub fn mahony(kp: f64, ki: f64) -> Box<dyn Running> {
     Box::new(Peer {
-        make: |first, kp, ki| ahrs::Mahony::new_with_quat(PERIOD_S, kp, ki, nwu_start(first)),
-        parameters: (kp, ki),
+        make: |first, [kp, ki, _]| ahrs::Mahony::new_with_quat(PERIOD_S, kp, ki, nwu_start(first)),
+        parameters: [kp, ki, 0.0],
         step: step_of_ahrs,
         filter: None,
     })
@@ -53,8 +52,8 @@ pub fn mahony(kp: f64, ki: f64) -> Box<dyn Running> {
 
 pub fn vqf() -> Box<dyn Running> {
     Box::new(Peer {
-        make: |_, _, _| vqf_rs::VQF::new(PERIOD_S, None, None, None),
-        parameters: (0.0, 0.0),
+        make: |_, _| vqf_rs::VQF::new(PERIOD_S, None, None, None),
+        parameters: [0.0; 3],
         step: |vqf, sample| {
             let field = sample.magnetic_field;
             vqf.update(sample.angular_velocity.into(), sample.specific_force.into(), field.map(Into::into));
@@ -65,25 +64,36 @@ pub fn vqf() -> Box<dyn Running> {
     })
 }
 
-/// With the correction of the gyroscope's bias that comes with it, and at the best settings of a search on BROAD itself:
-/// gain 0.02 to 0.5, rejection of acceleration 0 to 40°, of the field 0 to 20°.
-pub fn fusion() -> Box<dyn Running> {
+/// The settings of the example in the library's documentation.
+pub fn fusion_published() -> Box<dyn Running> {
+    fusion([0.5, 10.0, 10.0])
+}
+
+/// The best settings of a search on BROAD itself: gain 0.02 to 0.5, rejection of acceleration 0 to 40°, of the field 0 to
+/// 20°.
+pub fn fusion_best() -> Box<dyn Running> {
+    fusion([0.1, 40.0, 20.0])
+}
+
+/// With the correction of the gyroscope's bias that comes with it; gain, and rejection of acceleration and field in
+/// degrees.
+fn fusion(parameters: [f64; 3]) -> Box<dyn Running> {
     Box::new(Peer {
-        make: |_, _, _| {
+        make: |_, [gain, acceleration, magnetic]| {
             let sample_rate = (1.0 / PERIOD_S) as f32;
             let bias = fusion_ahrs::BiasSettings { sample_rate, ..fusion_ahrs::BiasSettings::default() };
             let ahrs = fusion_ahrs::Ahrs::with_settings(fusion_ahrs::AhrsSettings {
                 sample_rate,
                 convention: fusion_ahrs::Convention::Enu,
-                gain: 0.1,
+                gain: gain as f32,
                 gyroscope_range: 2000.0,
-                acceleration_rejection: 40.0,
-                magnetic_rejection: 20.0,
+                acceleration_rejection: acceleration as f32,
+                magnetic_rejection: magnetic as f32,
                 rejection_timeout: 5.0,
             });
             (fusion_ahrs::Bias::with_settings(bias), ahrs)
         },
-        parameters: (0.0, 0.0),
+        parameters,
         step: |(bias, ahrs), sample| {
             let single = |vector: Vector3<f64>| -> [f32; 3] { vector.map(|component| component as f32).into() };
             let gyroscope = bias.update(single(sample.angular_velocity.map(f64::to_degrees)));

@@ -25,6 +25,8 @@ pub struct AttitudeStatus {
     pub is_at_rest: Option<bool>,
     /// Whether the magnetic field is disturbed.
     pub is_magnetically_disturbed: Option<bool>,
+    /// Whether the heading is known well enough to act on.
+    pub is_heading_trusted: Option<bool>,
 }
 
 /// The outputs of `Vqf<Marg, AttitudeOutputs>` and its like: `output orientation;`, `output status;`.
@@ -49,6 +51,7 @@ impl AttitudeOutput for AttitudeOutputs {
             gyroscope_bias: filter.gyroscope_bias(),
             is_at_rest: filter.is_at_rest(),
             is_magnetically_disturbed: filter.is_magnetically_disturbed(),
+            is_heading_trusted: filter.is_heading_trusted(),
         };
         Some(Self { orientation: Some(Orientation::of(filter)?), status: Some(status) })
     }

@@ -58,6 +58,10 @@ impl<T: Real, F: AttitudeFilter<T>> AttitudeFilter for InScalar<T, F> {
         self.0.is_at_rest()
     }
 
+    fn is_heading_trusted(&self) -> Option<bool> {
+        self.0.is_heading_trusted()
+    }
+
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         self.0.is_magnetically_disturbed()
     }

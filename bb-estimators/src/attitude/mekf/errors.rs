@@ -8,7 +8,7 @@ use super::window::Window;
 use crate::attitude::Real;
 
 /// How many numbers the filter estimates.
-pub(super) const STATES: usize = 19;
+pub(super) const STATES: usize = 18;
 /// Rotation error, world axes, rad: `R_true = exp(θ) R`.
 pub(super) const ROTATION: usize = 0;
 /// Error of the gyroscope's bias, body axes, rad/s.
@@ -17,11 +17,8 @@ pub(super) const BIAS: usize = 3;
 pub(super) const CALIBRATION: usize = 6;
 /// Horizontal velocity, world axes, m/s: the whole of it, not an error.
 pub(super) const VELOCITY: usize = 15;
-/// How much the magnetometer lags the gyroscope, s: the whole of it, not an error.
-pub(super) const LATENCY: usize = 17;
-
 /// How much the accelerometer lags the gyroscope, s: the whole of it, not an error.
-pub(super) const FORCE_LATENCY: usize = 18;
+pub(super) const FORCE_LATENCY: usize = 17;
 
 /// Bias and calibration, which the rotation error integrates.
 const GYROSCOPE: usize = CALIBRATION + 9 - BIAS;
@@ -73,9 +70,9 @@ impl<T: Real> Errors<T> {
         self.covariance[state][state]
     }
 
-    /// Covariance of the rotation error, world axes, rad².
-    pub(super) fn rotation(&self) -> Matrix3<T> {
-        Matrix3::from_fn(|i, k| self.covariance[ROTATION + i][ROTATION + k])
+    /// Covariance of the three states from `first` on; of the rotation error in world axes, rad².
+    pub(super) fn block(&self, first: usize) -> Matrix3<T> {
+        Matrix3::from_fn(|i, k| self.covariance[first + i][first + k])
     }
 
     /// Whether every mean and variance is a number to compute with.
@@ -142,6 +139,28 @@ impl<T: Real> Errors<T> {
                 } else if !(target..target + ROWS).contains(&j) {
                     self.covariance[j][target + i] = self.covariance[target + i][j];
                 }
+            }
+        }
+    }
+
+    /// Turns the world about the vertical by an angle of this cosine and sine.
+    pub(super) fn turn_heading(&mut self, [cos, sin]: [T; 2]) {
+        let turned = |x: T, y: T| (cos * x - sin * y, sin * x + cos * y);
+        for first in [ROTATION, VELOCITY] {
+            (self.mean[first], self.mean[first + 1]) = turned(self.mean[first], self.mean[first + 1]);
+            for j in 0..STATES {
+                let (x, y) = turned(self.covariance[first][j], self.covariance[first + 1][j]);
+                self.covariance[first][j] = x;
+                self.covariance[first + 1][j] = y;
+            }
+            for row in &mut self.covariance {
+                (row[first], row[first + 1]) = turned(row[first], row[first + 1]);
+            }
+        }
+        // The halves have rounded each in its own way.
+        for i in 0..STATES {
+            for j in 0..i {
+                self.covariance[i][j] = self.covariance[j][i];
             }
         }
     }

@@ -4,6 +4,8 @@
 //! changes the dip. The third, which turns the heading, cannot be told from a wrong heading. But all three are
 //! of one size, so the two that show tell how wrong the heading may be.
 
+use nalgebra::Vector3;
+
 use crate::attitude::Real;
 use crate::attitude::initial::MIN_HORIZONTAL_FRACTION;
 
@@ -40,7 +42,7 @@ const CONTRADICTION_S: f64 = 10.0;
 const LARGEST: f64 = 10.0;
 
 /// The field in the vertical plane: horizontal and vertical part.
-type Plane<T> = [T; 2];
+pub(super) type Plane<T> = [T; 2];
 
 /// What a window's field means for the heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +79,21 @@ impl<T: Real> FieldReference<T> {
         }
     }
 
+    /// A reference that has been seen for so long, s.
+    pub(super) fn seen(field: Plane<T>, seen_s: T) -> Self {
+        Self { seen_s: seen_s.min(T::of(MOST_EVIDENCE_S)), ..Self::new(field) }
+    }
+
+    /// How long the field has been like the reference, s.
+    pub(super) fn seen_s(&self) -> T {
+        self.seen_s
+    }
+
+    /// Whether a field in the world has norm and dip of the reference, up to a part of its norm.
+    pub(super) fn is_like(&self, field: &Vector3<T>, part: T) -> bool {
+        distance(in_plane(field), self.reference) < (part * self.norm()) * (part * self.norm())
+    }
+
     fn norm(&self) -> T {
         norm(self.reference)
     }
@@ -109,6 +126,8 @@ impl<T: Real> FieldReference<T> {
 
         if distance(field, self.candidate) < same {
             self.candidate_s += dt;
+            // Only while alike: the age is that of the field that the candidate is the mean of.
+            approach(&mut self.candidate, field, (dt / T::of(CANDIDATE_TIME_CONSTANT_S)).min(T::ONE));
         } else {
             self.candidate_s -= T::of(3.0) * dt;
         }
@@ -116,7 +135,10 @@ impl<T: Real> FieldReference<T> {
             self.candidate_s = T::ZERO;
             self.candidate = field;
         }
-        approach(&mut self.candidate, field, (dt / T::of(CANDIDATE_TIME_CONSTANT_S)).min(T::ONE));
+        if distance(self.candidate, self.reference) < same {
+            // The reference itself, whose age says nothing of the field that comes next.
+            self.candidate_s = self.candidate_s.min(T::of(LEAST_EVIDENCE_S));
+        }
 
         let undisturbed = distance(field, self.reference) < same;
         if undisturbed {
@@ -146,6 +168,11 @@ impl<T: Real> FieldReference<T> {
     }
 }
 
+/// Horizontal and vertical part of a field in the world.
+pub(super) fn in_plane<T: Real>(field: &Vector3<T>) -> Plane<T> {
+    [(field.x * field.x + field.y * field.y).sqrt(), field.z]
+}
+
 fn norm<T: Real>([horizontal, vertical]: Plane<T>) -> T {
     (horizontal * horizontal + vertical * vertical).sqrt()
 }
@@ -163,4 +190,33 @@ fn approach<T: Real>(mean: &mut Plane<T>, value: Plane<T>, gain: T) {
 fn shortened<T: Real>(field: Plane<T>, longest: T) -> Plane<T> {
     let norm = norm(field);
     if norm > longest { field.map(|part| part * (longest / norm)) } else { field }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOW_S: f64 = 0.03;
+
+    /// How long a field lasts before it makes the heading unknown, s; none if it does not within `most_s`.
+    fn believed_after(reference: &mut FieldReference<f64>, field: Plane<f64>, most_s: f64) -> Option<f64> {
+        let windows = (most_s / WINDOW_S) as i32;
+        (1..=windows)
+            .find(|_| reference.observe(WINDOW_S, field, false) == Verdict::HeadingUnknown)
+            .map(|window| f64::from(window) * WINDOW_S)
+    }
+
+    #[test]
+    fn a_new_field_needs_evidence_of_its_own() {
+        for steady_s in [1.0, 5.0, 40.0, 300.0] {
+            for jump in [0.12, 0.3, 1.0] {
+                let mut reference = FieldReference::new([20.0, -45.0]);
+                assert_eq!(believed_after(&mut reference, [20.0, -45.0], steady_s), None);
+                let needed = (LEAST_EVIDENCE_S + EVIDENCE_RATIO * steady_s).min(MOST_EVIDENCE_S);
+                let believed = believed_after(&mut reference, [20.0 + 49.0 * jump, -45.0], 100.0);
+                let believed = believed.expect("a field that lasts is believed");
+                assert!(believed > 0.9 * needed && believed < needed + 5.0, "{steady_s} s, {jump}: {believed} s");
+            }
+        }
+    }
 }

@@ -2,12 +2,13 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::GRAVITY;
-use super::errors::{BIAS, CALIBRATION, Errors, FORCE_LATENCY, LATENCY, ProcessNoise, ROTATION, VELOCITY};
-use super::field::{FieldReference, Verdict};
+use super::errors::{BIAS, CALIBRATION, Errors, FORCE_LATENCY, ProcessNoise, ROTATION, VELOCITY};
+use super::field::{FieldReference, Verdict, in_plane};
+use super::iron::{Adoption, FieldMeans, HardIron};
 use super::measurement::{Heading, Measurements};
 use super::params::MekfParams;
 use super::rest::Rest;
+use super::vertical::{Contradiction, Vertical};
 use super::window::Window;
 use crate::attitude::initial::heading_error;
 use crate::attitude::rotation::{turn, turn_heading, turn_upright};
@@ -16,7 +17,7 @@ use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError}
 
 /// Standard deviation of the tilt that one accelerometer sample shows in motion, rad. At rest it is forgotten
 /// within a second.
-const INITIAL_TILT: f64 = 0.35;
+pub(super) const INITIAL_TILT: f64 = 0.35;
 
 /// Standard deviation of an orientation that was given, about every axis, rad.
 const GIVEN: f64 = 0.087;
@@ -51,11 +52,11 @@ const MAX_REST_BIAS: f64 = 0.035;
 /// How long a disturbance of the field lasts for a body that moves, s.
 const FIELD_TIME_S: f64 = 0.5;
 
-/// The specific force in the world is the vertical in the mean over this time, s.
-const FORCE_MEAN_S: f64 = 2.0;
+/// A heading that is known from before is turned to the field beyond this difference, rad, and two standard deviations.
+const REOPENED: f64 = 0.15;
 
-/// The slope of that mean beyond which the tilt is wrong: 30°, more than any motion of that time accelerates by.
-const MAX_FORCE_SLOPE: f64 = 0.577;
+/// A heading known up to this standard deviation is trusted, rad: 10°.
+const TRUSTED_HEADING: f64 = 0.175;
 
 /// A heading this far from an undisturbed field contradicts it, rad and standard deviations.
 const CONTRADICTION: f64 = 0.35;
@@ -78,11 +79,10 @@ pub struct MekfFilter<T: Real = f64> {
     measurements: Measurements<T>,
     rest: Rest<T>,
     field: Option<FieldReference<T>>,
+    iron: HardIron<T>,
     last_field: Vector3<T>,
     squared_acceleration: T,
-    /// ∫ R f dt, m/s, since the mean began, and how long ago that is.
-    mean_force: Vector3<T>,
-    mean_force_s: T,
+    vertical: Vertical<T>,
 }
 
 impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
@@ -102,10 +102,10 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             measurements: Measurements::none(),
             rest: Rest::new(&Vector3::zeros(), &Vector3::zeros()),
             field: None,
+            iron: HardIron::new(params.magnetometer_latency),
             last_field: Vector3::zeros(),
             squared_acceleration: T::ZERO,
-            mean_force: Vector3::zeros(),
-            mean_force_s: T::ZERO,
+            vertical: Vertical::new(false),
         };
         filter.forget_sensors();
         Ok(filter)
@@ -136,7 +136,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             && (field != self.last_field || self.rest.is_detected())
         {
             // A driver that is faster than the magnetometer repeats its last value, which is then a stale one.
-            self.window.add_field(&self.rotation, &rate, &field);
+            self.window.add_field(&self.rotation, &rate, &field, &self.iron.offset);
             self.last_field = field;
         }
 
@@ -162,6 +162,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         self.heading_known = true;
         if let Some(orientation) = self.state.world_from_body() {
             self.begin(&orientation, T::of(GIVEN), T::of(GIVEN));
+            self.iron.begin(false);
         }
         Ok(())
     }
@@ -178,7 +179,9 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     /// right by definition at the start, and what it drifts by since is in here.
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
-        Some(self.rotation.transpose() * self.errors.rotation() * self.rotation)
+        let mut in_world = self.errors.block(ROTATION);
+        in_world[(2, 2)] += self.iron.heading_variance();
+        Some(self.rotation.transpose() * in_world * self.rotation)
     }
 
     fn is_at_rest(&self) -> Option<bool> {
@@ -188,6 +191,14 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     /// By norm and dip: a field that differs from the reference by more than a tenth of its norm.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         self.params.magnetometer.then(|| self.field.as_ref().is_some_and(FieldReference::is_disturbed))
+    }
+
+    /// Up to a standard deviation of 10°. An unknown offset of the magnetometer is part of it: a sensor that has not
+    /// turned since the start has no heading to be trusted.
+    fn is_heading_trusted(&self) -> Option<bool> {
+        let variance = self.errors.variance(ROTATION + 2) + self.iron.heading_variance();
+        let is_trusted = self.heading_known && variance < T::of(TRUSTED_HEADING * TRUSTED_HEADING);
+        self.params.magnetometer.then_some(is_trusted)
     }
 
     fn reset(&mut self) {
@@ -204,9 +215,31 @@ impl<T: Real> MekfFilter<T> {
         self.calibration
     }
 
+    /// What the magnetometer reads beside the field: by iron on the body, in the body frame and the field's unit. Zero
+    /// as long as nothing speaks for another.
+    pub fn magnetometer_offset(&self) -> Vector3<T> {
+        self.iron.offset
+    }
+
+    /// Covariance of the offset in the body frame, the field's unit squared, by what was seen since the offset or the
+    /// field last changed.
+    pub fn magnetometer_offset_uncertainty(&self) -> Matrix3<T> {
+        self.iron.offset_covariance()
+    }
+
     /// How much the magnetometer lags the gyroscope, s.
     pub fn magnetometer_latency(&self) -> T {
-        self.errors.mean[LATENCY]
+        self.iron.lag()
+    }
+
+    /// Variance of that, s².
+    pub fn magnetometer_latency_variance(&self) -> T {
+        self.iron.lag_variance()
+    }
+
+    /// Covariance of the gyroscope's bias, body frame, (rad/s)².
+    pub fn gyroscope_bias_uncertainty(&self) -> Matrix3<T> {
+        self.errors.block(BIAS)
     }
 
     /// After a start from a sample, the first one or the one after a gap.
@@ -218,7 +251,9 @@ impl<T: Real> MekfFilter<T> {
         let direction = sample.magnetic_field.filter(|_| self.params.magnetometer).map(|field| field.normalize());
         self.heading_known = direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
         self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
+        self.last_field = sample.magnetic_field.unwrap_or_default();
         self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
+        self.vertical = Vertical::new(true);
     }
 
     /// Resets the orientation's errors; what is known of the sensors stays.
@@ -235,17 +270,15 @@ impl<T: Real> MekfFilter<T> {
         self.rotation = *orientation.to_rotation_matrix().matrix();
         self.window = Window::new();
         self.measurements = Measurements::none();
-        self.mean_force = Vector3::zeros();
-        self.mean_force_s = T::ZERO;
+        self.vertical = Vertical::new(false);
+        self.iron.begin(true);
     }
 
     /// Doubts what is known of the sensors as at the start.
     fn forget_sensors(&mut self) {
         let params = &self.params;
-        let latency = if params.magnetometer { T::of(params.magnetometer_latency) } else { T::ZERO };
         self.errors.forget::<3>(BIAS, T::of(params.initial_bias * params.initial_bias));
         self.errors.forget::<9>(CALIBRATION, T::of(params.calibration_error * params.calibration_error));
-        self.errors.forget::<1>(LATENCY, latency * latency);
         let latency = T::of(params.accelerometer_latency);
         self.errors.forget::<1>(FORCE_LATENCY, latency * latency);
     }
@@ -273,19 +306,21 @@ impl<T: Real> MekfFilter<T> {
         let orientation = correction * orientation;
         self.rotation = *orientation.to_rotation_matrix().matrix();
         let force = correction * window.force;
-        self.mean_force = correction * self.mean_force + force;
-        self.mean_force_s += dt;
-        if self.mean_force_s > T::of(FORCE_MEAN_S) {
-            let sum = core::mem::replace(&mut self.mean_force, Vector3::zeros());
-            self.mean_force_s = T::ZERO;
-            if sum.x.hypot(sum.y) > T::of(MAX_FORCE_SLOPE) * sum.z
-                && sum.norm() > T::HALF * T::of(GRAVITY) * T::of(FORCE_MEAN_S)
-            {
-                return self.level(orientation, &sum);
-            }
+        match self.vertical.add(dt, &correction, &force) {
+            Some(Contradiction::Start(up, deviation)) => return self.level_start(orientation, &up, deviation),
+            Some(Contradiction::Tilt(up)) => return self.level(orientation, &up),
+            None => {}
         }
-        self.measure(&window, &correction, &force);
-        orientation
+        self.iron.correct(&correction);
+        let fields = window.mean_field(&correction);
+        let adoption = fields
+            .as_ref()
+            .and_then(|fields| self.iron.observe(dt, fields, self.rest.is_detected(), self.field.as_ref()));
+        self.measure(dt, fields.as_ref(), &force);
+        match adoption {
+            Some(adoption) => self.adopt(orientation, &adoption),
+            None => orientation,
+        }
     }
 
     /// Moves the mean errors into what they are errors of; returns the rotation.
@@ -303,8 +338,7 @@ impl<T: Real> MekfFilter<T> {
     }
 
     /// Looks at what a window says, for the samples of the next one to take.
-    fn measure(&mut self, window: &Window<T>, correction: &UnitQuaternion<T>, force: &Vector3<T>) {
-        let dt = window.duration;
+    fn measure(&mut self, dt: T, fields: Option<&FieldMeans<T>>, force: &Vector3<T>) {
         let resting = self.rest.is_detected();
         let squared = (force.x * force.x + force.y * force.y) / (dt * dt);
         let gain = (dt / T::of(ACCELERATION_TIME_CONSTANT_S)).min(T::ONE);
@@ -317,10 +351,7 @@ impl<T: Real> MekfFilter<T> {
             squared * T::TWO * T::of(VELOCITY_TIME_S) / dt
         };
         let bias = resting.then(|| self.rest_bias(dt));
-        let heading = window.mean_field().and_then(|(field, rate)| {
-            let latency = self.errors.mean[LATENCY];
-            self.heading(dt, &(correction * (field - rate * latency)), &(correction * rate))
-        });
+        let heading = fields.map(|fields| self.heading(dt, fields));
         self.measurements = Measurements::new(velocity_variance, heading, bias);
     }
 
@@ -338,10 +369,12 @@ impl<T: Real> MekfFilter<T> {
         (difference * most, T::of(REST_BIAS * REST_BIAS) / dt)
     }
 
-    /// What the field says about the heading; `field` and what it changes by with the lag are in the world.
-    fn heading(&mut self, dt: T, field: &Vector3<T>, rate: &Vector3<T>) -> Option<Heading<T>> {
-        let squared = field.x * field.x + field.y * field.y;
-        let plane = [squared.sqrt(), field.z];
+    /// What the field says about the heading, less the offset and the lag.
+    fn heading(&mut self, dt: T, fields: &FieldMeans<T>) -> Heading<T> {
+        let FieldMeans { rotation, field, rate } = fields;
+        let field = field - rotation * self.iron.offset - rate * self.iron.lag();
+        let plane = in_plane(&field);
+        let squared = plane[0] * plane[0];
         let reference = self.field.get_or_insert_with(|| FieldReference::new(plane));
         let angle = field.x.atan2(field.y);
         let deviation = self.errors.variance(ROTATION + 2).max(T::ZERO).sqrt();
@@ -357,12 +390,60 @@ impl<T: Real> MekfFilter<T> {
         let usual = T::of(self.params.field_disturbance * self.params.field_disturbance);
         let least = T::of(0.25) * horizontal * horizontal * reference.squared_norm();
         let rate = (rate.x * field.y - rate.y * field.x) / squared.max(least);
-        Some(Heading {
-            angle: angle + rate * self.errors.mean[LATENCY],
+        // What is not known of the offset, across the field, as a fraction of its norm.
+        let across = rotation.tr_mul(&Vector3::new(field.y, -field.x, T::ZERO)) / squared.max(least).sqrt();
+        let unknown = across.dot(&(self.iron.covariance() * across)) / reference.squared_norm();
+        let disturbed = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown) / (horizontal * horizontal);
+        Heading {
+            angle,
             slope: reference.vertical() / horizontal,
-            rate,
-            variance: T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance) / (dt * horizontal * horizontal),
-        })
+            variance: disturbed / dt + rate * rate * self.iron.lag_variance(),
+        }
+    }
+
+    /// Takes an offset that the field has shown, and the heading where the fields are all that shows it.
+    #[cold]
+    fn adopt(&mut self, orientation: UnitQuaternion<T>, adoption: &Adoption<T>) -> UnitQuaternion<T> {
+        let Adoption { field, variance, is_heading, is_other_field, duration } = adoption;
+        // What the window says about the heading was with the offset before.
+        self.measurements.forget_heading();
+        if *is_heading || *is_other_field {
+            self.field = Some(FieldReference::seen(in_plane(field), *duration));
+        }
+        let Some(angle) = heading_error(&field.normalize()) else { return orientation };
+        let known = self.errors.variance(ROTATION + 2) + *variance;
+        let is_evident = angle.abs() > T::of(REOPENED) && angle * angle > T::of(4.0) * known;
+        if !is_heading && !is_evident {
+            return orientation;
+        }
+        let turned = turn_heading(&orientation, angle);
+        let rotation = turn_heading(&UnitQuaternion::identity(), angle);
+        let (sin, cos) = angle.sin_cos();
+        self.errors.turn_heading([cos, sin]);
+        self.errors.doubt(ROTATION + 2, if *is_heading { *variance } else { *variance + angle * angle });
+        self.vertical.turn(&rotation);
+        self.iron.turn(&rotation);
+        self.rotation = *turned.to_rotation_matrix().matrix();
+        turned
+    }
+
+    /// The body accelerated at the start: levels it by the mean specific force since, known up to `deviation`, rad.
+    /// The heading is that of the last field; what is known of the sensors stays.
+    #[cold]
+    fn level_start(&mut self, orientation: UnitQuaternion<T>, up: &Vector3<T>, deviation: T) -> UnitQuaternion<T> {
+        let mut orientation = turn_upright(&orientation, up);
+        if self.params.magnetometer
+            && let Some(field) = self.last_field.try_normalize(T::ZERO)
+            && let Some(error) = heading_error(&(orientation * field))
+        {
+            orientation = turn_heading(&orientation, error);
+            self.field = None;
+        }
+        let vertical = self.vertical.clone();
+        self.begin(&orientation, deviation, T::of(INITIAL_HEADING));
+        self.vertical = vertical;
+        self.vertical.levelled();
+        orientation
     }
 
     /// The tilt contradicts the mean specific force: restarts it, and the heading with the next field.

@@ -6,18 +6,16 @@
 
 use nalgebra::Vector3;
 
-use super::errors::{BIAS, Errors, LATENCY, ROTATION, VELOCITY};
+use super::errors::{BIAS, Errors, ROTATION, VELOCITY};
 use crate::attitude::Real;
 
 /// Heading, seen by the magnetic field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Heading<T> {
-    /// How far the field is from north, rad, as if the lag were zero to first order.
+    /// How far the field is from north, rad.
     pub(super) angle: T,
     /// Vertical over horizontal part of the reference.
     pub(super) slope: T,
-    /// What the angle grows by with the lag, rad/s.
-    pub(super) rate: T,
     /// rad².
     pub(super) variance: T,
 }
@@ -43,6 +41,11 @@ impl<T: Real> Measurements<T> {
         Self { next: 0, velocity_variance, heading, bias }
     }
 
+    /// Leaves the heading out.
+    pub(super) fn forget_heading(&mut self) {
+        self.heading = None;
+    }
+
     /// Takes the next scalar; `false` if there is none left.
     pub(super) fn take(&mut self, errors: &mut Errors<T>) -> bool {
         let taken = self.next;
@@ -50,8 +53,7 @@ impl<T: Real> Measurements<T> {
             0 | 1 => errors.update([(VELOCITY + taken as usize, T::ONE)], T::ZERO, self.velocity_variance),
             2 => {
                 if let Some(heading) = self.heading {
-                    let observation =
-                        [(ROTATION + 1, -heading.slope), (ROTATION + 2, T::ONE), (LATENCY, heading.rate)];
+                    let observation = [(ROTATION + 1, -heading.slope), (ROTATION + 2, T::ONE)];
                     errors.update(observation, heading.angle, heading.variance);
                 }
             }

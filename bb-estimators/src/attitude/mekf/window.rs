@@ -1,8 +1,9 @@
 //! What one window of samples adds up to, in a world frame that is not corrected within it.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::errors::{BIAS, CALIBRATION};
+use super::iron::FieldMeans;
 use crate::attitude::Real;
 
 /// A window ends after this many samples: enough to do the filter's work in small pieces, one with each.
@@ -29,8 +30,10 @@ pub(super) struct Window<T> {
     pub(super) squared_rate: T,
     /// Σ R m.
     field: Vector3<T>,
-    /// Σ R (ω × m).
+    /// Σ R (ω × (m - b)).
     field_rate: Vector3<T>,
+    /// Σ R over the samples of the field.
+    field_rotation: Matrix3<T>,
     fields: u32,
 }
 
@@ -46,6 +49,7 @@ impl<T: Real> Window<T> {
             squared_rate: T::ZERO,
             field: Vector3::zeros(),
             field_rate: Vector3::zeros(),
+            field_rotation: Matrix3::zeros(),
             fields: 0,
         }
     }
@@ -77,17 +81,30 @@ impl<T: Real> Window<T> {
         self.squared_rate += rate.norm_squared() * dt;
     }
 
-    /// Adds a magnetic field that was measured with the sensor at `rotation`, turning at `rate`.
-    pub(super) fn add_field(&mut self, rotation: &Matrix3<T>, rate: &Vector3<T>, field: &Vector3<T>) {
+    /// Adds a magnetic field that was measured with the sensor at `rotation`, turning at `rate`; `offset` is what
+    /// of it turns with the body.
+    pub(super) fn add_field(
+        &mut self,
+        rotation: &Matrix3<T>,
+        rate: &Vector3<T>,
+        field: &Vector3<T>,
+        offset: &Vector3<T>,
+    ) {
         self.field += rotation * field;
-        self.field_rate += rotation * rate.cross(field);
+        self.field_rate += rotation * rate.cross(&(field - offset));
+        self.field_rotation += rotation;
         self.fields += 1;
     }
 
-    /// Means of R m and R (ω × m), if there was a field.
-    pub(super) fn mean_field(&self) -> Option<(Vector3<T>, Vector3<T>)> {
+    /// Means over the fields in the world as `correction` makes it, if there was a field.
+    pub(super) fn mean_field(&self, correction: &UnitQuaternion<T>) -> Option<FieldMeans<T>> {
         let scale = T::ONE / T::of(f64::from(self.fields.max(1)));
-        (self.fields > 0).then(|| (self.field * scale, self.field_rate * scale))
+        let correction = *correction.to_rotation_matrix().matrix() * scale;
+        (self.fields > 0).then(|| FieldMeans {
+            rotation: correction * self.field_rotation,
+            field: correction * self.field,
+            rate: correction * self.field_rate,
+        })
     }
 
     /// How bias and calibration turn the world in this window, rad per rad/s and rad per fraction.

@@ -1,0 +1,216 @@
+//! Least squares for the magnetometer's offset and lag, as sums over windows.
+//!
+//! With R̄ the mean rotation over a window's field samples, w the mean of R m and q that of R (ω × (m - b)),
+//! `w = B + R̄ b + τ q`: an unknown field B in the world, the offset b on the body and the lag τ, seven numbers. B is
+//! eliminated; what is left is a system of four.
+
+use nalgebra::{Matrix3, Matrix4, UnitQuaternion, Vector3, Vector4};
+
+use crate::attitude::Real;
+
+/// The errors of a field before any are seen, as a fraction of its norm, and how long that is worth, s: seven numbers fit
+/// the first second too well.
+const PRIOR_ERROR: f64 = 0.02;
+const PRIOR_S: f64 = 2.0;
+
+/// What the errors of the field, which last for some time, are taken to be correlated over, s.
+const CORRELATION_S: f64 = 0.25;
+
+/// The least standard deviation of a field indoors, as a fraction of its norm: a room is not more even than that.
+const LEAST_ERROR: f64 = 0.02;
+
+/// Standard deviation of the offset on each axis before anything is known of it, as a fraction of the field's norm: that
+/// of chips without calibration.
+pub(in super::super) const PRIOR_OFFSET: f64 = 0.5;
+
+/// Means over the field samples of one window, in the world but for the offset's own frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in super::super) struct FieldMeans<T> {
+    /// R̄.
+    pub(in super::super) rotation: Matrix3<T>,
+    /// w.
+    pub(in super::super) field: Vector3<T>,
+    /// q, the field's unit times rad/s.
+    pub(in super::super) rate: Vector3<T>,
+}
+
+/// Integrals over time.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Sums<T> {
+    /// ∫ dt, s.
+    pub(super) duration: T,
+    rotation: Matrix3<T>,
+    field: Vector3<T>,
+    field_on_body: Vector3<T>,
+    squared_field: T,
+    rate: Vector3<T>,
+    rate_on_body: Vector3<T>,
+    squared_rate: T,
+    rate_times_field: T,
+}
+
+/// The lag as it was known before the sums began: its mean, s, and variance, s².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lag<T> {
+    pub(super) mean: T,
+    pub(super) variance: T,
+}
+
+/// The sums with B eliminated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fit<T> {
+    duration: T,
+    /// Without the prior, `cost(x) = S₀ - 2 cᵀ x + xᵀ A x`.
+    matrix: Matrix4<T>,
+    vector: Vector4<T>,
+    constant: T,
+    /// The minimum: offset, and lag in s.
+    pub(super) offset: Vector3<T>,
+    pub(super) lag: T,
+    /// Covariance of both.
+    pub(super) covariance: Matrix4<T>,
+    /// B there, in the world.
+    pub(super) field: Vector3<T>,
+    /// ∂B/∂x, negated: the means of R and q.
+    pub(super) slope: Matrix3<T>,
+    rate: Vector3<T>,
+    /// What one independent second of cost weighs: the variance of the field's error times its correlation, unit² s.
+    pub(super) noise: T,
+}
+
+impl<T: Real> Sums<T> {
+    pub(super) fn new() -> Self {
+        Self {
+            duration: T::ZERO,
+            rotation: Matrix3::zeros(),
+            field: Vector3::zeros(),
+            field_on_body: Vector3::zeros(),
+            squared_field: T::ZERO,
+            rate: Vector3::zeros(),
+            rate_on_body: Vector3::zeros(),
+            squared_rate: T::ZERO,
+            rate_times_field: T::ZERO,
+        }
+    }
+
+    /// Adds a window of `dt` seconds, after what was before has faded by `keep`.
+    pub(super) fn add(&mut self, dt: T, keep: T, means: &FieldMeans<T>) {
+        let FieldMeans { rotation, field, rate } = means;
+        self.duration = self.duration * keep + dt;
+        self.rotation = self.rotation * keep + rotation * dt;
+        self.field = self.field * keep + field * dt;
+        self.field_on_body = self.field_on_body * keep + rotation.tr_mul(field) * dt;
+        self.squared_field = self.squared_field * keep + field.norm_squared() * dt;
+        self.rate = self.rate * keep + rate * dt;
+        self.rate_on_body = self.rate_on_body * keep + rotation.tr_mul(rate) * dt;
+        self.squared_rate = self.squared_rate * keep + rate.norm_squared() * dt;
+        self.rate_times_field = self.rate_times_field * keep + rate.dot(field) * dt;
+    }
+
+    /// Turns the world.
+    pub(super) fn turn(&mut self, correction: &UnitQuaternion<T>) {
+        self.rotation = correction.to_rotation_matrix() * self.rotation;
+        self.field = correction * self.field;
+        self.rate = correction * self.rate;
+    }
+
+    /// Solves for offset and lag; `unit` is the norm of the field. None without data.
+    pub(super) fn fit(&self, unit: T, prior: Lag<T>) -> Option<Fit<T>> {
+        let scale = T::ONE / self.duration;
+        let slope = self.rotation * scale;
+        let mean_rate = self.rate * scale;
+        let mean_field = self.field * scale;
+        // R̄ᵀ R̄ is the identity but for the rotation within a window.
+        let offset_block = Matrix3::identity() * self.duration - self.rotation.tr_mul(&slope);
+        let cross = self.rate_on_body - self.rotation.tr_mul(&mean_rate);
+        let mut matrix = Matrix4::zeros();
+        matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&offset_block);
+        for i in 0..3 {
+            matrix[(i, 3)] = cross[i];
+            matrix[(3, i)] = cross[i];
+        }
+        matrix[(3, 3)] = self.squared_rate - self.rate.dot(&mean_rate);
+        let on_body = self.field_on_body - self.rotation.tr_mul(&mean_field);
+        let lagged = self.rate_times_field - self.rate.dot(&mean_field);
+        let vector = Vector4::new(on_body.x, on_body.y, on_body.z, lagged);
+        let constant = (self.squared_field - self.field.dot(&mean_field)).max(T::ZERO);
+
+        let correlation = T::TWO * T::of(CORRELATION_S);
+        let least = T::of(LEAST_ERROR * LEAST_ERROR) * unit * unit;
+        let mut regular = matrix;
+        let mut right = vector;
+        let offset_information = least * correlation / (T::of(PRIOR_OFFSET * PRIOR_OFFSET) * unit * unit);
+        let lag_information = least * correlation / prior.variance;
+        for i in 0..3 {
+            regular[(i, i)] += offset_information;
+        }
+        regular[(3, 3)] += lag_information;
+        right[3] += lag_information * prior.mean;
+        let inverse = regular.cholesky()?.inverse();
+        let solution = inverse * right;
+        let mut fit = Fit {
+            duration: self.duration,
+            matrix,
+            vector,
+            constant,
+            offset: solution.xyz(),
+            lag: solution.w,
+            covariance: inverse,
+            field: mean_field - slope * solution.xyz() - mean_rate * solution.w,
+            slope,
+            rate: mean_rate,
+            noise: T::ZERO,
+        };
+        let prior = T::of(PRIOR_ERROR * PRIOR_ERROR) * unit * unit * T::of(PRIOR_S);
+        let error = ((fit.cost(&solution) + prior) / (self.duration + T::of(PRIOR_S))).max(least);
+        fit.noise = error * correlation;
+        fit.covariance = inverse * fit.noise;
+        Some(fit)
+    }
+}
+
+impl<T: Real> Fit<T> {
+    /// ∫ |error|² dt at an offset and a lag.
+    fn cost(&self, x: &Vector4<T>) -> T {
+        (self.constant - T::TWO * self.vector.dot(x) + x.dot(&(self.matrix * x))).max(T::ZERO)
+    }
+
+    /// The trace of the offset's covariance.
+    pub(super) fn offset_trace(&self) -> T {
+        self.covariance[(0, 0)] + self.covariance[(1, 1)] + self.covariance[(2, 2)]
+    }
+
+    /// The field in the world with an offset and a lag.
+    pub(super) fn field_of(&self, offset: &Vector3<T>, lag: T) -> Vector3<T> {
+        self.field + self.slope * (self.offset - offset) + self.rate * (self.lag - lag)
+    }
+
+    /// The least cost of all.
+    pub(super) fn least_cost(&self) -> T {
+        self.cost(&Vector4::new(self.offset.x, self.offset.y, self.offset.z, self.lag))
+    }
+
+    /// The cost with this offset and the lag that suits it best, and that lag, s.
+    pub(super) fn cost_of(&self, offset: &Vector3<T>, prior: Lag<T>) -> (T, T) {
+        let information = self.noise / prior.variance;
+        let cross = Vector3::new(self.matrix[(0, 3)], self.matrix[(1, 3)], self.matrix[(2, 3)]);
+        let lag =
+            (self.vector.w - cross.dot(offset) + information * prior.mean) / (self.matrix[(3, 3)] + information);
+        (self.cost(&Vector4::new(offset.x, offset.y, offset.z, lag)), lag)
+    }
+
+    /// Mean square error of a cost, in the field's unit squared.
+    pub(super) fn mean_square(&self, cost: T) -> T {
+        cost / self.duration
+    }
+
+    /// Variance of the direction of B about the vertical, rad².
+    pub(super) fn heading_variance(&self) -> T {
+        let [x, y] = [self.field.x, self.field.y];
+        let squared = x * x + y * y;
+        let across = Vector3::new(y, -x, T::ZERO) / squared;
+        let on_body = self.slope.tr_mul(&across);
+        let gradient = Vector4::new(on_body.x, on_body.y, on_body.z, self.rate.dot(&across));
+        gradient.dot(&(self.covariance * gradient)) + self.noise / (self.duration * squared)
+    }
+}

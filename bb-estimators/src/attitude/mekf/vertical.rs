@@ -1,0 +1,88 @@
+//! The vertical that the mean specific force shows, and when it overrules the tilt.
+//!
+//! A velocity stays bounded, so the mean of R f over a time t is the vertical up to the change of velocity over g t,
+//! rad. The Kalman filter knows that too, but only to first order; a tilt that is off by more restarts.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::GRAVITY;
+use crate::attitude::Real;
+
+/// A mean is over this time, s.
+const MEAN_S: f64 = 2.0;
+
+/// The slope of a mean beyond which the tilt is wrong: 30°, more than any motion of that time accelerates by.
+const MAX_SLOPE: f64 = 0.577;
+
+/// A start is believed from this time on, s: a few samples more than the first.
+const LEAST_START_S: f64 = 0.05;
+
+/// By how much the velocity may have changed since a start, m/s: a hand that shakes a sensor.
+const START_VELOCITY: f64 = 1.4;
+
+/// The greatest slope that a start leaves alone, rad: the deviation of the first sample's tilt.
+const MAX_START_SLOPE: f64 = super::filter::INITIAL_TILT;
+
+/// What the mean specific force contradicts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Contradiction<T> {
+    /// The tilt of the first sample; the mean is the vertical up to this deviation, rad.
+    Start(Vector3<T>, T),
+    /// The tilt of a filter that has run for long.
+    Tilt(Vector3<T>),
+}
+
+/// The mean specific force of late, in the world.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Vertical<T> {
+    /// ∫ R f dt, m/s.
+    sum: Vector3<T>,
+    /// How long the mean is over, s.
+    duration: T,
+    /// Whether the filter started from a specific force when the mean began.
+    is_start: bool,
+}
+
+impl<T: Real> Vertical<T> {
+    pub(super) fn new(is_start: bool) -> Self {
+        Self { sum: Vector3::zeros(), duration: T::ZERO, is_start }
+    }
+
+    /// Takes a window's ∫ R f dt, after the world was corrected.
+    pub(super) fn add(
+        &mut self,
+        dt: T,
+        correction: &UnitQuaternion<T>,
+        force: &Vector3<T>,
+    ) -> Option<Contradiction<T>> {
+        self.sum = correction * self.sum + force;
+        self.duration += dt;
+        let (sum, weight) = (self.sum, T::of(GRAVITY) * self.duration);
+        let is_complete = self.duration > T::of(MEAN_S);
+        let was_start = self.is_start;
+        if is_complete {
+            *self = Self::new(false);
+        }
+        if sum.norm() <= T::HALF * weight {
+            // Free fall shows no vertical.
+            return None;
+        }
+        let leans = |slope: T| sum.x.hypot(sum.y) > slope * sum.z;
+        if was_start {
+            let deviation = (T::of(START_VELOCITY) / weight).min(T::of(MAX_START_SLOPE));
+            let believed = self.duration > T::of(LEAST_START_S) || is_complete;
+            return (believed && leans(deviation)).then_some(Contradiction::Start(sum, deviation));
+        }
+        (is_complete && leans(T::of(MAX_SLOPE))).then_some(Contradiction::Tilt(sum))
+    }
+
+    /// The world was turned.
+    pub(super) fn turn(&mut self, rotation: &UnitQuaternion<T>) {
+        self.sum = rotation * self.sum;
+    }
+
+    /// The world was levelled by the mean, so that it is the vertical from now on.
+    pub(super) fn levelled(&mut self) {
+        self.sum = Vector3::new(T::ZERO, T::ZERO, self.sum.norm());
+    }
+}
