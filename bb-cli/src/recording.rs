@@ -1,7 +1,9 @@
 //! A recording, opened: its samples, its truth, and what is to be said of it.
 
-use bb_bags::{Bag, BagError, BagErrorKind, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY, POSE, Truth};
 use bb_estimators::attitude::ImuSample;
+use bb_mcap::{
+    Bag, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Truth,
+};
 use std::path::Path;
 
 use crate::filters::Axes;
@@ -137,10 +139,10 @@ fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String
         Err(error) => error,
     };
     match error.kind() {
-        BagErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
+        RecordingErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
             Ok(Ok(name.unwrap_or_default().to_owned()))
         }
-        BagErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth-topic"))),
+        RecordingErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth-topic"))),
         _ => Err(said(&error, "--truth-topic")),
     }
 }
@@ -155,8 +157,8 @@ fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
     match bag.choose(MOVING, name) {
         Ok(topic) => Ok(Some(topic.name.to_string())),
         Err(error) => match error.kind() {
-            BagErrorKind::NoTopicOfType { .. } => Ok(None),
-            BagErrorKind::SeveralTopicsOfType { .. } => {
+            RecordingErrorKind::NoTopicOfType { .. } => Ok(None),
+            RecordingErrorKind::SeveralTopicsOfType { .. } => {
                 Err(format!("{}, or score all of it with --moving-topic none", said(&error, "--moving-topic")))
             }
             _ => Err(said(&error, "--moving-topic")),
@@ -176,15 +178,15 @@ fn truth(bag: &Bag, topics: &[Option<&str>]) -> Result<Truth, String> {
     }
 }
 
-fn is_break(error: &BagError) -> bool {
-    matches!(error.kind(), BagErrorKind::Truncated { .. })
+fn is_break(error: &RecordingError) -> bool {
+    matches!(error.kind(), RecordingErrorKind::Truncated { .. })
 }
 
 /// What is wrong, with the option that chooses another topic.
-fn said(error: &BagError, option: &str) -> String {
+fn said(error: &RecordingError, option: &str) -> String {
     let kind = error.kind();
     match kind {
-        BagErrorKind::NoTopicOfType { .. } => kind.to_string(),
+        RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),
         _ => format!("{kind} ({option})"),
     }
 }

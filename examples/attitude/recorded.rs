@@ -3,9 +3,9 @@
 use crate::arguments::Arguments;
 use crate::filter::{Chosen, ChosenParams};
 use crate::outcome::{Outcome, Series};
-use bb_bags::{Bag, BagImu, IMU, MAGNETIC_FIELD, Truth};
 use bb_cli::Progress;
 use bb_core::prelude::*;
+use bb_mcap::{Bag, BagImu, IMU, MAGNETIC_FIELD, Truth};
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;

@@ -1,10 +1,10 @@
 //! Orientation on the trials of BROAD: the mean over them of the RMS errors, one parameter set for all.
 
 use crate::recordings::broad;
-use bb_bags::{BagImu, Truth};
 use bb_cli::{Averages, Degrees, Score};
 use bb_core::prelude::*;
 use bb_estimators::{Complementary, Fusion, Madgwick, Mahony, Mekf, Tilt, Vqf};
+use bb_mcap::{BagImu, Truth};
 use std::error::Error;
 use std::path::Path;
 
@@ -72,7 +72,7 @@ const PUBLISHED: [(usize, usize, f64, f64); 7] = [
 
 /// The errors on one recording, in the order of [`KNOWN`].
 pub(crate) fn errors(file: &Path) -> Result<[Degrees; KNOWN.len()], Box<dyn Error>> {
-    let truth = Truth::read(&bb_bags::Bag::open(file)?)?;
+    let truth = Truth::read(&bb_mcap::Bag::open(file)?)?;
     let mut builder = Recorded::builder();
     builder.options(recorded::sensor::body::imu).file = file.to_owned();
     let mut filters = [

@@ -1,9 +1,7 @@
 //! Whole messages: the exact layout, and that of ROS.
 
 use super::ros::Header;
-use super::{
-    DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, data, encode_with, type_hash,
-};
+use super::{DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, encode_with, type_hash};
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
 
@@ -17,6 +15,14 @@ impl<T: Payload> Stamped<T> {
     pub fn ros_schema() -> Option<Schema> {
         T::ROS.and_then(|layout| match layout.shape {
             Shape::Struct(shape) => Some(Schema::new(shape.name, layout.shape)),
+            _ => None,
+        })
+    }
+
+    /// The name of ROS's message, `sensor_msgs/Imu`, if ROS has one for the payload.
+    pub fn ros_name() -> Option<&'static str> {
+        T::ROS.and_then(|layout| match layout.shape {
+            Shape::Struct(shape) => Some(shape.name),
             _ => None,
         })
     }
@@ -91,7 +97,7 @@ pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeEr
     match T::ROS {
         // Bytes after the message are ignored: ROS counts padding for empty lists that it does not write, so some of its own
         // messages end with bytes that mean nothing.
-        Some(layout) => (layout.read)(&mut data(bytes)?),
+        Some(layout) => (layout.read)(&mut Reader::of_message(bytes)?),
         None => Err(DecodeError::new(0, "a payload that ROS has a message for", T::NAME)),
     }
 }

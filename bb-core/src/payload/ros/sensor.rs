@@ -10,20 +10,29 @@ use crate::payload::{
     FluidPressure, GeodeticPosition, GnssFix, GnssServices, GnssStatus, Image, Imu, LaserScan, MagneticField,
     Radiation, Range,
 };
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector4};
 use std::sync::Arc;
 
-/// The covariance of an orientation that is not measured: −1 first.
+/// The covariance of what is not measured: −1 first, as `sensor_msgs/Imu` documents.
 const NO_ORIENTATION: [f64; 9] = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
+/// An orientation is absent where `sensor_msgs/Imu` says that it is: where the first element of its covariance is −1.
+/// A quaternion of zeros, which drivers send that leave the field alone, is no rotation, and so is absent as well. Any
+/// other quaternion is taken as it is.
 fn orientation_from_ros(
     orientation: UnitQuaternion<f64>,
     covariance: &[f64; 9],
 ) -> (Option<UnitQuaternion<f64>>, Option<Matrix3<f64>>) {
-    match covariance[0] == NO_ORIENTATION[0] {
+    match covariance[0] == NO_ORIENTATION[0] || orientation.coords == Vector4::zeros() {
         true => (None, None),
         false => (Some(orientation), covariance::from_ros(covariance)),
     }
+}
+
+/// The covariance of a rate or an acceleration. One that is marked as absent is unknown; the value beside it is kept, since
+/// drivers also write the mark where they mean that the covariance is unknown.
+fn measured(covariance: &[f64; 9]) -> Option<Matrix3<f64>> {
+    covariance::from_ros(covariance).filter(|_| covariance[0] != NO_ORIENTATION[0])
 }
 
 ros_message! {
@@ -46,8 +55,8 @@ ros_message! {
             linear_acceleration,
             orientation,
             orientation_covariance,
-            angular_velocity_covariance: covariance::from_ros(&angular_velocity_covariance),
-            linear_acceleration_covariance: covariance::from_ros(&linear_acceleration_covariance),
+            angular_velocity_covariance: measured(&angular_velocity_covariance),
+            linear_acceleration_covariance: measured(&linear_acceleration_covariance),
         }
     }
 }
