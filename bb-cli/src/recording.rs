@@ -1,9 +1,7 @@
 //! A recording, opened: its samples, its truth, and what is to be said of it.
 
 use bb_estimators::attitude::ImuSample;
-use bb_mcap::{
-    Bag, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Truth,
-};
+use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Truth};
 use std::path::Path;
 
 use crate::filters::Axes;
@@ -13,7 +11,7 @@ use crate::filters::Axes;
 pub struct Topics {
     /// The IMU; else the only topic of its type.
     pub imu: Option<String>,
-    /// The magnetometer; else the only topic of its type.
+    /// The magnetometer; else the one that was recorded with the IMU, or the only topic of its type.
     pub magnetometer: Option<String>,
     /// The true orientation; else the only topic of poses, if there is one.
     pub truth: Option<String>,
@@ -57,7 +55,7 @@ impl Recording {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
         let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
         let magnetometer = axes == Axes::Nine;
-        let magnetic = match bag.choose(MAGNETIC_FIELD, topics.magnetometer.as_deref()) {
+        let magnetic = match bag.magnetometer_of(&imu.name, topics.magnetometer.as_deref()) {
             _ if !magnetometer => None,
             Ok(topic) => Some(&*topic.name),
             Err(error) => return Err(format!("{}; without one, choose --axes six", said(&error, "--mag-topic"))),

@@ -45,10 +45,10 @@ pub use intern::MAX_NAME_BYTES;
 pub(crate) use intern::intern;
 pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
 pub use reader::Reader;
-pub use ros::{RosLayout, RosMessage};
+pub use ros::{RosCompanion, RosLayout, RosMessage};
 pub use schema::Schema;
 pub use shape::{EnumShape, FieldShape, Shape, StructShape};
-pub use stamped::{decode_as_ros, encode_as_ros, is_exact_as_ros};
+pub use stamped::{decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
 pub use type_description::{type_description, type_hash};
 pub use writer::Writer;
 

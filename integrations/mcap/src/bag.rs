@@ -108,6 +108,20 @@ impl Bag {
         Err(RecordingError::new(&self.path, kind))
     }
 
+    /// The topic of the magnetometer that goes with an IMU: the one of this name, if one is given, or else that which a
+    /// recorder of this crate has written beside the IMU, or else the only one of its type.
+    ///
+    /// # Errors
+    ///
+    /// As [`choose`](Self::choose).
+    pub fn magnetometer_of(&self, imu: &str, name: Option<&str>) -> Result<&Topic, RecordingError> {
+        let beside = format!("{imu}/magnetic_field");
+        match (name, self.choose(MAGNETIC_FIELD, Some(&beside))) {
+            (None, Ok(topic)) => Ok(topic),
+            _ => self.choose(MAGNETIC_FIELD, name),
+        }
+    }
+
     /// The messages of the named topics, read as they are asked for and in the order of the file.
     ///
     /// Recorders write messages as they arrive, so the order of the file is that of the log times but for small

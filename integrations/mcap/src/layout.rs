@@ -11,7 +11,67 @@ pub(crate) const LAYOUT: &str = "bb.layout";
 const ROBOT: &str = "bb.robot";
 const NODE: &str = "bb.node";
 const FRAME: &str = "bb.frame";
-const OFFSET: &str = "bb.wall_minus_monotonic_ns";
+
+/// The name of the metadata with the recording's [`Clock`].
+pub(crate) const CLOCK: &str = "bb.clock";
+const OFFSET: &str = "wall_minus_monotonic_ns";
+const SHIFT: &str = "date_shift_ns";
+
+/// A virtual clock starts within this time after 1970, and no robot ran then: 1 year.
+const VIRTUAL_NS: i64 = 365 * DAY_NS;
+const DAY_NS: i64 = 86_400_000_000_000;
+
+/// What the times of a recording have in common, written once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Clock {
+    /// Wall time minus monotonic time, as published, at the first message.
+    wall_minus_monotonic_ns: i64,
+    /// What was added to all wall times: a run on virtual time from zero is given today's date, since viewers show dates,
+    /// and tools sort by them.
+    shift_ns: i64,
+}
+
+impl Clock {
+    /// Of a recording that begins with a message of this stamp, `today`.
+    pub(crate) fn of(first: &Stamp, today: WallTime) -> Self {
+        let wall = first.wall_time.as_unix_nanos();
+        let is_virtual = (0..VIRTUAL_NS).contains(&wall);
+        let midnight = today.as_unix_nanos().div_euclid(DAY_NS).saturating_mul(DAY_NS);
+        Self {
+            wall_minus_monotonic_ns: wall.wrapping_sub(first.monotonic_time.as_nanos()),
+            shift_ns: if is_virtual { midnight } else { 0 },
+        }
+    }
+
+    /// The wall time as it is recorded.
+    // Wrapping, so that every time is read back.
+    pub(crate) fn recorded(&self, time: WallTime) -> WallTime {
+        WallTime::from_unix_nanos(time.as_unix_nanos().wrapping_add(self.shift_ns))
+    }
+
+    /// The wall time as it was published.
+    pub(crate) fn published(&self, time: WallTime) -> WallTime {
+        WallTime::from_unix_nanos(time.as_unix_nanos().wrapping_sub(self.shift_ns))
+    }
+
+    /// The monotonic time that belongs to a wall time as it was published.
+    fn monotonic(&self, wall_time: WallTime) -> MonotonicTime {
+        MonotonicTime::from_nanos(wall_time.as_unix_nanos().wrapping_sub(self.wall_minus_monotonic_ns))
+    }
+
+    pub(crate) fn to_metadata(self) -> BTreeMap<String, String> {
+        [(OFFSET, self.wall_minus_monotonic_ns), (SHIFT, self.shift_ns)]
+            .map(|(key, value)| (key.to_owned(), value.to_string()))
+            .into()
+    }
+
+    pub(crate) fn from_metadata(metadata: &BTreeMap<String, String>) -> Option<Self> {
+        Some(Self {
+            wall_minus_monotonic_ns: metadata.get(OFFSET)?.parse().ok()?,
+            shift_ns: metadata.get(SHIFT)?.parse().ok()?,
+        })
+    }
+}
 
 /// How the messages of a channel are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,10 +82,13 @@ pub(crate) enum Layout {
     Exact,
     /// Likewise: those of a `Ros` channel that differ from the rest, each just before the message it goes with.
     Beside,
+    /// The second message of a payload that ROS has two for, just before the first.
+    Companion,
 }
 
 impl Layout {
-    const ALL: [(Self, &'static str); 3] = [(Self::Ros, "ros"), (Self::Exact, "exact"), (Self::Beside, "beside")];
+    const ALL: [(Self, &'static str); 4] =
+        [(Self::Ros, "ros"), (Self::Exact, "exact"), (Self::Beside, "beside"), (Self::Companion, "companion")];
 
     fn name(self) -> &'static str {
         Self::ALL.iter().find(|(layout, _)| *layout == self).map_or("", |(_, name)| name)
@@ -42,34 +105,26 @@ pub(crate) struct Shared {
     pub(crate) robot: String,
     pub(crate) node: String,
     pub(crate) frame: String,
-    pub(crate) wall_minus_monotonic_ns: i64,
 }
 
 impl Shared {
     pub(crate) fn of(stamp: &Stamp) -> Self {
-        let Stamp { monotonic_time, wall_time, frame, origin } = stamp;
-        Self {
-            robot: origin.robot.to_owned(),
-            node: origin.node.to_owned(),
-            frame: frame.name().to_owned(),
-            wall_minus_monotonic_ns: wall_time.as_unix_nanos().saturating_sub(monotonic_time.as_nanos()),
-        }
+        let Stamp { frame, origin, .. } = stamp;
+        Self { robot: origin.robot.to_owned(), node: origin.node.to_owned(), frame: frame.name().to_owned() }
     }
 
     /// Whether a stamp follows from its wall time.
-    pub(crate) fn gives(&self, stamp: &Stamp) -> bool {
-        let monotonic = stamp.wall_time.as_unix_nanos().checked_sub(self.wall_minus_monotonic_ns);
-        monotonic == Some(stamp.monotonic_time.as_nanos())
+    pub(crate) fn gives(&self, clock: &Clock, stamp: &Stamp) -> bool {
+        clock.monotonic(stamp.wall_time) == stamp.monotonic_time
             && self.frame == stamp.frame.name()
             && self.robot == stamp.origin.robot
             && self.node == stamp.origin.node
     }
 
     /// The stamp that follows from a wall time; names are those that are kept.
-    pub(crate) fn stamp(&self, wall_time: WallTime, names: &Names) -> Stamp {
-        let monotonic = wall_time.as_unix_nanos().saturating_sub(self.wall_minus_monotonic_ns);
+    pub(crate) fn stamp(clock: &Clock, wall_time: WallTime, names: &Names) -> Stamp {
         Stamp {
-            monotonic_time: MonotonicTime::from_nanos(monotonic),
+            monotonic_time: clock.monotonic(wall_time),
             wall_time,
             frame: Frame::new(names.frame),
             origin: Origin { robot: names.robot, node: names.node },
@@ -81,7 +136,6 @@ impl Shared {
             robot: metadata.get(ROBOT)?.clone(),
             node: metadata.get(NODE)?.clone(),
             frame: metadata.get(FRAME)?.clone(),
-            wall_minus_monotonic_ns: metadata.get(OFFSET)?.parse().ok()?,
         })
     }
 }
@@ -108,6 +162,7 @@ impl Names {
 /// A channel to be written.
 pub(crate) struct Description {
     pub(crate) topic: String,
+    pub(crate) path: &'static str,
     pub(crate) schema: Schema,
     pub(crate) metadata: BTreeMap<String, String>,
 }
@@ -120,6 +175,10 @@ impl Description {
             Layout::Exact => (format!("/{path}"), message.schema()),
             // Hidden, as ROS has it, from whoever lists topics.
             Layout::Beside => (format!("/{path}/_exact"), message.schema()),
+            Layout::Companion => message.ros_companion().map_or_else(
+                || (format!("/{path}"), message.schema()),
+                |(topic, schema)| (format!("/{path}/{topic}"), schema),
+            ),
         };
         let entries = [
             (PATH, path),
@@ -128,11 +187,10 @@ impl Description {
             (ROBOT, &shared.robot),
             (NODE, &shared.node),
             (FRAME, &shared.frame),
-            (OFFSET, &shared.wall_minus_monotonic_ns.to_string()),
             // ROS's player wants it to be there.
             ("offered_qos_profiles", ""),
         ];
         let metadata = entries.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
-        Self { topic, schema, metadata }
+        Self { topic, path, schema, metadata }
     }
 }

@@ -1,6 +1,8 @@
 //! Writes what a subscription gets.
 
 mod background;
+mod frames;
+mod names;
 mod options;
 #[cfg(test)]
 mod tests;
@@ -10,19 +12,23 @@ pub(crate) use options::LIBRARY;
 pub use options::{Compression, RecorderOptions};
 
 use crate::error::{RecordingError, RecordingErrorKind, create_error, write_error};
-use crate::layout::{Description, Layout, Shared};
-use bb_core::message::Schema;
+use crate::file::LIMIT;
+use crate::layout::{CLOCK, Clock, Description, Layout, Shared};
 use bb_core::message::codec::ros::{Text, TransformsMessage};
 use bb_core::message::codec::{Field, Shape, encode};
+use bb_core::message::{Schema, Stamp};
 use bb_core::{DynamicMessage, DynamicSubscription, WallTime};
+use frames::Frames;
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, McapResult, Writer};
+use mcap::{Attachment, McapError, McapResult, Writer};
+use names::Names;
 use std::borrow::Cow;
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Where a recording goes.
 pub(crate) trait Output: Write + Seek + Send {}
@@ -45,6 +51,8 @@ pub struct RecorderReport {
     pub flushed: u64,
     /// Messages lost since the recorder was too slow for the room that its subscription has.
     pub lost: u64,
+    /// Messages left out since they have more than 128 MiB, which no chunk that is read back may hold.
+    pub too_large: u64,
 }
 
 /// Writes what a subscription gets into a file, when its owner says so ([`drain`](Self::drain): on virtual time) or on a
@@ -60,9 +68,12 @@ pub struct Recorder {
     channels: HashMap<&'static str, Channel>,
     report: RecorderReport,
     last_flush: Instant,
-    /// The frames, and the URDF, are written with the first message, since they have its time.
-    has_begun: bool,
-    bytes: Vec<u8>,
+    names: Names,
+    frames: Option<Frames>,
+    /// Known from the first message on; the frames and the URDF are written with it, since they have its time.
+    clock: Option<Clock>,
+    transforms: Option<Viewed>,
+    bytes: Bytes,
 }
 
 struct Channel {
@@ -70,14 +81,33 @@ struct Channel {
     layout: Layout,
     shared: Shared,
     beside: Option<u16>,
+    companion: Option<u16>,
     sequence: u32,
 }
+
+/// A channel for viewers.
+struct Viewed {
+    id: u16,
+    sequence: u32,
+}
+
+/// A message as bytes; kept for the room that they have.
+#[derive(Default)]
+struct Bytes {
+    main: Vec<u8>,
+    beside: Vec<u8>,
+    companion: Vec<u8>,
+}
+
+/// The largest message that is written, in bytes: with what is beside it, a chunk must not exceed what is read.
+const LARGEST: usize = LIMIT as usize / 2;
 
 impl Recorder {
     /// Creates the file `path` for what `subscription` gets.
     ///
     /// # Errors
-    /// The file exists already, or cannot be created.
+    /// The file exists already, or cannot be created; or two of the paths publish different types that would have one name
+    /// in the file.
     pub fn new(
         path: impl AsRef<Path>,
         subscription: DynamicSubscription,
@@ -87,21 +117,35 @@ impl Recorder {
         let create = |cause: io::Error| RecordingError::new(path, create_error(cause));
         let file = File::create_new(path).map_err(create)?;
         let to_sync = if options.sync { Some(file.try_clone().map_err(create)?) } else { None };
-        Self::on(path, Box::new(file), to_sync, subscription, options)
+        let recorder = Self::on(path, Box::new(file), to_sync, subscription, options);
+        recorder.inspect_err(|_| {
+            // It is empty, and another attempt needs its name.
+            let _ = std::fs::remove_file(path);
+        })
     }
 
     pub(crate) fn on(
-        path: &Path,
+        file: &Path,
         output: Box<dyn Output>,
         to_sync: Option<File>,
         subscription: DynamicSubscription,
         options: RecorderOptions,
     ) -> Result<Self, RecordingError> {
-        let fail = |error| RecordingError::new(path, write_error(0, error));
+        let fail = |error| RecordingError::new(file, write_error(0, error));
+        // Before the run rather than at the first message: nobody looks at a recorder's errors then.
+        let mut names = Names::default();
+        for (path, schemas) in subscription.schemas() {
+            let mut schemas = schemas.iter();
+            schemas
+                .try_for_each(|schema| names.take(path, schema))
+                .map_err(|kind| RecordingError::new(file, kind))?;
+        }
+        let robot = options.robot.as_ref().filter(|_| options.transforms);
+        let frames = robot.map(|robot| Frames::new(robot.topology, options.body.clone()));
         let mut writer = options.mcap().create(BufWriter::new(output)).map_err(fail)?;
         describe(&mut writer, &options).and_then(|()| writer.flush()).map_err(fail)?;
         Ok(Self {
-            path: path.to_owned(),
+            path: file.to_owned(),
             writer: Some(Box::new(writer)),
             to_sync,
             subscription,
@@ -109,8 +153,11 @@ impl Recorder {
             channels: HashMap::new(),
             report: RecorderReport::default(),
             last_flush: Instant::now(),
-            has_begun: false,
-            bytes: Vec::new(),
+            names,
+            frames,
+            clock: None,
+            transforms: None,
+            bytes: Bytes::default(),
         })
     }
 
@@ -180,8 +227,11 @@ impl Recorder {
     }
 
     fn record(&mut self, message: &DynamicMessage) -> Result<(), RecordingError> {
-        self.guarded(|recorder, writer| recorder.write(message, writer))?;
-        self.report.messages += 1;
+        let is_written = self.guarded(|recorder, writer| recorder.write(message, writer))?;
+        match is_written {
+            true => self.report.messages += 1,
+            false => self.report.too_large += 1,
+        }
         self.flush_if_due()
     }
 
@@ -193,66 +243,140 @@ impl Recorder {
     }
 
     /// Calls `write` unless an error came before; after one, nothing more is written.
-    fn guarded(
+    fn guarded<T>(
         &mut self,
-        write: impl FnOnce(&mut Self, &mut FileWriter) -> McapResult<()>,
-    ) -> Result<(), RecordingError> {
+        write: impl FnOnce(&mut Self, &mut FileWriter) -> Result<T, WriteFault>,
+    ) -> Result<T, RecordingError> {
         let Some(mut writer) = self.writer.take() else {
             return Err(RecordingError::new(&self.path, RecordingErrorKind::GivenUp));
         };
         match write(self, &mut writer) {
-            Ok(()) => {
+            Ok(value) => {
                 self.writer = Some(writer);
-                Ok(())
+                Ok(value)
             }
-            Err(error) => Err(RecordingError::new(&self.path, write_error(self.report.messages, error))),
+            Err(WriteFault::File(error)) => {
+                Err(RecordingError::new(&self.path, write_error(self.report.messages, error)))
+            }
+            Err(WriteFault::Message(kind)) => Err(RecordingError::new(&self.path, kind)),
         }
     }
 
-    fn write(&mut self, message: &DynamicMessage, writer: &mut FileWriter) -> McapResult<()> {
+    /// Writes a message, and what viewers are told by it; false, and nothing, if it is too large.
+    fn write(&mut self, message: &DynamicMessage, writer: &mut FileWriter) -> Result<bool, WriteFault> {
         let stamp = message.stamp();
-        let log_time = nanos(stamp.wall_time);
-        if !self.has_begun {
-            self.has_begun = true;
-            place(writer, &self.options, stamp.wall_time)?;
-        }
-        let channel = match self.channels.entry(message.path()) {
-            std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
-            std::collections::hash_map::Entry::Vacant(entry) => {
-                let layout = if message.ros_schema().is_some() { Layout::Ros } else { Layout::Exact };
-                let shared = Shared::of(&stamp);
-                let id = add(writer, &Description::of(message, layout, &shared))?;
-                entry.insert(Channel { id, layout, shared, beside: None, sequence: 0 })
+        let clock = match self.clock {
+            Some(clock) => clock,
+            None => self.begin(&stamp, writer)?,
+        };
+        let wall_time = clock.recorded(stamp.wall_time);
+        let dated;
+        let message = match wall_time == stamp.wall_time {
+            true => message,
+            false => {
+                dated = message.at_wall_time(wall_time);
+                &dated
             }
         };
-        let sequence = channel.sequence;
+        let channel = match self.channels.entry(message.path()) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let layout = if message.ros_schema().is_some() { Layout::Ros } else { Layout::Exact };
+                let shared = Shared::of(&stamp);
+                let id = add(writer, &mut self.names, &Description::of(message, layout, &shared))?;
+                entry.insert(Channel { id, layout, shared, beside: None, companion: None, sequence: 0 })
+            }
+        };
+        let Bytes { main, beside, companion } = &mut self.bytes;
+        for bytes in [&mut *main, beside, companion] {
+            bytes.clear();
+        }
+        match channel.layout {
+            Layout::Ros => {
+                message.encode_as_ros(main);
+                message.encode_companion(companion);
+                if !channel.shared.gives(&clock, &stamp) || !message.is_exact_as_ros() {
+                    message.encode(beside);
+                }
+            }
+            _ => message.encode(main),
+        }
+        if main.len() + beside.len() + companion.len() > LARGEST {
+            return Ok(false);
+        }
+        let (sequence, log_time) = (channel.sequence, nanos(wall_time));
         channel.sequence = sequence.wrapping_add(1);
         let header = |channel_id| MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
-        if channel.layout == Layout::Ros && !(channel.shared.gives(&stamp) && message.is_exact_as_ros()) {
-            let beside = match channel.beside {
-                Some(beside) => beside,
+        for (layout, id, bytes) in
+            [(Layout::Beside, &mut channel.beside, beside), (Layout::Companion, &mut channel.companion, companion)]
+        {
+            if bytes.is_empty() {
+                continue;
+            }
+            let id = match *id {
+                Some(id) => id,
                 None => {
-                    let id = add(writer, &Description::of(message, Layout::Beside, &channel.shared))?;
-                    *channel.beside.insert(id)
+                    let description = Description::of(message, layout, &channel.shared);
+                    *id.insert(add(writer, &mut self.names, &description)?)
                 }
             };
-            self.bytes.clear();
-            message.encode(&mut self.bytes);
-            writer.write_to_known_channel(&header(beside), &self.bytes)?;
+            writer.write_to_known_channel(&header(id), bytes)?;
         }
-        self.bytes.clear();
-        match channel.layout {
-            Layout::Ros => _ = message.encode_as_ros(&mut self.bytes),
-            Layout::Exact | Layout::Beside => message.encode(&mut self.bytes),
+        writer.write_to_known_channel(&header(channel.id), main)?;
+        if let Some(frames) = &mut self.frames {
+            let told = frames.told(message);
+            self.transform(&told, log_time, writer)?;
         }
-        writer.write_to_known_channel(&header(channel.id), &self.bytes)
+        Ok(true)
+    }
+
+    /// What comes before the first message, with its time.
+    fn begin(&mut self, first: &Stamp, writer: &mut FileWriter) -> Result<Clock, WriteFault> {
+        let today = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let today = WallTime::from_unix_nanos(i64::try_from(today.as_nanos()).unwrap_or(0));
+        let clock = *self.clock.insert(Clock::of(first, today));
+        writer.write_metadata(&Metadata { name: CLOCK.to_owned(), metadata: clock.to_metadata() })?;
+        let Some(robot) = &self.options.robot else { return Ok(clock) };
+        let time = clock.recorded(first.wall_time);
+        latched(writer, "/robot_description", time, &Text { data: robot.urdf.clone() })?;
+        latched(writer, "/tf_static", time, &TransformsMessage::fixed(robot.topology, time))?;
+        if let Some(frames) = &self.frames {
+            let at_rest = TransformsMessage::moving(robot.topology, frames.at_rest(), time);
+            self.transform(&at_rest, nanos(time), writer)?;
+        }
+        Ok(clock)
+    }
+
+    /// Writes transforms to `/tf`, if there are any.
+    fn transform(
+        &mut self,
+        transforms: &TransformsMessage,
+        log_time: u64,
+        writer: &mut FileWriter,
+    ) -> Result<(), WriteFault> {
+        if transforms.transforms.is_empty() {
+            return Ok(());
+        }
+        let channel = match &mut self.transforms {
+            Some(channel) => channel,
+            None => {
+                let id = view::<TransformsMessage>(writer, "/tf", "")?;
+                self.transforms.insert(Viewed { id, sequence: 0 })
+            }
+        };
+        let header =
+            MessageHeader { channel_id: channel.id, sequence: channel.sequence, log_time, publish_time: log_time };
+        channel.sequence = channel.sequence.wrapping_add(1);
+        self.bytes.main.clear();
+        encode(transforms, &mut self.bytes.main);
+        Ok(writer.write_to_known_channel(&header, &self.bytes.main)?)
     }
 
     fn end(&mut self) -> Result<(), RecordingError> {
         self.drain()?;
         let report = self.report();
         self.guarded(|_, writer| {
-            let counts = [("messages", report.messages), ("lost", report.lost)];
+            let counts = [("messages", report.messages), ("lost", report.lost), ("too_large", report.too_large)];
             let metadata = counts.map(|(key, count)| (key.to_owned(), count.to_string())).into();
             writer.write_metadata(&Metadata { name: END.to_owned(), metadata })?;
             writer.finish()?;
@@ -285,10 +409,29 @@ impl std::fmt::Debug for Recorder {
 
 type FileWriter = Writer<BufWriter<Box<dyn Output>>>;
 
-fn add(writer: &mut FileWriter, channel: &Description) -> McapResult<u16> {
-    let Description { topic, schema, metadata } = channel;
+/// Why nothing more is written.
+enum WriteFault {
+    File(McapError),
+    Message(RecordingErrorKind),
+}
+
+impl From<McapError> for WriteFault {
+    fn from(error: McapError) -> Self {
+        Self::File(error)
+    }
+}
+
+impl From<io::Error> for WriteFault {
+    fn from(error: io::Error) -> Self {
+        Self::File(error.into())
+    }
+}
+
+fn add(writer: &mut FileWriter, names: &mut Names, channel: &Description) -> Result<u16, WriteFault> {
+    let Description { topic, path, schema, metadata } = channel;
+    names.take(path, schema).map_err(WriteFault::Message)?;
     let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
-    writer.add_channel(schema, topic, Schema::MESSAGE_ENCODING, metadata)
+    Ok(writer.add_channel(schema, topic, Schema::MESSAGE_ENCODING, metadata)?)
 }
 
 /// Which robot it is, at the beginning.
@@ -305,19 +448,22 @@ fn describe(writer: &mut FileWriter, options: &RecorderOptions) -> McapResult<()
     })
 }
 
-/// Where its frames are, and what it looks like, on the topics where viewers expect that.
-fn place(writer: &mut FileWriter, options: &RecorderOptions, time: WallTime) -> McapResult<()> {
-    let Some(robot) = &options.robot else { return Ok(()) };
-    latched(writer, "/robot_description", time, &Text { data: robot.urdf.clone() })?;
-    latched(writer, "/tf_static", time, &TransformsMessage::at_rest(robot.topology, time))
+/// A channel for viewers.
+fn view<T: Field>(writer: &mut FileWriter, topic: &str, qos: &str) -> McapResult<u16> {
+    let name = match T::SHAPE {
+        Shape::Struct(shape) => shape.name,
+        _ => "",
+    };
+    let schema = Schema::new(name, T::SHAPE);
+    // ROS's player wants it to be there.
+    let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos.to_owned())]);
+    let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
+    writer.add_channel(schema, topic, Schema::MESSAGE_ENCODING, &metadata)
 }
 
-/// A message that whoever comes late gets as well.
+/// A message that late subscribers get as well.
 fn latched<T: Field>(writer: &mut FileWriter, topic: &str, time: WallTime, message: &T) -> McapResult<()> {
-    let Shape::Struct(shape) = T::SHAPE else { return Ok(()) };
-    let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), LATCHED.to_owned())]);
-    let schema = Schema::new(shape.name, T::SHAPE);
-    let id = add(writer, &Description { topic: topic.to_owned(), schema, metadata })?;
+    let id = view::<T>(writer, topic, LATCHED)?;
     let mut bytes = Vec::new();
     encode(message, &mut bytes);
     let log_time = nanos(time);

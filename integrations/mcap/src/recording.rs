@@ -6,7 +6,7 @@ pub use messages::{AllMessages, Messages, RecordedMessage};
 
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Channel, Channels, Record, Records};
-use crate::layout::{LAYOUT, Layout, Names, PATH, PAYLOAD, Shared};
+use crate::layout::{CLOCK, Clock, LAYOUT, Layout, Names, PATH, PAYLOAD, Shared};
 use crate::recorder::{END, LIBRARY, ROBOT, URDF};
 use bb_core::Payload;
 use messages::Wanted;
@@ -30,10 +30,12 @@ pub struct RecordedChannel {
     pub messages: u64,
     pub(crate) id: u16,
     pub(crate) layout: Layout,
-    pub(crate) shared: Shared,
     pub(crate) names: Names,
+    pub(crate) clock: Clock,
     /// The channel of those that ROS's layout does not hold, and its definition.
     pub(crate) beside: Option<(u16, String)>,
+    /// The channel of the second message, and its definition.
+    pub(crate) companion: Option<(u16, String)>,
 }
 
 /// A recording that this crate has written.
@@ -73,15 +75,19 @@ impl Recording {
             }
         };
         let broken = broken.map(|kind| Arc::new(fail(kind)));
-        let Scan { channels, counts, robot, urdf, lost, .. } = scan;
+        let Scan { channels, counts, robot, urdf, lost, clock, .. } = scan;
         let mut channels: Vec<_> = channels.into_values().collect();
         channels.sort_by_key(|channel| channel.id);
-        let beside: Vec<_> = channels.iter().filter(|channel| channel.layout == Layout::Beside).cloned().collect();
-        channels.retain(|channel| channel.layout != Layout::Beside);
+        let (mut channels, more): (Vec<_>, Vec<_>) =
+            channels.into_iter().partition(|channel| matches!(channel.layout, Layout::Ros | Layout::Exact));
         for channel in &mut channels {
             channel.messages = counts.get(&channel.id).copied().unwrap_or(0);
-            let beside = beside.iter().find(|beside| beside.path == channel.path);
-            channel.beside = beside.map(|beside| (beside.id, beside.definition.clone()));
+            let of_layout = |layout: Layout| {
+                let found = more.iter().find(|more| more.path == channel.path && more.layout == layout);
+                found.map(|more| (more.id, more.definition.clone()))
+            };
+            (channel.beside, channel.companion) = (of_layout(Layout::Beside), of_layout(Layout::Companion));
+            channel.clock = clock;
         }
         let channels = channels.into_iter().map(Arc::new).collect();
         Ok(Self { path: path.to_owned(), channels, robot, urdf, lost, broken })
@@ -151,6 +157,7 @@ struct Scan {
     robot: Option<String>,
     urdf: Option<String>,
     lost: Option<u64>,
+    clock: Clock,
 }
 
 impl Scan {
@@ -158,6 +165,9 @@ impl Scan {
         match record {
             Record::Message { channel, .. } => *self.counts.entry(channel).or_default() += 1,
             Record::Metadata { name: ROBOT, metadata } => self.robot = metadata.get("name").cloned(),
+            Record::Metadata { name: CLOCK, metadata } => {
+                self.clock = Clock::from_metadata(&metadata).ok_or("the metadata of the clock are malformed")?;
+            }
             Record::Metadata { name: END, metadata } => {
                 self.lost = metadata.get("lost").and_then(|lost| lost.parse().ok());
             }
@@ -192,8 +202,9 @@ impl RecordedChannel {
             id,
             layout: metadata.get(LAYOUT).and_then(|name| Layout::named(name)).ok_or_else(malformed)?,
             names: Names::of(&shared).map_err(|error| error.to_string())?,
-            shared,
+            clock: Clock::default(),
             beside: None,
+            companion: None,
         }))
     }
 }

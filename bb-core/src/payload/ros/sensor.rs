@@ -5,11 +5,13 @@ mod joint;
 
 use super::{covariance, number, ros_message};
 use crate::Payload;
-use crate::message::DecodeError;
+use crate::message::codec::{Field, RosCompanion};
+use crate::message::{DecodeError, RosMessage, Stamped};
 use crate::payload::{
-    FluidPressure, GeodeticPosition, GnssFix, GnssServices, GnssStatus, Image, Imu, LaserScan, MagneticField,
+    FluidPressure, GeodeticPosition, GnssFix, GnssServices, GnssStatus, Image, Imu, LaserScan, MagneticField, Marg,
     Radiation, Range,
 };
+use crate::time::WallTime;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector4};
 use std::sync::Arc;
 
@@ -68,6 +70,35 @@ ros_message! {
         magnetic_field_covariance: [f64; 9] = covariance::to_ros(&field.covariance),
     }
     read { Self { magnetic_field, covariance: covariance::from_ros(&magnetic_field_covariance) } }
+}
+
+/// An IMU and a magnetometer are two topics in ROS.
+impl RosMessage for Marg {
+    type Message = ImuMessage;
+
+    const COMPANION: Option<RosCompanion<Self>> = Some(RosCompanion {
+        topic: "magnetic_field",
+        shape: MagneticFieldMessage::SHAPE,
+        write: |marg, writer| {
+            let Some(field) = marg.magnetic_field else { return false };
+            MagneticField::to_ros(&marg.stamp().message(field)).write(writer);
+            true
+        },
+        read: |marg, reader| {
+            let (field, _) = MagneticField::from_ros(MagneticFieldMessage::read(reader)?)?;
+            marg.magnetic_field = Some(field);
+            Ok(())
+        },
+    });
+
+    fn to_ros(marg: &Stamped<Self>) -> ImuMessage {
+        Imu::to_ros(&marg.stamp().message(marg.imu))
+    }
+
+    fn from_ros(message: ImuMessage) -> Result<(Self, WallTime), DecodeError> {
+        let (imu, time) = Imu::from_ros(message)?;
+        Ok((Self { imu, magnetic_field: None }, time))
+    }
 }
 
 ros_message! {

@@ -18,7 +18,7 @@ pub struct BagImuOptions {
     /// The topic of the IMU. Default: the only one of its type.
     #[option(default = "")]
     pub imu_topic: String,
-    /// The topic of the magnetometer. Default: the only one of its type.
+    /// The topic of the magnetometer. Default: the one that was recorded with the IMU, or the only one of its type.
     #[option(default = "")]
     pub magnetometer_topic: String,
     /// Whether to play the magnetometer; the bag must have one then. Default: yes.
@@ -69,7 +69,7 @@ impl Sensor for BagImu {
         let named = |name: &str| Some(name.to_owned()).filter(|name| !name.is_empty());
         let imu = bag.choose(IMU, named(&options.imu_topic).as_deref())?;
         let magnetometer = match options.magnetometer {
-            true => Some(&*bag.choose(MAGNETIC_FIELD, named(&options.magnetometer_topic).as_deref())?.name),
+            true => Some(&*bag.magnetometer_of(&imu.name, named(&options.magnetometer_topic).as_deref())?.name),
             false => None,
         };
         Ok(Self(MargSamples::read(&bag, &imu.name, magnetometer)?))

@@ -25,6 +25,7 @@ struct Shared {
     messages: AtomicU64,
     flushed: AtomicU64,
     lost: AtomicU64,
+    too_large: AtomicU64,
 }
 
 impl BackgroundRecorder {
@@ -90,6 +91,7 @@ impl Shared {
             messages: self.messages.load(Ordering::Acquire),
             flushed: self.flushed.load(Ordering::Acquire),
             lost: self.lost.load(Ordering::Acquire),
+            too_large: self.too_large.load(Ordering::Acquire),
         }
     }
 
@@ -97,6 +99,7 @@ impl Shared {
         self.messages.store(report.messages, Ordering::Release);
         self.flushed.store(report.flushed, Ordering::Release);
         self.lost.store(report.lost, Ordering::Release);
+        self.too_large.store(report.too_large, Ordering::Release);
     }
 }
 

@@ -33,6 +33,12 @@ pub struct RecorderOptions {
     pub compression: Compression,
     /// The largest chunk, in bytes; a flush ends one as well. Default: 1 MiB.
     pub chunk_bytes: u64,
+    /// Whether joints that move, poses and orientations are written as transforms to `/tf` as well, of a robot that the
+    /// recorder was told. Default: yes.
+    pub transforms: bool,
+    /// The path whose poses or orientations place the robot's root link in `world`, on `/tf`. Default: the first that
+    /// publishes poses of the root link, or orientations as long as none does.
+    pub body: Option<String>,
     /// Whose frames, URDF and name are written. Default: none.
     pub(crate) robot: Option<Described>,
 }
@@ -52,6 +58,8 @@ impl Default for RecorderOptions {
             sync: false,
             compression: Compression::default(),
             chunk_bytes: 1 << 20,
+            transforms: true,
+            body: None,
             robot: None,
         }
     }

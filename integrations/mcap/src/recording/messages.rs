@@ -3,9 +3,9 @@
 use super::RecordedChannel;
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Record, Records};
-use crate::layout::Layout;
+use crate::layout::{Layout, Shared};
 use bb_core::message::Schema;
-use bb_core::message::codec::{decode, decode_as_ros};
+use bb_core::message::codec::{decode, decode_as_ros, decode_companion};
 use bb_core::{Payload, Stamped, WallTime};
 use std::collections::HashMap;
 use std::fmt;
@@ -19,12 +19,14 @@ use std::sync::Arc;
 pub struct RecordedMessage {
     /// Where it was published.
     pub channel: Arc<RecordedChannel>,
-    /// Its wall time; that of one before 1970 is the epoch here.
+    /// Its wall time, as published; that of one before 1970 is the epoch here.
     pub time: WallTime,
     /// As the channel's definition says.
     pub data: Vec<u8>,
     /// The message with all it holds, where ROS's layout does not hold it.
     exact: Option<Vec<u8>>,
+    /// The second message, where ROS has two.
+    companion: Option<Vec<u8>>,
 }
 
 impl RecordedMessage {
@@ -40,13 +42,22 @@ impl RecordedMessage {
     fn read<T: Payload>(&self) -> Result<Stamped<T>, RecordingErrorKind> {
         let channel = &self.channel;
         let damaged = |cause| RecordingErrorKind::Message { path: channel.path.clone(), cause };
+        let exact = |bytes: &[u8]| {
+            let mut message: Stamped<T> = decode(bytes).map_err(damaged)?;
+            message.wall_time = channel.clock.published(message.wall_time);
+            Ok(message)
+        };
         match (&self.exact, channel.layout) {
-            (Some(exact), _) => decode(exact).map_err(damaged),
-            (None, Layout::Exact | Layout::Beside) => decode(&self.data).map_err(damaged),
+            (Some(bytes), _) => exact(bytes),
             (None, Layout::Ros) => {
-                let (payload, wall_time) = decode_as_ros(&self.data).map_err(damaged)?;
-                Ok(channel.shared.stamp(wall_time, &channel.names).message(payload))
+                let (mut payload, wall_time) = decode_as_ros(&self.data).map_err(damaged)?;
+                if let Some(companion) = &self.companion {
+                    decode_companion(&mut payload, companion).map_err(damaged)?;
+                }
+                let wall_time = channel.clock.published(wall_time);
+                Ok(Shared::stamp(&channel.clock, wall_time, &channel.names).message(payload))
             }
+            (None, _) => exact(&self.data),
         }
     }
 }
@@ -57,13 +68,16 @@ impl RecordedChannel {
         let exact = Stamped::<T>::schema();
         let now = match self.layout {
             Layout::Ros => Stamped::<T>::ros_schema().unwrap_or_else(|| exact.clone()),
-            Layout::Exact | Layout::Beside => exact.clone(),
+            _ => exact.clone(),
         };
         let Schema { name, text } = &now;
         let is_same = self.payload == T::NAME
             && self.schema == *name
             && self.definition == *text
-            && self.beside.as_ref().is_none_or(|(_, definition)| *definition == exact.text);
+            && self.beside.as_ref().is_none_or(|(_, definition)| *definition == exact.text)
+            && self.companion.as_ref().is_none_or(|(_, definition)| {
+                Stamped::<T>::ros_companion().is_some_and(|(_, schema)| schema.text == *definition)
+            });
         if is_same {
             return Ok(());
         }
@@ -86,6 +100,8 @@ enum Role {
     Main(Arc<RecordedChannel>),
     /// Of the channel with this number.
     Beside(u16),
+    /// Likewise.
+    Companion(u16),
 }
 
 impl Wanted {
@@ -94,6 +110,9 @@ impl Wanted {
         for channel in channels {
             if let Some((beside, _)) = &channel.beside {
                 by_id.insert(*beside, Role::Beside(channel.id));
+            }
+            if let Some((companion, _)) = &channel.companion {
+                by_id.insert(*companion, Role::Companion(channel.id));
             }
             by_id.insert(channel.id, Role::Main(Arc::clone(channel)));
         }
@@ -106,13 +125,23 @@ pub struct AllMessages {
     path: PathBuf,
     records: Records,
     wanted: Wanted,
-    /// What stands beside the next message of a channel: its number, and the message with all it holds.
-    beside: HashMap<u16, (u32, Vec<u8>)>,
+    /// What was written beside the next message of a channel, by channel.
+    beside: HashMap<u16, Numbered>,
+    companions: HashMap<u16, Numbered>,
 }
+
+/// The number of a message, and what goes with it.
+type Numbered = (u32, Vec<u8>);
 
 impl AllMessages {
     pub(crate) fn open(path: &Path, wanted: Wanted) -> Result<Self, RecordingErrorKind> {
-        Ok(Self { path: path.to_owned(), records: Records::open(path)?, wanted, beside: HashMap::new() })
+        Ok(Self {
+            path: path.to_owned(),
+            records: Records::open(path)?,
+            wanted,
+            beside: HashMap::new(),
+            companions: HashMap::new(),
+        })
     }
 
     fn advance(&mut self) -> Result<Option<RecordedMessage>, RecordingErrorKind> {
@@ -123,15 +152,20 @@ impl AllMessages {
             match self.wanted.by_id.get(&channel) {
                 None => {}
                 Some(Role::Beside(of)) => _ = self.beside.insert(*of, (sequence, data.to_vec())),
+                Some(Role::Companion(of)) => _ = self.companions.insert(*of, (sequence, data.to_vec())),
                 Some(Role::Main(main)) => {
-                    let beside = self.beside.remove(&channel);
-                    let exact = beside.filter(|(number, _)| *number == sequence).map(|(_, exact)| exact);
+                    let of_this = |found: Option<Numbered>| {
+                        found.filter(|(number, _)| *number == sequence).map(|(_, bytes)| bytes)
+                    };
+                    let exact = of_this(self.beside.remove(&channel));
+                    let companion = of_this(self.companions.remove(&channel));
                     let time = WallTime::from_unix_nanos(i64::try_from(log_time).unwrap_or(i64::MAX));
                     return Ok(Some(RecordedMessage {
                         channel: Arc::clone(main),
-                        time,
+                        time: main.clock.published(time),
                         data: data.to_vec(),
                         exact,
+                        companion,
                     }));
                 }
             }

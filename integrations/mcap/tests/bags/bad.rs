@@ -1,5 +1,6 @@
 //! Bags with something wrong: always an error that says where, never a panic.
 
+use std::io::Read;
 use std::path::Path;
 
 use crate::common::ros::Bool;
@@ -91,7 +92,7 @@ fn a_malformed_payload_is_named_by_its_place() {
             vec![0, 7, 0, 0, 0, 0],
             "expected the encoding 0x0000 or 0x0001, plain CDR at byte 0, found 0x0007 (XCDR2)",
         ),
-        ("text", [&little(&imu(0))[..16], &[0xff; 400]].concat(), "expected text in UTF-8"),
+        ("text", [&little(&imu(0))[..16], &[0xff], &little(&imu(0))[17..]].concat(), "expected text in UTF-8"),
     ];
     for (name, payload, fault) in cases {
         for (layout, options) in layouts() {
@@ -219,4 +220,46 @@ fn a_chunk_packed_in_an_unknown_way() {
     bytes[at..at + 4].copy_from_slice(b"brot");
     let said = said(&file("brot.mcap", &bytes));
     assert!(said.starts_with("the chunk at byte ") && said.contains("packed with `brot`"), "{said}");
+}
+
+/// A record that is there, and longer than what is held in memory. The file is sparse, so that it takes no room.
+#[test]
+fn a_message_of_300_mib_is_refused() {
+    let length: u64 = 300 << 20;
+    let mut bytes = mcap::MAGIC.to_vec();
+    bytes.push(mcap::records::op::MESSAGE);
+    bytes.extend(length.to_le_bytes());
+    let path = file("long.mcap", &bytes);
+    let long = std::fs::OpenOptions::new().write(true).open(&path).expect("opens");
+    long.set_len(bytes.len() as u64 + length).expect("becomes longer");
+    let said = said(&path);
+    assert!(
+        said.starts_with("a record of 314572800 bytes at byte 8, after 0 messages, and at most 268435456"),
+        "{said}"
+    );
+    std::fs::remove_file(&path).expect("it is ours");
+}
+
+/// A chunk that says that it is short and unpacks to much is not unpacked further than it says.
+#[test]
+fn a_chunk_that_unpacks_to_more_than_it_says() {
+    let packed = zstd::stream::encode_all(std::io::repeat(0).take(300 << 20), 0).expect("packs");
+    for unpacked in [1000, 200 << 20, 300 << 20, u64::MAX] {
+        let mut chunk = [0u64, 0, unpacked].map(u64::to_le_bytes).concat();
+        chunk.extend([0; 4]);
+        chunk.extend(4u32.to_le_bytes());
+        chunk.extend(b"zstd");
+        chunk.extend((packed.len() as u64).to_le_bytes());
+        chunk.extend(&packed);
+        let mut bytes = mcap::MAGIC.to_vec();
+        bytes.push(mcap::records::op::CHUNK);
+        bytes.extend((chunk.len() as u64).to_le_bytes());
+        bytes.extend(chunk);
+        bytes.extend(mcap::MAGIC);
+        let (count, error) = read(&file("bomb.mcap", &bytes));
+        assert_eq!(count, 0);
+        let error = error.expect("it is damaged");
+        let is_too_large = matches!(error.kind(), RecordingErrorKind::TooLarge { .. });
+        assert_eq!(is_too_large, unpacked > 256 << 20, "{unpacked}: {error}");
+    }
 }

@@ -5,3 +5,4 @@ mod kill;
 mod robot;
 mod ros;
 mod round_trip;
+mod viewed;
