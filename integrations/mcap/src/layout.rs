@@ -1,7 +1,7 @@
 //! The channels of a recording: what they say of all their messages.
 
+use crate::clock::Clock;
 use bb_core::message::{Schema, Stamp};
-use bb_core::time::MonotonicTime;
 use bb_core::{DynamicMessage, Frame, Origin, WallTime};
 use std::collections::BTreeMap;
 
@@ -11,67 +11,6 @@ pub(crate) const LAYOUT: &str = "bb.layout";
 const ROBOT: &str = "bb.robot";
 const NODE: &str = "bb.node";
 const FRAME: &str = "bb.frame";
-
-/// The name of the metadata with the recording's [`Clock`].
-pub(crate) const CLOCK: &str = "bb.clock";
-const OFFSET: &str = "wall_minus_monotonic_ns";
-const SHIFT: &str = "date_shift_ns";
-
-/// A virtual clock starts within this time after 1970, and no robot ran then: 1 year.
-const VIRTUAL_NS: i64 = 365 * DAY_NS;
-const DAY_NS: i64 = 86_400_000_000_000;
-
-/// What the times of a recording have in common, written once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Clock {
-    /// Wall time minus monotonic time, as published, at the first message.
-    wall_minus_monotonic_ns: i64,
-    /// What was added to all wall times: a run on virtual time from zero is given today's date, since viewers show dates,
-    /// and tools sort by them.
-    shift_ns: i64,
-}
-
-impl Clock {
-    /// Of a recording that begins with a message of this stamp, `today`.
-    pub(crate) fn of(first: &Stamp, today: WallTime) -> Self {
-        let wall = first.wall_time.as_unix_nanos();
-        let is_virtual = (0..VIRTUAL_NS).contains(&wall);
-        let midnight = today.as_unix_nanos().div_euclid(DAY_NS).saturating_mul(DAY_NS);
-        Self {
-            wall_minus_monotonic_ns: wall.wrapping_sub(first.monotonic_time.as_nanos()),
-            shift_ns: if is_virtual { midnight } else { 0 },
-        }
-    }
-
-    /// The wall time as it is recorded.
-    // Wrapping, so that every time is read back.
-    pub(crate) fn recorded(&self, time: WallTime) -> WallTime {
-        WallTime::from_unix_nanos(time.as_unix_nanos().wrapping_add(self.shift_ns))
-    }
-
-    /// The wall time as it was published.
-    pub(crate) fn published(&self, time: WallTime) -> WallTime {
-        WallTime::from_unix_nanos(time.as_unix_nanos().wrapping_sub(self.shift_ns))
-    }
-
-    /// The monotonic time that belongs to a wall time as it was published.
-    fn monotonic(&self, wall_time: WallTime) -> MonotonicTime {
-        MonotonicTime::from_nanos(wall_time.as_unix_nanos().wrapping_sub(self.wall_minus_monotonic_ns))
-    }
-
-    pub(crate) fn to_metadata(self) -> BTreeMap<String, String> {
-        [(OFFSET, self.wall_minus_monotonic_ns), (SHIFT, self.shift_ns)]
-            .map(|(key, value)| (key.to_owned(), value.to_string()))
-            .into()
-    }
-
-    pub(crate) fn from_metadata(metadata: &BTreeMap<String, String>) -> Option<Self> {
-        Some(Self {
-            wall_minus_monotonic_ns: metadata.get(OFFSET)?.parse().ok()?,
-            shift_ns: metadata.get(SHIFT)?.parse().ok()?,
-        })
-    }
-}
 
 /// How the messages of a channel are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

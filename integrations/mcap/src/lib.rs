@@ -1,9 +1,18 @@
-//! Records what a robot publishes into MCAP files, and reads it back bit for bit.
+//! MCAP files: recordings of a robot's runs, and ROS 2 bags of any program.
+//!
+//! | what | where |
+//! |---|---|
+//! | write what a robot publishes | [`Recorder`] |
+//! | read it back, bit for bit | [`Recording`] |
+//! | read the messages of ROS in any bag, those of a [`Recorder`] too | [`Bag`] |
+//! | play a recorded IMU as the sensor of a robot, or take its samples | [`BagImu`], [`MargSamples`] |
+//! | what a bag knows of the true orientation | [`Truth`] |
+//! | make a whole file of what is before a break | [`recover`] |
 //!
 //! A recording is a ROS 2 bag: payloads that ROS has a message for are written as that message, all others with a
 //! definition of their own; the robot's frames, its URDF and its name are there as well, so that viewers show the run
-//! with no further set-up. What ROS's message cannot hold of a message is written beside it, and what is read back here
-//! is the `Stamped<T>` that was published.
+//! with no further set-up. What ROS's message cannot hold of a message is written beside it, and what a [`Recording`]
+//! gives is the `Stamped<T>` that was published.
 //!
 //! ```no_run
 //! use bb_core::prelude::*;
@@ -41,12 +50,21 @@
 //! machine loses power, what the operating system had not yet written is lost too, unless
 //! [`sync`](RecorderOptions::sync) is set.
 //!
+//! # Memory and trust
+//!
+//! Files are streamed: memory holds one chunk, packed and unpacked, and no record or chunk above 256 MiB is taken. Lengths
+//! are compared with the file before anything is allocated for them. A chunk's checksum is compared before its first
+//! message is delivered, where the recorder wrote one; of a chunk that breaks off it cannot be. Messages outside chunks
+//! carry no checksum of their own, so there a changed bit in a payload goes unseen unless it breaks the encoding. Every
+//! error names the file, the place in it and the way out; no input makes this crate panic.
+//!
 //! # A slow disk
 //!
 //! Nothing waits for it: the subscription is the queue, and when it is full the oldest message is lost, counted, and the
 //! count is written at the end of the file.
 
 mod bag;
+mod clock;
 mod error;
 mod file;
 mod layout;

@@ -6,29 +6,31 @@ mod names;
 mod options;
 #[cfg(test)]
 mod tests;
+mod viewers;
 
 pub use background::BackgroundRecorder;
 pub(crate) use options::LIBRARY;
 pub use options::{Compression, RecorderOptions};
 
+use crate::clock::{CLOCK, Clock};
 use crate::error::{RecordingError, RecordingErrorKind, create_error, write_error};
 use crate::file::LIMIT;
-use crate::layout::{CLOCK, Clock, Description, Layout, Shared};
+use crate::layout::{Description, Layout, Shared};
+use bb_core::message::codec::encode;
 use bb_core::message::codec::ros::{Text, TransformsMessage};
-use bb_core::message::codec::{Field, Shape, encode};
 use bb_core::message::{Schema, Stamp};
 use bb_core::{DynamicMessage, DynamicSubscription, WallTime};
 use frames::Frames;
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, McapError, McapResult, Writer};
+use mcap::{McapError, Writer};
 use names::Names;
-use std::borrow::Cow;
+use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
+use viewers::{describe, latched, nanos, view};
 
 /// Where a recording goes.
 pub(crate) trait Output: Write + Seek + Send {}
@@ -432,64 +434,4 @@ fn add(writer: &mut FileWriter, names: &mut Names, channel: &Description) -> Res
     names.take(path, schema).map_err(WriteFault::Message)?;
     let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
     Ok(writer.add_channel(schema, topic, Schema::MESSAGE_ENCODING, metadata)?)
-}
-
-/// Which robot it is, at the beginning.
-fn describe(writer: &mut FileWriter, options: &RecorderOptions) -> McapResult<()> {
-    let Some(robot) = &options.robot else { return Ok(()) };
-    let metadata = BTreeMap::from([("name".to_owned(), robot.name.to_owned())]);
-    writer.write_metadata(&Metadata { name: ROBOT.to_owned(), metadata })?;
-    writer.attach(&Attachment {
-        log_time: 0,
-        create_time: 0,
-        name: URDF.to_owned(),
-        media_type: "application/xml".to_owned(),
-        data: Cow::Borrowed(robot.urdf.as_bytes()),
-    })
-}
-
-/// A channel for viewers.
-fn view<T: Field>(writer: &mut FileWriter, topic: &str, qos: &str) -> McapResult<u16> {
-    let name = match T::SHAPE {
-        Shape::Struct(shape) => shape.name,
-        _ => "",
-    };
-    let schema = Schema::new(name, T::SHAPE);
-    // ROS's player wants it to be there.
-    let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos.to_owned())]);
-    let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
-    writer.add_channel(schema, topic, Schema::MESSAGE_ENCODING, &metadata)
-}
-
-/// A message that late subscribers get as well.
-fn latched<T: Field>(writer: &mut FileWriter, topic: &str, time: WallTime, message: &T) -> McapResult<()> {
-    let id = view::<T>(writer, topic, LATCHED)?;
-    let mut bytes = Vec::new();
-    encode(message, &mut bytes);
-    let log_time = nanos(time);
-    let header = MessageHeader { channel_id: id, sequence: 0, log_time, publish_time: log_time };
-    writer.write_to_known_channel(&header, &bytes)
-}
-
-/// Keep the last, reliable, transient local: as ROS's recorder writes it.
-const LATCHED: &str = "- history: 1
-  depth: 1
-  reliability: 1
-  durability: 1
-  deadline:
-    sec: 9223372036
-    nsec: 854775807
-  lifespan:
-    sec: 9223372036
-    nsec: 854775807
-  liveliness: 1
-  liveliness_lease_duration:
-    sec: 9223372036
-    nsec: 854775807
-  avoid_ros_namespace_conventions: false
-";
-
-/// MCAP has no time before 1970.
-fn nanos(time: WallTime) -> u64 {
-    u64::try_from(time.as_unix_nanos()).unwrap_or(0)
 }

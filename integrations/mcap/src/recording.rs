@@ -4,9 +4,10 @@ mod messages;
 
 pub use messages::{AllMessages, Messages, RecordedMessage};
 
+use crate::clock::{CLOCK, Clock};
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Channel, Channels, Record, Records};
-use crate::layout::{CLOCK, Clock, LAYOUT, Layout, Names, PATH, PAYLOAD, Shared};
+use crate::layout::{LAYOUT, Layout, Names, PATH, PAYLOAD, Shared};
 use crate::recorder::{END, LIBRARY, ROBOT, URDF};
 use bb_core::Payload;
 use messages::Wanted;
