@@ -3,6 +3,8 @@
 mod imu;
 mod messages;
 mod samples;
+#[cfg(feature = "sqlite")]
+mod sqlite;
 mod summary;
 mod truth;
 
@@ -35,7 +37,7 @@ pub struct Topic {
     pub messages: Option<u64>,
 }
 
-/// A recording of ROS 2 messages in an MCAP file.
+/// A recording of ROS 2 messages in an MCAP file, or with the feature `sqlite` in a `.db3` file.
 #[derive(Debug, Clone)]
 pub struct Bag {
     path: PathBuf,
@@ -164,6 +166,10 @@ impl Bag {
 }
 
 fn topics(path: &Path) -> Result<Vec<Topic>, RecordingErrorKind> {
+    #[cfg(feature = "sqlite")]
+    if sqlite::is_database(path) {
+        return sqlite::topics(path);
+    }
     let records = Records::open(path)?;
     let size = records.size();
     if let Some(topics) = summary::topics(records.into_file(), size) {

@@ -119,6 +119,16 @@ pub enum RecordingErrorKind {
         /// The method the file names.
         compression: String,
     },
+    /// A bag in SQLite is damaged, or a database of something else.
+    #[error(
+        "the database cannot be read after {messages} messages: {cause}; check that it is a bag of ROS 2, and copy it again"
+    )]
+    Database {
+        /// Messages of all topics before the fault.
+        messages: u64,
+        /// What SQLite said.
+        cause: String,
+    },
     /// The bag has no topic of that name.
     #[error("no topic {topic}; {topics}")]
     NoTopic {

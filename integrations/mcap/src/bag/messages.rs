@@ -33,6 +33,19 @@ pub struct BagMessage {
 }
 
 impl BagMessage {
+    pub(super) fn new(
+        topic: &Arc<str>,
+        schema: &Arc<str>,
+        log_time_ns: u64,
+        data: Vec<u8>,
+        path: &Arc<Path>,
+        number: u64,
+        byte: u64,
+    ) -> Self {
+        let (topic, schema, path) = (Arc::clone(topic), Arc::clone(schema), Arc::clone(path));
+        Self { topic, schema, log_time_ns, data, path, number, byte }
+    }
+
     /// The payload and the time in the header of a message that ROS has for payloads `T`; see the table in
     /// [`bb_core::message::codec::ros`].
     ///
@@ -111,6 +124,9 @@ pub struct BagMessages {
     records: Option<Records>,
     channels: Channels,
     wanted: Vec<Wanted>,
+    /// What is read instead of records, in a bag that is a database.
+    #[cfg(feature = "sqlite")]
+    rows: Option<super::sqlite::Rows>,
     /// What to do with the messages of each channel met so far; `None` for those that are not wanted.
     routes: HashMap<u16, Option<Route>>,
 }
@@ -134,17 +150,33 @@ struct Route {
 
 impl BagMessages {
     pub(crate) fn open(path: &Path, wanted: Vec<Wanted>) -> Result<Self, RecordingError> {
+        #[cfg(feature = "sqlite")]
+        if super::sqlite::is_database(path) {
+            let rows = super::sqlite::Rows::open(path, &wanted).map_err(|kind| RecordingError::new(path, kind))?;
+            return Ok(Self { rows: Some(rows).filter(|_| !wanted.is_empty()), ..Self::of(path, None, wanted) });
+        }
         let records = Records::open(path).map_err(|kind| RecordingError::new(path, kind))?;
-        Ok(Self {
+        let records = Some(records).filter(|_| !wanted.is_empty());
+        Ok(Self::of(path, records, wanted))
+    }
+
+    fn of(path: &Path, records: Option<Records>, wanted: Vec<Wanted>) -> Self {
+        Self {
             path: path.into(),
-            records: Some(records).filter(|_| !wanted.is_empty()),
+            records,
             channels: Channels::default(),
             wanted,
+            #[cfg(feature = "sqlite")]
+            rows: None,
             routes: HashMap::new(),
-        })
+        }
     }
 
     fn step(&mut self) -> Result<Option<BagMessage>, RecordingErrorKind> {
+        #[cfg(feature = "sqlite")]
+        if let Some(rows) = &mut self.rows {
+            return rows.next(&self.path, &mut self.wanted);
+        }
         let Some(records) = &mut self.records else {
             return Ok(None);
         };
@@ -183,15 +215,9 @@ impl BagMessages {
                 byte: records.byte(),
                 fault,
             })?;
-            return Ok(Some(BagMessage {
-                topic: Arc::clone(topic),
-                schema: Arc::clone(&route.schema),
-                log_time_ns: log_time,
-                data: data.into_owned(),
-                path: Arc::clone(&self.path),
-                number: *count,
-                byte: records.byte(),
-            }));
+            let data = data.into_owned();
+            let byte = records.byte();
+            return Ok(Some(BagMessage::new(topic, &route.schema, log_time, data, &self.path, *count, byte)));
         }
         // The length of a chunk and that it is one are covered by no checksum. Damage there can hide the chunk, and
         // only the summary knows.
@@ -211,6 +237,10 @@ impl Iterator for BagMessages {
         let item = self.step().map_err(|kind| RecordingError::new(&self.path, kind)).transpose();
         if !matches!(item, Some(Ok(_))) {
             self.records = None;
+            #[cfg(feature = "sqlite")]
+            {
+                self.rows = None;
+            }
         }
         item
     }

@@ -251,7 +251,8 @@ impl Records {
 /// What a file that is not MCAP is likely to be.
 fn guess(start: &[u8]) -> &'static str {
     if start.starts_with(b"SQLite format 3") {
-        "it is an SQLite database; if it is a ROS 2 bag, convert it with `ros2 bag convert` to storage `mcap`"
+        "it is an SQLite database; if it is a ROS 2 bag, build with the feature `sqlite`, or convert it with `ros2 bag \
+         convert` to storage `mcap`"
     } else if start.starts_with(b"#ROSBAG") {
         "it is a ROS 1 bag; convert it to a ROS 2 bag with storage `mcap`"
     } else if start.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) {
@@ -267,7 +268,7 @@ mod tests {
 
     #[test]
     fn other_formats_are_recognised() {
-        assert!(guess(b"SQLite format 3\0").contains("ros2 bag convert"));
+        assert!(guess(b"SQLite format 3\0").contains("ros2 bag"));
         assert!(guess(b"#ROSBAG V2.0\n").contains("ROS 1"));
         assert!(guess(b"t,x,y").contains("magic"));
     }

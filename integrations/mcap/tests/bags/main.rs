@@ -6,3 +6,5 @@ mod compressed;
 mod good;
 mod real;
 mod samples;
+#[cfg(feature = "sqlite")]
+mod sqlite;
