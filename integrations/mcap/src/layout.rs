@@ -15,7 +15,7 @@ const FRAME: &str = "bb.frame";
 /// How the messages of a channel are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
-    /// As ROS writes them; what is not in it is the same for all of the channel, or stands in the channel beside.
+    /// As ROS writes them; what is not in it is the same for all of the channel, or is in the channel beside.
     Ros,
     /// With all there is.
     Exact,
@@ -112,7 +112,7 @@ impl Description {
         let (topic, schema) = match layout {
             Layout::Ros => (format!("/{path}"), message.ros_schema().unwrap_or_else(|| message.schema())),
             Layout::Exact => (format!("/{path}"), message.schema()),
-            // Hidden, as ROS has it, from whoever lists topics.
+            // Hidden, as ROS has it, from lists of topics.
             Layout::Beside => (format!("/{path}/_exact"), message.schema()),
             Layout::Companion => message.ros_companion().map_or_else(
                 || (format!("/{path}"), message.schema()),

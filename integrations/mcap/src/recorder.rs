@@ -220,7 +220,7 @@ impl Recorder {
         &self.path
     }
 
-    /// Waits for a message, and writes it and all that wait behind it.
+    /// Waits for a message, and writes it and all that wait after it.
     pub(crate) fn work(&mut self, wait: Duration) -> Result<(), RecordingError> {
         if let Some(message) = self.subscription.recv_timeout(wait.min(self.options.flush_interval)) {
             self.record(&message)?;

@@ -1,4 +1,4 @@
-//! A whole file of what stands before the break of a broken one.
+//! A whole file of what is before the break of a broken one.
 
 use crate::error::{create_error, write_error};
 use crate::file::{Record, Records};
@@ -20,7 +20,7 @@ pub struct Recovered {
     pub broken: Option<RecordingError>,
 }
 
-/// Writes all that stands before the break of `broken` into a new, whole file `repaired`. It need not be a recording of this
+/// Writes all that is before the break of `broken` into a new, whole file `repaired`. It need not be a recording of this
 /// crate: any MCAP file will do.
 ///
 /// # Errors

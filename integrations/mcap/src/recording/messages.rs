@@ -13,7 +13,7 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A message whose payload's type is known only to whoever asks for it.
+/// A message whose payload's type only its reader knows.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct RecordedMessage {

@@ -263,3 +263,22 @@ fn the_offset_of_the_clock_is_written_once() {
     let count = |text: &[u8]| bytes.windows(text.len()).filter(|window| *window == text).count();
     assert_eq!(count(b"wall_minus_monotonic_ns"), 1);
 }
+
+#[test]
+fn the_layout_for_foxglove_names_topics_and_fields_that_are_there() {
+    let layout = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/foxglove-layout.json"));
+    let layout = layout.expect("the guide names it");
+    let (file, _) = recorded("layout");
+    let recording = Recording::open(&file).expect("it was recorded");
+    let paths: Vec<_> = layout.split("\"value\": \"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    assert!(paths.len() >= 10, "{paths:?}");
+    for path in paths {
+        let (topic, fields) = path.split_once('.').expect("a topic and its fields");
+        let channel = recording.channels().iter().find(|channel| format!("/{}", channel.path) == topic);
+        let definition = &channel.unwrap_or_else(|| panic!("{topic} is recorded")).definition;
+        let field = fields.split('.').next().unwrap_or_default();
+        assert!(definition.lines().any(|line| line.ends_with(&format!(" {field}"))), "{path} in {definition}");
+    }
+    let bag = Bag::open(&file).expect("it is a bag");
+    assert!(layout.contains("/robot_description") && bag.messages(&["/robot_description"]).is_ok());
+}
