@@ -133,6 +133,13 @@ pub enum End {
 /// The topic of poses, or why there is none. One that was named must be there.
 fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String> {
     let error = match bag.choose(POSE, name) {
+        Ok(topic) if name.is_none() && topic.is_own => {
+            return Ok(Err(format!(
+                "the poses of {} are what a robot published, an estimate say; name them with --truth-topic if they are \
+                 the truth",
+                topic.name
+            )));
+        }
         Ok(topic) => return Ok(Ok(topic.name.to_string())),
         Err(error) => error,
     };

@@ -2,6 +2,7 @@
 
 mod common;
 
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
 use bb_estimators::{Madgwick, SimulatedImu};
 use bb_mcap::{Recorder, RecorderOptions};
@@ -13,6 +14,7 @@ robot! {
 
     link base {
         sensor imu: SimulatedImu() { rate: 100 Hz; estimator orientation: Madgwick<Marg>(); }
+        sensor place: External<Pose>();
         joint mount: fixed { link mast { sensor imu: SimulatedImu() { rate: 100 Hz; } } }
     }
 }
@@ -27,6 +29,9 @@ fn record(name: &str, select: Select<'_>) -> std::path::PathBuf {
     let mut simulation = builder.simulate().expect("it starts");
     for _ in 0..30 {
         simulation.run_for(Duration::from_millis(100));
+        let world_from_body = UnitQuaternion::identity();
+        let pose = Pose { position: Vector3::zeros(), world_from_body, covariance: None };
+        simulation.publish(walker::sensor::base::place, simulation.clock().now(), pose);
         recorder.drain().expect("there is room");
     }
     recorder.finish().expect("there is room");
@@ -48,6 +53,11 @@ fn of_several_imus_one_is_named_and_its_magnetometer_follows() {
     assert_ne!(output.code, Some(0));
     let said = output.out + &output.err;
     assert!(said.contains("/sensor/base/imu, /sensor/base/mount/mast/imu"), "{said}");
-    let output = eval(&[&file], &["--imu-topic", "/sensor/base/mount/mast/imu"]);
+    let imu = ["--imu-topic", "/sensor/base/mount/mast/imu"];
+    let output = eval(&[&file], &imu);
     assert_eq!(output.code, Some(0), "{}", output.err);
+    // A score against an estimate would look like one against the truth.
+    assert!(output.err.contains("no truth, so no errors: the poses of /sensor/base/place"), "{}", output.err);
+    let output = eval(&[&file], &[imu[0], imu[1], "--truth-topic", "/sensor/base/place"]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
 }

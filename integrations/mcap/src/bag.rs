@@ -15,6 +15,7 @@ pub use truth::{Bool, MOVING, ODOMETRY, POSE, Truth};
 
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Channels, Record, Records, full_name};
+use crate::layout::PATH;
 use messages::Wanted;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,6 +34,9 @@ pub struct Topic {
     pub schema: Arc<str>,
     /// How the messages are encoded; `cdr` is what can be read.
     pub encoding: String,
+    /// Whether a robot of this project published it, by a recording of ours. Its poses may be estimates, so they are not
+    /// taken for the truth unasked.
+    pub is_own: bool,
     /// How many messages there are, in a broken bag before the break; `None` if a summary leaves it out.
     pub messages: Option<u64>,
 }
@@ -215,6 +219,7 @@ fn topics_of(channels: &Channels, counts: Option<&BTreeMap<u16, u64>>) -> Vec<To
                 name: Arc::clone(&channel.topic),
                 schema: Arc::clone(&channel.schema),
                 encoding: channel.encoding.clone(),
+                is_own: channel.metadata.contains_key(PATH),
                 messages: count,
             });
         }

@@ -41,8 +41,13 @@ fn read_topics(connection: &Connection) -> rusqlite::Result<Vec<(i64, Topic)>> {
     let topics = statement.query_map([], |row| {
         let name: String = row.get(1)?;
         let schema: String = row.get(2)?;
-        let topic =
-            Topic { name: name.into(), schema: full_name(&schema).into(), encoding: row.get(3)?, messages: None };
+        let topic = Topic {
+            name: name.into(),
+            schema: full_name(&schema).into(),
+            encoding: row.get(3)?,
+            is_own: false,
+            messages: None,
+        };
         Ok((row.get(0)?, topic))
     })?;
     topics.collect()

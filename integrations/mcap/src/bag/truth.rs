@@ -35,12 +35,14 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Reads both, where the bag has exactly one topic of their types.
+    /// Reads both, where the bag has exactly one topic of their types. Poses that a robot of this project published are
+    /// not taken: they are estimates.
     ///
     /// # Errors
     /// The bag is broken; says where.
     pub fn read(bag: &Bag) -> Result<Self, RecordingError> {
-        let topics: Vec<_> = [POSE, MOVING].iter().filter_map(|schema| bag.topic_of(schema).ok()).collect();
+        let topics = [POSE, MOVING].iter().filter_map(|schema| bag.topic_of(schema).ok());
+        let topics: Vec<_> = topics.filter(|topic| !topic.is_own).collect();
         let topics: Vec<_> = topics.iter().map(|topic| &topic.name).collect();
         let mut truth = Self::default();
         truth.extend(bag.messages(&topics)?)?;
