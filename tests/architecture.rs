@@ -29,10 +29,14 @@ fn every_path_in_the_documents_exists() {
     }
 }
 
+/// The folders of the crates with code that others use.
+const CRATES: [&str; 6] =
+    ["bb-macros", "bb-core", "bb-estimators", "bb-cli", "integrations/mcap", "integrations/metrics"];
+
 #[test]
 fn every_folder_of_code_is_on_the_map() {
     let map = read("ARCHITECTURE.md");
-    for krate in ["bb-macros", "bb-core", "bb-estimators", "bb-bags", "bb-cli", "bb-metrics", "bb-recorder"] {
+    for krate in CRATES {
         let source = root().join(krate).join("src");
         let entries = std::fs::read_dir(&source).unwrap_or_else(|error| panic!("{}: {error}", source.display()));
         for entry in entries.flatten().filter(|entry| entry.path().is_dir()) {
@@ -74,23 +78,37 @@ fn arrows_between_crates_point_one_way() {
         ("bb-macros", "bb-core"),
         ("bb-macros", "bb-estimators"),
         ("bb-core", "bb-estimators"),
-        ("bb-core", "bb-bags"),
-        ("bb-estimators", "bb-macros"),
-        ("bb-estimators", "bb-bags"),
-        ("bb-bags", "bb-estimators"),
-        ("bb-bags", "bb-macros"),
-        ("bb-core", "bb-metrics"),
-        ("bb-metrics", "bb-macros"),
-        ("bb-metrics", "bb-estimators"),
         ("bb-core", "bb-cli"),
+        ("bb-core", "bb-mcap"),
+        ("bb-core", "bb-metrics"),
+        ("bb-estimators", "bb-macros"),
         ("bb-estimators", "bb-cli"),
-        ("bb-bags", "bb-cli"),
-        ("bb-core", "bb-recorder"),
-        ("bb-recorder", "bb-estimators"),
-        ("bb-recorder", "bb-bags"),
+        ("bb-estimators", "bb-mcap"),
+        ("bb-estimators", "bb-metrics"),
+        ("integrations/mcap", "bb-macros"),
+        ("integrations/mcap", "bb-estimators"),
+        ("integrations/mcap", "bb-metrics"),
+        ("integrations/mcap", "bb-cli"),
+        ("integrations/metrics", "bb-macros"),
+        ("integrations/metrics", "bb-estimators"),
+        ("integrations/metrics", "bb-mcap"),
+        ("integrations/metrics", "bb-cli"),
     ] {
         assert!(!depends(krate, on), "{krate} must not depend on {on}");
     }
+}
+
+/// What a user may leave out is in `integrations/`, so that the top level is what the project is.
+#[test]
+fn the_top_level_is_the_project() {
+    let entries = std::fs::read_dir(root()).expect("it is the checkout");
+    let mut crates: Vec<_> = entries
+        .flatten()
+        .filter(|entry| entry.path().join("Cargo.toml").exists())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    crates.sort();
+    assert_eq!(crates, ["bb-cli", "bb-core", "bb-estimators", "bb-macros", "benches", "examples", "tests"]);
 }
 
 /// The folders of the runtime, from the bottom up.

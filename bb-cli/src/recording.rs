@@ -1,7 +1,7 @@
 //! A recording, opened: its samples, its truth, and what is to be said of it.
 
-use bb_bags::{Bag, BagError, BagErrorKind, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY, POSE, Truth};
 use bb_estimators::attitude::ImuSample;
+use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Truth};
 use std::path::Path;
 
 use crate::filters::Axes;
@@ -11,7 +11,7 @@ use crate::filters::Axes;
 pub struct Topics {
     /// The IMU; else the only topic of its type.
     pub imu: Option<String>,
-    /// The magnetometer; else the only topic of its type.
+    /// The magnetometer; else the one that was recorded with the IMU, or the only topic of its type.
     pub magnetometer: Option<String>,
     /// The true orientation; else the only topic of poses, if there is one.
     pub truth: Option<String>,
@@ -55,7 +55,7 @@ impl Recording {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
         let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
         let magnetometer = axes == Axes::Nine;
-        let magnetic = match bag.choose(MAGNETIC_FIELD, topics.magnetometer.as_deref()) {
+        let magnetic = match bag.magnetometer_of(&imu.name, topics.magnetometer.as_deref()) {
             _ if !magnetometer => None,
             Ok(topic) => Some(&*topic.name),
             Err(error) => return Err(format!("{}; without one, choose --axes six", said(&error, "--mag-topic"))),
@@ -138,14 +138,21 @@ pub enum End {
 /// The topic of poses, or why there is none. One that was named must be there.
 fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String> {
     let error = match bag.choose(POSE, name) {
+        Ok(topic) if name.is_none() && topic.is_own => {
+            return Ok(Err(format!(
+                "the poses of {} are what a robot published, an estimate say; name them with --truth-topic if they are \
+                 the truth",
+                topic.name
+            )));
+        }
         Ok(topic) => return Ok(Ok(topic.name.to_string())),
         Err(error) => error,
     };
     match error.kind() {
-        BagErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
+        RecordingErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
             Ok(Ok(name.unwrap_or_default().to_owned()))
         }
-        BagErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth-topic"))),
+        RecordingErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth-topic"))),
         _ => Err(said(&error, "--truth-topic")),
     }
 }
@@ -160,8 +167,8 @@ fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
     match bag.choose(MOVING, name) {
         Ok(topic) => Ok(Some(topic.name.to_string())),
         Err(error) => match error.kind() {
-            BagErrorKind::NoTopicOfType { .. } => Ok(None),
-            BagErrorKind::SeveralTopicsOfType { .. } => {
+            RecordingErrorKind::NoTopicOfType { .. } => Ok(None),
+            RecordingErrorKind::SeveralTopicsOfType { .. } => {
                 Err(format!("{}, or score all of it with --moving-topic none", said(&error, "--moving-topic")))
             }
             _ => Err(said(&error, "--moving-topic")),
@@ -181,15 +188,15 @@ fn truth(bag: &Bag, topics: &[Option<&str>]) -> Result<Truth, String> {
     }
 }
 
-fn is_break(error: &BagError) -> bool {
-    matches!(error.kind(), BagErrorKind::Truncated { .. })
+fn is_break(error: &RecordingError) -> bool {
+    matches!(error.kind(), RecordingErrorKind::Truncated { .. })
 }
 
 /// What is wrong, with the option that chooses another topic.
-fn said(error: &BagError, option: &str) -> String {
+fn said(error: &RecordingError, option: &str) -> String {
     let kind = error.kind();
     match kind {
-        BagErrorKind::NoTopicOfType { .. } => kind.to_string(),
+        RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),
         _ => format!("{kind} ({option})"),
     }
 }

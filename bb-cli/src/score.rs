@@ -1,8 +1,8 @@
 //! The error of one run: which samples count, and the root mean square over them.
 
-use bb_bags::Truth;
 use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::{ErrorStatistics, OrientationError};
+use bb_mcap::Truth;
 
 /// The errors of an estimate against the truth, gathered one sample at a time.
 ///

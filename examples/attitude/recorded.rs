@@ -3,9 +3,9 @@
 use crate::arguments::Arguments;
 use crate::filter::{Chosen, ChosenParams};
 use crate::outcome::{Outcome, Series};
-use bb_bags::{Bag, BagImu, IMU, MAGNETIC_FIELD, Truth};
 use bb_cli::Progress;
 use bb_core::prelude::*;
+use bb_mcap::{Bag, BagImu, IMU, Truth};
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
@@ -24,7 +24,8 @@ robot! {
 pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
     let bag = Bag::open(file)?;
     if params.magnetometer && arguments.mag.is_none() {
-        bag.topic_of(MAGNETIC_FIELD).map_err(|error| format!("{error} (or choose --axes 6)"))?;
+        let imu = bag.choose(IMU, arguments.imu.as_deref())?;
+        bag.magnetometer_of(&imu.name, None).map_err(|error| format!("{error} (or choose --axes 6)"))?;
     }
     let truth = Truth::read(&bag)?;
 

@@ -26,7 +26,7 @@ fn the_command_and_a_robot_agree() -> Result<(), Box<dyn Error>> {
         ("tilt", Axes::Six, ""),
     ];
     // One of them disturbed.
-    for file in broad().into_iter().flatten().rev().take(2) {
+    for file in broad()?.into_iter().flatten().rev().take(2) {
         for ((name, axes, setting), robot) in runs.into_iter().zip(attitude::errors(&file)?) {
             let filter = FILTERS.iter().find(|filter| filter.name == name).ok_or("no such filter")?;
             let settings = setting.split_whitespace().map(str::parse::<Setting>).collect::<Result<Vec<_>, _>>()?;

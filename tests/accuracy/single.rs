@@ -70,7 +70,7 @@ fn score<T: Real, F: AttitudeFilter<T>>(
 
 #[test]
 fn single_precision_is_as_accurate() -> Result<(), Box<dyn Error>> {
-    let Some(files) = broad() else { return Ok(()) };
+    let Some(files) = broad()? else { return Ok(()) };
     let mut errors = Vec::new();
     for file in &files {
         let mut recording = Recording::open(file, &Topics::default(), Axes::Nine, None)?;

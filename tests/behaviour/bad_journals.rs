@@ -5,7 +5,7 @@ use crate::journals::{Again, Failure, IS_FIRST, Way, again, alone};
 use crate::replay::{Lines, overflow};
 use bb_core::journal::{Entry, Event, JournalLine, JournalReader};
 use bb_core::prelude::*;
-use bb_recorder::{Recorder, RecorderOptions, Recording};
+use bb_mcap::{Recorder, RecorderOptions, Recording};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 use std::sync::PoisonError;

@@ -1,4 +1,5 @@
-"""Compares messages of bb-core with how ROS 2's own Python packages, rosbags and jsonschema understand them.
+"""Compares messages of bb-core with how ROS 2's own Python packages, rosbags, mcap and jsonschema understand them,
+and reads a recording with these.
 
 `check` writes the messages and runs this; each line of them has the name, definition and hash of a type, and a value as
 CDR and as JSON.
@@ -21,6 +22,7 @@ def has(module):
 
 
 CHECKS = {"rclpy": has("rclpy") and has("sensor_msgs"), "rosbags": has("rosbags"), "jsonschema": has("jsonschema")}
+CHECKS["mcap"] = has("mcap") and has("mcap_ros2")
 
 
 class Mismatch(Exception):
@@ -105,6 +107,41 @@ def check_rosbags(lines, are_ros):
     return len(lines)
 
 
+def check_recording(path):
+    """Every message of a recording, decoded by the definitions in it; and what is there for viewers."""
+    from rosbags.highlevel import AnyReader
+
+    counts = {}
+    parents = {}
+    with AnyReader([path]) as reader:
+        for connection, time, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            counts[connection.topic] = counts.get(connection.topic, 0) + 1
+            if connection.msgtype == "sensor_msgs/msg/Imu":
+                stamp = message.header.stamp
+                if stamp.sec * 10**9 + stamp.nanosec != time or stamp.sec < 1_700_000_000:
+                    raise Mismatch(f"{connection.topic}: the stamp {stamp} of a message that was logged at {time} ns")
+            for transform in getattr(message, "transforms", []):
+                parents.setdefault(transform.child_frame_id, set()).add(transform.header.frame_id)
+    for child, found in parents.items():
+        if len(found) != 1:
+            raise Mismatch(f"the frame {child} has the parents {sorted(found)}")
+    topics = ["imu", "imu/magnetic_field", "imu/orientation", "shoulder/encoder"]
+    for topic in ["/tf", "/tf_static", "/robot_description"] + [f"/sensor/base/{topic}" for topic in topics]:
+        if topic not in counts:
+            raise Mismatch(f"{topic} is not in the recording, which has {sorted(counts)}")
+    return sum(counts.values())
+
+
+def check_mcap(path):
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        return sum(1 for _ in reader.iter_decoded_messages())
+
+
 def check_jsonschema(lines):
     from jsonschema import Draft202012Validator
 
@@ -130,6 +167,11 @@ def main():
     if CHECKS["rosbags"]:
         count = check_rosbags(ros, True) + check_rosbags(exact, False)
         print(f"ros2: rosbags reads {count} messages by our definitions, with the same type hashes")
+    recording = pathlib.Path(folder, "recording.mcap")
+    if CHECKS["rosbags"]:
+        print(f"ros2: rosbags reads {check_recording(recording)} messages of a recording")
+    if CHECKS["mcap"]:
+        print(f"ros2: the reader of MCAP's own project reads {check_mcap(recording)} messages of it")
     if CHECKS["jsonschema"]:
         print(f"ros2: jsonschema accepts {check_jsonschema(ros + exact)} values and their schemas")
     return 0

@@ -3,10 +3,10 @@
 // Each test compiles this by itself and uses a part of it.
 #![allow(dead_code, unreachable_pub)]
 
-#[path = "../../../bb-bags/tests/common/mod.rs"]
+#[path = "../../../integrations/mcap/tests/bags/common.rs"]
 mod bags;
 
-use bb_bags::ros::*;
+use bags::ros::*;
 use bb_core::nalgebra::{UnitQuaternion, Vector3 as V};
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -17,8 +17,7 @@
 //!
 //! Why not a crate for CDR: those that there are go through serde, which knows the values of a type but not its shape, so
 //! that a definition for other programs would have to be written a second time and could differ; every payload and all that
-//! it holds would have to implement serde's traits; and none promises what the paragraph above does. Bags of other
-//! programs, whose types are known beforehand, `bb-bags` reads with such a crate.
+//! it holds would have to implement serde's traits; and none promises what the paragraph above does.
 
 mod algebra;
 mod collections;
@@ -46,10 +45,10 @@ pub use intern::MAX_NAME_BYTES;
 pub(crate) use intern::intern;
 pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
 pub use reader::Reader;
-pub use ros::{RosLayout, RosMessage};
+pub use ros::{RosCompanion, RosLayout, RosMessage};
 pub use schema::Schema;
 pub use shape::{EnumShape, FieldShape, Shape, StructShape};
-pub use stamped::{decode_as_ros, encode_as_ros, is_exact_as_ros};
+pub use stamped::{decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
 pub use type_description::{type_description, type_hash};
 pub use writer::Writer;
 
@@ -137,22 +136,10 @@ fn decode_with<T>(
     bytes: &[u8],
     read: impl FnOnce(&mut Reader<'_>) -> Result<T, DecodeError>,
 ) -> Result<T, DecodeError> {
-    let mut reader = data(bytes)?;
+    let mut reader = Reader::of_message(bytes)?;
     let value = read(&mut reader)?;
     match reader.left() {
         0..=PADDING => Ok(value),
         left => Err(reader.error("the end", format!("{left} more bytes"))),
     }
-}
-
-/// What follows the four bytes that name the encoding.
-fn data(bytes: &[u8]) -> Result<Reader<'_>, DecodeError> {
-    let Some((header, data)) = bytes.split_first_chunk::<4>() else {
-        return Err(DecodeError::new(0, "the four bytes that name the encoding", format!("{} bytes", bytes.len())));
-    };
-    if header[..2] != HEADER[..2] {
-        let found = format!("{:#04x}{:02x}", header[0], header[1]);
-        return Err(DecodeError::new(0, "the encoding 0x0001, plain CDR in little endian", found));
-    }
-    Ok(Reader::new(data))
 }

@@ -53,8 +53,9 @@ impl MagneticField {
 }
 
 /// One sample of a sensor with gyroscope, accelerometer and magnetometer in one housing: magnetic, angular rate,
-/// gravity.
+/// gravity (`sensor_msgs/Imu`, and `sensor_msgs/MagneticField` where there is a reading).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(ros)]
 pub struct Marg {
     /// The inertial sample.
     pub imu: Imu,

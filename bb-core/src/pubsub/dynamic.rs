@@ -4,8 +4,9 @@ use super::queue::Queue;
 use super::unmatched::{Unmatched, unmatched};
 use super::{AnyTopic, Overflow, Payloads, Registry, Select};
 use crate::fault::Fault;
-use crate::message::codec::{encode, encode_as_ros, is_exact_as_ros, to_json};
+use crate::message::codec::{encode, encode_as_ros, encode_companion, is_exact_as_ros, to_json};
 use crate::message::{Payload, Schema, Stamp, Stamped};
+use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
@@ -27,6 +28,9 @@ trait AnyMessage: Send + Sync {
     fn schema(&self) -> Schema;
     fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool;
     fn ros_schema(&self) -> Option<Schema>;
+    fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool;
+    fn ros_companion(&self) -> Option<(&'static str, Schema)>;
+    fn at_wall_time(&self, time: WallTime) -> Arc<dyn AnyMessage>;
     fn is_exact_as_ros(&self) -> bool;
     fn to_json(&self) -> String;
     fn topic(&self, path: &str, registry: &Registry) -> Result<Arc<dyn AnyTopic>, Fault>;
@@ -56,6 +60,15 @@ impl<T: Payload> AnyMessage for Stamped<T> {
     }
     fn ros_schema(&self) -> Option<Schema> {
         Self::ros_schema()
+    }
+    fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool {
+        encode_companion(self, bytes)
+    }
+    fn ros_companion(&self) -> Option<(&'static str, Schema)> {
+        Self::ros_companion()
+    }
+    fn at_wall_time(&self, wall_time: WallTime) -> Arc<dyn AnyMessage> {
+        Arc::new(Self { wall_time, ..self.clone() })
     }
     fn is_exact_as_ros(&self) -> bool {
         is_exact_as_ros(self)
@@ -120,6 +133,21 @@ impl DynamicMessage {
         self.message.ros_schema()
     }
 
+    /// Appends the second message of ROS; false, and nothing, if there is none.
+    pub fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool {
+        self.message.encode_companion(bytes)
+    }
+
+    /// The last part of the topic and the definition of a second message, if ROS has two for its payload.
+    pub fn ros_companion(&self) -> Option<(&'static str, Schema)> {
+        self.message.ros_companion()
+    }
+
+    /// The same with another wall time.
+    pub fn at_wall_time(&self, time: WallTime) -> Self {
+        Self { path: self.path, message: self.message.at_wall_time(time) }
+    }
+
     /// Whether payload and wall time can be read back from ROS's layout bit for bit.
     pub fn is_exact_as_ros(&self) -> bool {
         self.message.is_exact_as_ros()
@@ -149,6 +177,7 @@ pub struct Tap(pub(super) Arc<Queue<DynamicMessage>>);
 pub struct DynamicSubscription {
     queue: Arc<Queue<DynamicMessage>>,
     paths: Vec<&'static str>,
+    schemas: Vec<fn() -> Vec<Schema>>,
     unmatched: Vec<Unmatched>,
 }
 
@@ -177,14 +206,16 @@ impl DynamicSubscription {
     ) -> Self {
         let queue = Arc::new(Queue::new(overflow));
         let mut paths = Vec::new();
+        let mut schemas = Vec::new();
         for topic in topics {
             if select.includes(topic.path()) && payloads.includes(topic.payload_name()) {
                 topic.tap(&Tap(Arc::clone(&queue)));
                 paths.push(topic.path());
+                schemas.push(topic.schemas());
             }
         }
         let unmatched = unmatched(topics, declared, select, payloads);
-        Self { queue, paths, unmatched }
+        Self { queue, paths, schemas, unmatched }
     }
 
     /// Logs what is unmatched. No lock may be held: it runs the user's `tracing` subscriber.
@@ -201,6 +232,11 @@ impl DynamicSubscription {
     /// The paths it listened to when it was made. Of those made later at run time, it also listens to the selected ones.
     pub fn paths(&self) -> &[&'static str] {
         &self.paths
+    }
+
+    /// The definitions of what it listened to when it was made, by path: what a recorder would write.
+    pub fn schemas(&self) -> impl Iterator<Item = (&'static str, Vec<Schema>)> + '_ {
+        self.paths.iter().zip(&self.schemas).map(|(path, schemas)| (*path, schemas()))
     }
 
     /// What it asked for and matched nothing when it was made, with the nearest name for each.

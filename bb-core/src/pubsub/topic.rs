@@ -5,7 +5,7 @@ use super::queue::{Queue, counted_bytes};
 use super::wakers::Wakers;
 use super::{DynamicMessage, Overflow, Subscription};
 use crate::Payload;
-use crate::message::{DecodeError, Stamped};
+use crate::message::{DecodeError, Schema, Stamped};
 use std::any::Any;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -194,6 +194,9 @@ pub trait AnyTopic: Any + Send + Sync {
     fn path(&self) -> &'static str;
     /// The name of its payload's type.
     fn payload_name(&self) -> &'static str;
+    /// Makes the definitions of its messages: the exact one, and those of ROS if it has any.
+    #[doc(hidden)]
+    fn schemas(&self) -> fn() -> Vec<Schema>;
     /// Everybody who listens.
     fn subscribers(&self) -> Vec<SubscriberStatistics>;
     /// Hands every message to `tap` as well.
@@ -220,6 +223,14 @@ impl<T: Payload> AnyTopic for Topic<T> {
 
     fn payload_name(&self) -> &'static str {
         T::NAME
+    }
+
+    fn schemas(&self) -> fn() -> Vec<Schema> {
+        || {
+            let ros = Stamped::<T>::ros_schema();
+            let companion = Stamped::<T>::ros_companion().map(|(_, schema)| schema);
+            [Stamped::<T>::schema()].into_iter().chain(ros).chain(companion).collect()
+        }
     }
 
     fn subscribers(&self) -> Vec<SubscriberStatistics> {

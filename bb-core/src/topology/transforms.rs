@@ -1,33 +1,62 @@
-//! The frames of a robot as ROS's message of transforms.
+//! The frames of a robot as ROS's messages of transforms.
 
-use super::{JointKind, Topology};
+use super::{Joint, JointKind, Topology};
 use crate::message::codec::ros::{Header, Time, TransformStamped, TransformsMessage};
 use crate::time::WallTime;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
 impl TransformsMessage {
-    /// Where the links and joints of a robot are when every joint is at rest: the frame of a joint in that of the link it
-    /// is mounted on, and that of the link it carries in the joint's. What a joint that moves carries is placed as if
-    /// it were at rest.
-    pub fn at_rest(topology: &Topology, time: WallTime) -> Self {
-        let stamp = Time::of(time);
+    /// What does not move: the frame of a joint in that of the link it is mounted on, and of a fixed joint that of the link
+    /// it carries.
+    pub fn fixed(topology: &Topology, time: WallTime) -> Self {
         let name = |link: usize| topology.links.get(link).map_or("", |link| link.name);
-        let mut transforms = Vec::new();
-        for joint in topology.joints {
-            let at_joint = joint.parent_from_joint.isometry();
-            let mut place = |parent: &str, child: &str, transform: Isometry3<f64>| {
-                let header = Header { stamp, frame_id: parent.to_owned() };
-                transforms.push(TransformStamped { header, child_frame_id: child.to_owned(), transform });
+        let transforms = topology.joints.iter().filter_map(|joint| {
+            let child = match joint.kind {
+                // A fixed joint carries the link itself; nothing is measured in its frame.
+                JointKind::Fixed => name(joint.child),
+                // There is one frame of that name, and it moves.
+                _ if joint.name == name(joint.child) => return None,
+                _ => joint.name,
             };
-            // A fixed joint carries the link itself; nothing is measured in its frame.
-            if joint.kind == JointKind::Fixed || joint.name == name(joint.child) {
-                place(name(joint.parent), name(joint.child), at_joint);
-            } else {
-                place(name(joint.parent), joint.name, at_joint);
-                let unmoved = Isometry3::from_parts(Vector3::zeros().into(), UnitQuaternion::identity());
-                place(joint.name, name(joint.child), unmoved);
-            }
-        }
-        Self { transforms }
+            Some(transform(time, name(joint.parent), child, joint.parent_from_joint.isometry()))
+        });
+        Self { transforms: transforms.collect() }
     }
+
+    /// What the joints of these numbers carry, if they move, with the position of each: rad where it turns, m where it
+    /// slides. A joint with more than one degree of freedom is placed at rest.
+    pub fn moving(topology: &Topology, joints: impl IntoIterator<Item = (usize, f64)>, time: WallTime) -> Self {
+        let name = |link: usize| topology.links.get(link).map_or("", |link| link.name);
+        let transforms = joints.into_iter().filter_map(|(number, position)| {
+            let joint = topology.joints.get(number).filter(|joint| joint.kind != JointKind::Fixed)?;
+            let motion = joint.motion(position);
+            Some(match joint.name == name(joint.child) {
+                true => {
+                    transform(time, name(joint.parent), joint.name, joint.parent_from_joint.isometry() * motion)
+                }
+                false => transform(time, joint.name, name(joint.child), motion),
+            })
+        });
+        Self { transforms: transforms.collect() }
+    }
+}
+
+impl Joint {
+    /// Takes points from the link that the joint carries to the joint's frame, at a position: rad or m.
+    pub fn motion(&self, position: f64) -> Isometry3<f64> {
+        let axis = Vector3::from(self.axis.unwrap_or([1.0, 0.0, 0.0]));
+        match self.kind {
+            JointKind::Revolute | JointKind::Continuous => {
+                let turn = UnitQuaternion::from_axis_angle(&Unit::new_normalize(axis), position);
+                Isometry3::from_parts(Translation3::identity(), turn)
+            }
+            JointKind::Prismatic => Translation3::from(axis * position).into(),
+            JointKind::Fixed | JointKind::Planar | JointKind::Floating => Isometry3::identity(),
+        }
+    }
+}
+
+fn transform(time: WallTime, parent: &str, child: &str, transform: Isometry3<f64>) -> TransformStamped {
+    let header = Header { stamp: Time::of(time), frame_id: parent.to_owned() };
+    TransformStamped { header, child_frame_id: child.to_owned(), transform }
 }

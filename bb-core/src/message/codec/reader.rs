@@ -2,17 +2,45 @@
 
 use super::{DecodeError, Field};
 
+/// Encodings by their numbers: plain CDR.
+const BIG_ENDIAN: u16 = 0x0000;
+const LITTLE_ENDIAN: u16 = 0x0001;
+
 /// Reads values off bytes.
 #[derive(Clone, Debug)]
 pub struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
+    /// Whether numbers begin with the most significant byte.
+    is_big_endian: bool,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads `bytes`, which begin behind those that name the encoding.
+    /// Reads `bytes`, which begin after those that name the encoding, in little endian.
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, at: 0 }
+        Self { bytes, at: 0, is_big_endian: false }
+    }
+
+    /// Reads a message, which begins with the four bytes that name the encoding: plain CDR, in either byte order.
+    ///
+    /// # Errors
+    /// They are not there, or name another encoding.
+    pub fn of_message(bytes: &'a [u8]) -> Result<Self, DecodeError> {
+        let Some((header, data)) = bytes.split_first_chunk::<4>() else {
+            let found = format!("{} bytes", bytes.len());
+            return Err(DecodeError::new(0, "the four bytes that name the encoding", found));
+        };
+        // The first two are the encoding, in big endian; plain CDR leaves the others unused.
+        let encoding = u16::from_be_bytes([header[0], header[1]]);
+        let name = match encoding {
+            BIG_ENDIAN | LITTLE_ENDIAN => {
+                return Ok(Self { is_big_endian: encoding == BIG_ENDIAN, ..Self::new(data) });
+            }
+            0x0002 | 0x0003 => " (parameter list)",
+            0x0006..=0x000b => " (XCDR2)",
+            _ => "",
+        };
+        Err(DecodeError::new(0, "the encoding 0x0000 or 0x0001, plain CDR", format!("{encoding:#06x}{name}")))
     }
 
     /// How many bytes are left.
@@ -25,7 +53,7 @@ impl<'a> Reader<'a> {
         DecodeError::new(self.at, expected, found)
     }
 
-    /// A number, which stands at a multiple of its size, in little endian.
+    /// A number, which is at a multiple of its size. Its bytes are returned in little endian.
     ///
     /// # Errors
     /// The bytes end before.
@@ -34,7 +62,11 @@ impl<'a> Reader<'a> {
         let number = self.bytes.get(self.at + padding..).and_then(|rest| rest.first_chunk::<SIZE>());
         let Some(number) = number else { return Err(self.ends(expected)) };
         self.at += padding + SIZE;
-        Ok(*number)
+        let mut number = *number;
+        if self.is_big_endian {
+            number.reverse();
+        }
+        Ok(number)
     }
 
     /// Bytes as they are.

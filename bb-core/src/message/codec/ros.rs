@@ -4,6 +4,7 @@
 //! | payload | message | what it does not keep |
 //! |---|---|---|
 //! | `Imu` | `sensor_msgs/msg/Imu` | a covariance of zeros, which reads as unknown; that of an orientation that is not there |
+//! | `Marg` | `sensor_msgs/msg/Imu`, and for the field a `sensor_msgs/msg/MagneticField` with the same header | as for those |
 //! | `MagneticField` | `sensor_msgs/msg/MagneticField` | a covariance of zeros, which reads as unknown |
 //! | `FluidPressure` | `sensor_msgs/msg/FluidPressure` | a variance of zero, which reads as unknown |
 //! | `Range` | `sensor_msgs/msg/Range` | a variance of zero, which reads as unknown |
@@ -150,6 +151,9 @@ pub trait RosMessage: Sized {
     /// The message, with its header.
     type Message: Field;
 
+    /// A second message, where ROS divides the payload into two.
+    const COMPANION: Option<RosCompanion<Self>> = None;
+
     /// The message as ROS has it.
     fn to_ros(message: &Stamped<Self>) -> Self::Message;
 
@@ -160,6 +164,19 @@ pub trait RosMessage: Sized {
     fn from_ros(message: Self::Message) -> Result<(Self, WallTime), DecodeError>;
 }
 
+/// A second message of ROS for a payload, recorded on a topic below that of the first. A payload may be without it.
+#[derive(Debug)]
+pub struct RosCompanion<T> {
+    /// The last part of the topic: `magnetic_field`.
+    pub topic: &'static str,
+    /// What the bytes mean.
+    pub shape: Shape,
+    /// Appends it; false, and nothing, if this payload is without it.
+    pub write: fn(&Stamped<T>, &mut Writer<'_>) -> bool,
+    /// Puts what it says into the payload that the first message gave.
+    pub read: fn(&mut T, &mut Reader<'_>) -> Result<(), DecodeError>,
+}
+
 /// How messages of a payload are written in ROS's layout.
 #[derive(Debug)]
 pub struct RosLayout<T> {
@@ -167,6 +184,7 @@ pub struct RosLayout<T> {
     pub(crate) shape: Shape,
     pub(crate) write: fn(&Stamped<T>, &mut Writer<'_>),
     pub(crate) read: fn(&mut Reader<'_>) -> Result<(T, WallTime), DecodeError>,
+    pub(crate) companion: Option<RosCompanion<T>>,
 }
 
 impl<T: Payload + RosMessage> RosLayout<T> {
@@ -175,6 +193,7 @@ impl<T: Payload + RosMessage> RosLayout<T> {
         shape: <T::Message as Field>::SHAPE,
         write: |message, writer| T::to_ros(message).write(writer),
         read: |reader| T::from_ros(T::Message::read(reader)?),
+        companion: T::COMPANION,
     };
 
     /// As its [`RosMessage`] says.

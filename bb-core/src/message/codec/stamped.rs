@@ -1,16 +1,20 @@
 //! Whole messages: the exact layout, and that of ROS.
 
 use super::ros::Header;
-use super::{
-    DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, data, encode_with, type_hash,
-};
+use super::{DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, encode_with, type_hash};
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
 
 impl<T: Payload> Stamped<T> {
     /// What a program that does not know the payload needs to read a message in the exact layout.
     pub fn schema() -> Schema {
-        Schema::new(&format!("{}Stamped", T::NAME), Self::SHAPE)
+        // The name that the derive was told, if it was: two types of one name need two.
+        let name = match T::SHAPE {
+            Shape::Struct(shape) => shape.name,
+            Shape::Enum(shape) => shape.name,
+            _ => T::NAME,
+        };
+        Schema::new(&format!("{name}Stamped"), Self::SHAPE)
     }
 
     /// ROS's definition of a message, if ROS has one for the payload.
@@ -19,6 +23,23 @@ impl<T: Payload> Stamped<T> {
             Shape::Struct(shape) => Some(Schema::new(shape.name, layout.shape)),
             _ => None,
         })
+    }
+
+    /// The name of ROS's message, `sensor_msgs/Imu`, if ROS has one for the payload.
+    pub fn ros_name() -> Option<&'static str> {
+        T::ROS.and_then(|layout| match layout.shape {
+            Shape::Struct(shape) => Some(shape.name),
+            _ => None,
+        })
+    }
+
+    /// The last part of the topic and the definition of a second message, if ROS has two for the payload.
+    pub fn ros_companion() -> Option<(&'static str, Schema)> {
+        let companion = T::ROS?.companion?;
+        match companion.shape {
+            Shape::Struct(shape) => Some((companion.topic, Schema::new(shape.name, companion.shape))),
+            _ => None,
+        }
     }
 
     /// The [`type_hash`] of ROS's message, if ROS has one for the payload.
@@ -83,6 +104,28 @@ pub fn encode_as_ros<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> b
     true
 }
 
+/// Appends the second message of a payload that ROS has two for; false, and nothing, if there is none.
+pub fn encode_companion<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> bool {
+    let Some(companion) = T::ROS.and_then(|layout| layout.companion) else { return false };
+    let start = bytes.len();
+    let is_there = encode_with(bytes, |writer| (companion.write)(message, writer));
+    if !is_there {
+        bytes.truncate(start);
+    }
+    is_there
+}
+
+/// Puts what [`encode_companion`] wrote into the payload that [`decode_as_ros`] has read.
+///
+/// # Errors
+/// ROS has no second message for the payload, or the bytes are wrong.
+pub fn decode_companion<T: Payload>(payload: &mut T, bytes: &[u8]) -> Result<(), DecodeError> {
+    match T::ROS.and_then(|layout| layout.companion) {
+        Some(companion) => (companion.read)(payload, &mut Reader::of_message(bytes)?),
+        None => Err(DecodeError::new(0, "a payload that ROS has two messages for", T::NAME)),
+    }
+}
+
 /// The payload and the wall time of a message in ROS's layout. Its frame, origin and monotonic time are not there.
 ///
 /// # Errors
@@ -91,18 +134,23 @@ pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeEr
     match T::ROS {
         // Bytes after the message are ignored: ROS counts padding for empty lists that it does not write, so some of its own
         // messages end with bytes that mean nothing.
-        Some(layout) => (layout.read)(&mut data(bytes)?),
+        Some(layout) => (layout.read)(&mut Reader::of_message(bytes)?),
         None => Err(DecodeError::new(0, "a payload that ROS has a message for", T::NAME)),
     }
 }
 
-/// Whether payload and wall time of a message are read back from ROS's layout as they are, bit for bit.
+/// Whether payload and wall time of a message are read back from ROS's layout, with the second message where there is one,
+/// as they are, bit for bit.
 pub fn is_exact_as_ros<T: Payload>(message: &Stamped<T>) -> bool {
     let mut bytes = Vec::new();
     if !encode_as_ros(message, &mut bytes) {
         return false;
     }
-    let Ok((payload, wall_time)) = decode_as_ros::<T>(&bytes) else { return false };
+    let Ok((mut payload, wall_time)) = decode_as_ros::<T>(&bytes) else { return false };
+    bytes.clear();
+    if encode_companion(message, &mut bytes) && decode_companion(&mut payload, &bytes).is_err() {
+        return false;
+    }
     let (mut read, mut written) = (Vec::new(), Vec::new());
     payload.write(&mut Writer::new(&mut read));
     message.payload.write(&mut Writer::new(&mut written));

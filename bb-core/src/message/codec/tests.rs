@@ -266,11 +266,19 @@ fn errors_name_the_field_and_what_was_expected() {
     );
     let error = decode::<Choice>(&[0, 1, 0, 0, 9, 0, 0, 0]).unwrap_err();
     assert_eq!(error.to_string(), "expected the number of a variant at byte 4, found 9");
-    let error = decode::<bool>(&[0, 0, 0, 0, 1]).unwrap_err();
+    let error = decode::<bool>(&[0, 7, 0, 0, 1]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "expected the encoding 0x0001, plain CDR in little endian at byte 0, found 0x0000"
+        "expected the encoding 0x0000 or 0x0001, plain CDR at byte 0, found 0x0007 (XCDR2)"
     );
+}
+
+#[test]
+fn both_byte_orders_are_read() {
+    let little = [0, 1, 0, 0, 2, 0, 0, 0, 1, 0, 3, 0];
+    let big = [0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 3];
+    assert_eq!(decode::<Vec<u16>>(&little), Ok(vec![1, 3]));
+    assert_eq!(decode::<Vec<u16>>(&big), Ok(vec![1, 3]));
 }
 
 /// Four bytes that promise four thousand million values allocate nothing for them.
@@ -343,7 +351,12 @@ fn definitions_are_those_of_ros() {
     let names =
         [Stamped::<Odometry>::ros_schema(), Stamped::<Orientation>::ros_schema(), Stamped::<Marg>::ros_schema()];
     let names: Vec<_> = names.iter().map(|schema| schema.as_ref().map(|schema| schema.name.as_str())).collect();
-    assert_eq!(names, [Some("nav_msgs/msg/Odometry"), Some("geometry_msgs/msg/QuaternionStamped"), None]);
+    assert_eq!(
+        names,
+        [Some("nav_msgs/msg/Odometry"), Some("geometry_msgs/msg/QuaternionStamped"), Some("sensor_msgs/msg/Imu")]
+    );
+    let companion = Stamped::<Marg>::ros_companion().map(|(topic, schema)| (topic, schema.name));
+    assert_eq!(companion, Some(("magnetic_field", "sensor_msgs/msg/MagneticField".to_owned())));
 }
 
 #[test]

@@ -5,25 +5,36 @@ mod joint;
 
 use super::{covariance, number, ros_message};
 use crate::Payload;
-use crate::message::DecodeError;
+use crate::message::codec::{Field, RosCompanion};
+use crate::message::{DecodeError, RosMessage, Stamped};
 use crate::payload::{
-    FluidPressure, GeodeticPosition, GnssFix, GnssServices, GnssStatus, Image, Imu, LaserScan, MagneticField,
+    FluidPressure, GeodeticPosition, GnssFix, GnssServices, GnssStatus, Image, Imu, LaserScan, MagneticField, Marg,
     Radiation, Range,
 };
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use crate::time::WallTime;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector4};
 use std::sync::Arc;
 
-/// The covariance of an orientation that is not measured: −1 first.
+/// The covariance of what is not measured: −1 first, as `sensor_msgs/Imu` documents.
 const NO_ORIENTATION: [f64; 9] = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
+/// An orientation is absent where `sensor_msgs/Imu` says that it is: where the first element of its covariance is −1.
+/// A quaternion of zeros, which drivers send that leave the field alone, is no rotation, and so is absent as well. Any
+/// other quaternion is taken as it is.
 fn orientation_from_ros(
     orientation: UnitQuaternion<f64>,
     covariance: &[f64; 9],
 ) -> (Option<UnitQuaternion<f64>>, Option<Matrix3<f64>>) {
-    match covariance[0] == NO_ORIENTATION[0] {
+    match covariance[0] == NO_ORIENTATION[0] || orientation.coords == Vector4::zeros() {
         true => (None, None),
         false => (Some(orientation), covariance::from_ros(covariance)),
     }
+}
+
+/// The covariance of a rate or an acceleration. One that is marked as absent is unknown; the value beside it is kept, since
+/// drivers also write the mark where they mean that the covariance is unknown.
+fn measured(covariance: &[f64; 9]) -> Option<Matrix3<f64>> {
+    covariance::from_ros(covariance).filter(|_| covariance[0] != NO_ORIENTATION[0])
 }
 
 ros_message! {
@@ -46,8 +57,8 @@ ros_message! {
             linear_acceleration,
             orientation,
             orientation_covariance,
-            angular_velocity_covariance: covariance::from_ros(&angular_velocity_covariance),
-            linear_acceleration_covariance: covariance::from_ros(&linear_acceleration_covariance),
+            angular_velocity_covariance: measured(&angular_velocity_covariance),
+            linear_acceleration_covariance: measured(&linear_acceleration_covariance),
         }
     }
 }
@@ -59,6 +70,35 @@ ros_message! {
         magnetic_field_covariance: [f64; 9] = covariance::to_ros(&field.covariance),
     }
     read { Self { magnetic_field, covariance: covariance::from_ros(&magnetic_field_covariance) } }
+}
+
+/// An IMU and a magnetometer are two topics in ROS.
+impl RosMessage for Marg {
+    type Message = ImuMessage;
+
+    const COMPANION: Option<RosCompanion<Self>> = Some(RosCompanion {
+        topic: "magnetic_field",
+        shape: MagneticFieldMessage::SHAPE,
+        write: |marg, writer| {
+            let Some(field) = marg.magnetic_field else { return false };
+            MagneticField::to_ros(&marg.stamp().message(field)).write(writer);
+            true
+        },
+        read: |marg, reader| {
+            let (field, _) = MagneticField::from_ros(MagneticFieldMessage::read(reader)?)?;
+            marg.magnetic_field = Some(field);
+            Ok(())
+        },
+    });
+
+    fn to_ros(marg: &Stamped<Self>) -> ImuMessage {
+        Imu::to_ros(&marg.stamp().message(marg.imu))
+    }
+
+    fn from_ros(message: ImuMessage) -> Result<(Self, WallTime), DecodeError> {
+        let (imu, time) = Imu::from_ros(message)?;
+        Ok((Self { imu, magnetic_field: None }, time))
+    }
 }
 
 ros_message! {

@@ -4,7 +4,7 @@ mod exchange;
 mod random;
 
 use super::super::tests::{bytes_of, ros_round_trip, round_trip, stamp};
-use super::super::{decode, decode_as_ros, is_exact_as_ros};
+use super::super::{decode, decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
 use crate::message::{Finite, Frame, Payload, RosMessage, Stamp, Stamped};
 use crate::payload::*;
 use crate::time::{MonotonicTime, WallTime};
@@ -105,6 +105,53 @@ fn type_hashes_are_those_of_ros() {
     let expected: Vec<_> =
         expected.iter().map(|(name, hash)| ((*name).to_owned(), format!("RIHS01_{hash}"))).collect();
     assert_eq!(hashes, expected);
+}
+
+/// `sensor_msgs/Imu` documents −1 as the first element of a covariance as the mark of what is absent, and zeros as unknown.
+#[test]
+fn an_orientation_is_absent_where_ros_says_so() {
+    let imu = |orientation: [f64; 4], first: f64| {
+        let mut fields: Vec<f64> = orientation.to_vec();
+        fields.push(first);
+        fields.extend([0.0; 8]);
+        fields.extend([0.1, 0.2, 0.3]);
+        fields.push(-1.0);
+        fields.extend([0.0; 8]);
+        fields.extend([0.0, 0.0, 9.81]);
+        fields.extend([0.0; 9]);
+        // Encoding, stamp, an empty frame and its padding.
+        let mut bytes = vec![0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
+        bytes.extend(fields.iter().flat_map(|field| field.to_le_bytes()));
+        decode_as_ros::<Imu>(&bytes).expect("it is an IMU's").0
+    };
+    let identity = [0.0, 0.0, 0.0, 1.0];
+    assert_eq!(imu(identity, -1.0).orientation, None);
+    assert_eq!(imu(identity, 0.0).orientation, Some(UnitQuaternion::identity()));
+    assert_eq!(imu(identity, 0.0).orientation_covariance, None);
+    assert!(imu(identity, 0.5).orientation_covariance.is_some());
+    assert!(imu(identity, -0.5).orientation.is_some(), "the mark is -1 and nothing else");
+    assert_eq!(imu([0.0; 4], 0.0).orientation, None, "zeros are no rotation");
+    let rates = imu(identity, -1.0);
+    assert_eq!((rates.angular_velocity.x, rates.angular_velocity_covariance), (0.1, None));
+}
+
+#[test]
+fn nine_axes_are_two_messages() {
+    let field = MagneticField::new(Vector3::new(2e-5, 0.0, -4e-5));
+    let imu = Imu::new(Vector3::new(0.1, 0.2, 0.3), Vector3::new(0.0, 0.0, 9.81));
+    let wall_time = WallTime::from_unix_nanos(1_700_000_000_123_456_789);
+    for magnetic_field in [None, Some(field)] {
+        let message = Stamp { wall_time, ..Stamp::default() }.message(Marg { imu, magnetic_field });
+        assert!(is_exact_as_ros(&message));
+        let (mut first, mut second) = (Vec::new(), Vec::new());
+        encode_as_ros(&message, &mut first);
+        assert_eq!(encode_companion(&message, &mut second), magnetic_field.is_some());
+        let (mut read, _) = decode_as_ros::<Marg>(&first).expect("it was written just now");
+        assert_eq!(read, Marg { imu, magnetic_field: None });
+        assert_eq!(decode_companion(&mut read, &second).is_ok(), magnetic_field.is_some());
+        assert_eq!(read, message.payload);
+        assert_eq!(decode_as_ros::<Imu>(&first).expect("it is an IMU's").0, imu);
+    }
 }
 
 /// ROS's message holds what sensors usually measure, so it is recorded once.

@@ -1,7 +1,7 @@
 //! Messages for ROS 2 itself to read, and back: run by `tests/ros2/check`, which names the folder.
 
 use super::super::super::tests::bytes_of;
-use super::super::super::{Field, bytes_to_json, data, json_schema, to_json, type_hash};
+use super::super::super::{Field, Reader, bytes_to_json, json_schema, to_json, type_hash};
 use super::of_each_ros_payload;
 use super::random::Random;
 use crate::message::{Payload, RosMessage, Schema, Stamped};
@@ -76,7 +76,8 @@ fn is_read<T: Payload + RosMessage>(name: &str, cdr: &str, expected: &str) -> bo
     let bytes: Result<Vec<u8>, _> =
         (0..cdr.len()).step_by(2).map(|at| u8::from_str_radix(&cdr[at..at + 2], 16)).collect();
     let bytes = bytes.expect("they are digits");
-    let message = data(&bytes).and_then(|mut data| T::Message::read(&mut data)).expect("ROS has written it");
+    let message =
+        Reader::of_message(&bytes).and_then(|mut data| T::Message::read(&mut data)).expect("ROS has written it");
     assert_eq!(hex(&bytes_of(&message)), expected, "{name}: {}", to_json(&message));
     true
 }

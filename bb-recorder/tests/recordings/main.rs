@@ -1,7 +1,0 @@
-//! Runs of a small robot, recorded and read back.
-
-mod damage;
-mod kill;
-mod robot;
-mod ros;
-mod round_trip;

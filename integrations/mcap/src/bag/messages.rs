@@ -1,0 +1,295 @@
+//! The messages of chosen topics, one by one.
+
+use crate::error::{RecordingError, RecordingErrorKind};
+use crate::file::{Channels, Record, Records, full_name, unpack};
+use bb_core::message::codec::ros::Header;
+use bb_core::message::codec::{Reader, Shape, decode, decode_as_ros};
+use bb_core::message::{DecodeError, Field};
+use bb_core::{Payload, Stamped, WallTime};
+use std::collections::HashMap;
+use std::fmt;
+use std::iter::FusedIterator;
+use std::path::Path;
+use std::sync::Arc;
+
+/// One message of a bag.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct BagMessage {
+    /// The topic it was published on; the same allocation for every message of the topic.
+    pub topic: Arc<str>,
+    /// Its type in the full spelling, as `sensor_msgs/msg/Imu`.
+    pub schema: Arc<str>,
+    /// When the recorder received it, in nanoseconds of the recorder's clock, mostly since 1970. When its values
+    /// held is in the header.
+    pub log_time_ns: u64,
+    /// As the type says, in CDR; unpacked, if the message was packed by itself.
+    pub data: Vec<u8>,
+    path: Arc<Path>,
+    /// Its number on its topic, from 1.
+    number: u64,
+    /// Where its record starts, or the chunk that holds it.
+    byte: u64,
+}
+
+impl BagMessage {
+    pub(super) fn new(
+        topic: &Arc<str>,
+        schema: &Arc<str>,
+        log_time_ns: u64,
+        data: Vec<u8>,
+        path: &Arc<Path>,
+        number: u64,
+        byte: u64,
+    ) -> Self {
+        let (topic, schema, path) = (Arc::clone(topic), Arc::clone(schema), Arc::clone(path));
+        Self { topic, schema, log_time_ns, data, path, number, byte }
+    }
+
+    /// The payload and the time in the header of a message that ROS has for payloads `T`; see the table in
+    /// [`bb_core::message::codec::ros`].
+    ///
+    /// # Errors
+    /// The message is of another type, or its bytes are damaged.
+    pub fn payload<T: Payload>(&self) -> Result<(T, WallTime), RecordingError> {
+        let wanted = Stamped::<T>::ros_name().unwrap_or(T::NAME);
+        self.read(wanted, decode_as_ros)
+    }
+
+    /// The message as a type that has ROS's fields and, by `#[payload(name = "package/Name")]`, ROS's name.
+    ///
+    /// # Errors
+    /// The message is of another type, or its bytes are damaged.
+    pub fn decode<M: Field>(&self) -> Result<M, RecordingError> {
+        let wanted = match M::SHAPE {
+            Shape::Struct(shape) => shape.name,
+            _ => "",
+        };
+        self.read(wanted, decode)
+    }
+
+    /// The header that the message begins with, as most do: the time and the frame of its values.
+    ///
+    /// # Errors
+    /// Its bytes are no header.
+    pub fn header(&self) -> Result<Header, RecordingError> {
+        Reader::of_message(&self.data)
+            .and_then(|mut reader| Header::read(&mut reader))
+            .map_err(|error| self.fault(error))
+    }
+
+    fn read<T>(
+        &self,
+        wanted: &str,
+        read: impl FnOnce(&[u8]) -> Result<T, DecodeError>,
+    ) -> Result<T, RecordingError> {
+        if !is_named(&self.schema, wanted) {
+            let topic = self.topic.to_string();
+            let kind =
+                RecordingErrorKind::OtherType { topic, schema: self.schema.to_string(), wanted: full_name(wanted) };
+            return Err(RecordingError::new(&self.path, kind));
+        }
+        read(&self.data).map_err(|error| self.fault(error))
+    }
+
+    fn fault(&self, fault: impl ToString) -> RecordingError {
+        let kind = RecordingErrorKind::Payload {
+            topic: self.topic.to_string(),
+            schema: self.schema.to_string(),
+            message: self.number,
+            log_time_ns: self.log_time_ns,
+            byte: self.byte,
+            fault: fault.to_string(),
+        };
+        RecordingError::new(&self.path, kind)
+    }
+}
+
+/// Whether `schema`, in the full spelling, is the type `name`: `sensor_msgs/msg/Imu` is `sensor_msgs/Imu`.
+fn is_named(schema: &str, name: &str) -> bool {
+    schema == name
+        || name.split_once('/').is_some_and(|(package, name)| {
+            let rest = schema.strip_prefix(package).and_then(|rest| rest.strip_prefix("/msg/"));
+            rest == Some(name)
+        })
+}
+
+/// The messages of chosen topics in the order of the file; see [`Bag::messages`](crate::Bag::messages).
+///
+/// After an error of the file there is nothing more. A message whose payload is malformed is an error only where it is
+/// decoded.
+pub struct BagMessages {
+    path: Arc<Path>,
+    /// `None` once it is over, which closes the file.
+    records: Option<Records>,
+    channels: Channels,
+    wanted: Vec<Wanted>,
+    /// What is read instead of records, in a bag that is a database.
+    #[cfg(feature = "sqlite")]
+    rows: Option<super::sqlite::Rows>,
+    /// What to do with the messages of each channel met so far; `None` for those that are not wanted.
+    routes: HashMap<u16, Option<Route>>,
+}
+
+/// A topic that was chosen.
+#[derive(Debug)]
+pub(crate) struct Wanted {
+    pub(crate) topic: Arc<str>,
+    /// How many messages there are at least, by the summary.
+    pub(crate) expected: u64,
+    /// How many there have been.
+    pub(crate) count: u64,
+}
+
+/// A channel of a wanted topic.
+struct Route {
+    /// Index into the wanted topics.
+    topic: usize,
+    schema: Arc<str>,
+}
+
+impl BagMessages {
+    pub(crate) fn open(path: &Path, wanted: Vec<Wanted>) -> Result<Self, RecordingError> {
+        #[cfg(feature = "sqlite")]
+        if super::sqlite::is_database(path) {
+            let rows = super::sqlite::Rows::open(path, &wanted).map_err(|kind| RecordingError::new(path, kind))?;
+            return Ok(Self { rows: Some(rows).filter(|_| !wanted.is_empty()), ..Self::of(path, None, wanted) });
+        }
+        let records = Records::open(path).map_err(|kind| RecordingError::new(path, kind))?;
+        let records = Some(records).filter(|_| !wanted.is_empty());
+        Ok(Self::of(path, records, wanted))
+    }
+
+    fn of(path: &Path, records: Option<Records>, wanted: Vec<Wanted>) -> Self {
+        Self {
+            path: path.into(),
+            records,
+            channels: Channels::default(),
+            wanted,
+            #[cfg(feature = "sqlite")]
+            rows: None,
+            routes: HashMap::new(),
+        }
+    }
+
+    fn step(&mut self) -> Result<Option<BagMessage>, RecordingErrorKind> {
+        #[cfg(feature = "sqlite")]
+        if let Some(rows) = &mut self.rows {
+            return rows.next(&self.path, &mut self.wanted);
+        }
+        let Some(records) = &mut self.records else {
+            return Ok(None);
+        };
+        while records.advance()? {
+            let record = records.record()?;
+            let Record::Message { channel, log_time, data, .. } = record else {
+                self.channels.define(record).map_err(|fault| records.corrupt(fault))?;
+                continue;
+            };
+            let route = match self.routes.get(&channel) {
+                Some(route) => route,
+                None => {
+                    let route = match self.channels.get(channel) {
+                        None => {
+                            return Err(records.corrupt(format!("a message of the unknown channel {channel}")));
+                        }
+                        Some(c) => match self.wanted.iter().position(|wanted| wanted.topic == c.topic) {
+                            None => None,
+                            Some(topic) => {
+                                check(&c.topic, &c.encoding)?;
+                                Some(Route { topic, schema: Arc::clone(&c.schema) })
+                            }
+                        },
+                    };
+                    self.routes.entry(channel).or_insert(route)
+                }
+            };
+            let Some(route) = route else { continue };
+            let Wanted { topic, count, .. } = &mut self.wanted[route.topic];
+            *count += 1;
+            let data = unpack(data).map_err(|fault| RecordingErrorKind::Payload {
+                topic: topic.to_string(),
+                schema: route.schema.to_string(),
+                message: *count,
+                log_time_ns: log_time,
+                byte: records.byte(),
+                fault,
+            })?;
+            let data = data.into_owned();
+            let byte = records.byte();
+            return Ok(Some(BagMessage::new(topic, &route.schema, log_time, data, &self.path, *count, byte)));
+        }
+        // The length of a chunk and that it is one are covered by no checksum. Damage there can hide the chunk, and
+        // only the summary knows.
+        match self.wanted.iter().find(|wanted| wanted.count < wanted.expected) {
+            Some(Wanted { topic, expected, count }) => {
+                Err(records.corrupt(format!("it ends with {count} of the {expected} messages on {topic}")))
+            }
+            None => Ok(None),
+        }
+    }
+}
+
+impl Iterator for BagMessages {
+    type Item = Result<BagMessage, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let item = self.step().map_err(|kind| RecordingError::new(&self.path, kind)).transpose();
+        if !matches!(item, Some(Ok(_))) {
+            self.records = None;
+            #[cfg(feature = "sqlite")]
+            {
+                self.rows = None;
+            }
+        }
+        item
+    }
+}
+
+impl FusedIterator for BagMessages {}
+
+impl fmt::Debug for BagMessages {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let at = self.records.as_ref().map(Records::byte);
+        f.debug_struct("BagMessages")
+            .field("path", &self.path)
+            .field("topics", &self.wanted)
+            .field("byte", &at)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Whether messages of this topic can be read.
+pub(crate) fn check(topic: &str, encoding: &str) -> Result<(), RecordingErrorKind> {
+    match encoding {
+        "cdr" => Ok(()),
+        _ => Err(RecordingErrorKind::Encoding { topic: topic.into(), encoding: encoding.into() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_iterator_can_go_to_another_thread() {
+        fn check<T: Send + 'static>() {}
+        check::<BagMessages>();
+        check::<BagMessage>();
+    }
+
+    #[test]
+    fn types_are_compared_in_both_spellings() {
+        assert!(is_named("sensor_msgs/msg/Imu", "sensor_msgs/Imu"));
+        assert!(is_named("sensor_msgs/msg/Imu", "sensor_msgs/msg/Imu"));
+        assert!(!is_named("sensor_msgs/msg/Imu", "sensor_msgs/Im"));
+        assert!(!is_named("sensor_msgs/msg/Imu", "geometry_msgs/Imu"));
+    }
+
+    #[test]
+    fn only_cdr_is_read() {
+        assert!(check("/imu", "cdr").is_ok());
+        let said = check("/imu", "ros1").expect_err("it is not CDR").to_string();
+        assert!(said.starts_with("the messages of /imu are encoded as `ros1`"), "{said}");
+    }
+}

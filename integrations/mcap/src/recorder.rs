@@ -1,0 +1,437 @@
+//! Writes what a subscription gets.
+
+mod background;
+mod frames;
+mod names;
+mod options;
+#[cfg(test)]
+mod tests;
+mod viewers;
+
+pub use background::BackgroundRecorder;
+pub(crate) use options::LIBRARY;
+pub use options::{Compression, RecorderOptions};
+
+use crate::clock::{CLOCK, Clock};
+use crate::error::{RecordingError, RecordingErrorKind, create_error, write_error};
+use crate::file::LIMIT;
+use crate::layout::{Description, Layout, Shared};
+use bb_core::message::codec::encode;
+use bb_core::message::codec::ros::{Text, TransformsMessage};
+use bb_core::message::{Schema, Stamp};
+use bb_core::{DynamicMessage, DynamicSubscription, WallTime};
+use frames::Frames;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{McapError, Writer};
+use names::Names;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+use viewers::{describe, latched, nanos, view};
+
+/// Where a recording goes.
+pub(crate) trait Output: Write + Seek + Send {}
+impl<T: Write + Seek + Send> Output for T {}
+
+/// The name of the attachment with the robot as URDF.
+pub(crate) const URDF: &str = "robot.urdf";
+/// The name of the metadata that tell which robot it is.
+pub(crate) const ROBOT: &str = "bb.robot";
+/// The name of the metadata at the end.
+pub(crate) const END: &str = "bb.recorder";
+
+/// What has been recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct RecorderReport {
+    /// Messages written.
+    pub messages: u64,
+    /// Messages that the operating system has: they survive the death of the process.
+    pub flushed: u64,
+    /// Messages lost since the recorder was too slow for the room that its subscription has.
+    pub lost: u64,
+    /// Messages left out since they have more than 128 MiB, which no chunk that is read back may hold.
+    pub too_large: u64,
+}
+
+/// Writes what a subscription gets into a file, when its owner says so ([`drain`](Self::drain): on virtual time) or on a
+/// thread of its own ([`spawn`](Self::spawn)). Dropping it ends the file.
+pub struct Recorder {
+    path: PathBuf,
+    /// None once the file has its end, or an error came.
+    writer: Option<Box<FileWriter>>,
+    /// The same file, to wait for the disk.
+    to_sync: Option<File>,
+    subscription: DynamicSubscription,
+    options: RecorderOptions,
+    channels: HashMap<&'static str, Channel>,
+    report: RecorderReport,
+    last_flush: Instant,
+    names: Names,
+    frames: Option<Frames>,
+    /// Known from the first message on; the frames and the URDF are written with it, since they have its time.
+    clock: Option<Clock>,
+    transforms: Option<Viewed>,
+    bytes: Bytes,
+}
+
+struct Channel {
+    id: u16,
+    layout: Layout,
+    shared: Shared,
+    beside: Option<u16>,
+    companion: Option<u16>,
+    sequence: u32,
+}
+
+/// A channel for viewers.
+struct Viewed {
+    id: u16,
+    sequence: u32,
+}
+
+/// A message as bytes; kept for the room that they have.
+#[derive(Default)]
+struct Bytes {
+    main: Vec<u8>,
+    beside: Vec<u8>,
+    companion: Vec<u8>,
+}
+
+/// The largest message that is written, in bytes: with what is beside it, a chunk must not exceed what is read.
+const LARGEST: usize = LIMIT as usize / 2;
+
+impl Recorder {
+    /// Creates the file `path` for what `subscription` gets.
+    ///
+    /// # Errors
+    /// The file exists already, or cannot be created; or two of the paths publish different types that would have one name
+    /// in the file.
+    pub fn new(
+        path: impl AsRef<Path>,
+        subscription: DynamicSubscription,
+        options: RecorderOptions,
+    ) -> Result<Self, RecordingError> {
+        let path = path.as_ref();
+        let create = |cause: io::Error| RecordingError::new(path, create_error(cause));
+        let file = File::create_new(path).map_err(create)?;
+        let to_sync = if options.sync { Some(file.try_clone().map_err(create)?) } else { None };
+        let recorder = Self::on(path, Box::new(file), to_sync, subscription, options);
+        recorder.inspect_err(|_| {
+            // It is empty, and another attempt needs its name.
+            let _ = std::fs::remove_file(path);
+        })
+    }
+
+    pub(crate) fn on(
+        file: &Path,
+        output: Box<dyn Output>,
+        to_sync: Option<File>,
+        subscription: DynamicSubscription,
+        options: RecorderOptions,
+    ) -> Result<Self, RecordingError> {
+        let fail = |error| RecordingError::new(file, write_error(0, error));
+        // Before the run rather than at the first message: nobody looks at a recorder's errors then.
+        let mut names = Names::default();
+        for (path, schemas) in subscription.schemas() {
+            let mut schemas = schemas.iter();
+            schemas
+                .try_for_each(|schema| names.take(path, schema))
+                .map_err(|kind| RecordingError::new(file, kind))?;
+        }
+        let robot = options.robot.as_ref().filter(|_| options.transforms);
+        let frames = robot.map(|robot| Frames::new(robot.topology, options.body.clone()));
+        let mut writer = options.mcap().create(BufWriter::new(output)).map_err(fail)?;
+        describe(&mut writer, &options).and_then(|()| writer.flush()).map_err(fail)?;
+        Ok(Self {
+            path: file.to_owned(),
+            writer: Some(Box::new(writer)),
+            to_sync,
+            subscription,
+            options,
+            channels: HashMap::new(),
+            report: RecorderReport::default(),
+            last_flush: Instant::now(),
+            names,
+            frames,
+            clock: None,
+            transforms: None,
+            bytes: Bytes::default(),
+        })
+    }
+
+    /// Writes all messages that wait now; how many.
+    ///
+    /// # Errors
+    /// The file cannot be written on, the disk is full say. Nothing more is recorded then.
+    pub fn drain(&mut self) -> Result<u64, RecordingError> {
+        let before = self.report.messages;
+        for _ in 0..self.subscription.waiting() {
+            let Some(message) = self.subscription.try_recv() else { break };
+            self.record(&message)?;
+        }
+        self.flush_if_due()?;
+        Ok(self.report.messages - before)
+    }
+
+    /// Hands all that is written to the operating system.
+    ///
+    /// # Errors
+    /// The file cannot be written on.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.guarded(|recorder, writer| {
+            writer.flush()?;
+            if let Some(file) = &recorder.to_sync {
+                file.sync_data()?;
+            }
+            Ok(())
+        })?;
+        self.report.flushed = self.report.messages;
+        self.last_flush = Instant::now();
+        Ok(())
+    }
+
+    /// What has been recorded so far.
+    pub fn report(&self) -> RecorderReport {
+        RecorderReport { lost: self.subscription.lagged(), ..self.report }
+    }
+
+    /// Writes what waits, and the end of the file.
+    ///
+    /// # Errors
+    /// The file cannot be written on.
+    pub fn finish(mut self) -> Result<RecorderReport, RecordingError> {
+        self.end()?;
+        Ok(self.report())
+    }
+
+    /// Writes on a thread of its own from now on.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn spawn(self) -> Result<BackgroundRecorder, RecordingError> {
+        BackgroundRecorder::new(self)
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Waits for a message, and writes it and all that wait after it.
+    pub(crate) fn work(&mut self, wait: Duration) -> Result<(), RecordingError> {
+        if let Some(message) = self.subscription.recv_timeout(wait.min(self.options.flush_interval)) {
+            self.record(&message)?;
+        }
+        self.drain().map(drop)
+    }
+
+    fn record(&mut self, message: &DynamicMessage) -> Result<(), RecordingError> {
+        let is_written = self.guarded(|recorder, writer| recorder.write(message, writer))?;
+        match is_written {
+            true => self.report.messages += 1,
+            false => self.report.too_large += 1,
+        }
+        self.flush_if_due()
+    }
+
+    fn flush_if_due(&mut self) -> Result<(), RecordingError> {
+        let unflushed = self.report.messages - self.report.flushed;
+        let is_due = unflushed >= self.options.flush_messages.max(1)
+            || (unflushed > 0 && self.last_flush.elapsed() >= self.options.flush_interval);
+        if is_due { self.flush() } else { Ok(()) }
+    }
+
+    /// Calls `write` unless an error came before; after one, nothing more is written.
+    fn guarded<T>(
+        &mut self,
+        write: impl FnOnce(&mut Self, &mut FileWriter) -> Result<T, WriteFault>,
+    ) -> Result<T, RecordingError> {
+        let Some(mut writer) = self.writer.take() else {
+            return Err(RecordingError::new(&self.path, RecordingErrorKind::GivenUp));
+        };
+        match write(self, &mut writer) {
+            Ok(value) => {
+                self.writer = Some(writer);
+                Ok(value)
+            }
+            Err(WriteFault::File(error)) => {
+                Err(RecordingError::new(&self.path, write_error(self.report.messages, error)))
+            }
+            Err(WriteFault::Message(kind)) => Err(RecordingError::new(&self.path, kind)),
+        }
+    }
+
+    /// Writes a message, and what viewers are told by it; false, and nothing, if it is too large.
+    fn write(&mut self, message: &DynamicMessage, writer: &mut FileWriter) -> Result<bool, WriteFault> {
+        let stamp = message.stamp();
+        let clock = match self.clock {
+            Some(clock) => clock,
+            None => self.begin(&stamp, writer)?,
+        };
+        let wall_time = clock.recorded(stamp.wall_time);
+        let dated;
+        let message = match wall_time == stamp.wall_time {
+            true => message,
+            false => {
+                dated = message.at_wall_time(wall_time);
+                &dated
+            }
+        };
+        let channel = match self.channels.entry(message.path()) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let layout = if message.ros_schema().is_some() { Layout::Ros } else { Layout::Exact };
+                let shared = Shared::of(&stamp);
+                let id = add(writer, &mut self.names, &Description::of(message, layout, &shared))?;
+                entry.insert(Channel { id, layout, shared, beside: None, companion: None, sequence: 0 })
+            }
+        };
+        let Bytes { main, beside, companion } = &mut self.bytes;
+        for bytes in [&mut *main, beside, companion] {
+            bytes.clear();
+        }
+        match channel.layout {
+            Layout::Ros => {
+                message.encode_as_ros(main);
+                message.encode_companion(companion);
+                if !channel.shared.gives(&clock, &stamp) || !message.is_exact_as_ros() {
+                    message.encode(beside);
+                }
+            }
+            _ => message.encode(main),
+        }
+        if main.len() + beside.len() + companion.len() > LARGEST {
+            return Ok(false);
+        }
+        let (sequence, log_time) = (channel.sequence, nanos(wall_time));
+        channel.sequence = sequence.wrapping_add(1);
+        let header = |channel_id| MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        for (layout, id, bytes) in
+            [(Layout::Beside, &mut channel.beside, beside), (Layout::Companion, &mut channel.companion, companion)]
+        {
+            if bytes.is_empty() {
+                continue;
+            }
+            let id = match *id {
+                Some(id) => id,
+                None => {
+                    let description = Description::of(message, layout, &channel.shared);
+                    *id.insert(add(writer, &mut self.names, &description)?)
+                }
+            };
+            writer.write_to_known_channel(&header(id), bytes)?;
+        }
+        writer.write_to_known_channel(&header(channel.id), main)?;
+        if let Some(frames) = &mut self.frames {
+            let told = frames.told(message);
+            self.transform(&told, log_time, writer)?;
+        }
+        Ok(true)
+    }
+
+    /// What comes before the first message, with its time.
+    fn begin(&mut self, first: &Stamp, writer: &mut FileWriter) -> Result<Clock, WriteFault> {
+        let today = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let today = WallTime::from_unix_nanos(i64::try_from(today.as_nanos()).unwrap_or(0));
+        let clock = *self.clock.insert(Clock::of(first, today));
+        writer.write_metadata(&Metadata { name: CLOCK.to_owned(), metadata: clock.to_metadata() })?;
+        let Some(robot) = &self.options.robot else { return Ok(clock) };
+        let time = clock.recorded(first.wall_time);
+        latched(writer, "/robot_description", time, &Text { data: robot.urdf.clone() })?;
+        latched(writer, "/tf_static", time, &TransformsMessage::fixed(robot.topology, time))?;
+        if let Some(frames) = &self.frames {
+            let at_rest = TransformsMessage::moving(robot.topology, frames.at_rest(), time);
+            self.transform(&at_rest, nanos(time), writer)?;
+        }
+        Ok(clock)
+    }
+
+    /// Writes transforms to `/tf`, if there are any.
+    fn transform(
+        &mut self,
+        transforms: &TransformsMessage,
+        log_time: u64,
+        writer: &mut FileWriter,
+    ) -> Result<(), WriteFault> {
+        if transforms.transforms.is_empty() {
+            return Ok(());
+        }
+        let channel = match &mut self.transforms {
+            Some(channel) => channel,
+            None => {
+                let id = view::<TransformsMessage>(writer, "/tf", "")?;
+                self.transforms.insert(Viewed { id, sequence: 0 })
+            }
+        };
+        let header =
+            MessageHeader { channel_id: channel.id, sequence: channel.sequence, log_time, publish_time: log_time };
+        channel.sequence = channel.sequence.wrapping_add(1);
+        self.bytes.main.clear();
+        encode(transforms, &mut self.bytes.main);
+        Ok(writer.write_to_known_channel(&header, &self.bytes.main)?)
+    }
+
+    fn end(&mut self) -> Result<(), RecordingError> {
+        self.drain()?;
+        let report = self.report();
+        self.guarded(|_, writer| {
+            let counts = [("messages", report.messages), ("lost", report.lost), ("too_large", report.too_large)];
+            let metadata = counts.map(|(key, count)| (key.to_owned(), count.to_string())).into();
+            writer.write_metadata(&Metadata { name: END.to_owned(), metadata })?;
+            writer.finish()?;
+            Ok(())
+        })?;
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        let mut file = writer.into_inner();
+        let ended = file.flush().and_then(|()| self.to_sync.as_ref().map_or(Ok(()), File::sync_all));
+        self.report.flushed = report.messages;
+        ended.map_err(|cause| {
+            RecordingError::new(&self.path, RecordingErrorKind::Write { messages: report.messages, cause })
+        })
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if self.writer.is_some() {
+            // There is nobody to tell.
+            let _ = self.end();
+        }
+    }
+}
+
+impl std::fmt::Debug for Recorder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Recorder").field("path", &self.path).field("report", &self.report()).finish_non_exhaustive()
+    }
+}
+
+type FileWriter = Writer<BufWriter<Box<dyn Output>>>;
+
+/// Why nothing more is written.
+enum WriteFault {
+    File(McapError),
+    Message(RecordingErrorKind),
+}
+
+impl From<McapError> for WriteFault {
+    fn from(error: McapError) -> Self {
+        Self::File(error)
+    }
+}
+
+impl From<io::Error> for WriteFault {
+    fn from(error: io::Error) -> Self {
+        Self::File(error.into())
+    }
+}
+
+fn add(writer: &mut FileWriter, names: &mut Names, channel: &Description) -> Result<u16, WriteFault> {
+    let Description { topic, path, schema, metadata } = channel;
+    names.take(path, schema).map_err(WriteFault::Message)?;
+    let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
+    Ok(writer.add_channel(schema, topic, Schema::MESSAGE_ENCODING, metadata)?)
+}

@@ -1,0 +1,114 @@
+//! A recorder on a thread of its own.
+
+use super::{Recorder, RecorderReport};
+use crate::error::{RecordingError, RecordingErrorKind};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How long the thread waits for a message before it looks whether it shall stop.
+const WAIT: Duration = Duration::from_millis(20);
+
+/// A recorder that writes on a thread of its own until it is stopped or dropped.
+#[derive(Debug)]
+pub struct BackgroundRecorder {
+    path: PathBuf,
+    thread: Option<JoinHandle<Result<RecorderReport, RecordingError>>>,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    stop: AtomicBool,
+    messages: AtomicU64,
+    flushed: AtomicU64,
+    lost: AtomicU64,
+    too_large: AtomicU64,
+}
+
+impl BackgroundRecorder {
+    pub(crate) fn new(recorder: Recorder) -> Result<Self, RecordingError> {
+        let path = recorder.path().to_owned();
+        let shared = Arc::new(Shared::default());
+        let theirs = Arc::clone(&shared);
+        // If no thread starts, the recorder comes back, so that it is dropped here with its file ended.
+        let recorder = Arc::new(Mutex::new(Some(recorder)));
+        let handed = Arc::clone(&recorder);
+        let thread = std::thread::Builder::new().name("recorder".into()).spawn(move || {
+            let recorder = handed.lock().unwrap_or_else(PoisonError::into_inner).take();
+            recorder.map_or(Ok(RecorderReport::default()), |recorder| run(recorder, &theirs))
+        });
+        match thread {
+            Ok(thread) => Ok(Self { path, thread: Some(thread), shared }),
+            Err(cause) => {
+                let kind = RecordingErrorKind::Thread(format!("cannot be started: {cause}"));
+                Err(RecordingError::new(&path, kind))
+            }
+        }
+    }
+
+    /// What has been recorded so far.
+    pub fn report(&self) -> RecorderReport {
+        self.shared.report()
+    }
+
+    /// Whether it still writes; if not before it is stopped, an error came, which [`stop`](Self::stop) tells.
+    pub fn is_running(&self) -> bool {
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// Writes what waits, and the end of the file.
+    ///
+    /// # Errors
+    /// The file could not be written on, now or before.
+    pub fn stop(mut self) -> Result<RecorderReport, RecordingError> {
+        self.end().unwrap_or_else(|| Ok(self.report()))
+    }
+
+    fn end(&mut self) -> Option<Result<RecorderReport, RecordingError>> {
+        self.shared.stop.store(true, Ordering::Release);
+        let thread = self.thread.take()?;
+        let panicked = |_| {
+            let kind = RecordingErrorKind::Thread("has panicked".into());
+            Err(RecordingError::new(&self.path, kind))
+        };
+        Some(thread.join().unwrap_or_else(panicked))
+    }
+}
+
+impl Drop for BackgroundRecorder {
+    fn drop(&mut self) {
+        // There is nobody to tell.
+        let _ = self.end();
+    }
+}
+
+impl Shared {
+    fn report(&self) -> RecorderReport {
+        RecorderReport {
+            messages: self.messages.load(Ordering::Acquire),
+            flushed: self.flushed.load(Ordering::Acquire),
+            lost: self.lost.load(Ordering::Acquire),
+            too_large: self.too_large.load(Ordering::Acquire),
+        }
+    }
+
+    fn tell(&self, report: RecorderReport) {
+        self.messages.store(report.messages, Ordering::Release);
+        self.flushed.store(report.flushed, Ordering::Release);
+        self.lost.store(report.lost, Ordering::Release);
+        self.too_large.store(report.too_large, Ordering::Release);
+    }
+}
+
+fn run(mut recorder: Recorder, shared: &Shared) -> Result<RecorderReport, RecordingError> {
+    while !shared.stop.load(Ordering::Acquire) {
+        recorder.work(WAIT)?;
+        shared.tell(recorder.report());
+    }
+    let report = recorder.finish()?;
+    shared.tell(report);
+    Ok(report)
+}

@@ -1,0 +1,97 @@
+//! How a recording is written.
+
+use bb_core::Robot;
+use bb_core::topology::Topology;
+use mcap::WriteOptions;
+use std::time::Duration;
+
+/// How chunks are packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Compression {
+    /// Not at all.
+    None,
+    /// Fast.
+    #[default]
+    Lz4,
+    /// Small.
+    Zstd,
+}
+
+/// How a recording is written.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct RecorderOptions {
+    /// After so many messages they are handed to the operating system, so that the death of the process does not lose
+    /// them. Small: larger files and more calls; large: more is lost. Default: 100.
+    pub flush_messages: u64,
+    /// After so much time likewise, if anything has come. Default: 200 ms.
+    pub flush_interval: Duration,
+    /// Whether each flush also waits until the disk has it, so that a loss of power does not lose it. Default: no.
+    pub sync: bool,
+    /// How chunks are packed. Default: lz4.
+    pub compression: Compression,
+    /// The largest chunk, in bytes; a flush ends one as well. Default: 1 MiB.
+    pub chunk_bytes: u64,
+    /// Whether joints that move, poses and orientations are written as transforms to `/tf` as well, of a robot that the
+    /// recorder was told. Default: yes.
+    pub transforms: bool,
+    /// The path whose poses or orientations place the robot's root link in `world`, on `/tf`. Default: the first that
+    /// publishes poses of the root link, or orientations as long as none does.
+    pub body: Option<String>,
+    /// Whose frames, URDF and name are written. Default: none.
+    pub(crate) robot: Option<Described>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Described {
+    pub(crate) name: &'static str,
+    pub(crate) topology: &'static Topology,
+    pub(crate) urdf: String,
+}
+
+impl Default for RecorderOptions {
+    fn default() -> Self {
+        Self {
+            flush_messages: 100,
+            flush_interval: Duration::from_millis(200),
+            sync: false,
+            compression: Compression::default(),
+            chunk_bytes: 1 << 20,
+            transforms: true,
+            body: None,
+            robot: None,
+        }
+    }
+}
+
+impl RecorderOptions {
+    /// The defaults, with the frames, the URDF and the name of a robot.
+    pub fn of<R: Robot>() -> Self {
+        let robot = Described { name: R::NAME, topology: R::TOPOLOGY, urdf: R::to_urdf() };
+        Self { robot: Some(robot), ..Self::default() }
+    }
+
+    pub(crate) fn mcap(&self) -> WriteOptions {
+        let compression = match self.compression {
+            Compression::None => None,
+            Compression::Lz4 => Some(mcap::Compression::Lz4),
+            Compression::Zstd => Some(mcap::Compression::Zstd),
+        };
+        WriteOptions::new()
+            .profile("ros2")
+            .library(library())
+            .compression(compression)
+            .compression_threads(0)
+            .chunk_size(Some(self.chunk_bytes))
+            // A chunk is put together in memory and written as a whole: a file that breaks off has no half-known chunk.
+            .disable_seeking(true)
+    }
+}
+
+/// What tells recordings of this crate from others.
+pub(crate) const LIBRARY: &str = "bb-mcap";
+
+fn library() -> String {
+    format!("{LIBRARY} {}", env!("CARGO_PKG_VERSION"))
+}

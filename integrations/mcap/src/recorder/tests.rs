@@ -1,0 +1,82 @@
+//! A disk that is full.
+
+use super::*;
+use bb_core::payload::JointState;
+use bb_core::pubsub::{AnyTopic, Topic};
+use bb_core::{Overflow, Select, Stamped, time::MonotonicTime};
+use std::io::{Cursor, SeekFrom};
+use std::sync::{Arc, Mutex};
+
+/// Takes so many bytes.
+struct Disk {
+    taken: Arc<Mutex<Cursor<Vec<u8>>>>,
+    room: usize,
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut taken = self.taken.lock().map_err(|_| io::ErrorKind::Other)?;
+        match self.room.saturating_sub(taken.get_ref().len()) {
+            0 => Err(io::ErrorKind::StorageFull.into()),
+            room => taken.write(&bytes[..bytes.len().min(room)]),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Disk {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.taken.lock().map_err(|_| io::ErrorKind::Other)?.seek(position)
+    }
+}
+
+fn publish(topic: &Topic<JointState>, count: u32) {
+    for number in 0..count {
+        let state = JointState { position: number.into(), velocity: None, effort: None };
+        topic.publish(&Stamped::new(MonotonicTime::from_nanos(number.into()), state));
+    }
+}
+
+#[test]
+fn a_full_disk_is_an_error_that_names_the_file_and_what_was_written_before_is_readable() {
+    let topic = Topic::<JointState>::new("sensor/arm/encoder");
+    let all = DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::default());
+    let taken = Arc::new(Mutex::new(Cursor::new(Vec::new())));
+    let disk = Disk { taken: Arc::clone(&taken), room: 4000 };
+    let options = RecorderOptions { flush_messages: 10, ..RecorderOptions::default() };
+    let mut recorder = Recorder::on(Path::new("full.mcap"), Box::new(disk), None, all, options).expect("it fits");
+    publish(&topic, 1000);
+    let error = recorder.drain().expect_err("it does not fit");
+    assert!(error.to_string().starts_with("full.mcap: cannot be written to after "), "{error}");
+    let flushed = recorder.report().flushed;
+    assert!(flushed > 0 && recorder.report().messages < 1000);
+    publish(&topic, 1);
+    let again = recorder.drain().expect_err("it was given up");
+    assert!(matches!(again.kind(), RecordingErrorKind::GivenUp));
+    assert!(matches!(recorder.finish().expect_err("it was given up").kind(), RecordingErrorKind::GivenUp));
+
+    let file = std::env::temp_dir().join(format!("bb-mcap-full-{}.mcap", std::process::id()));
+    std::fs::write(&file, taken.lock().expect("nobody panicked").get_ref()).expect("there is room here");
+    let recording = crate::Recording::open(&file).expect("it breaks off");
+    let read = recording.messages::<JointState>("sensor/arm/encoder").expect("it was recorded");
+    assert!(read.filter(Result::is_ok).count() as u64 >= flushed);
+    std::fs::remove_file(&file).expect("it is ours");
+}
+
+#[test]
+fn a_recorder_on_a_thread_says_when_it_has_failed() {
+    let topic = Topic::<JointState>::new("sensor/arm/encoder");
+    let all = DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::default());
+    let disk = Disk { taken: Arc::default(), room: 1000 };
+    let recorder = Recorder::on(Path::new("full.mcap"), Box::new(disk), None, all, RecorderOptions::default());
+    let recorder = recorder.and_then(Recorder::spawn).expect("it starts");
+    publish(&topic, 1000);
+    while recorder.is_running() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let error = recorder.stop().expect_err("it does not fit");
+    assert!(matches!(error.kind(), RecordingErrorKind::Write { .. }), "{error}");
+}

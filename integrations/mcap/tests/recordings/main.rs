@@ -1,0 +1,8 @@
+//! Runs of a small robot, recorded and read back.
+
+mod damage;
+mod kill;
+mod robot;
+mod ros;
+mod round_trip;
+mod viewed;
