@@ -4,9 +4,9 @@
 //! of it that is magnetic, or fixed in the world, as iron that the body passes.
 
 use crate::recording::Recording;
-use bb_bags::Truth;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::attitude::ImuSample;
+use bb_mcap::Truth;
 use std::path::Path;
 use std::str::FromStr;
 

@@ -57,7 +57,7 @@ const TOTAL: [[f64; 2]; 6] =
 
 #[test]
 fn hard_recordings_are_no_worse_than_known() -> Result<(), Box<dyn Error>> {
-    let Some(files) = broad() else { return Ok(()) };
+    let Some(files) = broad()? else { return Ok(()) };
     let filter = FILTERS.iter().find(|filter| filter.name == "mekf").ok_or("no such filter")?;
     let mut worse = Vec::new();
     for Known { name, before_motion_s, variants, total } in known()? {
