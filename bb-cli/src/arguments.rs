@@ -33,7 +33,7 @@ enum Command {
 enum Eval {
     /// Plays recordings through attitude filters and prints their errors against the truth.
     #[command(after_help = EXAMPLES)]
-    Attitude(AttitudeArguments),
+    Attitude(Box<AttitudeArguments>),
     /// Plays drives and flights through navigation filters and prints their errors against the truth.
     #[command(after_help = NAVIGATION_EXAMPLES)]
     Navigation(NavigationArguments),
@@ -131,7 +131,7 @@ struct AttitudeArguments {
 /// What to do.
 #[derive(Debug)]
 pub(crate) enum Job {
-    Attitude(Attitude),
+    Attitude(Box<Attitude>),
     Navigation(Navigation),
 }
 
@@ -162,7 +162,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
             return Ok(Job::Navigation(Navigation { data, filters, settings, json }));
         }
     };
-    arguments.check().map(Job::Attitude).map_err(|(kind, fault)| {
+    arguments.check().map(|attitude| Job::Attitude(Box::new(attitude))).map_err(|(kind, fault)| {
         let mut bb = Bb::command();
         bb.build();
         let attitude = bb.find_subcommand_mut("eval").and_then(|eval| eval.find_subcommand_mut("attitude"));
