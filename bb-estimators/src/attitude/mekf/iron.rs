@@ -34,9 +34,9 @@ const EVIDENCE: f64 = 30.0;
 /// And by this part of itself.
 const EVIDENCE_PART: f64 = 0.5;
 
-/// An offset that makes the field another one than before needs more evidence by this factor: disturbances are fixed
-/// in the world.
-const OTHER_FIELD: f64 = 6.0;
+/// An offset that makes the field another one than before needs more evidence by this factor: disturbances are fixed in
+/// the world, and while they last an offset may explain them as well, by errors that are no noise.
+const OTHER_FIELD: f64 = 20.0;
 
 /// To return to an offset that held for long takes less.
 const RETURN: f64 = 1.0 / 3.0;
