@@ -52,7 +52,8 @@ fn neither_keeps_the_robot_from_being_disarmed() -> Result<(), Box<dyn std::erro
     tracing::subscriber::set_global_default(Blocks)?;
     let mut builder = Logged::builder();
     builder.journal(|_| block());
-    let running = builder.start()?;
+    // What blocks would keep it from ending for five seconds; if it is not disarmed, for ever.
+    let running = std::mem::ManuallyDrop::new(builder.start()?);
     assert!(running.arm());
     let live = running.live();
     std::thread::spawn(move || {
@@ -74,7 +75,5 @@ fn neither_keeps_the_robot_from_being_disarmed() -> Result<(), Box<dyn std::erro
     });
     let after = has_stopped.recv_timeout(Duration::from_secs(10))?;
     assert!(after < Duration::from_secs(1), "disarmed after {after:?}");
-    // What blocks would keep it from ending for five seconds.
-    std::mem::forget(running);
     Ok(())
 }
