@@ -100,6 +100,12 @@ impl<T: Payload> Topic<T> {
     /// The same for one of several publishers, of a message that `write` writes into a journal: subscribers receive messages
     /// in the order of their lines. What `write` gives is returned.
     pub(crate) fn publish_as_written<L>(&self, message: &Stamped<T>, write: impl FnOnce() -> L) -> L {
+        if self.listening.load(Ordering::Acquire) == 0 {
+            // Whoever subscribes at this very moment may get it or not.
+            let line = write();
+            self.publish(message);
+            return line;
+        }
         let mut wakers = Wakers::default();
         let order = self.order.lock().unwrap_or_else(PoisonError::into_inner);
         let line = write();
