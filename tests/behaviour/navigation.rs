@@ -392,3 +392,36 @@ fn a_vehicle_in_motion_takes_its_heading_from_its_course_and_leaves_its_origin_b
     assert!(last < 0.003, "{last} rad");
     Ok(())
 }
+
+/// At rest, a start takes a second, the first time and after more than a minute without samples.
+#[test]
+fn a_rover_at_rest_that_was_blind_for_a_minute_starts_again() -> Result<(), StartError> {
+    let builder = Surveyor::builder();
+    let odometry = builder.subscribe(surveyor::estimator::base::navigation::odometry);
+    let mut simulation = builder.simulate()?;
+    let board_from_base = UnitQuaternion::from_euler_angles(PI, 0.0, FRAC_PI_2).inverse();
+    let gravity = board_from_base * Vector3::new(0.0, 0.0, 9.80665);
+    let place = Geodetic::from_degrees(ORIGIN.0, ORIGIN.1, ORIGIN.2);
+    let position = GeodeticPosition {
+        latitude_rad: place.latitude,
+        longitude_rad: place.longitude,
+        altitude: Some(place.height),
+    };
+    let (status, services) = (GnssStatus::Fix, GnssServices::default());
+    let fix = GnssFix { status, services, position: Some(position), position_covariance: None };
+    let mut emitted = [0, 0];
+    for (begin, emitted) in [0_u64, 72_000].into_iter().zip(&mut emitted) {
+        for step in 0..200 {
+            let time = MonotonicTime::ZERO + Duration::from_millis(begin + 10 * step);
+            if step % 20 == 0 {
+                simulation.publish(surveyor::sensor::base::mast::antenna::gnss, time, fix);
+            }
+            let imu = Imu::new(Vector3::zeros(), gravity);
+            simulation.publish(surveyor::sensor::base::bracket::board::imu, time, imu);
+        }
+        *emitted = odometry.drain().count();
+    }
+    // Of two seconds at 100 Hz, those after the first; the sample after the gap only tells of it.
+    assert!((98..=100).contains(&emitted[0]) && (97..=99).contains(&emitted[1]), "{emitted:?}");
+    Ok(())
+}

@@ -101,9 +101,9 @@ impl<T: Payload> Topic<T> {
     /// in the order of their lines. What `write` gives is returned.
     pub(crate) fn publish_as_written<L>(&self, message: &Stamped<T>, write: impl FnOnce() -> L) -> L {
         if self.listening.load(Ordering::Acquire) == 0 {
-            // Whoever subscribes at this very moment may get it or not.
             let line = write();
-            self.publish(message);
+            // A subscription that begins meanwhile does not get it: it might already have got one with a later line.
+            self.published.fetch_add(1, Ordering::Relaxed);
             return line;
         }
         let mut wakers = Wakers::default();

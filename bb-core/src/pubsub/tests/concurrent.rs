@@ -87,3 +87,33 @@ fn whoever_subscribes_at_any_time_receives_every_later_message_once() {
     assert_eq!(published, (PUBLISHERS * EACH) as u64);
     assert!(registry.topics().len() <= (PUBLISHERS + 1) * PATHS);
 }
+
+/// Also one that comes while others publish: what it gets is in the order of the lines, whatever it does not get.
+#[test]
+fn subscribers_receive_messages_in_the_order_of_their_lines() {
+    const EACH: u32 = 20_000;
+    let topic = Topic::new("sensor/arm/encoder");
+    let lines = std::sync::Mutex::new(Vec::new());
+    let publish = |id: u32| {
+        let joint = JointState { position: f64::from(id), velocity: None, effort: None };
+        let message = Stamped::new(MonotonicTime::ZERO, joint);
+        topic.publish_as_written(&message, || lines.lock().expect("nobody panics under it").push(id));
+    };
+    let received: Vec<Vec<u32>> = std::thread::scope(|scope| {
+        let publishers = [0, EACH].map(|first| scope.spawn(move || (first..first + EACH).for_each(publish)));
+        let mut received = Vec::new();
+        while publishers.iter().any(|publisher| !publisher.is_finished()) {
+            let subscription = topic.subscribe(Overflow::DropOldest { capacity: 64 });
+            std::thread::yield_now();
+            received.push(subscription.drain().map(|message| message.payload.position as u32).collect());
+        }
+        received
+    });
+    let lines = lines.into_inner().expect("nobody panicked");
+    assert_eq!(lines.len(), 2 * EACH as usize);
+    let mut place = vec![0; lines.len()];
+    lines.iter().enumerate().for_each(|(line, id)| place[*id as usize] = line);
+    for ids in received {
+        assert!(ids.is_sorted_by_key(|id| place[*id as usize]), "{ids:?}");
+    }
+}
