@@ -39,7 +39,7 @@ impl Word {
 /// What a word sets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Value {
-    /// A number with a unit, or without one where its dimension is none.
+    /// A number with a unit, or without one where it has no dimension.
     Number(Measure, Bounds),
     /// A whole number, both ends included.
     Count { lowest: u32, highest: u32 },

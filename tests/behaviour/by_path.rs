@@ -182,7 +182,7 @@ fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Box<dyn s
     cancelled.cancel();
     simulation.run_until(at(60));
     assert!(cancelled.try_result().is_some_and(|result| result.is_err()));
-    // Nothing stands for the default arguments: no stops.
+    // An empty string means the default arguments: no stops.
     let default = bus.start_command("command/go", "")?;
     simulation.run_until(at(61));
     assert_eq!(result(&default), Some(Ok(r#"{"name":"","stops":0}"#.to_owned())));

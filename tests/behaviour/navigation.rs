@@ -37,7 +37,7 @@ const ANTENNA: Vector3<f64> = Vector3::new(-0.5, 0.2, 1.5);
 const ORIGIN: (f64, f64, f64) = (48.1, 11.6, 520.0);
 const STEP_MILLIS: i64 = 10;
 
-/// Where the rover is at a time: it stands for three seconds, speeds up to 2 m/s along its x axis, east, and then drives on a
+/// Where the rover is at a time: it is at rest for three seconds, speeds up to 2 m/s along its x axis, east, and then drives on a
 /// circle of 20 m.
 struct Truth {
     position: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! A robot on which everything goes wrong that can: what a message says decides what becomes of whoever takes it.
+//! A robot on which everything goes wrong that can: the content of a message decides what happens to the estimator that takes it.
 
 use bb_core::RequestCodec;
 use bb_core::prelude::*;

@@ -145,7 +145,7 @@ impl Bus {
         self.host.commands()
     }
 
-    /// Starts the command at `path` with arguments from JSON; an empty text stands for the default arguments.
+    /// Starts the command at `path` with arguments from JSON; an empty string means the default arguments.
     ///
     /// # Errors
     /// There is no such command, the arguments do not fit its shape, or it is refused.

@@ -61,7 +61,7 @@ pub(crate) struct OwnHooks {
 }
 
 impl OwnHooks {
-    /// `numbers` are those of its callbacks: whoever ends the execution forgets them.
+    /// `numbers` are those of its callbacks, which are removed when the execution ends.
     pub(crate) fn new(
         path: &'static str,
         guardian: Arc<dyn Guardian>,

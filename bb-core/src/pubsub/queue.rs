@@ -184,8 +184,8 @@ impl<M> Queue<M> {
         }
     }
 
-    /// Says that nobody reads it any more. What waits is dropped here, and nothing is added from now on: whoever drops the
-    /// queue itself, under whatever lock, runs no user's code.
+    /// Says that nobody reads it any more. What waits is dropped here, and nothing is added from now on, so that
+    /// dropping the queue itself runs no user code, whatever lock is held.
     pub(super) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Release);
         let mut state = self.lock();

@@ -137,7 +137,7 @@ impl State {
         if self.topics.len() < Registry::MAX_TOPICS {
             return Some(Room::Free);
         }
-        // A publisher, and whoever subscribes at this moment, holds the topic.
+        // Publishers hold the topic, and so does a thread that is subscribing to it.
         let is_used = |made: &Made| {
             Arc::strong_count(&made.topic) > 1 || made.topic.subscribers().iter().any(|one| one.is_typed)
         };

@@ -91,7 +91,7 @@ pub struct SourceStatistics {
     pub path: &'static str,
     /// How often it was read.
     pub readings: u64,
-    /// Readings at its rate that it missed because it, or what lies downstream, took too long.
+    /// Readings at its rate that it missed because it, or what is downstream of it, took too long.
     pub skipped: u64,
     /// How often it was restarted.
     pub restarts: u64,

@@ -15,8 +15,8 @@ pub(crate) struct Door(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {
-    /// Twice the number of those inside, and 1 once it is closed: in one word, so that whoever enters is either seen by the one
-    /// who closes it or sees it closed.
+    /// Twice the number of those inside, and 1 once it is closed: in one word, so that a thread that enters either is
+    /// seen by the one that closes it or finds it closed.
     state: AtomicUsize,
     /// Without a journal nothing has to agree with it, and nobody is counted.
     is_counted: bool,

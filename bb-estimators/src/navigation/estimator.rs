@@ -60,7 +60,7 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 /// ```
 ///
 /// The world is a local tangent frame, x east, y north, z up. Its origin is where the first fix was; without satellites, where
-/// the filter started. It starts once the IMU has lain still for a second, with the heading of the options, or, with
+/// the filter started. It starts once the IMU has been at rest for a second, with the heading of the options, or, with
 /// `heading_from_course`, once fixes show in which direction the robot travels. Until then it emits nothing.
 ///
 /// Measurements are fused at the time of their stamps, up to a second late. A gate for each sensor refuses what does not fit; what

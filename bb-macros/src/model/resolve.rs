@@ -242,7 +242,7 @@ fn texts(root: &str, path: &[Ident]) -> Vec<String> {
     std::iter::once(root.to_owned()).chain(path.iter().map(text)).collect()
 }
 
-/// Of a rate that is none, none: it is refused.
+/// None if the rate is not a valid one, which another rule reports.
 fn period(rate: &Quantity) -> Option<f64> {
     (rate.dimension == Dimension::FREQUENCY && rate.value > 0.0).then(|| 1.0 / rate.value)
 }

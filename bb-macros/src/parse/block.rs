@@ -82,7 +82,7 @@ pub(super) fn items_of(
         }
         let result = match head(input, expected, notes) {
             Ok(Some(head)) => item(head, input, notes),
-            // Nothing follows a comment that is none.
+            // What follows a comment in another language's notation cannot be read.
             Ok(None) => return,
             Err(error) => Err(error),
         };

@@ -46,7 +46,7 @@ impl Input {
     }
 }
 
-/// That no path stands where the name is expected.
+/// The error for a path in place of the input's name.
 fn unnamed(input: ParseStream<'_>) -> syn::Result<()> {
     let Ok(path) = Path::parse(input, "") else { return Ok(()) };
     match &path.0[..] {

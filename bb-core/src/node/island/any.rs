@@ -157,7 +157,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn is_idle(&self) -> bool {
-        // In this order: whoever takes the last entry holds the island before.
+        // In this order: a thread holds the island before it takes the last entry.
         self.pending.load(Ordering::SeqCst) == 0 && self.is_free()
     }
 

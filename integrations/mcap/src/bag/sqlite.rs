@@ -16,7 +16,7 @@ const MAGIC: &[u8] = b"SQLite format 3\0";
 /// How many messages are looked up at once. Their data are read one by one.
 const PAGE: i64 = 1000;
 
-/// Whether a file is a database. One that cannot be read is none, and the reader of MCAP says why.
+/// Whether a file is a database. For one that cannot be read it says no, so that the reader of MCAP reports why.
 pub(super) fn is_database(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
     // Asked before opening: opening a pipe would wait for a writer.

@@ -91,7 +91,7 @@ impl Frames {
 
 const NONE: TransformsMessage = TransformsMessage { transforms: Vec::new() };
 
-/// Where a body is by an estimate of it; none if the message is none, or not a place.
+/// Where a body is by an estimate of it; none if the message is not an estimate of a pose, or is not finite.
 fn place(message: &DynamicMessage) -> Option<(Told, Isometry3<f64>)> {
     let at = |position: Vector3<f64>, rotation: UnitQuaternion<f64>| {
         let is_place = position.iter().all(|value| value.is_finite()) && (rotation.norm() - 1.0).abs() < 0.1;

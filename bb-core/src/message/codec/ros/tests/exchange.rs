@@ -95,6 +95,6 @@ fn messages_from_ros() {
             *count += usize::from(is_read::<T>(texts[0], texts[1], texts[2]));
         }
         of_each_ros_payload!(counted([&name, &cdr, &expected], &mut count));
-        assert!(count > 0, "{name} is none of ours");
+        assert!(count > 0, "{name} is not one of our messages");
     }
 }
