@@ -18,6 +18,7 @@ mod permit;
 mod record;
 mod sensor;
 mod service;
+mod setting;
 
 pub(crate) use crate::fault::Fault;
 pub(crate) use actuator::Accepts;
@@ -40,3 +41,5 @@ pub(crate) use permit::Permit;
 pub use record::RequestCodec;
 pub use sensor::{Next, Reading, Sensor};
 pub use service::Service;
+pub(crate) use setting::quantity;
+pub use setting::{AnyOptions, ByCode, ByText, ByValue, Setting, SettingKind, SettingOf, WithUnit};

@@ -6,6 +6,7 @@ mod graph;
 mod parameter;
 mod quantity;
 mod source;
+pub(crate) mod unit;
 
 pub use command::{Cancel, CommandDeclaration, Role};
 pub use estimator::{

@@ -66,7 +66,8 @@ pub use pubsub::{
 };
 pub use run::{
     ActuatorHandle, Builder, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Live, OutputHandle,
-    ParameterHandle, Replay, ReplayError, Report, Robot, Running, SensorHandle, Simulation, StartError,
+    ParameterHandle, Replay, ReplayError, Report, Robot, Running, SensorHandle, SettingProblem, SettingsError,
+    SettingsList, Simulation, StartError,
 };
 /// Handles of the topics that every robot has: subscribe to them as to any other.
 pub mod system {
@@ -109,8 +110,8 @@ pub mod __private {
         find_output,
     };
     pub use crate::component::{
-        Binding, Command, FieldIndex, FromParameter, FromQuantity, FromText, Input, InputAt, InputField,
-        OptionField, OutputAt, Slot, SyncMiss, declare,
+        AnyOptions, Binding, ByCode, ByText, ByValue, Command, FieldIndex, FromParameter, FromQuantity, FromText,
+        Input, InputAt, InputField, OptionField, OutputAt, Setting, SettingOf, Slot, SyncMiss, WithUnit, declare,
     };
     pub use crate::control::Prepared;
     pub use crate::declaration::{

@@ -71,3 +71,11 @@ pub fn inputs(tokens: TokenStream) -> TokenStream {
 pub fn outputs(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::outputs).into()
 }
+
+/// The units of the language as tables, for the runtime, which reads them in settings: `[UNITS, NAMED, SI]` of
+/// `bb_core::declaration`. Not for users.
+#[doc(hidden)]
+#[proc_macro]
+pub fn unit_tables(_: TokenStream) -> TokenStream {
+    units::tables().into()
+}

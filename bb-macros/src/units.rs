@@ -1,6 +1,7 @@
 //! Units and their dimensions. Everything inside is SI; a unit is a factor to it.
 
-use proc_macro2::{Ident, Span};
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::quote;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{LitInt, Token};
@@ -153,6 +154,24 @@ const UNITS: &[(&str, [i8; 6], f64)] = &[
     ("kPa", [-1, 1, -2, 0, 0, 0], 1e3),
     ("bar", [-1, 1, -2, 0, 0, 0], 1e5),
 ];
+
+/// The tables as constants, for the runtime: a unit in a settings file is one of those in `robot!`.
+pub(crate) fn tables() -> TokenStream {
+    let units = UNITS
+        .iter()
+        .map(|(symbol, [m, kg, s, a, k, rad], factor)| quote!((#symbol, [#m, #kg, #s, #a, #k, #rad], #factor)));
+    let named = NAMED.iter().map(|([m, kg, s, a, k, rad], name)| quote!(([#m, #kg, #s, #a, #k, #rad], #name)));
+    let si = SI.iter().map(|(Dimension([m, kg, s, a, k, rad]), unit)| quote!(([#m, #kg, #s, #a, #k, #rad], #unit)));
+    quote! {
+        /// Symbol, dimension, factor to SI.
+        #[allow(clippy::approx_constant, reason = "a factor is a number here")]
+        const UNITS: &[(&str, [i8; 6], f64)] = &[#(#units),*];
+        /// Dimensions with their names, for messages.
+        const NAMED: &[([i8; 6], &str)] = &[#(#named),*];
+        /// Dimensions with the SI unit that they are shown in.
+        const SI: &[([i8; 6], &str)] = &[#(#si),*];
+    }
+}
 
 /// A time for messages: `250 ms`. Rounded up, so that it is enough where it is said to be.
 pub(crate) fn time_text(seconds: f64) -> String {

@@ -16,14 +16,19 @@ mod sensors;
 mod tests;
 mod timeline;
 
+use bb_core::Builder;
 use clap::Parser;
+use rover::Rover;
 use std::error::Error;
 use std::io::Write;
 use std::process::ExitCode;
 
 /// Stalls the wheels of a rover, unplugs its IMU, and shows what becomes of it.
 #[derive(Debug, Parser)]
-#[command(name = "unplugged")]
+#[command(
+    name = "unplugged",
+    after_help = "Settings of the robot: --config FILE, --set PATH=VALUE, --list, --schema"
+)]
 struct Arguments {
     /// Takes as long as the story does, instead of running on virtual time.
     #[arg(long)]
@@ -31,8 +36,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match tell(&arguments, &mut std::io::stdout().lock()) {
+    match start(&mut std::io::stdout().lock()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         // A reader that has read enough (`| head`) knows that it has not read the end.
@@ -48,9 +52,20 @@ fn is_broken_pipe(error: &std::io::Error) -> bool {
     error.kind() == std::io::ErrorKind::BrokenPipe
 }
 
+/// Takes the robot's settings from the command line, and the story's own arguments from what is left.
+fn start(out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
+    let mut builder = Rover::builder();
+    let mut arguments = std::env::args_os();
+    let program = arguments.next().unwrap_or_default();
+    let Some(others) = builder.take_arguments(arguments)? else { return Ok(true) };
+    let arguments = Arguments::parse_from(std::iter::once(program).chain(others));
+    tell(builder, &arguments, out)
+}
+
 /// Runs the story; whether all of it happened.
-fn tell(arguments: &Arguments, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
-    let lines = if arguments.real_time { run::in_real_time(out)? } else { run::on_virtual_time(out)? };
+fn tell(builder: Builder<Rover>, arguments: &Arguments, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
+    let lines =
+        if arguments.real_time { run::in_real_time(builder, out)? } else { run::on_virtual_time(builder, out)? };
     let missing = expected::missing(&lines);
     if missing.is_empty() {
         writeln!(out, "\nAll that was expected happened, in its order.")?;

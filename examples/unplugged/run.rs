@@ -18,8 +18,7 @@ struct Story<'a> {
     out: &'a mut dyn Write,
 }
 
-pub(crate) fn on_virtual_time(out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
-    let builder = Rover::builder();
+pub(crate) fn on_virtual_time(builder: Builder<Rover>, out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
     let mut story = Story::new(&builder, out)?;
     let mut simulation = builder.simulate()?;
     for (time, deed) in script::steps() {
@@ -31,8 +30,7 @@ pub(crate) fn on_virtual_time(out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn 
     story.end()
 }
 
-pub(crate) fn in_real_time(out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
-    let builder = Rover::builder();
+pub(crate) fn in_real_time(builder: Builder<Rover>, out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
     let mut story = Story::new(&builder, out)?;
     let running = builder.start()?;
     for (time, deed) in script::steps() {

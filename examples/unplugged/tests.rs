@@ -1,5 +1,6 @@
 //! The output is the stored one, and what is missing is named.
 
+use crate::rover::Rover;
 use crate::timeline::{Kind, Line};
 use crate::{Arguments, expected, run, tell};
 use std::error::Error;
@@ -7,9 +8,21 @@ use std::error::Error;
 #[test]
 fn the_story_on_virtual_time_is_the_stored_one() -> Result<(), Box<dyn Error>> {
     let mut out = Vec::new();
-    assert!(tell(&Arguments { real_time: false }, &mut out)?);
+    assert!(tell(Rover::builder(), &Arguments { real_time: false }, &mut out)?);
     // To renew it: cargo run --example unplugged > examples/unplugged/expected.txt
     assert_eq!(String::from_utf8(out)?, include_str!("expected.txt"));
+    Ok(())
+}
+
+/// Its speed is a parameter, so another one is another story.
+#[test]
+fn a_setting_from_outside_takes_effect() -> Result<(), Box<dyn Error>> {
+    let mut builder = Rover::builder();
+    builder.set("command/drive/speed", "0.5 m/s")?;
+    let lines = run::on_virtual_time(builder, &mut std::io::sink())?;
+    let speeds: Vec<&str> =
+        lines.iter().filter(|line| line.kind == Kind::Parameter).map(|line| line.event.as_str()).collect();
+    assert_eq!(speeds.first(), Some(&"speed 0.0 -> 0.5"));
     Ok(())
 }
 
@@ -26,7 +39,7 @@ fn what_the_readme_shows_is_a_part_of_it() {
 
 #[test]
 fn what_has_not_happened_in_its_order_is_missing() -> Result<(), Box<dyn Error>> {
-    let lines = run::on_virtual_time(&mut std::io::sink())?;
+    let lines = run::on_virtual_time(Rover::builder(), &mut std::io::sink())?;
     assert_eq!(expected::missing(&lines), []);
     let without: Vec<Line> = lines.iter().filter(|line| line.event != "drive refused").cloned().collect();
     assert_eq!(expected::missing(&without), [(Kind::Command, "drive refused")]);

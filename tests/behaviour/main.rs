@@ -30,6 +30,7 @@ mod real_time;
 mod replay;
 mod restarts;
 mod safety;
+mod settings;
 mod simulation;
 mod subscriptions;
 mod supervision;

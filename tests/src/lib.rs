@@ -27,3 +27,7 @@ struct BeamBots;
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/recording.md")]
 struct Recording;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/settings.md")]
+struct Settings;

@@ -1,5 +1,6 @@
 //! Typed options with defaults, ranges, units and docs.
 
+use super::Setting;
 use crate::declaration::{Dimension, Range};
 use std::time::Duration;
 
@@ -42,6 +43,12 @@ pub trait Options: Clone + std::fmt::Debug + Send + 'static {
 
     /// Checks every range. The error names the option, its value and what is accepted.
     fn validate(&self) -> Result<(), String>;
+
+    /// The option number `index` of [`Options::FIELDS`], for settings that are read at run time.
+    #[doc(hidden)]
+    fn setting(&mut self, _index: usize) -> Option<Box<dyn Setting + '_>> {
+        None
+    }
 }
 
 /// What is known of one option.
@@ -98,17 +105,27 @@ impl<T: From<&'static str>> FromText for T {
 pub trait FromQuantity {
     /// From its value in SI.
     fn from_quantity(value: f64) -> Self;
+    /// Its value in SI, if it has one.
+    fn to_quantity(&self) -> Option<f64>;
 }
 
 impl FromQuantity for f64 {
     fn from_quantity(value: f64) -> Self {
         value
     }
+
+    fn to_quantity(&self) -> Option<f64> {
+        Some(*self)
+    }
 }
 
 impl FromQuantity for f32 {
     fn from_quantity(value: f64) -> Self {
         value as Self
+    }
+
+    fn to_quantity(&self) -> Option<f64> {
+        Some(f64::from(*self))
     }
 }
 
@@ -118,10 +135,18 @@ impl FromQuantity for Duration {
         let longest = if seconds > 0.0 { Self::MAX } else { Self::ZERO };
         Self::try_from_secs_f64(seconds).unwrap_or(longest)
     }
+
+    fn to_quantity(&self) -> Option<f64> {
+        Some(self.as_secs_f64())
+    }
 }
 
 impl<T: FromQuantity> FromQuantity for Option<T> {
     fn from_quantity(value: f64) -> Self {
         Some(T::from_quantity(value))
+    }
+
+    fn to_quantity(&self) -> Option<f64> {
+        self.as_ref().and_then(T::to_quantity)
     }
 }

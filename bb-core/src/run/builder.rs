@@ -28,10 +28,10 @@ pub(super) type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
 /// A robot that is assembled and not yet started: options may still be changed, and a subscription made here misses
 /// nothing.
 pub struct Builder<R: Robot> {
-    options: R::Options,
+    pub(super) options: R::Options,
     topics: R::Topics,
     system: Arc<SystemTopics>,
-    parameters: Vec<ParameterValue>,
+    pub(super) parameters: Vec<ParameterValue>,
     supervision: Supervision,
     journal: Option<Sink>,
     telemetry: Telemetry,

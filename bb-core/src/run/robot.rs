@@ -1,6 +1,8 @@
 //! What `robot!` implements.
 
+use super::settings::settings_schema;
 use super::{AnyActuator, Assembly, Builder, Source};
+use crate::component::AnyOptions;
 use crate::control::Prepared;
 use crate::declaration::{
     ActuatorDeclaration, CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, SensorDeclaration, graph,
@@ -46,6 +48,10 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// By publisher, how its messages are published again; none for an estimator's.
     #[doc(hidden)]
     const FEEDS: &'static [Option<FeedOf<Self::Wiring>>];
+    /// The options that are bound to a parameter: the number of the component in [`Robot::all_options`], the option's name,
+    /// the number of the parameter.
+    #[doc(hidden)]
+    const BOUND_OPTIONS: &'static [(usize, &'static str, usize)];
 
     /// The options of all components.
     #[doc(hidden)]
@@ -60,6 +66,9 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// The options as declared.
     #[doc(hidden)]
     fn options() -> Self::Options;
+    /// Of all components: sensors, estimators, actuators, services, commands, each in the order of their declaration.
+    #[doc(hidden)]
+    fn all_options(options: &mut Self::Options) -> Vec<&mut dyn AnyOptions>;
     #[doc(hidden)]
     fn topics() -> Self::Topics;
     /// Starts all estimators; what cannot start is kept in `assembly`.
@@ -86,6 +95,12 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// Its topology and dataflow as a picture, in Mermaid or DOT.
     fn graph(format: GraphFormat) -> String {
         graph(format, Self::TOPOLOGY, Self::SENSORS, Self::ESTIMATORS)
+    }
+
+    /// The JSON Schema (draft 2020-12) of its settings, see [`Builder::set`]: options and parameters in nested objects, as a
+    /// TOML file of them is nested.
+    fn settings_schema() -> String {
+        settings_schema::<Self>()
     }
 
     /// Has rustc say how a robot is assembled where `new` is called.

@@ -14,13 +14,15 @@ pub(crate) fn options(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
         return TokenStream::new();
     };
     let (mut schema, mut defaults, mut checks) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
-    for field in named {
+    let mut settings = TokenStream::new();
+    for (index, field) in named.into_iter().enumerate() {
         let option = Attribute::read(field, diagnostics);
         let Some(name) = &field.ident else { continue };
         schema.extend(option.schema(crate::names::text(name), &fields::doc(&field.attrs)));
         let default = option.default_value(field, diagnostics);
         defaults.extend(quote!(#name: #default,));
         checks.extend(option.check(field));
+        settings.extend(option.setting(index, field));
     }
     let name = &item.ident;
     let (generics, arguments, bounds) = item.generics.split_for_impl();
@@ -36,6 +38,18 @@ pub(crate) fn options(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
             fn validate(&self) -> ::core::result::Result<(), ::std::string::String> {
                 #checks
                 ::core::result::Result::Ok(())
+            }
+
+            fn setting(
+                &mut self,
+                index: usize,
+            ) -> ::core::option::Option<::std::boxed::Box<dyn ::bb_core::__private::Setting + '_>> {
+                #[allow(unused_imports)]
+                use ::bb_core::__private::{ByCode as _, ByText as _, ByValue as _, WithUnit as _};
+                match index {
+                    #settings
+                    _ => ::core::option::Option::None,
+                }
             }
         }
     }
@@ -134,6 +148,17 @@ impl Attribute {
                 quote!(::core::default::Default::default())
             }
         }
+    }
+
+    /// `0 => Some((&&&&SettingOf::<f64>::new()).with_unit(Self::FIELDS[0], &mut self.beta)),`
+    fn setting(&self, index: usize, field: &Field) -> TokenStream {
+        let (name, kind) = (&field.ident, &field.ty);
+        let of = quote!((&&&&::bb_core::__private::SettingOf::<#kind>::new()));
+        let setting = match self.unit {
+            Some(_) => quote!(#of.with_unit(<Self as ::bb_core::Options>::FIELDS[#index], &mut self.#name)),
+            None => quote!(#of.plain(&mut self.#name)),
+        };
+        quote!(#index => ::core::option::Option::Some(#setting),)
     }
 
     /// What checks the range at run time.

@@ -62,24 +62,30 @@ pub(super) fn structs(
     }
 }
 
-/// `fn list`, which lists all fields as trait objects.
-pub(super) fn list(name: &str, function: &str, fields: &[Field], object: &TokenStream) -> TokenStream {
+/// `fn list`, which lists all fields as trait objects, by `&` or by `&mut`.
+pub(super) fn list(
+    name: &str,
+    function: &str,
+    fields: &[Field],
+    object: &TokenStream,
+    mutability: &TokenStream,
+) -> TokenStream {
     let (whole, list_whole) = (format_ident!("{name}"), format_ident!("{function}"));
     let (mut groups, mut calls) = (TokenStream::new(), TokenStream::new());
     for (number, fields) in fields.chunks(SIZE).enumerate() {
         let (field, group, function) =
             (group_name(number), format_ident!("{name}{number}"), format_ident!("{function}{number}"));
-        let pushes = fields.iter().map(|Field { name, .. }| quote!(list.push(&group.#name);));
+        let pushes = fields.iter().map(|Field { name, .. }| quote!(list.push(&#mutability group.#name);));
         groups.extend(quote! {
-            fn #function<'a>(group: &'a #group, list: &mut ::std::vec::Vec<&'a #object>) {
+            fn #function<'a>(group: &'a #mutability #group, list: &mut ::std::vec::Vec<&'a #mutability #object>) {
                 #(#pushes)*
             }
         });
-        calls.extend(quote!(#function(&whole.#field, &mut list);));
+        calls.extend(quote!(#function(&#mutability whole.#field, &mut list);));
     }
     quote! {
-        #[allow(unused_mut)]
-        fn #list_whole(whole: &#whole) -> ::std::vec::Vec<&#object> {
+        #[allow(unused_mut, unused_variables)]
+        fn #list_whole(whole: &#mutability #whole) -> ::std::vec::Vec<&#mutability #object> {
             let mut list = ::std::vec::Vec::new();
             #calls
             list

@@ -11,7 +11,7 @@ use crate::parse::{Component, OptionValue, ParameterKind};
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-/// The structs, and `fn __declared_options() -> __Options`.
+/// The structs, `fn __declared_options() -> __Options`, and `fn __list_options`.
 pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
     let types = Types::new(robot, name, 0);
     let (mut fields, mut functions) = (Vec::new(), TokenStream::new());
@@ -24,7 +24,23 @@ pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
         fields.push(Field { name: field, kind: options, value: quote!(#function()) });
     }
     let structs = group::structs("__Options", "__declared_options", &fields, &quote!(), &quote!());
-    quote!(#structs #functions)
+    let object = quote!(dyn ::bb_core::__private::AnyOptions);
+    let list = group::list("__Options", "__list_options", &fields, &object, &quote!(mut));
+    quote!(#structs #list #functions)
+}
+
+/// `&[(2, "beta", 0)]`: the options that are bound to a parameter, by the number of their component.
+pub(super) fn bound(robot: &Robot) -> TokenStream {
+    let bound = Part::all(robot).enumerate().flat_map(|(number, part)| {
+        part.component(robot).options.iter().filter_map(move |option| match &option.value {
+            OptionValue::Parameter(path) => {
+                let (name, id) = (crate::names::text(&option.name), robot.parameter(path)?);
+                Some(quote!((#number, #name, #id)))
+            }
+            OptionValue::Quantity(_) | OptionValue::Expression { .. } => None,
+        })
+    });
+    quote!(&[#(#bound),*])
 }
 
 /// Where the options of a part stand in `__Options`.

@@ -1,6 +1,6 @@
 //! `impl Robot`: how all is made, started and listed.
 
-use super::options::{binding, place};
+use super::options::{binding, bound, place};
 use super::part::Part;
 use super::types::Types;
 use super::wiring::{index_name, start_function, topic};
@@ -75,6 +75,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
         quote!(#group(wiring, options, assembly, &mut sources);)
     });
     let states = control::states(robot);
+    let bound = bound(robot);
     let commands = robot.commands.ids().map(|id| {
         let part = Part::Command(id);
         let (kind, options, binding) = (types.part(part), place(robot, part), binding(&types, part));
@@ -97,12 +98,20 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
             const ISLANDS: &'static [::bb_core::__private::IslandOf<__Wiring>] = &__ISLANDS;
             const FEEDS: &'static [::core::option::Option<::bb_core::__private::FeedOf<__Wiring>>] = &__FEEDS;
 
+            const BOUND_OPTIONS: &'static [(usize, &'static str, usize)] = #bound;
+
             type Options = __Options;
             type Topics = __Topics;
             type Wiring = __Wiring;
 
             fn options() -> __Options {
                 __declared_options()
+            }
+
+            fn all_options(
+                options: &mut __Options,
+            ) -> ::std::vec::Vec<&mut dyn ::bb_core::__private::AnyOptions> {
+                __list_options(options)
             }
 
             fn topics() -> __Topics {

@@ -75,7 +75,7 @@ pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream 
     let island_structs =
         group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, assembly));
     let list_topics =
-        group::list("__Topics", "__list_topics", &topics, &quote!(dyn ::bb_core::__private::AnyTopic));
+        group::list("__Topics", "__list_topics", &topics, &quote!(dyn ::bb_core::__private::AnyTopic), &quote!());
     let finders = islands.all.ids().map(|number| {
         let place = group::path(number.number(), &island(number));
         quote!(|wiring| &wiring.islands.#place)
@@ -150,7 +150,7 @@ fn actuators(types: &Types<'_>) -> TokenStream {
     let arguments = quote!(options, assembly);
     let structs = group::structs("__Actuators", "__new_actuators", &fields, &parameters, &arguments);
     let object = quote!(dyn ::bb_core::__private::AnyActuator);
-    let list = group::list("__Actuators", "__list_actuators", &fields, &object);
+    let list = group::list("__Actuators", "__list_actuators", &fields, &object, &quote!());
     quote!(#structs #list)
 }
 

@@ -25,6 +25,7 @@ mod write;
 pub use error::JsonError;
 pub use read::{from_json, json_to_bytes};
 pub use schema::json_schema;
+pub(crate) use schema::{Definitions, document, member};
 pub use write::{bytes_to_json, to_json};
 
 use super::shape::{FieldShape, NOTHING};

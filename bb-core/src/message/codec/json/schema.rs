@@ -33,11 +33,16 @@ use crate::message::codec::{EnumShape, FieldShape, Shape, StructShape};
 pub fn json_schema(shape: Shape) -> String {
     let mut definitions = Definitions::default();
     let root = definitions.keywords(shape);
+    document(&title(shape), &root, definitions)
+}
+
+/// A schema of these keywords, with what they refer to.
+pub(crate) fn document(title: &str, root: &str, mut definitions: Definitions) -> String {
     let mut json = r#"{"$schema":"https://json-schema.org/draft/2020-12/schema""#.to_owned();
-    for keywords in [title(shape), root] {
+    for keywords in [title, root] {
         if !keywords.is_empty() {
             json.push(',');
-            json.push_str(&keywords);
+            json.push_str(keywords);
         }
     }
     // A definition may name further ones.
@@ -46,7 +51,7 @@ pub fn json_schema(shape: Shape) -> String {
         json.push_str(if index == 0 { r#","$defs":{"# } else { "," });
         text(&name, &mut json);
         json.push_str(":{");
-        let title = title(shape);
+        let title = self::title(shape);
         json.push_str(&title);
         json.push(',');
         json.push_str(&definitions.keywords(shape));
@@ -65,8 +70,9 @@ fn title(shape: Shape) -> String {
     }
 }
 
+/// The structs and enums that a schema refers to.
 #[derive(Default)]
-struct Definitions {
+pub(crate) struct Definitions {
     known: Vec<(String, Shape)>,
 }
 
@@ -104,7 +110,7 @@ impl Definitions {
     }
 
     /// A schema in braces; a struct or an enum by reference.
-    fn schema(&mut self, shape: Shape) -> String {
+    pub(crate) fn schema(&mut self, shape: Shape) -> String {
         let name = match shape {
             Shape::Struct(of) => match Form::of(of.fields) {
                 Form::Transparent(shape) => return self.schema(shape),
@@ -183,7 +189,7 @@ impl Definitions {
     }
 }
 
-fn member(keyword: &str, value: &str) -> String {
+pub(crate) fn member(keyword: &str, value: &str) -> String {
     let mut json = String::new();
     text(keyword, &mut json);
     json.push(':');

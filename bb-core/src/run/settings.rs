@@ -1,0 +1,68 @@
+//! Options and parameters by path, without compiling: from a TOML file, from the command line, or from code.
+//!
+//! A setting is `PATH/NAME` for an option of the component at `PATH`, and the path of a parameter. Values are checked as the
+//! literals in `robot!` are: a number that states a unit is written as a text with a unit of that dimension, `"20 ms"`.
+//!
+//! ```toml
+//! [sensor.base.imu]
+//! port = "/dev/ttyUSB0"
+//! maximum_range = "12 m"
+//!
+//! [param.imu]
+//! beta = 0.05
+//! ```
+
+mod arguments;
+mod assign;
+mod error;
+#[cfg(feature = "toml")]
+mod file;
+mod list;
+mod schema;
+
+pub use error::{SettingProblem, SettingsError};
+pub use list::SettingsList;
+pub(super) use schema::settings_schema;
+
+use super::{Builder, Robot};
+use assign::Assignment;
+use error::Place;
+
+impl<R: Robot> Builder<R> {
+    /// Sets an option or a parameter by path: `set("sensor/base/imu/maximum_range", "12 m")`. The value is JSON; what is
+    /// none is a text.
+    ///
+    /// # Errors
+    /// Why it was not set: an unknown path, with the nearest one, or what was expected.
+    pub fn set(&mut self, path: &str, value: &str) -> Result<(), SettingsError> {
+        assign::assign(self, &[Assignment::from_text(Place::Code, path, value)])
+    }
+
+    /// Sets what a TOML file says. If anything in it is wrong, nothing is set.
+    ///
+    /// # Errors
+    /// All that is wrong, each with its line and column.
+    #[cfg(feature = "toml")]
+    pub fn load_settings(&mut self, file: impl AsRef<std::path::Path>) -> Result<(), SettingsError> {
+        let file = file.as_ref();
+        let name = file.display().to_string();
+        let text = std::fs::read_to_string(file).map_err(|error| SettingsError::of_file(&name, &error))?;
+        self.set_from_toml(&name, &text)
+    }
+
+    /// The same of a text; `name` is named in errors.
+    ///
+    /// # Errors
+    /// As [`Builder::load_settings`].
+    #[cfg(feature = "toml")]
+    pub fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
+        let is_setting = assign::names(self);
+        let assignments = file::read(name, text, |path| is_setting.contains(path))?;
+        assign::assign(self, &assignments)
+    }
+
+    /// All settings with their values: its `Display` is a TOML file that [`Builder::load_settings`] reads.
+    pub fn settings(&mut self) -> SettingsList {
+        list::list(self)
+    }
+}

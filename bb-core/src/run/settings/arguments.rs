@@ -1,0 +1,128 @@
+//! Settings from the command line.
+
+use super::SettingsError;
+use super::assign::{Assignment, assign};
+use super::error::Place;
+use crate::run::{Builder, Robot};
+use std::ffi::OsString;
+
+impl<R: Robot> Builder<R> {
+    /// Takes the settings out of a program's arguments and returns the others:
+    ///
+    /// | argument | effect |
+    /// |---|---|
+    /// | `--config FILE` | loads a TOML file, see `load_settings`; may be repeated |
+    /// | `--set PATH=VALUE` | sets one option or parameter, after all files; may be repeated |
+    /// | `--list` | prints all settings as a TOML file; `None` is returned |
+    /// | `--schema` | prints their JSON Schema; `None` is returned |
+    ///
+    /// What follows `--` is returned as it is.
+    ///
+    /// ```no_run
+    /// use bb_core::prelude::*;
+    ///
+    /// robot! {
+    ///     robot Rover;
+    ///     link base {
+    ///         sensor imu: External<Imu>();
+    ///     }
+    /// }
+    ///
+    /// fn main() -> Result<(), Box<dyn std::error::Error>> {
+    ///     let mut builder = Rover::builder();
+    ///     let Some(_others) = builder.take_arguments(std::env::args_os().skip(1))? else { return Ok(()) };
+    ///     let running = builder.start()?;
+    ///     running.stop();
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// All settings of a file that are wrong; else all of the arguments. Nothing of those is set.
+    pub fn take_arguments(
+        &mut self,
+        arguments: impl IntoIterator<Item = OsString>,
+    ) -> Result<Option<Vec<OsString>>, SettingsError> {
+        let mut read = Arguments::default();
+        read.read(arguments.into_iter())?;
+        for file in &read.files {
+            self.load(file)?;
+        }
+        assign(self, &read.settings)?;
+        if read.lists {
+            print!("{}", self.settings());
+        }
+        if read.shows_schema {
+            println!("{}", R::settings_schema());
+        }
+        Ok((!read.lists && !read.shows_schema).then_some(read.others))
+    }
+
+    #[cfg(feature = "toml")]
+    fn load(&mut self, file: &OsString) -> Result<(), SettingsError> {
+        self.load_settings(file)
+    }
+
+    #[cfg(not(feature = "toml"))]
+    fn load(&mut self, _: &OsString) -> Result<(), SettingsError> {
+        Err(wrong("`--config` needs the feature `toml` of `bb-core`"))
+    }
+}
+
+#[derive(Default)]
+struct Arguments {
+    files: Vec<OsString>,
+    settings: Vec<Assignment>,
+    lists: bool,
+    shows_schema: bool,
+    others: Vec<OsString>,
+}
+
+impl Arguments {
+    fn read(&mut self, mut arguments: impl Iterator<Item = OsString>) -> Result<(), SettingsError> {
+        while let Some(argument) = arguments.next() {
+            let Some(text) = argument.to_str() else {
+                self.others.push(argument);
+                continue;
+            };
+            let (name, value) = match text.split_once('=') {
+                Some((name, value)) if name.starts_with("--") => (name, Some(OsString::from(value))),
+                _ => (text, None),
+            };
+            match name {
+                "--config" => self.files.push(value_of(name, value, &mut arguments)?),
+                "--set" => self.settings.push(setting(value_of(name, value, &mut arguments)?)?),
+                "--list" => self.lists = true,
+                "--schema" => self.shows_schema = true,
+                "--" => {
+                    self.others.push(argument);
+                    self.others.extend(arguments);
+                    return Ok(());
+                }
+                _ => self.others.push(argument),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn value_of(
+    name: &str,
+    value: Option<OsString>,
+    arguments: &mut impl Iterator<Item = OsString>,
+) -> Result<OsString, SettingsError> {
+    let example = if name == "--set" { "PATH=VALUE" } else { "FILE" };
+    value.or_else(|| arguments.next()).ok_or_else(|| wrong(format!("`{name}` needs a value: `{name} {example}`")))
+}
+
+fn setting(argument: OsString) -> Result<Assignment, SettingsError> {
+    let Some((path, value)) = argument.to_str().and_then(|text| text.split_once('=')) else {
+        let argument = argument.display();
+        return Err(wrong(format!("expected `--set PATH=VALUE`, found `--set {argument}`")));
+    };
+    Ok(Assignment::from_text(Place::Argument, path.trim(), value))
+}
+
+fn wrong(message: impl Into<String>) -> SettingsError {
+    SettingsError::one(Place::Code, "", message)
+}

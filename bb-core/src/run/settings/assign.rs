@@ -1,0 +1,200 @@
+//! Settings to options and parameters: all of them, or none.
+
+use super::error::{Place, SettingProblem, SettingsError};
+use crate::component::{AnyOptions, quantity};
+use crate::declaration::{ParameterDeclaration, ParameterDefault, unit};
+use crate::event::ParameterValue;
+use crate::message::codec::{from_json, to_json};
+use crate::message::nearest::{nearest, nearest_path};
+use crate::run::{Builder, Robot};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A setting as written.
+pub(super) struct Assignment {
+    pub(super) place: Place,
+    pub(super) path: String,
+    /// Its value.
+    pub(super) json: String,
+    /// What it may be meant to be instead: a text without quotation marks.
+    pub(super) text: Option<String>,
+}
+
+impl Assignment {
+    /// Of JSON, or else of a plain text.
+    pub(super) fn from_text(place: Place, path: &str, value: &str) -> Self {
+        let text = to_json(&value.to_owned());
+        let path = path.to_owned();
+        match serde_json::from_str::<serde_core::de::IgnoredAny>(value) {
+            Ok(_) => Self { place, path, json: value.trim().to_owned(), text: Some(text) },
+            Err(_) => Self { place, path, json: text, text: None },
+        }
+    }
+
+    fn problem(&self, message: impl Into<String>) -> SettingProblem {
+        SettingProblem::new(self.place.clone(), &self.path, message)
+    }
+}
+
+/// The paths of a robot's components, as their options are listed.
+pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
+    let sensors = R::SENSORS.iter().map(|declared| declared.path);
+    let estimators = R::ESTIMATORS.iter().map(|declared| declared.path);
+    let actuators = R::ACTUATORS.iter().map(|declared| declared.path);
+    let services = R::SERVICES.iter().map(|declared| declared.path);
+    let commands = R::COMMANDS.iter().map(|declared| declared.path);
+    sensors.chain(estimators).chain(actuators).chain(services).chain(commands).collect()
+}
+
+/// The paths of all settings.
+pub(super) fn names<R: Robot>(builder: &mut Builder<R>) -> BTreeSet<String> {
+    let paths = component_paths::<R>();
+    let options = R::all_options(&mut builder.options);
+    let options = options.iter().zip(paths);
+    let options = options.flat_map(|(options, path)| options.fields().iter().map(move |field| (path, field.name)));
+    let options = options.map(|(path, name)| format!("{path}/{name}"));
+    options.chain(R::PARAMETERS.iter().map(|declared| declared.path.to_owned())).collect()
+}
+
+/// Sets all of `assignments`; none, if one of them is wrong.
+pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignment]) -> Result<(), SettingsError> {
+    let names = names(builder);
+    let paths = component_paths::<R>();
+    let mut problems = Vec::new();
+    let mut parameters = builder.parameters.clone();
+    let mut options = R::all_options(&mut builder.options);
+    // The changed options of a component, and what changed them.
+    let mut changed: BTreeMap<usize, (Box<dyn AnyOptions>, Vec<&Assignment>)> = BTreeMap::new();
+    for assignment in assignments {
+        let target = target::<R>(&paths, &options, &assignment.path);
+        let result = match target {
+            Some(Target::Parameter(number)) => parameter(&R::PARAMETERS[number], assignment).map(|value| {
+                parameters[number] = value;
+            }),
+            Some(Target::Option { component, field }) => match bound_to::<R>(component, &assignment.path) {
+                Some(bound) => Err(format!("is bound to `{bound}`; set that")),
+                None => {
+                    let (copy, by) =
+                        changed.entry(component).or_insert_with(|| (options[component].copy(), Vec::new()));
+                    by.push(assignment);
+                    option(copy.as_mut(), field, assignment)
+                }
+            },
+            None => Err(unknown(&names, &paths, &assignment.path)),
+        };
+        if let Err(message) = result {
+            problems.push(assignment.problem(message));
+        }
+    }
+    if problems.is_empty() {
+        for (copy, by) in changed.values() {
+            if let Err(message) = copy.validate() {
+                // The message names the option, as `#[derive(Options)]` writes it.
+                let is_named =
+                    |assignment: &&&Assignment| message.contains(&format!("`{}`", last(&assignment.path)));
+                let culprit = by.iter().find(is_named).or(by.first());
+                problems.extend(culprit.map(|assignment| assignment.problem(message)));
+            }
+        }
+    }
+    if !problems.is_empty() {
+        return Err(SettingsError::new(problems));
+    }
+    for (component, (copy, _)) in changed {
+        options[component].replace(copy);
+    }
+    builder.parameters = parameters;
+    Ok(())
+}
+
+enum Target {
+    Parameter(usize),
+    Option { component: usize, field: usize },
+}
+
+fn target<R: Robot>(paths: &[&str], options: &[&mut dyn AnyOptions], path: &str) -> Option<Target> {
+    if let Some(number) = R::PARAMETERS.iter().position(|declared| declared.path == path) {
+        return Some(Target::Parameter(number));
+    }
+    let (component, name) = path.rsplit_once('/')?;
+    let component = paths.iter().position(|path| *path == component)?;
+    let field = options.get(component)?.fields().iter().position(|field| field.name == name)?;
+    Some(Target::Option { component, field })
+}
+
+/// The path of the parameter that an option is bound to.
+pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'static str> {
+    let is_bound = |bound: &&(usize, &str, usize)| bound.0 == component && bound.1 == last(path);
+    let (_, _, parameter) = R::BOUND_OPTIONS.iter().find(is_bound)?;
+    Some(R::PARAMETERS.get(*parameter)?.path)
+}
+
+fn last(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
+}
+
+fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -> Result<(), String> {
+    let Some(mut setting) = options.setting(field) else {
+        return Err("can be set in code only: its options are not derived".to_owned());
+    };
+    let set = setting.set(&assignment.json);
+    match (&set, &assignment.text) {
+        (Err(_), Some(text)) if setting.set(text).is_ok() => Ok(()),
+        _ => set,
+    }
+}
+
+fn parameter(declared: &ParameterDeclaration, assignment: &Assignment) -> Result<ParameterValue, String> {
+    let read = |json: &str| -> Result<ParameterValue, String> {
+        let value = match declared.default {
+            ParameterDefault::Bool(_) => from_json::<bool>(json).map(ParameterValue::Bool),
+            ParameterDefault::Integer(_) => from_json::<i64>(json).map(ParameterValue::Integer),
+            ParameterDefault::Text(_) => from_json::<String>(json).map(ParameterValue::Text),
+            ParameterDefault::Float(_) if declared.unit.is_empty() => {
+                from_json::<f64>(json).map(ParameterValue::Float)
+            }
+            ParameterDefault::Float(_) => {
+                let (exponents, _) = unit::parse_unit(declared.unit)?;
+                return quantity(json, exponents).map(ParameterValue::Float);
+            }
+        };
+        value.map_err(|error| error.to_string())
+    };
+    let value = read(&assignment.json);
+    let value = match (&value, &assignment.text) {
+        (Err(_), Some(text)) => read(text).or(value)?,
+        _ => value?,
+    };
+    declared.check(&value).map_err(|error| error.message)?;
+    Ok(value)
+}
+
+/// What is wrong with a path that names no setting.
+fn unknown(names: &BTreeSet<String>, paths: &[&str], path: &str) -> String {
+    let below = |component: &str| {
+        let start = format!("{component}/");
+        let fields = names.iter().filter_map(|name| name.strip_prefix(&start)).filter(|name| !name.contains('/'));
+        fields.map(str::to_owned).collect::<Vec<_>>()
+    };
+    if paths.contains(&path) {
+        let options = below(path);
+        return match options.is_empty() {
+            true => "is a component without options".to_owned(),
+            false => format!("is a component; its options are {}", options.join(", ")),
+        };
+    }
+    if let Some((component, name)) = path.rsplit_once('/')
+        && paths.contains(&component)
+    {
+        let options = below(component);
+        let near = nearest(name, options.iter().map(String::as_str));
+        return match near {
+            Some(near) => format!("there is no such option; did you mean `{near}`?"),
+            None if options.is_empty() => format!("there is no such option; {component} has none"),
+            None => format!("there is no such option; the options of {component} are {}", options.join(", ")),
+        };
+    }
+    match nearest_path(path, names.iter().map(String::as_str)) {
+        Some(near) => format!("there is no such setting; did you mean `{near}`?"),
+        None => "there is no such setting; `--list` shows all".to_owned(),
+    }
+}

@@ -1,0 +1,106 @@
+//! A TOML file to settings.
+
+use super::assign::Assignment;
+use super::error::{Place, SettingProblem, SettingsError};
+use crate::message::codec::to_json;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// All settings of a file, in the order of their lines. A table is either on the way to a setting or, where `is_setting`
+/// says so, the value of one.
+pub(super) fn read(
+    name: &str,
+    text: &str,
+    is_setting: impl Fn(&str) -> bool,
+) -> Result<Vec<Assignment>, SettingsError> {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    let mut reader = Reader { name: name.into(), text, is_setting, found: Vec::new(), problems: Vec::new() };
+    for error in errors {
+        let place = reader.place(error.span().map_or(0, |span| span.start));
+        reader.problems.push(SettingProblem::new(place, "", error.message()));
+    }
+    if reader.problems.is_empty() {
+        reader.table("", table.get_ref());
+    }
+    let mut seen = BTreeSet::new();
+    reader.found.sort_by_key(|(start, _)| *start);
+    for (_, assignment) in &reader.found {
+        if !seen.insert(assignment.path.as_str()) {
+            let message = "is set twice in this file";
+            let problem = SettingProblem::new(assignment.place.clone(), &assignment.path, message);
+            reader.problems.push(problem);
+        }
+    }
+    if reader.problems.is_empty() {
+        Ok(reader.found.into_iter().map(|(_, assignment)| assignment).collect())
+    } else {
+        Err(SettingsError::new(reader.problems))
+    }
+}
+
+struct Reader<'a, F> {
+    name: Arc<str>,
+    text: &'a str,
+    is_setting: F,
+    /// With the place in the text.
+    found: Vec<(usize, Assignment)>,
+    problems: Vec<SettingProblem>,
+}
+
+impl<F: Fn(&str) -> bool> Reader<'_, F> {
+    fn table(&mut self, above: &str, table: &DeTable<'_>) {
+        for (key, value) in table {
+            let path = match above {
+                "" => key.get_ref().to_string(),
+                above => format!("{above}/{}", key.get_ref()),
+            };
+            match value.get_ref() {
+                DeValue::Table(inner) if !(self.is_setting)(&path) && !inner.is_empty() => self.table(&path, inner),
+                _ => self.setting(path, key.span().start, value),
+            }
+        }
+    }
+
+    fn setting(&mut self, path: String, start: usize, value: &Spanned<DeValue<'_>>) {
+        // What is wrong with a name is shown at the name, and what is wrong with a value at the value.
+        let start = if (self.is_setting)(&path) { value.span().start } else { start };
+        let place = self.place(start);
+        let json = json(value.get_ref());
+        self.found.push((start, Assignment { place, path, json, text: None }));
+    }
+
+    /// The line and the column of a byte.
+    fn place(&self, at: usize) -> Place {
+        let before = self.text.get(..at).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+        Place::File { name: Arc::clone(&self.name), position: Some((line, column)) }
+    }
+}
+
+/// A value as JSON. Floats that JSON has no number for are texts, as everywhere here.
+fn json(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => to_json(&text.to_string()),
+        DeValue::Integer(integer) => match i128::from_str_radix(integer.as_str(), integer.radix()) {
+            Ok(integer) => integer.to_string(),
+            Err(_) => integer.to_string(),
+        },
+        DeValue::Float(float) => to_json(&float.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Boolean(value) => value.to_string(),
+        DeValue::Datetime(time) => to_json(&time.to_string()),
+        DeValue::Array(items) => {
+            let items: Vec<String> = items.iter().map(|item| json(item.get_ref())).collect();
+            format!("[{}]", items.join(","))
+        }
+        DeValue::Table(members) => {
+            let members = members.iter();
+            let members: Vec<String> = members
+                .map(|(key, value)| format!("{}:{}", to_json(&key.get_ref().to_string()), json(value.get_ref())))
+                .collect();
+            format!("{{{}}}", members.join(","))
+        }
+    }
+}

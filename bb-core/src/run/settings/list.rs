@@ -1,0 +1,152 @@
+//! All settings of a robot, as a TOML file.
+
+use super::assign::{bound_to, component_paths, names};
+use crate::component::{OptionField, SettingKind};
+use crate::declaration::{Range, unit};
+use crate::event::ParameterValue;
+use crate::message::codec::to_json;
+use crate::run::{Builder, Robot};
+use std::fmt;
+
+/// All settings of a robot with their values. Its `Display` is a TOML file, with the doc, the range and the unit of each.
+#[derive(Clone, Debug, Default)]
+pub struct SettingsList {
+    tables: Vec<Table>,
+}
+
+#[derive(Clone, Debug)]
+struct Table {
+    /// `[sensor.base.imu]`
+    header: String,
+    settings: Vec<Line>,
+}
+
+#[derive(Clone, Debug)]
+struct Line {
+    name: &'static str,
+    doc: &'static str,
+    /// In TOML; else why there is none.
+    value: Result<String, String>,
+    /// Range and unit.
+    limits: String,
+}
+
+pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
+    let names = names(builder);
+    // A table of the same name as a setting would define that twice.
+    let header = |path: &str| {
+        let is_in_the_way =
+            path.match_indices('/').any(|(end, _)| names.contains(&path[..end])) || names.contains(path);
+        if is_in_the_way {
+            format!("[{}]", to_json(&path.to_owned()))
+        } else {
+            format!("[{}]", path.replace('/', "."))
+        }
+    };
+    let mut tables = Vec::new();
+    let paths = component_paths::<R>();
+    for (number, (options, path)) in R::all_options(&mut builder.options).into_iter().zip(paths).enumerate() {
+        let fields = options.fields().iter().enumerate();
+        let settings: Vec<Line> = fields
+            .filter_map(|(index, field)| {
+                let setting = options.setting(index)?;
+                let value = match (bound_to::<R>(number, field.name), setting.kind(), setting.value()) {
+                    (Some(parameter), ..) => Err(format!("is bound to {parameter}")),
+                    (None, SettingKind::Code, _) => Err("can be set in code only".to_owned()),
+                    (None, _, None) => Err("has a value that cannot be written".to_owned()),
+                    (None, _, Some(json)) => toml(&json).ok_or_else(|| "is not set".to_owned()),
+                };
+                Some(Line { name: field.name, doc: field.doc, value, limits: limits_of(field) })
+            })
+            .collect();
+        if !settings.is_empty() {
+            tables.push(Table { header: header(path), settings });
+        }
+    }
+    for (declared, value) in R::PARAMETERS.iter().zip(&builder.parameters) {
+        let (group, name) = declared.path.rsplit_once('/').unwrap_or(("", declared.path));
+        let value = match value {
+            ParameterValue::Float(value) if !declared.unit.is_empty() => format!("\"{value} {}\"", declared.unit),
+            ParameterValue::Text(text) => quoted(text),
+            other => other.to_string(),
+        };
+        // The range of a parameter is written with its units.
+        let limits = limits(declared.range, "");
+        let line = Line { name, doc: declared.doc, value: Ok(value), limits };
+        let header = header(group);
+        match tables.iter_mut().find(|table| table.header == header) {
+            Some(table) => table.settings.push(line),
+            None => tables.push(Table { header, settings: vec![line] }),
+        }
+    }
+    SettingsList { tables }
+}
+
+fn limits_of(field: &OptionField) -> String {
+    let unit = field.dimension.map_or(String::new(), |dimension| unit::si_unit(dimension.exponents));
+    limits(field.range, &unit)
+}
+
+fn limits(range: Option<Range>, unit: &str) -> String {
+    match range {
+        Some(range) if unit.is_empty() => range.text.to_owned(),
+        Some(range) => format!("{} {unit}", range.text),
+        None => String::new(),
+    }
+}
+
+/// JSON as TOML, which has no null and other objects.
+fn toml(json: &str) -> Option<String> {
+    let value: serde_json::Value = serde_json::from_str(json).ok()?;
+    of_value(&value)
+}
+
+fn of_value(value: &serde_json::Value) -> Option<String> {
+    use serde_json::Value;
+    match value {
+        Value::Null => None,
+        Value::Bool(value) => Some(value.to_string()),
+        Value::Number(number) => Some(number.to_string()),
+        Value::String(text) => Some(quoted(text)),
+        Value::Array(items) => {
+            let items: Option<Vec<String>> = items.iter().map(of_value).collect();
+            Some(format!("[{}]", items?.join(", ")))
+        }
+        Value::Object(members) => {
+            // What is null is left out: it is optional.
+            let members = members.iter().filter(|(_, value)| !value.is_null());
+            let members: Option<Vec<String>> =
+                members.map(|(name, value)| Some(format!("{} = {}", quoted(name), of_value(value)?))).collect();
+            Some(format!("{{ {} }}", members?.join(", ")))
+        }
+    }
+}
+
+/// A text in quotation marks, as in JSON; TOML allows no DEL in it either.
+fn quoted(text: &str) -> String {
+    to_json(&text.to_owned()).replace('\u{7f}', "\\u007F")
+}
+
+impl fmt::Display for SettingsList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, table) in self.tables.iter().enumerate() {
+            if index > 0 {
+                f.write_str("\n")?;
+            }
+            writeln!(f, "{}", table.header)?;
+            for line in &table.settings {
+                for doc in line.doc.lines() {
+                    writeln!(f, "# {}", doc.trim())?;
+                }
+                if !line.limits.is_empty() {
+                    writeln!(f, "# In {}.", line.limits)?;
+                }
+                match &line.value {
+                    Ok(value) => writeln!(f, "{} = {value}", line.name)?,
+                    Err(reason) => writeln!(f, "# {} {reason}", line.name)?,
+                }
+            }
+        }
+        Ok(())
+    }
+}

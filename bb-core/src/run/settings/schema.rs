@@ -1,0 +1,138 @@
+//! The JSON Schema of a robot's settings: for editors, and for programs that write them.
+
+use super::assign::{bound_to, component_paths};
+use crate::component::{OptionField, Setting, SettingKind};
+use crate::declaration::unit::si_unit;
+use crate::declaration::{ParameterDeclaration, ParameterDefault, Range};
+use crate::message::codec::{Definitions, Shape, document, member, to_json};
+use crate::run::Robot;
+use std::collections::BTreeMap;
+
+pub(crate) fn settings_schema<R: Robot>() -> String {
+    let mut definitions = Definitions::default();
+    let mut root = BTreeMap::new();
+    let mut options = R::options();
+    for (number, (options, path)) in
+        R::all_options(&mut options).into_iter().zip(component_paths::<R>()).enumerate()
+    {
+        for (index, field) in options.fields().iter().enumerate() {
+            let Some(setting) = options.setting(index) else { continue };
+            if bound_to::<R>(number, field.name).is_none()
+                && let Some(schema) = of_option(field, &*setting, &mut definitions)
+            {
+                insert(&mut root, &format!("{path}/{}", field.name), schema);
+            }
+        }
+    }
+    for declared in R::PARAMETERS {
+        insert(&mut root, declared.path, of_parameter(declared));
+    }
+    document(&member("title", R::NAME), &object(&root), definitions)
+}
+
+/// A setting, or a table of further ones.
+enum Node {
+    Setting(String),
+    Table(BTreeMap<String, Node>),
+}
+
+/// Puts a schema in its place. Where a setting is already at a table's, the whole path is a name, as in the file.
+fn insert(root: &mut BTreeMap<String, Node>, path: &str, schema: String) {
+    let mut table = &mut *root;
+    let mut names: Vec<&str> = path.split('/').collect();
+    let last = names.pop().unwrap_or(path);
+    for name in names {
+        let node = table.entry(name.to_owned()).or_insert_with(|| Node::Table(BTreeMap::new()));
+        match node {
+            Node::Table(inner) => table = inner,
+            Node::Setting(_) => return,
+        }
+    }
+    if !matches!(table.get(last), Some(Node::Table(_))) {
+        table.insert(last.to_owned(), Node::Setting(schema));
+    }
+}
+
+fn object(table: &BTreeMap<String, Node>) -> String {
+    let properties = table.iter().map(|(name, node)| {
+        let schema = match node {
+            Node::Setting(schema) => schema.clone(),
+            Node::Table(inner) => format!("{{{}}}", object(inner)),
+        };
+        format!("{}:{schema}", to_json(name))
+    });
+    let properties: Vec<String> = properties.collect();
+    let properties = properties.join(",");
+    format!(r#""type":"object","properties":{{{properties}}},"additionalProperties":false"#)
+}
+
+fn of_option(field: &OptionField, setting: &dyn Setting, definitions: &mut Definitions) -> Option<String> {
+    let range = field.range;
+    let mut unit = String::new();
+    let keywords = match setting.kind() {
+        SettingKind::Code => return None,
+        SettingKind::Text => member("type", "string"),
+        SettingKind::Quantity => {
+            unit = field.dimension.map_or(String::new(), |dimension| si_unit(dimension.exponents));
+            quantity(&unit)
+        }
+        SettingKind::Value(Shape::F32 | Shape::F64) => number("number", range),
+        SettingKind::Value(shape) if is_integer(shape) && range.is_some() => number("integer", range),
+        SettingKind::Value(shape) => {
+            let schema = definitions.schema(shape);
+            schema.strip_prefix('{').and_then(|schema| schema.strip_suffix('}')).unwrap_or("").to_owned()
+        }
+    };
+    Some(with_notes(keywords, field.doc, &unit, range, setting.value().as_deref()))
+}
+
+fn of_parameter(declared: &ParameterDeclaration) -> String {
+    let (keywords, default) = match declared.default {
+        ParameterDefault::Bool(value) => (member("type", "boolean"), value.to_string()),
+        ParameterDefault::Integer(value) => (number("integer", declared.range), value.to_string()),
+        ParameterDefault::Text(value) => (member("type", "string"), to_json(&value.to_owned())),
+        ParameterDefault::Float(value) if declared.unit.is_empty() => {
+            (number("number", declared.range), to_json(&value))
+        }
+        ParameterDefault::Float(value) => (quantity(declared.unit), to_json(&format!("{value} {}", declared.unit))),
+    };
+    // The range of a parameter is written with its units.
+    with_notes(keywords, declared.doc, "", declared.range, Some(&default))
+}
+
+fn with_notes(keywords: String, doc: &str, unit: &str, range: Option<Range>, default: Option<&str>) -> String {
+    let mut description = doc.trim().to_owned();
+    if let Some(range) = range {
+        let separator = if description.is_empty() { "" } else { " " };
+        description = format!("{description}{separator}In {} {unit}", range.text).trim_end().to_owned() + ".";
+    }
+    let mut all = vec![keywords];
+    if !description.is_empty() {
+        all.push(member("description", &description));
+    }
+    all.extend(default.filter(|default| *default != "null").map(|default| format!(r#""default":{default}"#)));
+    format!("{{{}}}", all.join(","))
+}
+
+/// A text of a number and a unit; that the unit is of the right dimension is checked when it is read.
+fn quantity(unit: &str) -> String {
+    let pattern = r"^\s*[-+]?[0-9._]+([eE][-+]?[0-9]+)?\s*\S.*$";
+    format!(
+        "{},{},\"examples\":[{}]",
+        member("type", "string"),
+        member("pattern", pattern),
+        to_json(&format!("1 {unit}"))
+    )
+}
+
+fn number(kind: &str, range: Option<Range>) -> String {
+    let limits = range.map_or(String::new(), |range| {
+        format!(r#","minimum":{},"maximum":{}"#, to_json(&range.start), to_json(&range.end))
+    });
+    member("type", kind) + &limits
+}
+
+fn is_integer(shape: Shape) -> bool {
+    use Shape::{I8, I16, I32, I64, U8, U16, U32, U64};
+    matches!(shape, I8 | I16 | I32 | I64 | U8 | U16 | U32 | U64)
+}

@@ -1,0 +1,361 @@
+//! Options and parameters from files, from the command line and by path.
+
+use crate::components::Number;
+use bb_core::prelude::*;
+use bb_core::{Builder, HandleCall};
+use proptest::prelude::*;
+use std::path::PathBuf;
+
+/// How a device is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
+pub(crate) enum Filtering {
+    #[default]
+    None,
+    LowPass {
+        cutoff: f64,
+    },
+}
+
+/// Has no JSON form.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Opaque;
+
+/// An option of every kind.
+#[derive(Clone, Debug, Options)]
+pub(crate) struct EveryOptions {
+    /// Device file.
+    #[option(required)]
+    pub(crate) port: PathBuf,
+    /// Readings beyond it are dropped.
+    #[option(default = 4.0, range = 0.1..=30.0, unit = "m")]
+    pub(crate) maximum_range: f64,
+    #[option(default = Duration::from_millis(20))]
+    pub(crate) timeout: Duration,
+    #[option(default = None, unit = "rad/s")]
+    pub(crate) rate: Option<f32>,
+    #[option(default = 3, range = 1..=8)]
+    pub(crate) retries: u8,
+    #[option(default = [1.0, 0.0, 0.0])]
+    pub(crate) axis: [f64; 3],
+    #[option(default = "imu \"left\"\\\n\u{7f}é")]
+    pub(crate) name: String,
+    #[option(default = Filtering::None)]
+    pub(crate) filtering: Filtering,
+    #[option(default = Opaque)]
+    pub(crate) opaque: Opaque,
+    #[option(default = 0.5, range = 0.0..=1.0)]
+    pub(crate) gain: f64,
+    #[option(default = f64::INFINITY, unit = "s")]
+    pub(crate) horizon: f64,
+    #[option(default = [f64::NAN, 1.0])]
+    pub(crate) scale: [f64; 2],
+}
+
+#[derive(Debug)]
+pub(crate) struct Every(EveryOptions);
+
+impl Estimator for Every {
+    type Options = EveryOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: EveryOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self(options))
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::none())
+    }
+}
+
+pub(crate) struct Which;
+
+impl HandleCall<Which> for Every {
+    type Response = EveryOptions;
+    fn handle_call(&mut self, Which: Which) -> Result<(EveryOptions, Reply<Number>), Fault> {
+        Ok((self.0.clone(), Reply::none()))
+    }
+}
+
+robot! {
+    robot Set;
+    parameters {
+        tuning {
+            /// How much is believed.
+            gain: f64 = 0.5, range: 0.0..=1.0;
+            limit: f64 = 2 m/s;
+            count: i64 = 3;
+            label: String = "a";
+            enabled: bool = true;
+        }
+    }
+    link base {
+        sensor source: External<Number>() {
+            estimator every: Every(port = "/dev/null", gain = param::tuning::gain);
+        }
+    }
+}
+
+fn options(builder: Builder<Set>) -> EveryOptions {
+    let simulation = builder.simulate().expect("the robot starts");
+    simulation.call(set::sensor::base::source::every, Which).expect("it answers")
+}
+
+#[test]
+fn a_file_sets_options_and_parameters_alike() {
+    let mut builder = Set::builder();
+    let file = r#"
+        # Any nesting of the path will do.
+        [sensor.base.source.every]
+        port = "/dev/ttyUSB0"
+        maximum_range = "1200 cm"
+        timeout = "0.5 s"
+        rate = "180 deg/s"
+        retries = 8
+        axis = [0, 1.5, -2e-3]
+        filtering = { LowPass = { cutoff = 12.5 } }
+
+        [param]
+        tuning.gain = 0.25
+        "tuning/limit" = "3.6 km/h"
+        tuning.label = "b"
+        tuning.enabled = false
+    "#;
+    builder.set_from_toml("rover.toml", file).expect("all is right");
+    builder.set("param/tuning/count", "-7").expect("it is an integer");
+    builder.set("sensor/base/source/every/name", "plain text").expect("it needs no quotation marks");
+    let listed = builder.settings().to_string();
+    assert!(listed.contains("count = -7\n") && listed.contains("limit = \"1 m/s\"\n"), "{listed}");
+    let options = options(builder);
+    assert_eq!(options.port, PathBuf::from("/dev/ttyUSB0"));
+    assert_eq!(options.maximum_range, 12.0);
+    assert_eq!(options.timeout, Duration::from_millis(500));
+    assert_eq!(options.rate, Some(std::f32::consts::PI));
+    assert_eq!((options.retries, options.axis), (8, [0.0, 1.5, -2e-3]));
+    assert_eq!((options.filtering, options.gain), (Filtering::LowPass { cutoff: 12.5 }, 0.25));
+    assert_eq!(options.name, "plain text");
+}
+
+#[test]
+fn all_that_is_wrong_is_said_with_its_line_and_column_and_nothing_is_set() {
+    let mut builder = Set::builder();
+    let before = builder.settings().to_string();
+    let file = "\
+[sensor.base.source.every]
+retries = 7
+maximum_range = 12
+timeout = \"5 m\"
+rate = \"3 dge/s\"
+axis = [1, 2]
+port = 3
+opaque = 1
+gain = 0.1
+retires = 7
+[sensor.bose.source.every]
+port = \"a\"
+[param.tuning]
+gain = 1.5
+limit = 2.5
+count = 2.5
+enabled = \"yes\"
+label = nan
+[param.tuning.gian]
+";
+    let error = builder.set_from_toml("rover.toml", file).expect_err("nearly all is wrong");
+    assert_eq!(
+        error.to_string(),
+        "\
+rover.toml:3:17: sensor/base/source/every/maximum_range: expected a length, found a number without a unit; write it with one, as in \"1 m\"
+rover.toml:4:11: sensor/base/source/every/timeout: expected a time, found a length
+rover.toml:5:8: sensor/base/source/every/rate: unknown unit `dge`; did you mean `deg`?
+rover.toml:6:8: sensor/base/source/every/axis: expected an array of 3, found an array of 2
+rover.toml:7:8: sensor/base/source/every/port: expected text, found 3
+rover.toml:8:10: sensor/base/source/every/opaque: cannot be written as text: its type has no JSON form. Derive `Payload` for it, or set it in code
+rover.toml:9:8: sensor/base/source/every/gain: is bound to `param/tuning/gain`; set that
+rover.toml:10:1: sensor/base/source/every/retires: there is no such option; did you mean `retries`?
+rover.toml:12:1: sensor/bose/source/every/port: there is no such setting; did you mean `sensor/base/source/every/port`?
+rover.toml:14:8: param/tuning/gain: expected a number in 0.0..=1.0, found `1.5`
+rover.toml:15:9: param/tuning/limit: expected a velocity, found a number without a unit; write it with one, as in \"1 m/s\"
+rover.toml:16:9: param/tuning/count: expected an integer from -9223372036854775808 to 9223372036854775807, found 2.5
+rover.toml:17:11: param/tuning/enabled: expected true or false, found the text \"yes\"
+rover.toml:19:15: param/tuning/gian: there is no such setting; did you mean `param/tuning/gain`?"
+    );
+    assert_eq!(builder.settings().to_string(), before);
+    assert_eq!(error.problems()[0].position(), Some((3, 17)));
+}
+
+#[test]
+fn values_out_of_their_range_are_refused_where_they_are_written() {
+    let wrong = |text: &str| {
+        let mut builder = Set::builder();
+        builder.set_from_toml("rover.toml", text).expect_err("it is wrong").to_string()
+    };
+    assert_eq!(
+        wrong("[sensor.base.source.every]\ntimeout = \"1 s\"\nmaximum_range = \"31 m\""),
+        "rover.toml:3:17: sensor/base/source/every/maximum_range: option `maximum_range` is 31 m, but must be in \
+         0.1..=30.0 m"
+    );
+    assert_eq!(
+        wrong("sensor.base.source.every.timeout = \"-1 s\""),
+        "rover.toml:1:36: sensor/base/source/every/timeout: cannot be -1 s"
+    );
+    assert_eq!(
+        wrong("sensor.base.source.every.filtering = { LowPass = { cutoff = nan } }"),
+        "rover.toml:1:38: sensor/base/source/every/filtering: expected a finite number"
+    );
+    assert_eq!(
+        wrong("[param]\ntuning.count = 1\n\"tuning/count\" = 2"),
+        "rover.toml:3:18: param/tuning/count: is set twice in this file"
+    );
+    assert_eq!(
+        wrong("sensor.base.source.every = 3"),
+        "rover.toml:1:20: sensor/base/source/every: is a component; its options are axis, filtering, gain, \
+         horizon, maximum_range, name, opaque, port, rate, retries, scale, timeout"
+    );
+    assert_eq!(wrong("a = \nb = ]").lines().count(), 2, "every syntax error");
+    assert_eq!(wrong("sensor = 3"), "rover.toml:1:1: sensor: there is no such setting; `--list` shows all");
+    let missing = Set::builder().load_settings("no such file.toml").expect_err("it is not there");
+    assert!(missing.to_string().starts_with("no such file.toml: cannot be read: "), "{missing}");
+}
+
+#[test]
+fn arguments_are_taken_and_the_others_are_left() {
+    let folder = std::env::temp_dir().join(format!("bb-settings-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let file = folder.join("rover.toml");
+    std::fs::write(&file, "[param.tuning]\ncount = 5\nlabel = \"from the file\"\n").expect("a file");
+    let take = |arguments: &[&str]| {
+        let mut builder = Set::builder();
+        let others = builder.take_arguments(arguments.iter().map(Into::into));
+        (builder.settings().to_string(), others)
+    };
+    let config = format!("--config={}", file.display());
+    let (listed, others) = take(&[
+        "--set",
+        "param/tuning/count=6",
+        "data.mcap",
+        &config,
+        "--set=param/tuning/limit=2 m/s",
+        "--",
+        "--set",
+    ]);
+    assert_eq!(others.expect("all is right").expect("nothing is listed"), ["data.mcap", "--", "--set"]);
+    assert!(listed.contains("count = 6\n") && listed.contains("label = \"from the file\"\n"), "{listed}");
+    let message = |arguments: &[&str]| take(arguments).1.expect_err("it is wrong").to_string();
+    assert_eq!(message(&["--set"]), "`--set` needs a value: `--set PATH=VALUE`");
+    assert_eq!(message(&["--config"]), "`--config` needs a value: `--config FILE`");
+    assert_eq!(message(&["--set", "count"]), "expected `--set PATH=VALUE`, found `--set count`");
+    assert_eq!(
+        message(&["--set", "param/tuning/count=many", "--set", "param/tuning/lable=x"]),
+        "--set param/tuning/count: expected an integer from -9223372036854775808 to 9223372036854775807, found the text \"many\"\n\
+         --set param/tuning/lable: there is no such setting; did you mean `param/tuning/label`?"
+    );
+    let (_, listed) = take(&["--list"]);
+    assert_eq!(listed.expect("it lists"), None);
+    let _ = std::fs::remove_dir_all(folder);
+}
+
+#[test]
+fn the_list_is_a_file_with_docs_ranges_and_units() {
+    assert_eq!(
+        Set::builder().settings().to_string(),
+        r#"[sensor.base.source.every]
+# Device file.
+port = "/dev/null"
+# Readings beyond it are dropped.
+# In 0.1..=30.0 m.
+maximum_range = "4 m"
+timeout = "0.02 s"
+# rate is not set
+# In 1..=8.
+retries = 3
+axis = [1.0, 0.0, 0.0]
+name = "imu \"left\"\\\n\u007Fé"
+filtering = "None"
+# opaque can be set in code only
+# In 0.0..=1.0.
+# gain is bound to param/tuning/gain
+# horizon has a value that cannot be written
+# scale has a value that cannot be written
+
+[param.tuning]
+# How much is believed.
+# In 0.0..=1.0.
+gain = 0.5
+limit = "2 m/s"
+count = 3
+label = "a"
+enabled = true
+"#
+    );
+}
+
+#[test]
+fn the_schema_says_what_can_be_set() {
+    let schema = Set::settings_schema();
+    for part in [
+        r#""$schema":"https://json-schema.org/draft/2020-12/schema","title":"Set""#,
+        r#""port":{"type":"string","description":"Device file.","default":"/dev/null"}"#,
+        r#""examples":["1 m"],"description":"Readings beyond it are dropped. In 0.1..=30.0 m.","default":"4 m"}"#,
+        r#""retries":{"type":"integer","minimum":1.0,"maximum":8.0,"description":"In 1..=8.","default":3}"#,
+        r##""filtering":{"$ref":"#/$defs/Filtering","default":"None"}"##,
+        r#""gain":{"type":"number","minimum":0.0,"maximum":1.0,"description":"How much is believed. In 0.0..=1.0.","default":0.5}"#,
+        r#""$defs":{"Filtering":"#,
+    ] {
+        assert!(schema.contains(part), "{part} is not in {schema}");
+    }
+    assert!(!schema.contains("opaque"), "{schema}");
+    let parsed: serde_json::Value = serde_json::from_str(&schema).expect("it is JSON");
+    let options =
+        &parsed["properties"]["sensor"]["properties"]["base"]["properties"]["source"]["properties"]["every"];
+    assert_eq!(
+        options["properties"].as_object().map(serde_json::Map::len),
+        Some(10),
+        "gain is bound, opaque is none"
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Whatever is set can be listed, and read back to the same.
+    #[test]
+    fn a_list_reads_back_to_the_same_settings(
+        port in "\\PC{0,12}",
+        range in 0.1..30.0_f64,
+        nanos in 0..4_000_000_000_000_000_u64,
+        rate in proptest::num::f32::NORMAL,
+        retries in 1..=8_u8,
+        axis in [proptest::num::f64::NORMAL, proptest::num::f64::NORMAL, proptest::num::f64::NORMAL],
+        name in ".{0,12}",
+        cutoff in proptest::option::of(proptest::num::f64::NORMAL),
+        limit in proptest::num::f64::NORMAL,
+        count in any::<i64>(),
+        label in ".{0,12}",
+    ) {
+        let mut builder = Set::builder();
+        let options = builder.options(set::sensor::base::source::every);
+        options.port = port.into();
+        options.maximum_range = range;
+        options.timeout = Duration::from_nanos(nanos);
+        options.rate = Some(rate);
+        options.retries = retries;
+        options.axis = axis;
+        options.name = name;
+        options.filtering = cutoff.map_or(Filtering::None, |cutoff| Filtering::LowPass { cutoff });
+        builder.set_parameter(set::param::tuning::limit, limit).expect("it has no range");
+        builder.set_parameter(set::param::tuning::count, count).expect("it has no range");
+        builder.set_parameter(set::param::tuning::label, label).expect("it has no range");
+        let expected = format!("{:?}", builder.options(set::sensor::base::source::every));
+        let listed = builder.settings().to_string();
+        let mut other = Set::builder();
+        other.set_from_toml("list", &listed).map_err(|error| TestCaseError::fail(format!("{error}\n{listed}")))?;
+        prop_assert_eq!(format!("{:?}", other.options(set::sensor::base::source::every)), expected);
+        prop_assert_eq!(other.settings().to_string(), listed);
+    }
+
+    #[test]
+    fn no_file_panics(text in "[\\[\\]=\"a-z.0-9{}#\\n ]{0,80}") {
+        let _ = Set::builder().set_from_toml("any", &text);
+    }
+}
