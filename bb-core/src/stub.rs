@@ -127,10 +127,14 @@ macro_rules! __stub_robot {
             const PARAMETERS: &'static [$crate::__private::ParameterDeclaration] = &[];
             const ISLANDS: &'static [$crate::__private::IslandOf<()>] = &[];
             const FEEDS: &'static [::core::option::Option<$crate::__private::FeedOf<()>>] = &[];
+            const BOUND_OPTIONS: &'static [(usize, &'static str, usize)] = &[];
             type Options = ();
             type Topics = ();
             type Wiring = ();
             fn options() {}
+            fn all_options(_: &mut ()) -> ::std::vec::Vec<&mut dyn $crate::__private::AnyOptions> {
+                ::std::vec::Vec::new()
+            }
             fn topics() {}
             fn wire(_: (), _: &(), _: &$crate::__private::Assembly) {}
             fn sources(

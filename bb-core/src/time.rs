@@ -1,7 +1,10 @@
-//! Time: instants as integers of nanoseconds, and the one [`Clock`] that everything reads.
+//! Time: instants as integers of nanoseconds, the one [`Clock`] that everything reads, and the counters of
+//! devices.
 
 mod clock;
+mod device;
 mod instant;
 
 pub use clock::Clock;
+pub use device::DeviceClock;
 pub use instant::{MonotonicTime, WallTime};

@@ -66,6 +66,12 @@ impl Clock {
         WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos()))
     }
 
+    /// The monotonic time that belongs to a calendar time, by the current offset: for devices that stamp with the date, such as a
+    /// GNSS receiver or a camera on the network.
+    pub fn monotonic_at(&self, wall: WallTime) -> MonotonicTime {
+        MonotonicTime::from_nanos(wall.as_unix_nanos().saturating_sub(self.wall_offset_nanos()))
+    }
+
     /// Wall time minus monotonic time, in nanoseconds. It changes when the machine's date is set.
     pub fn wall_offset_nanos(&self) -> i64 {
         // The offset guards no other data, so that no order is needed.
