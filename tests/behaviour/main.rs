@@ -9,6 +9,7 @@ mod components;
 mod contention;
 mod control;
 mod disarm_first;
+mod drivers;
 mod end;
 mod everything;
 mod external;

@@ -31,3 +31,7 @@ struct Recording;
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/settings.md")]
 struct Settings;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/drivers.md")]
+struct Drivers;

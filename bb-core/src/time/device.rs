@@ -77,16 +77,14 @@ impl DeviceClock {
     /// the counter goes on.
     pub fn time_of(&mut self, ticks: u64, arrival: MonotonicTime) -> MonotonicTime {
         let ticks = self.modulus.map_or(ticks, |modulus| ticks % modulus);
-        let time = match self.state.and_then(|state| self.next(state, ticks, arrival)) {
-            Some(state) => self.state.insert(state).last,
-            None => {
-                let window = Window { start: arrival, least: 0.0 };
-                let origin = arrival.as_nanos() as f64;
-                self.state = Some(State { ticks, elapsed: 0, origin, last: arrival, window });
-                arrival
-            }
-        };
-        time
+        let next = self.state.and_then(|state| self.next(state, ticks, arrival)).unwrap_or(State {
+            ticks,
+            elapsed: 0,
+            origin: arrival.as_nanos() as f64,
+            last: arrival,
+            window: Window { start: arrival, least: 0.0 },
+        });
+        self.state.insert(next).last
     }
 
     /// None if the counter does not go on.
