@@ -35,3 +35,11 @@ struct Settings;
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/drivers.md")]
 struct Drivers;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/programs.md")]
+struct Programs;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/coming-from.md")]
+struct ComingFrom;
