@@ -8,6 +8,9 @@
 //! `bb eval navigation DATA…` does the same for navigation filters on data sets of CSV files; [`evaluate_navigation`] is its
 //! library.
 
+// A robot must not stop because a value was not what it was taken for.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
 mod arguments;
 mod averages;
 mod error_plot;

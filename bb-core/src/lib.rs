@@ -23,6 +23,8 @@
 //!
 //! All stored quantities are SI: metres, seconds, radians, kilograms, tesla.
 
+// A robot must not stop because a value was not what it was taken for.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 #![cfg_attr(loom, allow(dead_code, reason = "a model is of a part"))]
 
 // The derives name this crate by its absolute path, also when this crate itself uses them.
@@ -43,6 +45,7 @@ pub mod telemetry;
 pub mod time;
 pub mod topology;
 
+#[allow(clippy::panic, reason = "a fault is a panic at compile time, which rustc reports")]
 mod check;
 mod fault;
 mod schedule;
