@@ -12,7 +12,7 @@ use std::ffi::OsStr;
 use std::marker::PhantomData;
 
 /// The options of one component, whatever its type.
-pub trait AnyOptions: Send {
+pub trait AnyOptions: Any + Send {
     /// See [`Options::FIELDS`].
     fn fields(&self) -> &'static [OptionField];
     /// The option number `index` of [`AnyOptions::fields`].
@@ -23,8 +23,6 @@ pub trait AnyOptions: Send {
     fn copy(&self) -> Box<dyn AnyOptions>;
     /// Takes over a copy.
     fn replace(&mut self, copy: Box<dyn AnyOptions>);
-    /// As itself.
-    fn into_any(self: Box<Self>) -> Box<dyn Any>;
 }
 
 impl<O: Options> AnyOptions for O {
@@ -45,13 +43,10 @@ impl<O: Options> AnyOptions for O {
     }
 
     fn replace(&mut self, copy: Box<dyn AnyOptions>) {
-        if let Ok(copy) = copy.into_any().downcast() {
+        let copy: Box<dyn Any> = copy;
+        if let Ok(copy) = copy.downcast() {
             *self = *copy;
         }
-    }
-
-    fn into_any(self: Box<Self>) -> Box<dyn Any> {
-        self
     }
 }
 

@@ -17,9 +17,6 @@ use std::sync::Arc;
 /// Finds an island in a wiring.
 pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
 
-/// Publishes a message of a sensor or a service; false if its payload is another.
-pub type FeedOf<W> = fn(&W, &DynamicMessage, MonotonicTime) -> bool;
-
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
 pub trait Robot: Sized + Send + Sync + 'static {
     /// Its name.
@@ -45,10 +42,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// Where its islands are in the wiring.
     #[doc(hidden)]
     const ISLANDS: &'static [IslandOf<Self::Wiring>];
-    /// By publisher, how its messages are published again; none for an estimator's.
-    #[doc(hidden)]
-    const FEEDS: &'static [Option<FeedOf<Self::Wiring>>];
-    /// The options that are bound to a parameter: the number of the component in [`Robot::all_options`], the option's name,
+    /// The options that are bound to a parameter: the number of the component in [`Robot::options_of`], the option's name,
     /// the number of the parameter.
     #[doc(hidden)]
     const BOUND_OPTIONS: &'static [(usize, &'static str, usize)];
@@ -66,9 +60,6 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// The options as declared.
     #[doc(hidden)]
     fn options() -> Self::Options;
-    /// Of all components: sensors, estimators, actuators, services, commands, each in the order of their declaration.
-    #[doc(hidden)]
-    fn all_options(options: &mut Self::Options) -> Vec<&mut dyn AnyOptions>;
     #[doc(hidden)]
     fn topics() -> Self::Topics;
     /// Starts all estimators; what cannot start is kept in `assembly`.
@@ -79,13 +70,32 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, assembly: &Assembly) -> Vec<Box<dyn Source>>;
     #[doc(hidden)]
     fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
+    /// The topic of that publisher; none beyond the last.
     #[doc(hidden)]
-    fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic>;
+    fn topic(topics: &Self::Topics, publisher: usize) -> Option<&dyn AnyTopic>;
+    /// The options of that component, an `S::Options`; none beyond the last.
     #[doc(hidden)]
-    fn all_actuators(wiring: &Self::Wiring) -> Vec<&dyn AnyActuator>;
+    fn options_of(options: &mut Self::Options, component: usize) -> Option<&mut dyn AnyOptions>;
+    /// The actuator of that number; none beyond the last.
+    #[doc(hidden)]
+    fn actuator(wiring: &Self::Wiring, actuator: usize) -> Option<&dyn AnyActuator>;
+    /// Publishes a recorded message of a sensor or a service; false if the publisher of that number is none, or has another
+    /// payload.
+    #[doc(hidden)]
+    fn feed(wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, now: MonotonicTime) -> bool;
     /// The commands with their options.
     #[doc(hidden)]
     fn commands(options: &Self::Options) -> Vec<Prepared>;
+
+    #[doc(hidden)]
+    fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic> {
+        (0..).map_while(|publisher| Self::topic(topics, publisher)).collect()
+    }
+
+    #[doc(hidden)]
+    fn all_actuators(wiring: &Self::Wiring) -> Vec<&dyn AnyActuator> {
+        (0..).map_while(|actuator| Self::actuator(wiring, actuator)).collect()
+    }
 
     /// Its links and joints as a URDF file.
     fn to_urdf() -> String {

@@ -1,7 +1,7 @@
 //! Settings to options and parameters: all of them, or none.
 
 use super::error::{Place, SettingProblem, SettingsError};
-use crate::component::{AnyOptions, quantity};
+use crate::component::{AnyOptions, OptionField, quantity};
 use crate::declaration::{ParameterDeclaration, ParameterDefault, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::{from_json, to_json};
@@ -45,13 +45,17 @@ pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
     sensors.chain(estimators).chain(actuators).chain(services).chain(commands).collect()
 }
 
+/// The options of a component.
+fn fields<R: Robot>(options: &mut R::Options, component: usize) -> &'static [OptionField] {
+    R::options_of(options, component).map_or(&[], |options| options.fields())
+}
+
 /// The paths of all settings.
 pub(super) fn names<R: Robot>(builder: &mut Builder<R>) -> BTreeSet<String> {
-    let paths = component_paths::<R>();
-    let options = R::all_options(&mut builder.options);
-    let options = options.iter().zip(paths);
-    let options = options.flat_map(|(options, path)| options.fields().iter().map(move |field| (path, field.name)));
-    let options = options.map(|(path, name)| format!("{path}/{name}"));
+    let paths = component_paths::<R>().into_iter().enumerate();
+    let options = paths.flat_map(|(component, path)| {
+        fields::<R>(&mut builder.options, component).iter().map(move |field| format!("{path}/{}", field.name))
+    });
     options.chain(R::PARAMETERS.iter().map(|declared| declared.path.to_owned())).collect()
 }
 
@@ -61,23 +65,24 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
     let paths = component_paths::<R>();
     let mut problems = Vec::new();
     let mut parameters = builder.parameters.clone();
-    let mut options = R::all_options(&mut builder.options);
     // The changed options of a component, and what changed them.
     let mut changed: BTreeMap<usize, (Box<dyn AnyOptions>, Vec<&Assignment>)> = BTreeMap::new();
     for assignment in assignments {
-        let target = target::<R>(&paths, &options, &assignment.path);
+        let target = target::<R>(&paths, &mut builder.options, &assignment.path);
         let result = match target {
             Some(Target::Parameter(number)) => parameter(&R::PARAMETERS[number], assignment).map(|value| {
                 parameters[number] = value;
             }),
             Some(Target::Option { component, field }) => match bound_to::<R>(component, &assignment.path) {
                 Some(bound) => Err(format!("is bound to `{bound}`; set that")),
-                None => {
-                    let (copy, by) =
-                        changed.entry(component).or_insert_with(|| (options[component].copy(), Vec::new()));
-                    by.push(assignment);
-                    option(copy.as_mut(), field, assignment)
-                }
+                None => match R::options_of(&mut builder.options, component) {
+                    Some(options) => {
+                        let (copy, by) = changed.entry(component).or_insert_with(|| (options.copy(), Vec::new()));
+                        by.push(assignment);
+                        option(copy.as_mut(), field, assignment)
+                    }
+                    None => Err("has no options".to_owned()),
+                },
             },
             None => Err(unknown(&names, &paths, &assignment.path)),
         };
@@ -100,7 +105,9 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
         return Err(SettingsError::new(problems));
     }
     for (component, (copy, _)) in changed {
-        options[component].replace(copy);
+        if let Some(options) = R::options_of(&mut builder.options, component) {
+            options.replace(copy);
+        }
     }
     builder.parameters = parameters;
     Ok(())
@@ -111,13 +118,13 @@ enum Target {
     Option { component: usize, field: usize },
 }
 
-fn target<R: Robot>(paths: &[&str], options: &[&mut dyn AnyOptions], path: &str) -> Option<Target> {
+fn target<R: Robot>(paths: &[&str], options: &mut R::Options, path: &str) -> Option<Target> {
     if let Some(number) = R::PARAMETERS.iter().position(|declared| declared.path == path) {
         return Some(Target::Parameter(number));
     }
     let (component, name) = path.rsplit_once('/')?;
     let component = paths.iter().position(|path| *path == component)?;
-    let field = options.get(component)?.fields().iter().position(|field| field.name == name)?;
+    let field = fields::<R>(options, component).iter().position(|field| field.name == name)?;
     Some(Target::Option { component, field })
 }
 

@@ -45,7 +45,8 @@ pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
     };
     let mut tables = Vec::new();
     let paths = component_paths::<R>();
-    for (number, (options, path)) in R::all_options(&mut builder.options).into_iter().zip(paths).enumerate() {
+    for (number, path) in paths.into_iter().enumerate() {
+        let Some(options) = R::options_of(&mut builder.options, number) else { continue };
         let fields = options.fields().iter().enumerate();
         let settings: Vec<Line> = fields
             .filter_map(|(index, field)| {
