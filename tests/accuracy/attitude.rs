@@ -14,8 +14,8 @@ robot! {
 
     link body {
         sensor imu: BagImu() {
-            estimator madgwick: Madgwick<Marg>(beta = 0.12);
-            estimator madgwick_six: Madgwick<Marg>(beta = 0.03, magnetometer = false);
+            estimator madgwick: Madgwick<Marg>(beta = 0.12 rad/s);
+            estimator madgwick_six: Madgwick<Marg>(beta = 0.03 rad/s, magnetometer = false);
             estimator complementary: Complementary<Marg>();
             estimator complementary_six: Complementary<Marg>(magnetometer = false);
             estimator mekf: Mekf<Marg>();
