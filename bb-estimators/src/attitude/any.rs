@@ -65,7 +65,6 @@ macro_rules! any {
         }
 
         #[derive(Clone, Debug, PartialEq)]
-        #[expect(clippy::large_enum_variant, reason = "without an allocator there is no box")]
         enum Running<T: Real> {
             $($estimator(super::$filter<T>),)*
         }
