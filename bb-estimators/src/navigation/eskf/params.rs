@@ -46,6 +46,7 @@ macro_rules! imu_params {
     };
 }
 
+#[cfg(feature = "runtime")]
 pub(crate) use imu_params;
 
 imu_params! {
