@@ -49,7 +49,8 @@ fn robot(estimators: usize) -> String {
     );
     for number in 0..estimators {
         // Writing to a string cannot fail.
-        let _ = writeln!(source, "sensor s{number}: External<Imu>() {{ estimator e: Madgwick(beta = 0.1); }}");
+        let _ =
+            writeln!(source, "sensor s{number}: External<Imu>() {{ estimator e: Madgwick(beta = 0.1 rad/s); }}");
     }
     source + "} }\n"
 }

@@ -2,7 +2,7 @@
 //!
 //! `instructions FILE FILTER six|nine UPDATES`
 
-use bb_cli::{Axes, Chosen, End, FILTERS, Recording, Running, Topics};
+use bb_cli::{Axes, Chosen, End, Recording, Running, Topics};
 use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::ImuSample;
 use std::error::Error;
@@ -18,8 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("write: instructions FILE FILTER six|nine UPDATES".into());
     };
     let axes = if axes == "six" { Axes::Six } else { Axes::Nine };
-    let filter = FILTERS.iter().find(|filter| filter.name == *name).ok_or("no such filter")?;
-    let mut filter = Chosen::all(&[filter], axes, &[])?.first().ok_or("no filter")?.start()?;
+    let mut filter = Chosen::named(name, axes, &[])?.start()?;
     let mut recording = Recording::open(Path::new(file), &Topics::default(), axes, Some(0.0))?;
     let mut samples = Vec::new();
     while samples.len() < SAMPLES && matches!(recording.read(&mut samples, SAMPLES)?, End::NotYet) {}

@@ -1,12 +1,13 @@
 //! The command line.
 
 use crate::evaluate::Evaluator;
-use crate::filters::{Axes, Chosen, FILTERS, Filter, Setting};
-use crate::navigation::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
+use crate::filters::{Axes, Chosen, Setting};
+use crate::navigation::{self, NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
 use crate::plot::Picture;
 use crate::recording::{MovingTopic, Topics};
 use crate::variants::{Field, Offset, Starts, Variants};
 use crate::{files, filters};
+use bb_estimators::attitude::FilterParams;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
@@ -58,15 +59,18 @@ Examples:
 #[derive(Debug, Args)]
 struct NavigationArguments {
     /// Prefixes of data sets: `folder/name` for `folder/name_imu.csv`, `folder/name_keyframes.csv` and the others.
-    #[arg(value_name = "DATA", required = true)]
+    #[arg(value_name = "DATA", required_unless_present = "list")]
     data: Vec<PathBuf>,
     /// The filters; several with commas.
     #[arg(long = "filter", value_name = "NAME", value_delimiter = ',', default_value = NAVIGATION_FILTERS[0].name,
           value_parser = navigation_filter, long_help = navigation_filters_in_words())]
     filters: Vec<NavigationFilter>,
-    /// Sets a parameter, in SI, in place of what the data set says.
+    /// Sets a parameter, in SI or with a unit, in place of what the data set says.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<NavigationSetting>,
+    /// Prints the parameters, with defaults, ranges and units, and does nothing else.
+    #[arg(long)]
+    list: bool,
     /// Prints an array of objects instead of the table.
     #[arg(long)]
     json: bool,
@@ -79,14 +83,17 @@ struct AttitudeArguments {
     files: Vec<PathBuf>,
     /// The filters, or `all`.
     #[arg(long = "filter", value_name = "NAME", num_args = 1.., value_delimiter = ',', default_value = "all",
-          long_help = filters_in_words())]
+          long_help = filters::described())]
     filters: Vec<String>,
     /// Gyroscope and accelerometer alone, or the magnetometer as well. With six axes only the inclination counts.
     #[arg(long, value_enum, default_value_t = Axes::Nine)]
     axes: Axes,
-    /// Sets a parameter, in SI, of all chosen filters that have it; FILTER.NAME=VALUE sets it of one.
+    /// Sets a parameter, in SI or with a unit, of all chosen filters that have it; FILTER.NAME=VALUE sets it of one.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<Setting>,
+    /// Prints the parameters of the chosen filters, with defaults, ranges and units, and does nothing else.
+    #[arg(long)]
+    list: bool,
     /// Starts the filters so many seconds before the first motion, instead of at the first sample.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     start_before_motion: Option<f64>,
@@ -133,6 +140,8 @@ struct AttitudeArguments {
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
     Navigation(Navigation),
+    /// Prints this.
+    Print(String),
 }
 
 /// `bb eval navigation`.
@@ -158,11 +167,14 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
     let Bb { command: Command::Eval { what } } = Bb::try_parse_from(arguments)?;
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,
-        Eval::Navigation(NavigationArguments { data, filters, settings, json }) => {
+        Eval::Navigation(NavigationArguments { list: true, .. }) => {
+            return Ok(Job::Print(navigation::listed()));
+        }
+        Eval::Navigation(NavigationArguments { data, filters, settings, json, .. }) => {
             return Ok(Job::Navigation(Navigation { data, filters, settings, json }));
         }
     };
-    arguments.check().map(|attitude| Job::Attitude(Box::new(attitude))).map_err(|(kind, fault)| {
+    arguments.check().map_err(|(kind, fault)| {
         let mut bb = Bb::command();
         bb.build();
         let attitude = bb.find_subcommand_mut("eval").and_then(|eval| eval.find_subcommand_mut("attitude"));
@@ -174,9 +186,12 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
 }
 
 impl AttitudeArguments {
-    fn check(mut self) -> Result<Attitude, (ErrorKind, String)> {
+    fn check(mut self) -> Result<Job, (ErrorKind, String)> {
         let invalid = |fault: String| (ErrorKind::ValueValidation, fault);
         let filters = self.filters().map_err(invalid)?;
+        if self.list {
+            return Ok(Job::Print(filters::listed(&filters)));
+        }
         if self.files.is_empty() {
             let fault = "no recording is named; name bags (.mcap) or folders of them";
             return Err((ErrorKind::MissingRequiredArgument, fault.into()));
@@ -215,16 +230,18 @@ impl AttitudeArguments {
             variants,
             keep_errors: self.plot.is_some(),
         };
-        Ok(Attitude { paths: self.files, evaluator, json: self.json, plot: self.plot })
+        let attitude = Attitude { paths: self.files, evaluator, json: self.json, plot: self.plot };
+        Ok(Job::Attitude(Box::new(attitude)))
     }
 
     /// The filters that are named, in the order of the table. What follows `--filter` and is a path is a recording.
-    fn filters(&mut self) -> Result<Vec<&'static Filter>, String> {
+    fn filters(&mut self) -> Result<Vec<FilterParams>, String> {
         let is_recording = |name: &str| {
             let path = Path::new(name);
             path.extension().is_some_and(|end| end == files::EXTENSION) || path.exists()
         };
-        let known: Vec<_> = FILTERS.iter().map(|filter| filter.name).chain(["all"]).collect();
+        let filters = || FilterParams::ALL.iter().map(|default| default());
+        let known: Vec<_> = filters().map(|filter| filter.name()).chain(["all"]).collect();
         let mut named = Vec::new();
         for name in std::mem::take(&mut self.filters) {
             if known.contains(&&*name) {
@@ -236,12 +253,12 @@ impl AttitudeArguments {
             }
         }
         let all = named.iter().any(|name| name == "all");
-        let is_chosen = |filter: &&Filter| match all {
+        let is_chosen = |filter: &FilterParams| match all {
             // Those that have no ninth axis are not asked to.
-            true => filter.takes(self.axes),
-            false => named.iter().any(|name| name == filter.name),
+            true => self.axes.suit(filter),
+            false => named.iter().any(|name| name == filter.name()),
         };
-        Ok(FILTERS.iter().filter(is_chosen).collect())
+        Ok(filters().filter(is_chosen).collect())
     }
 }
 
@@ -255,16 +272,6 @@ fn navigation_filters_in_words() -> String {
     let mut text = String::from("The filters; several with commas. Those there are:\n");
     for filter in NAVIGATION_FILTERS {
         text += &format!("\n{}: {}", filter.name, filter.about);
-    }
-    text
-}
-
-fn filters_in_words() -> String {
-    let mut text =
-        String::from("The filters, or `all`: several with commas. Those there are, with their parameters:\n");
-    for filter in FILTERS {
-        let parameters: Vec<_> = filter.parameters.iter().copied().filter(|name| *name != "magnetometer").collect();
-        text += &format!("\n{}: {}", filter.name, parameters.join(", "));
     }
     text
 }

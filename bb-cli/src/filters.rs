@@ -1,102 +1,29 @@
-//! The filters to choose from.
+//! The filters to choose from: those of `bb-estimators`, by name.
 
+mod list;
 mod settings;
 
+pub(crate) use list::{described, listed, parameters};
 pub use settings::Setting;
 pub(crate) use settings::near;
 
 use bb_core::nalgebra::UnitQuaternion;
-use bb_estimators::attitude::{
-    AttitudeFilter, ComplementaryFilter, FusionFilter, ImuSample, MadgwickFilter, MahonyFilter, MekfFilter,
-    SampleError, TiltFilter, VqfFilter,
-};
-
-/// Makes the table: the name on the command line, the filter, and its parameters for `--set`.
-macro_rules! filters {
-    ($($name:ident: $filter:ident { $($parameter:ident),* $(,)? }),* $(,)?) => {
-        /// Every filter, in the order in which `--filter all` takes them.
-        pub const FILTERS: &[Filter] = &[$(Filter {
-            name: stringify!($name),
-            parameters: &[$(stringify!($parameter)),*],
-            #[cfg(test)]
-            declared: || {
-                let fields = <<$filter as AttitudeFilter>::Params as bb_core::Options>::FIELDS;
-                fields.iter().map(|field| field.name).collect()
-            },
-            make: |values| {
-                make::<$filter>(values, |params, name, value| match name {
-                    $(stringify!($parameter) => settings::set(&mut params.$parameter, value),)*
-                    _ => Err("not a parameter of this filter".into()),
-                })
-            },
-        }),*];
-    };
-}
-
-filters! {
-    mekf: MekfFilter {
-        gyroscope_noise, gyroscope_rate_noise, initial_bias, bias_drift, calibration_error, velocity,
-        acceleration_time, accelerometer_latency, force_is_mean, magnetometer_latency, field_disturbance,
-        magnetometer,
-    },
-    madgwick: MadgwickFilter { beta, magnetometer },
-    vqf: VqfFilter {
-        tilt_time_constant, heading_time_constant, rest_bias, motion_bias, initial_bias, bias_forgetting_time,
-        largest_bias, motion_bias_deviation, vertical_forgetting_factor, rest_bias_deviation, rest_time,
-        rest_time_constant, rest_angular_velocity, rest_specific_force, disturbance_rejection, field_time_constant,
-        reference_time_constant, field_norm_tolerance, field_dip_tolerance, new_field_time, first_field_time,
-        new_field_angular_velocity, undisturbed_time, rejection_time, rejection_factor, magnetometer,
-    },
-    complementary: ComplementaryFilter { tilt_time_constant, heading_time_constant, magnetometer },
-    mahony: MahonyFilter { proportional_gain, integral_gain, magnetometer },
-    fusion: FusionFilter {
-        gain, gyroscope_range, acceleration_rejection, magnetic_rejection, recovery_time, offset_correction,
-        rest_angular_velocity, rest_time, magnetometer,
-    },
-    tilt: TiltFilter { time_constant, magnetometer },
-}
+use bb_estimators::attitude::{self, AttitudeFilter, FilterParams, ImuSample, SampleError};
+use bb_estimators::attitude_filters;
+use bb_estimators::params::Params;
 
 /// The parameter that every filter of nine axes has: whether it uses the ninth.
 const MAGNETOMETER: &str = "magnetometer";
-
-/// An attitude filter that can be chosen by name.
-#[derive(Clone, Copy, Debug)]
-pub struct Filter {
-    /// Its name on the command line.
-    pub name: &'static str,
-    /// Its parameters.
-    pub parameters: &'static [&'static str],
-    #[cfg(test)]
-    declared: fn() -> Vec<&'static str>,
-    make: fn(&[(&str, &str)]) -> Made,
-}
 
 /// Gyroscope and accelerometer, or the magnetometer as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Axes {
     /// Gyroscope and accelerometer: heading starts anywhere and is no result.
+    #[value(alias = "6")]
     Six,
     /// The magnetometer as well.
+    #[value(alias = "9")]
     Nine,
-}
-
-/// A filter with the values of its parameters.
-#[derive(Clone, Debug)]
-pub struct Chosen {
-    filter: &'static Filter,
-    /// Name and value.
-    values: Vec<(String, String)>,
-}
-
-impl Filter {
-    /// Whether it can use so many axes.
-    pub fn takes(&self, axes: Axes) -> bool {
-        axes == Axes::Six || self.has(MAGNETOMETER)
-    }
-
-    fn has(&self, parameter: &str) -> bool {
-        self.parameters.contains(&parameter)
-    }
 }
 
 impl Axes {
@@ -107,12 +34,28 @@ impl Axes {
             Self::Nine => "nine",
         }
     }
+
+    /// Whether a filter can use so many.
+    pub(crate) fn suit(self, filter: &FilterParams) -> bool {
+        self == Self::Six || filter.get(MAGNETOMETER).is_some()
+    }
+}
+
+/// A filter with the values of its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chosen {
+    params: FilterParams,
 }
 
 impl Chosen {
     /// The filter's name.
     pub fn name(&self) -> &'static str {
-        self.filter.name
+        self.params.name()
+    }
+
+    /// Its parameters.
+    pub fn params(&self) -> &FilterParams {
+        &self.params
     }
 
     /// A filter that has seen no sample yet.
@@ -120,8 +63,18 @@ impl Chosen {
     /// # Errors
     /// A value that is refused; there is none after [`all`](Self::all).
     pub fn start(&self) -> Result<Box<dyn Running>, String> {
-        let values: Vec<_> = self.values.iter().map(|(name, value)| (&**name, &**value)).collect();
-        (self.filter.make)(&values)
+        /// Of its own type, so that the samples of a block pass through no choice of the filter.
+        macro_rules! started {
+            ($params:ident, $($module:ident $estimator:ident $filter:ident $_params:ident;)*) => {
+                match $params {
+                    $(FilterParams::$estimator(params) => {
+                        attitude::$filter::<f64>::new(params).map(|filter| Box::new(filter) as Box<dyn Running>)
+                    })*
+                }
+            };
+        }
+        let params = self.params;
+        attitude_filters!(started!(params,)).map_err(|error| error.to_string())
     }
 }
 
@@ -168,35 +121,14 @@ impl<F: AttitudeFilter> Running for F {
     }
 }
 
-/// A filter, or which value it refuses.
-type Made = Result<Box<dyn Running>, String>;
-
-/// Sets a parameter of a name to what a text says.
-type Set<P> = fn(&mut P, &str, &str) -> Result<(), String>;
-
-fn make<F: AttitudeFilter + 'static>(values: &[(&str, &str)], set: Set<F::Params>) -> Made {
-    let mut params = F::Params::default();
-    for (name, value) in values {
-        set(&mut params, name, value).map_err(|fault| format!("`{name}` is `{value}`, {fault}"))?;
-    }
-    Ok(Box::new(F::new(params).map_err(|error| error.to_string())?))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_table_names_every_parameter() {
-        for filter in FILTERS {
-            assert_eq!(filter.parameters, (filter.declared)(), "the parameters of {}, for `--set`", filter.name);
-        }
-    }
-
-    #[test]
     fn defaults_make_every_filter() {
-        for filter in FILTERS {
-            assert!((filter.make)(&[]).is_ok(), "{}", filter.name);
+        for params in FilterParams::ALL.iter().map(|default| default()) {
+            assert!(Chosen { params }.start().is_ok(), "{}", params.name());
         }
     }
 }

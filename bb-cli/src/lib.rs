@@ -27,7 +27,7 @@ mod variants;
 
 pub use averages::Averages;
 pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_variant};
-pub use filters::{Axes, Chosen, FILTERS, Filter, Refused, Running, Setting};
+pub use filters::{Axes, Chosen, Refused, Running, Setting};
 pub use navigation::{
     DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
 };
@@ -56,6 +56,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let done = match &job {
         Job::Attitude(attitude) => eval_attitude(attitude),
         Job::Navigation(navigation) => eval_navigation(navigation),
+        Job::Print(text) => say(text).map(|()| true),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

@@ -9,4 +9,5 @@ pub use data::DataSet;
 pub use evaluate::{NavigationScore, evaluate_navigation};
 pub use filters::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
 
+pub(crate) use filters::listed;
 pub(crate) use report::{json, table};

@@ -24,31 +24,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod any;
 pub mod average;
-pub mod complementary;
 mod directions;
 mod error;
 mod filter;
-pub mod fusion;
+mod filters;
 pub mod initial;
 mod low_pass;
-pub mod madgwick;
-pub mod mahony;
-pub mod mekf;
-pub(crate) mod params;
 mod real;
 mod rotation;
 mod sample;
 mod state;
-pub mod tilt;
-pub mod vqf;
 
 #[cfg(feature = "runtime")]
 mod estimator;
 #[cfg(test)]
 mod laws;
 
-pub use complementary::{ComplementaryFilter, ComplementaryParams};
+pub use crate::params::ParamsError;
+pub use any::{About, AnyFilter, AnyParams, FilterParams};
 pub use error::{ErrorStatistics, OrientationError};
 #[cfg(feature = "runtime")]
 pub use estimator::{
@@ -56,13 +51,18 @@ pub use estimator::{
     InertialInputs,
 };
 pub use filter::AttitudeFilter;
-pub use fusion::{FusionFilter, FusionParams};
-pub use madgwick::{MadgwickFilter, MadgwickParams};
-pub use mahony::{MahonyFilter, MahonyParams};
-pub use mekf::{MekfFilter, MekfParams};
-pub use params::ParamsError;
 pub use real::Real;
 pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};
 pub use state::MAX_GAP_S;
-pub use tilt::{TiltFilter, TiltParams};
-pub use vqf::{VqfFilter, VqfParams};
+
+/// The module of each filter, with its types.
+macro_rules! modules {
+    ($($module:ident $estimator:ident $filter:ident $params:ident;)*) => {
+        $(
+            pub mod $module;
+            pub use $module::{$filter, $params};
+        )*
+    };
+}
+
+crate::attitude_filters!(modules!());

@@ -6,7 +6,7 @@
 //!
 //! | declared as | takes | emits |
 //! |---|---|---|
-//! | `Mekf(…)`, `Vqf(…)`, `Madgwick(beta = 0.1)`, … in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
+//! | `Mekf(…)`, `Vqf(…)`, `Madgwick(beta = 0.1 rad/s)`, … in a sensor | the sensor's `Imu` | `Orientation` of the sensor |
 //! | `Mekf<Marg>(…)`, `Vqf<Marg>(…)`, `Madgwick<Marg>(…)`, … in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
 //! | `Madgwick<ImuAndMagnetometer>(…)` on a link | `input imu`, driver, and `input magnetic_field`, of two sensors | `Orientation` of the link |
 //! | `Vqf<Marg, AttitudeOutputs>(…)`, … | as before | `output orientation`, and `output status`: bias, rest, disturbance |
@@ -21,6 +21,7 @@
 
 pub mod attitude;
 pub mod navigation;
+pub mod params;
 #[cfg(feature = "simulation")]
 pub mod simulation;
 
@@ -38,34 +39,18 @@ pub use simulation::SimulatedImu;
 #[cfg(feature = "runtime")]
 pub type Eskf<O = Odometry> = navigation::EskfEstimator<O>;
 
-/// Madgwick's filter as an estimator: of six axes, `Madgwick<Marg>` and `Madgwick<ImuAndMagnetometer>` of nine.
+/// The estimator of each attitude filter.
 #[cfg(feature = "runtime")]
-pub type Madgwick<I = Imu, O = Orientation> = Attitude<attitude::MadgwickFilter, I, O>;
+macro_rules! estimators {
+    ($($module:ident $estimator:ident $filter:ident $params:ident;)*) => {$(
+        #[doc = concat!(
+            "[`", stringify!($filter), "`](attitude::", stringify!($filter), ") as an estimator: of six axes, `",
+            stringify!($estimator), "<Marg>` and `", stringify!($estimator), "<ImuAndMagnetometer>` of nine. Its options are [`",
+            stringify!($params), "`](attitude::", stringify!($params), ")."
+        )]
+        pub type $estimator<I = Imu, O = Orientation> = Attitude<attitude::$filter, I, O>;
+    )*};
+}
 
-/// Mahony's filter as an estimator: of six axes, `Mahony<Marg>` and `Mahony<ImuAndMagnetometer>` of nine.
 #[cfg(feature = "runtime")]
-pub type Mahony<I = Imu, O = Orientation> = Attitude<attitude::MahonyFilter, I, O>;
-
-/// VQF as an estimator: of six axes, `Vqf<Marg>` and `Vqf<ImuAndMagnetometer>` of nine.
-#[cfg(feature = "runtime")]
-pub type Vqf<I = Imu, O = Orientation> = Attitude<attitude::VqfFilter, I, O>;
-
-/// The revised AHRS algorithm of x-io's Fusion library as an estimator: of six axes, `Fusion<Marg>` and
-/// `Fusion<ImuAndMagnetometer>` of nine.
-#[cfg(feature = "runtime")]
-pub type Fusion<I = Imu, O = Orientation> = Attitude<attitude::FusionFilter, I, O>;
-
-/// Inclination from gravity, without a gyroscope, as an estimator: `Tilt<Marg>` and `Tilt<ImuAndMagnetometer>` have a
-/// heading from the field, too.
-#[cfg(feature = "runtime")]
-pub type Tilt<I = Imu, O = Orientation> = Attitude<attitude::TiltFilter, I, O>;
-
-/// The self-calibrating Kalman filter as an estimator, the most accurate of all here: of six axes, `Mekf<Marg>` and
-/// `Mekf<ImuAndMagnetometer>` of nine.
-#[cfg(feature = "runtime")]
-pub type Mekf<I = Imu, O = Orientation> = Attitude<attitude::MekfFilter, I, O>;
-
-/// The complementary filter as an estimator: of six axes, `Complementary<Marg>` and
-/// `Complementary<ImuAndMagnetometer>` of nine.
-#[cfg(feature = "runtime")]
-pub type Complementary<I = Imu, O = Orientation> = Attitude<attitude::ComplementaryFilter, I, O>;
+attitude_filters!(estimators!());

@@ -1,6 +1,7 @@
 //! The command line.
 
-use crate::filter::{ChosenParams, Kind};
+use bb_cli::{Axes, Chosen, Setting};
+use bb_estimators::attitude::AnyParams;
 use clap::Parser;
 use std::path::PathBuf;
 
@@ -17,15 +18,15 @@ pub(crate) struct Arguments {
     /// The topic of the magnetometer, where the bag has several.
     #[arg(long, value_name = "TOPIC", requires = "data")]
     pub(crate) mag: Option<String>,
-    /// The filter.
-    #[arg(long, value_enum, default_value_t = Kind::Madgwick)]
-    pub(crate) filter: Kind,
-    /// Six axes: gyroscope and accelerometer. Nine: the magnetometer as well.
-    #[arg(long, default_value = "9", value_parser = ["6", "9"])]
-    axes: String,
-    /// Madgwick's step, rad/s. [default: 0.12]
-    #[arg(long, allow_negative_numbers = true)]
-    beta: Option<f64>,
+    /// The filter; `bb eval attitude --help` says which there are.
+    #[arg(long, value_name = "NAME", default_value = "mekf")]
+    filter: String,
+    /// Gyroscope and accelerometer alone, or the magnetometer as well.
+    #[arg(long, value_enum, default_value_t = Axes::Nine)]
+    pub(crate) axes: Axes,
+    /// Sets a parameter of the filter, in SI or with a unit; `bb eval attitude --list` prints them.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    settings: Vec<Setting>,
     /// Plots truth and estimate over time into this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
@@ -36,20 +37,8 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     /// The filter that was asked for.
-    pub(crate) fn params(&self) -> Result<ChosenParams, String> {
-        let mut params =
-            ChosenParams { kind: self.filter, magnetometer: self.axes == "9", ..ChosenParams::default() };
-        match (self.beta, self.filter) {
-            (Some(_), kind) if kind != Kind::Madgwick => {
-                Err("--beta belongs to --filter madgwick; leave it out".into())
-            }
-            (Some(beta), _) if !(0.0..=1e3).contains(&beta) => {
-                Err(format!("--beta is {beta}, but must be in 0..=1000 rad/s"))
-            }
-            (beta, _) => {
-                params.beta = beta.unwrap_or(params.beta);
-                Ok(params)
-            }
-        }
+    pub(crate) fn params(&self) -> Result<AnyParams, String> {
+        let filter = *Chosen::named(&self.filter, self.axes, &self.settings)?.params();
+        Ok(AnyParams { filter })
     }
 }

@@ -4,7 +4,6 @@
 //! of both. With `--data FILE.mcap` a recorded IMU takes their place.
 
 mod arguments;
-mod filter;
 mod outcome;
 mod plot;
 mod recorded;
@@ -43,7 +42,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     let outcome = match &arguments.data {
         Some(file) => recorded::run(file, arguments, params)?,
-        None => simulated::run(params)?,
+        None => simulated::run(arguments, params)?,
     };
     if arguments.json {
         say(&format!("{}\n", serde_json::to_string(&outcome.summary())?))?;

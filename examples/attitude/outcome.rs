@@ -1,6 +1,5 @@
 //! What a run gave: estimates beside the truth, and their errors.
 
-use crate::filter::Kind;
 use bb_cli::{Degrees, Score};
 use bb_core::Report;
 use bb_core::nalgebra::UnitQuaternion;
@@ -9,7 +8,7 @@ use serde::Serialize;
 use std::fmt;
 
 pub(crate) struct Outcome {
-    pub(crate) filter: Kind,
+    pub(crate) filter: &'static str,
     /// The one that counts comes first.
     pub(crate) series: Vec<Series>,
     pub(crate) report: Report,
@@ -73,7 +72,7 @@ impl Outcome {
         let first = self.series.first();
         let rms = first.and_then(|series| series.score.rms());
         Summary {
-            filter: self.filter.name(),
+            filter: self.filter,
             samples: first.map_or(0, Series::len),
             scored: first.map_or(0, |series| series.score.count() as usize),
             total_deg: rms.map(|rms| rms.total),
@@ -89,8 +88,7 @@ impl fmt::Display for Outcome {
         writeln!(f, "Published:\n\n{}", self.report)?;
         let recorded_s =
             self.series.first().and_then(|series| series.points.last()).map_or(0.0, |last| last.time_s);
-        let filter = self.filter.name();
-        writeln!(f, "{filter}: {recorded_s:.1} s in {:.2} s", self.seconds)?;
+        writeln!(f, "{}: {recorded_s:.1} s in {:.2} s", self.filter, self.seconds)?;
         if !self.has_truth {
             return writeln!(f, "The recording has no truth to compare with.");
         }

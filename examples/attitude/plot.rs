@@ -32,6 +32,6 @@ pub(crate) fn picture(outcome: &Outcome) -> Result<Picture, String> {
     let inclination = line(&|point| point.error.map(|error| error.inclination.to_degrees()));
     let lines = vec![Line::new("heading", ERROR, 1, &heading), Line::new("inclination", ESTIMATE, 1, &inclination)];
     panels.push(Panel { name: "error, deg over s".into(), lines });
-    let title = format!("{} ({})", series.name, outcome.filter.name());
+    let title = format!("{} ({})", series.name, outcome.filter);
     Ok(Picture { title, panels, panel_size: (1400, 240) })
 }

@@ -1,10 +1,10 @@
 //! A recorded IMU, played as the sensor.
 
 use crate::arguments::Arguments;
-use crate::filter::{Chosen, ChosenParams};
 use crate::outcome::{Outcome, Series};
-use bb_cli::Progress;
+use bb_cli::{Axes, Progress};
 use bb_core::prelude::*;
+use bb_estimators::attitude::{AnyFilter, AnyParams, Attitude};
 use bb_mcap::{Bag, BagImu, IMU, Truth};
 use std::error::Error;
 use std::path::Path;
@@ -16,16 +16,17 @@ robot! {
 
     link body {
         sensor imu: BagImu() {
-            estimator orientation: Chosen();
+            estimator orientation: Attitude<AnyFilter, Marg>();
         }
     }
 }
 
-pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
+pub(crate) fn run(file: &Path, arguments: &Arguments, params: AnyParams) -> Result<Outcome, Box<dyn Error>> {
     let bag = Bag::open(file)?;
-    if params.magnetometer && arguments.mag.is_none() {
+    let magnetometer = arguments.axes == Axes::Nine;
+    if magnetometer && arguments.mag.is_none() {
         let imu = bag.choose(IMU, arguments.imu.as_deref())?;
-        bag.magnetometer_of(&imu.name, None).map_err(|error| format!("{error} (or choose --axes 6)"))?;
+        bag.magnetometer_of(&imu.name, None).map_err(|error| format!("{error} (or choose --axes six)"))?;
     }
     let truth = Truth::read(&bag)?;
 
@@ -34,8 +35,8 @@ pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> R
     imu.file = file.to_owned();
     imu.imu_topic = arguments.imu.clone().unwrap_or_default();
     imu.magnetometer_topic = arguments.mag.clone().unwrap_or_default();
-    imu.magnetometer = params.magnetometer;
-    *builder.options(recorded::sensor::body::imu::orientation) = params.clone();
+    imu.magnetometer = magnetometer;
+    *builder.options(recorded::sensor::body::imu::orientation) = params;
     let orientation = builder.subscribe(recorded::sensor::body::imu::orientation);
 
     let mut simulation = builder.simulate()?;
@@ -61,6 +62,6 @@ pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> R
             format!("{}: no orientation came out of it; it may hold no sample of the IMU", file.display()).into()
         );
     }
-    let (has_truth, has_heading) = (truth.is_known(), params.magnetometer);
-    Ok(Outcome { filter: params.kind, series: vec![series], report, seconds, has_truth, has_heading })
+    let (has_truth, has_heading) = (truth.is_known(), magnetometer);
+    Ok(Outcome { filter: params.filter.name(), series: vec![series], report, seconds, has_truth, has_heading })
 }

@@ -1,9 +1,10 @@
 //! Two simulated IMUs on one rigid body.
 
-use crate::filter::{Chosen, ChosenParams};
+use crate::arguments::Arguments;
 use crate::outcome::{Outcome, Series};
-use bb_cli::Progress;
+use bb_cli::{Axes, Progress};
 use bb_core::prelude::*;
+use bb_estimators::attitude::{AnyFilter, AnyParams, Attitude};
 use bb_estimators::simulation::Motion;
 use bb_estimators::{OrientationAverage, SimulatedImu};
 use std::error::Error;
@@ -16,7 +17,7 @@ robot! {
     link base {
         sensor imu: SimulatedImu(duration = 60 s) {
             rate: 200 Hz;
-            estimator orientation: Chosen();
+            estimator orientation: Attitude<AnyFilter, Marg>();
         }
         estimator attitude: OrientationAverage() {
             input first: sensor::base::imu::orientation, driver;
@@ -28,7 +29,7 @@ robot! {
             link mast {
                 sensor imu: SimulatedImu(duration = 60 s) {
                     rate: 200 Hz;
-                    estimator orientation: Chosen();
+                    estimator orientation: Attitude<AnyFilter, Marg>();
                 }
             }
         }
@@ -37,10 +38,10 @@ robot! {
 
 const DURATION_S: f64 = 60.0;
 
-pub(crate) fn run(params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
+pub(crate) fn run(arguments: &Arguments, params: AnyParams) -> Result<Outcome, Box<dyn Error>> {
     let mut builder = TwoImus::builder();
-    *builder.options(two_imus::sensor::base::imu::orientation) = params.clone();
-    *builder.options(two_imus::sensor::base::mount::mast::imu::orientation) = params.clone();
+    *builder.options(two_imus::sensor::base::imu::orientation) = params;
+    *builder.options(two_imus::sensor::base::mount::mast::imu::orientation) = params;
     let base = builder.subscribe(two_imus::sensor::base::imu::orientation);
     let mast = builder.subscribe(two_imus::sensor::base::mount::mast::imu::orientation);
     let fused = builder.subscribe(two_imus::estimator::base::attitude);
@@ -71,11 +72,11 @@ pub(crate) fn run(params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
     let report = simulation.stop().ok()?;
     let [base, mast, fused] = series.map(|(_, series)| series);
     Ok(Outcome {
-        filter: params.kind,
+        filter: params.filter.name(),
         series: vec![fused, base, mast],
         report,
         seconds,
         has_truth: true,
-        has_heading: params.magnetometer,
+        has_heading: arguments.axes == Axes::Nine,
     })
 }

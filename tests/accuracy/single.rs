@@ -1,61 +1,17 @@
 //! Every filter in `f32` beside itself in `f64`, on the trials of BROAD.
 
+use crate::known::{self, Row};
 use crate::recordings::broad;
 use bb_cli::{Averages, Axes, Degrees, End, Recording, Score, Topics};
 use bb_core::nalgebra::{Quaternion, UnitQuaternion};
-use bb_estimators::attitude::{
-    AttitudeFilter, ComplementaryFilter, ComplementaryParams, FusionFilter, FusionParams, ImuSample,
-    MadgwickFilter, MadgwickParams, MahonyFilter, MahonyParams, MekfFilter, MekfParams, Real, TiltFilter,
-    TiltParams, VqfFilter, VqfParams,
-};
+use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, ImuSample, Real};
 use std::error::Error;
 
 /// The greatest error in `f32`, as a multiple of that in `f64`.
 const MOST: f64 = 1.001;
 
-/// A filter's name, and its errors on one recording in `f64` and in `f32`.
-struct Compared {
-    name: &'static str,
-    run: Run,
-}
-
-type Run = fn(&Recording, &[ImuSample]) -> Result<[Degrees; 2], Box<dyn Error>>;
-
-/// Writes the comparison of one filter: its type without the scalar, and its parameters.
-macro_rules! compared {
-    ($name:literal, $filter:ident, $params:expr) => {
-        Compared {
-            name: $name,
-            run: |recording, samples| {
-                let double = score::<f64, _>(recording, samples, $filter::new($params)?)?;
-                Ok([double, score::<f32, _>(recording, samples, $filter::new($params)?)?])
-            },
-        }
-    };
-}
-
-const COMPARED: &[Compared] = &[
-    compared!("mekf, nine axes", MekfFilter, MekfParams::default()),
-    compared!("mekf, six axes", MekfFilter, MekfParams { magnetometer: false, ..MekfParams::default() }),
-    compared!("VQF, nine axes", VqfFilter, VqfParams::default()),
-    compared!("VQF, six axes", VqfFilter, VqfParams { magnetometer: false, ..VqfParams::default() }),
-    compared!("complementary, nine axes", ComplementaryFilter, ComplementaryParams::default()),
-    compared!(
-        "Fusion, nine axes",
-        FusionFilter,
-        FusionParams { gain: 0.1, recovery_time: 20.0, ..FusionParams::default() }
-    ),
-    compared!("Madgwick, nine axes", MadgwickFilter, MadgwickParams { beta: 0.12, magnetometer: true }),
-    compared!("Madgwick, six axes", MadgwickFilter, MadgwickParams { beta: 0.03, magnetometer: false }),
-    compared!("Mahony, nine axes", MahonyFilter, MahonyParams::default()),
-    compared!("tilt, nine axes", TiltFilter, TiltParams::default()),
-];
-
-fn score<T: Real, F: AttitudeFilter<T>>(
-    recording: &Recording,
-    samples: &[ImuSample],
-    mut filter: F,
-) -> Result<Degrees, Box<dyn Error>> {
+fn score<T: Real>(recording: &Recording, samples: &[ImuSample], row: &Row) -> Result<Degrees, Box<dyn Error>> {
+    let mut filter = AnyFilter::<T>::new(AnyParams { filter: *row.chosen()?.params() })?;
     let mut score = Score::default();
     for sample in samples {
         filter.update(&sample.cast())?;
@@ -70,31 +26,33 @@ fn score<T: Real, F: AttitudeFilter<T>>(
 
 #[test]
 fn single_precision_is_as_accurate() -> Result<(), Box<dyn Error>> {
+    let rows = known::rows()?;
     let Some(files) = broad()? else { return Ok(()) };
     let mut errors = Vec::new();
     for file in &files {
         let mut recording = Recording::open(file, &Topics::default(), Axes::Nine, None)?;
         let mut samples = Vec::new();
         while let End::NotYet = recording.read(&mut samples, usize::MAX)? {}
-        let one: Result<Vec<_>, _> = COMPARED.iter().map(|compared| (compared.run)(&recording, &samples)).collect();
-        errors.push(one?);
+        let both = |row: &Row| -> Result<[Degrees; 2], Box<dyn Error>> {
+            Ok([score::<f64>(&recording, &samples, row)?, score::<f32>(&recording, &samples, row)?])
+        };
+        errors.push(rows.iter().map(both).collect::<Result<Vec<_>, _>>()?);
     }
-    for (filter, compared) in COMPARED.iter().enumerate() {
-        let averages = |scalar: usize| Averages::of(errors.iter().map(|errors| errors[filter][scalar]));
+    for (index, row) in rows.iter().enumerate() {
+        let averages = |scalar: usize| Averages::of(errors.iter().map(|errors| errors[index][scalar]));
         let (Some(double), Some(single)) = (averages(0), averages(1)) else { return Err("no recording".into()) };
-        let worst = errors.iter().map(|errors| errors[filter][1].inclination / errors[filter][0].inclination);
+        let worst = errors.iter().map(|errors| errors[index][1].inclination / errors[index][0].inclination);
         println!(
             "{}: total {:.4} in f64, {:.4} in f32; inclination {:.4}, {:.4}, on one trial at most {:.4} times",
-            compared.name,
+            row.name(),
             double.mean.total,
             single.mean.total,
             double.mean.inclination,
             single.mean.inclination,
             worst.fold(0.0, f64::max),
         );
-        assert!(single.mean.inclination <= MOST * double.mean.inclination, "{}", compared.name);
-        let six = compared.name.ends_with("six axes");
-        assert!(six || single.mean.total <= MOST * double.mean.total, "{}", compared.name);
+        assert!(single.mean.inclination <= MOST * double.mean.inclination, "{}", row.name());
+        assert!(row.axes == Axes::Six || single.mean.total <= MOST * double.mean.total, "{}", row.name());
     }
     Ok(())
 }

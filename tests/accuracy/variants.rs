@@ -2,7 +2,7 @@
 
 use crate::recordings::broad;
 use bb_cli::{
-    Averages, Axes, Chosen, Evaluator, FILTERS, Field, Offset, Progress, Starts, Topics, Variants, evaluate_variant,
+    Averages, Axes, Chosen, Evaluator, Field, Offset, Progress, Starts, Topics, Variants, evaluate_variant,
 };
 use std::error::Error;
 
@@ -58,12 +58,11 @@ const TOTAL: [[f64; 2]; 6] =
 #[test]
 fn hard_recordings_are_no_worse_than_known() -> Result<(), Box<dyn Error>> {
     let Some(files) = broad()? else { return Ok(()) };
-    let filter = FILTERS.iter().find(|filter| filter.name == "mekf").ok_or("no such filter")?;
     let mut worse = Vec::new();
     for Known { name, before_motion_s, variants, total } in known()? {
         let count = variants.count();
         let evaluator = Evaluator {
-            filters: Chosen::all(&[filter], Axes::Nine, &[])?,
+            filters: vec![Chosen::named("mekf", Axes::Nine, &[])?],
             axes: Axes::Nine,
             topics: Topics::default(),
             before_motion_s,

@@ -1,6 +1,8 @@
 //! `--set`: parameters by name.
 
-use super::{Axes, Chosen, Filter, MAGNETOMETER};
+use super::{Axes, Chosen, MAGNETOMETER};
+use bb_estimators::attitude::FilterParams;
+use bb_estimators::params::{Params, SetError, nearest};
 use std::str::FromStr;
 
 /// A parameter and its value: of one filter, or of all that have it.
@@ -30,37 +32,45 @@ impl Chosen {
     ///
     /// # Errors
     /// A setting that is of none of them, a value that is refused, or a filter that has not so many axes.
-    pub fn all(filters: &[&'static Filter], axes: Axes, settings: &[Setting]) -> Result<Vec<Self>, String> {
+    pub fn all(filters: &[FilterParams], axes: Axes, settings: &[Setting]) -> Result<Vec<Self>, String> {
         for setting in settings {
             setting.check(filters)?;
         }
         let chosen = filters.iter().map(|filter| {
-            if !filter.takes(axes) {
-                return Err(format!("{} uses no magnetometer; take it with --axes six", filter.name));
+            if !axes.suit(filter) {
+                return Err(format!("{} uses no magnetometer; take it with --axes six", filter.name()));
             }
-            let mut values: Vec<_> = settings
-                .iter()
-                .filter(|setting| setting.is_of(filter))
-                .map(|setting| (setting.name.clone(), setting.value.clone()))
-                .collect();
-            if filter.has(MAGNETOMETER) {
-                values.push((MAGNETOMETER.into(), (axes == Axes::Nine).to_string()));
+            let mut params = *filter;
+            let fault = |error: SetError<'_>| format!("{}: {error}", filter.name());
+            for setting in settings.iter().filter(|setting| setting.is_of(filter)) {
+                params.set(&setting.name, &setting.value).map_err(fault)?;
             }
-            let chosen = Self { filter, values };
-            // Made once to see that the values are taken.
-            chosen.start().map_err(|fault| format!("{}: {fault}", filter.name))?;
-            Ok(chosen)
+            if params.get(MAGNETOMETER).is_some() {
+                params.set(MAGNETOMETER, if axes == Axes::Nine { "true" } else { "false" }).map_err(fault)?;
+            }
+            Ok(Self { params })
         });
         chosen.collect()
+    }
+
+    /// The filter of this name with these settings.
+    ///
+    /// # Errors
+    /// A name that is none, or what [`all`](Self::all) refuses.
+    pub fn named(name: &str, axes: Axes, settings: &[Setting]) -> Result<Self, String> {
+        let names: Vec<_> = FilterParams::ALL.iter().map(|default| default().name()).collect();
+        let filter = FilterParams::named(name);
+        let filter = filter.ok_or_else(|| format!("no filter `{name}`; {}", near(name, &names)))?;
+        Self::all(&[filter], axes, settings)?.pop().ok_or_else(|| format!("no filter `{name}`"))
     }
 }
 
 impl Setting {
-    fn is_of(&self, filter: &Filter) -> bool {
-        self.filter.as_ref().is_none_or(|name| name == filter.name) && filter.has(&self.name)
+    fn is_of(&self, filter: &FilterParams) -> bool {
+        self.filter.as_ref().is_none_or(|name| name == filter.name()) && filter.get(&self.name).is_some()
     }
 
-    fn check(&self, filters: &[&'static Filter]) -> Result<(), String> {
+    fn check(&self, filters: &[FilterParams]) -> Result<(), String> {
         let Self { filter, name, .. } = self;
         if name == MAGNETOMETER {
             return Err("--set magnetometer is not for the command line; choose --axes six or nine".into());
@@ -68,15 +78,15 @@ impl Setting {
         if filters.iter().any(|filter| self.is_of(filter)) {
             return Ok(());
         }
-        let chosen: Vec<_> = filters.iter().map(|filter| filter.name).collect();
+        let chosen: Vec<_> = filters.iter().map(FilterParams::name).collect();
         if let Some(filter) = filter
             && !chosen.contains(&&**filter)
         {
             let near = near(filter, &chosen);
             return Err(format!("--set {filter}.{name}: no filter `{filter}` is chosen; {near}"));
         }
-        let of = |candidate: &&&Filter| filter.as_ref().is_none_or(|name| name == candidate.name);
-        let among = filters.iter().filter(of).flat_map(|filter| filter.parameters.iter().copied());
+        let of = |candidate: &&FilterParams| filter.as_ref().is_none_or(|name| name == candidate.name());
+        let among = filters.iter().filter(of).flat_map(|filter| filter.parameters().iter().map(|row| row.name));
         let mut names: Vec<_> = among.filter(|name| *name != MAGNETOMETER).collect();
         names.sort_unstable();
         names.dedup();
@@ -87,33 +97,20 @@ impl Setting {
 
 /// What a misspelt word may have been meant to be.
 pub(crate) fn near(word: &str, candidates: &[&str]) -> String {
-    let mut likeness: Vec<_> = candidates.iter().map(|name| (strsim::jaro_winkler(word, name), *name)).collect();
-    likeness.sort_by(|a, b| b.0.total_cmp(&a.0));
-    match likeness.first() {
-        Some((likeness, name)) if *likeness > 0.8 => format!("did you mean `{name}`?"),
-        Some(_) => format!("there is {}", candidates.join(", ")),
-        None => "there is none".into(),
+    match nearest(word, candidates.iter().copied()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None if candidates.is_empty() => "there is none".into(),
+        None => format!("there is {}", candidates.join(", ")),
     }
-}
-
-/// Sets a field to what a text says.
-pub(super) fn set<T: FromStr>(field: &mut T, value: &str) -> Result<(), String> {
-    let kind = match std::any::type_name::<T>() {
-        "bool" => "`true` or `false`",
-        "f64" => "a number in SI",
-        _ => "of another kind",
-    };
-    *field = value.parse().map_err(|_| format!("but must be {kind}"))?;
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::FILTERS;
     use super::*;
 
     fn fault(settings: &[&str], names: &[&str]) -> String {
-        let filters: Vec<_> = FILTERS.iter().filter(|filter| names.contains(&filter.name)).collect();
+        let filters = FilterParams::ALL.iter().map(|default| default());
+        let filters: Vec<_> = filters.filter(|filter| names.contains(&filter.name())).collect();
         let settings: Result<Vec<Setting>, _> = settings.iter().map(|text| text.parse()).collect();
         match settings.and_then(|settings| Chosen::all(&filters, Axes::Nine, &settings)) {
             Ok(_) => String::new(),
@@ -151,11 +148,13 @@ mod tests {
 
     #[test]
     fn a_value_that_is_refused_is_named() {
-        assert_eq!(fault(&["beta=fast"], &["madgwick"]), "madgwick: `beta` is `fast`, but must be a number in SI");
         assert_eq!(
-            fault(&["force_is_mean=1"], &["mekf"]),
-            "mekf: `force_is_mean` is `1`, but must be `true` or `false`"
+            fault(&["beta=fast"], &["madgwick"]),
+            "madgwick: `beta` is `fast`: write a number from 0 to 1000 rad/s"
         );
+        assert_eq!(fault(&["beta=5 deg/s"], &["madgwick"]), "");
+        assert!(fault(&["beta=5 deg"], &["madgwick"]).contains("`beta` is `5 deg`: its unit is rad/s"));
+        assert_eq!(fault(&["force_is_mean=1"], &["mekf"]), "mekf: `force_is_mean` is `1`: write `true` or `false`");
         assert!(fault(&["beta=-1"], &["madgwick"]).ends_with("choose a value from 0 to 1000 rad/s"));
         assert!(fault(&["beta=nan"], &["madgwick"]).ends_with("choose a value from 0 to 1000 rad/s"));
         assert!(fault(&["magnetometer=false"], &["madgwick"]).contains("--axes six"));

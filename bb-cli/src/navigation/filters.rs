@@ -1,8 +1,9 @@
 //! The navigation filters by name, and their parameters.
 
 use super::data::DataSet;
-use crate::filters::near;
+use crate::filters::parameters;
 use bb_estimators::navigation::{Aiding, EskfParams, Navigator};
+use bb_estimators::params::Params;
 use std::str::FromStr;
 
 /// A filter that can be chosen.
@@ -33,22 +34,8 @@ pub const NAVIGATION_FILTERS: [NavigationFilter; 2] = [
 #[derive(Clone, Debug, PartialEq)]
 pub struct NavigationSetting {
     name: String,
-    value: f64,
+    value: String,
 }
-
-/// Where a parameter is.
-type Parameter = fn(&mut EskfParams) -> &mut f64;
-
-/// Parameters by name, in SI.
-const PARAMETERS: [(&str, Parameter); 7] = [
-    ("gyroscope_noise", |params| &mut params.gyroscope_noise),
-    ("accelerometer_noise", |params| &mut params.accelerometer_noise),
-    ("gyroscope_bias_walk", |params| &mut params.gyroscope_bias_walk),
-    ("accelerometer_bias_walk", |params| &mut params.accelerometer_bias_walk),
-    ("gravity", |params| &mut params.gravity),
-    ("relative_scale", |params| &mut params.relative_scale.deviation),
-    ("relative_scale_time", |params| &mut params.relative_scale.time_s),
-];
 
 impl FromStr for NavigationSetting {
     type Err = String;
@@ -57,15 +44,21 @@ impl FromStr for NavigationSetting {
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, value) =
             text.split_once('=').ok_or("no `=` in it; write NAME=VALUE, as gyroscope_noise=1e-3")?;
-        let name = name.trim();
-        let names = PARAMETERS.map(|(name, _)| name);
-        if !names.contains(&name) {
-            return Err(format!("no parameter `{name}`; {}", near(name, &names)));
-        }
-        let value = value.trim();
-        let number = value.parse().map_err(|_| format!("`{name}` is `{value}`, but must be a number in SI"))?;
-        Ok(Self { name: name.to_owned(), value: number })
+        let setting = Self { name: name.trim().to_owned(), value: value.trim().to_owned() };
+        setting.apply(&mut EskfParams::default())?;
+        Ok(setting)
     }
+}
+
+impl NavigationSetting {
+    fn apply(&self, params: &mut EskfParams) -> Result<(), String> {
+        params.set(&self.name, &self.value).map_err(|error| error.to_string())
+    }
+}
+
+/// The parameters of all of them, for `--list`.
+pub(crate) fn listed() -> String {
+    parameters(&EskfParams::default(), |_| true)
 }
 
 impl NavigationFilter {
@@ -84,9 +77,7 @@ impl NavigationFilter {
             ..EskfParams::default()
         };
         for setting in settings {
-            for (_, parameter) in PARAMETERS.iter().filter(|(name, _)| *name == setting.name) {
-                *parameter(&mut params) = setting.value;
-            }
+            setting.apply(&mut params)?;
         }
         let aiding = if data.relative.is_empty() { Aiding::Gnss } else { Aiding::RelativePoses };
         let made = if self.is_bank { Navigator::new(params, aiding) } else { Navigator::single(params) };

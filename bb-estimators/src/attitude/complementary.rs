@@ -23,3 +23,9 @@ mod tests;
 
 pub use filter::ComplementaryFilter;
 pub use params::ComplementaryParams;
+
+/// What the filter is for.
+pub const ABOUT: super::About = super::About {
+    when: "few numbers that are easy to choose, little work",
+    idea: "the gyroscope for short times, gravity and field for long ones, each through a first-order low-pass",
+};

@@ -54,5 +54,11 @@ mod window;
 pub use filter::MekfFilter;
 pub use params::MekfParams;
 
+/// What the filter is for.
+pub const ABOUT: super::About = super::About {
+    when: "first choice: the most accurate from rest and in motion, without calibration, with a covariance",
+    idea: "an error-state Kalman filter that also finds the gyroscope's bias, scale and misalignment, and the magnetometer's offset and lag",
+};
+
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;

@@ -19,3 +19,7 @@ mod tests;
 
 pub use filter::TiltFilter;
 pub use params::TiltParams;
+
+/// What the filter is for.
+pub const ABOUT: super::About =
+    super::About { when: "no gyroscope, slow motion", idea: "gravity and field, low-passed" };

@@ -8,48 +8,38 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::eskf::{ImuMean, Refusal, Start};
 use super::math::{atan2, sqrt};
 use crate::attitude::initial::initial_orientation;
+use crate::params::params;
 
 #[cfg(test)]
 mod tests;
 
-/// What is taken for rest, and what the sensors are like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AlignmentParams {
-    /// How long rest must last, s.
-    ///
-    /// Small: starts soon. Large: the bias of the gyroscope is better known. Default: 1.
-    pub rest_time: f64,
-    /// The most that the angular velocity varies at rest, standard deviation of a component, rad/s.
-    ///
-    /// Small: noise is taken for motion. Large: motion is taken for rest. Default: 0.01. Source: MEMS gyroscopes at 100 Hz
-    /// have 0.002 rad/s.
-    pub rest_rotation: f64,
-    /// The most that the specific force varies at rest, standard deviation of a component, m/s².
-    ///
-    /// Small: noise is taken for motion. Large: motion is taken for rest. Default: 0.1. Source: MEMS accelerometers at 100 Hz
-    /// have 0.02 m/s².
-    pub rest_force: f64,
-    /// The largest bias of the gyroscope, rad/s: a steady rotation that is faster is no bias. Default: 0.1.
-    pub largest_bias: f64,
-    /// Standard deviation of the accelerometer's bias, m/s². Default: 0.1.
-    pub accelerometer_bias: f64,
-    /// Horizontal acceleration while in motion, which tilts what the accelerometer shows, m/s². Default: 1.
-    pub acceleration: f64,
-    /// Gravity, m/s². Default: 9.80665.
-    pub gravity: f64,
-}
-
-impl Default for AlignmentParams {
-    fn default() -> Self {
-        Self {
-            rest_time: 1.0,
-            rest_rotation: 0.01,
-            rest_force: 0.1,
-            largest_bias: 0.1,
-            accelerometer_bias: 0.1,
-            acceleration: 1.0,
-            gravity: 9.80665,
-        }
+params! {
+    /// What is taken for rest, and what the sensors are like.
+    pub struct AlignmentParams {
+        /// How long rest must last.
+        ///
+        /// Small: starts soon. Large: the bias of the gyroscope is better known.
+        rest_time: f64 = 1.0, in 0.0..=1e6, unit "s";
+        /// The most that the angular velocity varies at rest, standard deviation of a component.
+        ///
+        /// Small: noise is taken for motion. Large: motion is taken for rest.
+        ///
+        /// Source: MEMS gyroscopes at 100 Hz have 0.002 rad/s.
+        rest_rotation: f64 = 0.01, in 0.0..=1e3, unit "rad/s";
+        /// The most that the specific force varies at rest, standard deviation of a component.
+        ///
+        /// Small: noise is taken for motion. Large: motion is taken for rest.
+        ///
+        /// Source: MEMS accelerometers at 100 Hz have 0.02 m/s².
+        rest_force: f64 = 0.1, in 0.0..=1e6, unit "m/s^2";
+        /// The largest bias of the gyroscope: a steady rotation that is faster is no bias.
+        largest_bias: f64 = 0.1, in 0.0..=1e3, unit "rad/s";
+        /// Standard deviation of the accelerometer's bias.
+        accelerometer_bias: f64 = 0.1, in 0.0..=1e3, unit "m/s^2";
+        /// Horizontal acceleration while in motion, which tilts what the accelerometer shows.
+        acceleration: f64 = 1.0, in 0.0..=1e3, unit "m/s^2";
+        /// Gravity where the robot is.
+        gravity: f64 = 9.80665, in 1.0..=30.0, unit "m/s^2";
     }
 }
 

@@ -29,6 +29,8 @@ mod tests;
 
 pub use estimate::{Estimate, Keyframe};
 pub use filter::{Eskf, ImuMean, Start};
+#[cfg(feature = "runtime")]
+pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov};
 pub use refusal::Refusal;
 pub use states::{

@@ -19,6 +19,7 @@ use self::input::Mounting;
 use self::world::World;
 use super::eskf::{ImuMean, Refusal};
 use super::history::History;
+use crate::params::Params as _;
 use bb_core::payload::Odometry;
 use bb_core::{Context, Estimator, Fault, Reply};
 use std::marker::PhantomData;

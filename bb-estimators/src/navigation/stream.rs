@@ -4,6 +4,7 @@ use crate::navigation::chi_square::limit;
 use crate::navigation::consistency::Consistency;
 use crate::navigation::eskf::Refusal;
 use crate::navigation::math::sqrt;
+use crate::params::params;
 
 /// The largest dimension of a measurement whose limits are kept.
 const DIMENSIONS: usize = 7;
@@ -11,37 +12,32 @@ const DIMENSIONS: usize = 7;
 /// The most that a covariance is raised by at once.
 const MOST_RAISED: f64 = 1e6;
 
-/// How the measurements of one sensor are judged.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StreamParams {
-    /// What the variance of every measurement is multiplied by. Default: 1.
-    pub variance_factor: f64,
-    /// Part of good measurements that the gate refuses; 0 for no gate.
-    ///
-    /// Small: lets more outliers pass. Large: refuses what a filter that is off needs. Default: 1e-4.
-    pub gate: f64,
-    /// How many measurements in a row the gate refuses before it takes the filter to be wrong, not the sensor: the next is
-    /// fused with the covariance raised to fit it; 0 for never.
-    ///
-    /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long. Default: 3.
-    pub patience: u32,
-    /// Part of good measurements that are weighed down as outliers are, by Huber's function of their Mahalanobis distance; 0
-    /// for none.
-    ///
-    /// Small: the weights of a least-squares filter. Large: closer to a median. Default: 0.
-    pub robust: f64,
-    /// How fast the noise of the sensor adapts to its innovations: the change of its variance, per measurement; 0 for
-    /// never.
-    ///
-    /// Small: the noise is as given. Large: follows each innovation. Default: 0.
-    pub adaptation: f64,
-    /// The most that the adapted variance is of the given one; at least 1. Default: 100.
-    pub most_adaptation: f64,
-}
-
-impl Default for StreamParams {
-    fn default() -> Self {
-        Self { variance_factor: 1.0, gate: 1e-4, patience: 3, robust: 0.0, adaptation: 0.0, most_adaptation: 100.0 }
+params! {
+    /// How the measurements of one sensor are judged.
+    pub struct StreamParams {
+        /// What the variance of every measurement is multiplied by.
+        variance_factor: f64 = 1.0, in 1e-12..=1e12;
+        /// Part of good measurements that the gate refuses; 0 for no gate.
+        ///
+        /// Small: lets more outliers pass. Large: refuses what a filter that is off needs.
+        gate: f64 = 1e-4, in 0.0..=1.0;
+        /// How many measurements in a row the gate refuses before it takes the filter to be wrong, not the sensor: the next
+        /// is fused with the covariance raised to fit it; 0 for never.
+        ///
+        /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long.
+        patience: u32 = 3;
+        /// Part of good measurements that are weighed down as outliers are, by Huber's function of their Mahalanobis
+        /// distance; 0 for none.
+        ///
+        /// Small: the weights of a least-squares filter. Large: closer to a median.
+        robust: f64 = 0.0, in 0.0..=1.0;
+        /// How fast the noise of the sensor adapts to its innovations: the change of its variance, per measurement; 0 for
+        /// never.
+        ///
+        /// Small: the noise is as given. Large: follows each innovation.
+        adaptation: f64 = 0.0, in 0.0..=1.0;
+        /// The most that the adapted variance is of the given one.
+        most_adaptation: f64 = 100.0, in 1.0..=1e12;
     }
 }
 

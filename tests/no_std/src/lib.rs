@@ -6,10 +6,10 @@
 use bb_estimators::attitude::average::{average, average_pair};
 use bb_estimators::attitude::initial::initial_orientation;
 use bb_estimators::attitude::{
-    AttitudeFilter, ComplementaryFilter, FusionFilter, ImuSample, MadgwickFilter, MahonyFilter, MekfFilter,
-    OrientationError, Real, TiltFilter, VqfFilter,
+    AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample, OrientationError, Real,
 };
 use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Optional, Start, States, Stream};
+use bb_estimators::params::Params;
 use nalgebra::{UnitQuaternion, Vector3};
 
 #[panic_handler]
@@ -29,15 +29,10 @@ pub fn single(sample: &ImuSample<f32>) -> Option<f64> {
 
 fn all<T: Real>(sample: &ImuSample<T>) -> Option<f64> {
     let truth = initial_orientation(&sample.specific_force, sample.magnetic_field.as_ref()).ok()?;
-    let orientations = [
-        updated::<T, ComplementaryFilter<T>>(sample)?,
-        updated::<T, FusionFilter<T>>(sample)?,
-        updated::<T, MadgwickFilter<T>>(sample)?,
-        updated::<T, MahonyFilter<T>>(sample)?,
-        updated::<T, MekfFilter<T>>(sample)?,
-        updated::<T, TiltFilter<T>>(sample)?,
-        updated::<T, VqfFilter<T>>(sample)?,
-    ];
+    let mut orientations = [UnitQuaternion::identity(); FilterParams::ALL.len()];
+    for (orientation, default) in orientations.iter_mut().zip(FilterParams::ALL) {
+        *orientation = updated(default(), sample)?;
+    }
     let mean = average(&orientations.map(|orientation| (orientation, T::ONE))).ok()?;
     let mean = average_pair(&mean, T::ONE, &truth, T::HALF).ok()?;
     Some(OrientationError::between(&mean, &truth)?.heading)
@@ -61,8 +56,11 @@ pub fn navigate(sample: &ImuMean) -> Option<f64> {
     Some(filter.estimate()?.position.x)
 }
 
-fn updated<T: Real, F: AttitudeFilter<T>>(sample: &ImuSample<T>) -> Option<UnitQuaternion<T>> {
-    let mut filter = F::new(F::Params::default()).ok()?;
+/// With the first of its parameters set by name.
+fn updated<T: Real>(mut params: FilterParams, sample: &ImuSample<T>) -> Option<UnitQuaternion<T>> {
+    let first = params.parameters().first()?.name;
+    params.set(first, "0.5").ok()?;
+    let mut filter = AnyFilter::new(AnyParams { filter: params }).ok()?;
     filter.update(sample).ok()?;
     filter.world_from_body()
 }

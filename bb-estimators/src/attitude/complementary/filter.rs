@@ -8,6 +8,7 @@ use crate::attitude::low_pass::gain;
 use crate::attitude::rotation::{turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
+use crate::params::Params as _;
 
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;

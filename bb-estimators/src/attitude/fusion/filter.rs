@@ -10,6 +10,7 @@ use crate::attitude::initial::MIN_HORIZONTAL_FRACTION;
 use crate::attitude::rotation::turn;
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
+use crate::params::Params as _;
 
 /// The gain at startup, 1/s, and how long it takes to go down to its value, s. Source: the library's.
 const STARTUP_GAIN: f64 = 10.0;

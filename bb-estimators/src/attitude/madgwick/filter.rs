@@ -7,6 +7,7 @@ use crate::attitude::directions::{horizontal_axis, misalignment};
 use crate::attitude::rotation::{turn, turn_by_tangent};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
+use crate::params::Params as _;
 
 /// Below this norm the gradient is rounding noise, which has no direction to descend in.
 const NO_GRADIENT: f64 = 1e-12;

@@ -8,6 +8,7 @@ use crate::attitude::rotation::{SERIES_SQUARED_ANGLE, renormalised, turn, turn_l
 use crate::attitude::sample::Directions;
 use crate::attitude::state::{AttitudeState, Step};
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
+use crate::params::Params as _;
 
 /// Below this norm an error upside down is none, which a lean to one side ends.
 const NO_ERROR: f64 = 1e-6;

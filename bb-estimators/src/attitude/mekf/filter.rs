@@ -14,6 +14,7 @@ use crate::attitude::initial::heading_error;
 use crate::attitude::rotation::{turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
+use crate::params::Params as _;
 
 /// Standard deviation of the tilt that one accelerometer sample shows in motion, rad. At rest it is forgotten
 /// within a second.

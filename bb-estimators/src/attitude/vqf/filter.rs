@@ -12,6 +12,7 @@ use super::rest::Rest;
 use crate::attitude::rotation::{renormalised, turn, turn_upright};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
+use crate::params::Params as _;
 
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;

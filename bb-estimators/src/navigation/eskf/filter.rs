@@ -15,6 +15,7 @@ use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE, ParamsError};
 use crate::navigation::math::{Integrals, exp};
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
+use crate::params::Params as _;
 
 /// A correction of the rotation below this squared angle, rad², leaves the covariance as it is: to rounding, the same.
 const RESET: f64 = 1e-12;

@@ -1,97 +1,113 @@
 //! What the sensors and the optional states are like.
 
 use super::states::Optional;
-use crate::attitude::ParamsError;
-use crate::attitude::params::accept;
+use crate::params::{Field, Kind, Value};
 
-/// The tuning of [`Eskf`](super::Eskf).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EskfParams {
-    /// White noise of the gyroscope.
-    ///
-    /// Small: trusts the gyroscope. Large: the attitude follows the other sensors sooner. From 1e-9 to 10.
-    ///
-    /// Unit: rad/s/√Hz. Default: 1.7e-4, 0.01°/s/√Hz. Source: data sheets of MEMS gyroscopes, 0.003–0.03°/s/√Hz.
-    pub gyroscope_noise: f64,
-    /// White noise of the accelerometer.
-    ///
-    /// Small: trusts the accelerometer. Large: the velocity follows the other sensors sooner. From 1e-9 to 100.
-    ///
-    /// Unit: m/s²/√Hz. Default: 2e-3, 200 µg/√Hz. Source: data sheets of MEMS accelerometers, 60–300 µg/√Hz.
-    pub accelerometer_noise: f64,
-    /// Random walk of the gyroscope's bias.
-    ///
-    /// Small: steady, and slow to follow a bias that changes. Large: the bias takes up errors of the model. From 0 to 1.
-    ///
-    /// Unit: rad/s²/√Hz. Default: 2e-5. Source: calibration of the ADIS16448 in the EuRoC MAV data sets.
-    pub gyroscope_bias_walk: f64,
-    /// Random walk of the accelerometer's bias.
-    ///
-    /// Small: steady, and slow to follow a bias that changes. Large: the bias takes up errors of the model. From 0 to 10.
-    ///
-    /// Unit: m/s³/√Hz. Default: 3e-3. Source: calibration of the ADIS16448 in the EuRoC MAV data sets.
-    pub accelerometer_bias_walk: f64,
-    /// Gravity where the robot is.
-    ///
-    /// An error of it is taken for a bias of the accelerometer while the body is level. From 1 to 30.
-    ///
-    /// Unit: m/s². Default: 9.80665. Source: standard gravity; it varies by 0.05 m/s² over the earth.
-    pub gravity: f64,
-    /// The longest time that one sample of the IMU is taken to describe. What is longer is a gap.
-    ///
-    /// Small: a late sample counts as a gap, and the covariance grows by much. Large: a lost sample is bridged as if
-    /// its successor had been measured all the time. From 1e-4 to 1.
-    ///
-    /// Unit: s. Default: 0.1. Source: ten samples of a slow IMU.
-    pub longest_sample: f64,
-    /// Acceleration that a gap in the samples of the IMU may hide, as white noise.
-    ///
-    /// Small: trusts a constant velocity. Large: the velocity is forgotten sooner. From 0 to 1e4.
-    ///
-    /// Unit: m/s²/√Hz. Default: 3. Source: a body that accelerates by 3 m/s² for about a second.
-    pub gap_acceleration: f64,
-    /// Angular velocity that a gap in the samples of the IMU may hide, as white noise.
-    ///
-    /// Small: trusts a constant attitude. Large: the attitude is forgotten sooner. From 0 to 1e3.
-    ///
-    /// Unit: rad/s/√Hz. Default: 1. Source: a body that turns by 1 rad/s for about a second.
-    pub gap_rotation: f64,
-    /// How far the scale of relative poses is from 1, [`Optional::RelativeScale`].
-    ///
-    /// Small: takes the scale as known. Large: relative translations say less about the velocity. From 0 to 1.
-    ///
-    /// Unit: none. Default: 0.02 for 20 s. Source: drift of monocular visual-inertial odometry, 1–2 %.
-    pub relative_scale: GaussMarkov,
-    /// How far the GNSS antenna is from where it is said to be, [`Optional::GnssLeverArm`].
-    ///
-    /// Small: takes the mounting as measured. Large: needs rotation to be found. From 0 to 100.
-    ///
-    /// Unit: m. Default: 0.1, for ever. Source: a tape measure.
-    pub gnss_lever_arm: GaussMarkov,
-    /// How late GNSS measurements are, beyond their stamps, [`Optional::GnssDelay`].
-    ///
-    /// Small: takes the stamps as they are. Large: needs acceleration to be found. From 0 to 10.
-    ///
-    /// Unit: s. Default: 0.1, for ever. Source: receivers that stamp at the end of a 10 Hz period.
-    pub gnss_delay: GaussMarkov,
-    /// How far the scale of the wheel speed is from 1, [`Optional::WheelScale`].
-    ///
-    /// Small: takes the wheel's radius as known. Large: needs another source of speed to be found. From 0 to 1.
-    ///
-    /// Unit: none. Default: 0.03 for 1000 s. Source: wear and pressure of a tyre.
-    pub wheel_scale: GaussMarkov,
-    /// Magnetic field of the body itself, [`Optional::HardIron`].
-    ///
-    /// Small: takes the magnetometer as calibrated. Large: needs rotation to be found. From 0 to 1.
-    ///
-    /// Unit: T. Default: 5e-6 for 1000 s. Source: a tenth of the earth's field.
-    pub hard_iron: GaussMarkov,
-    /// How far the barometric height is off, [`Optional::BarometerBias`].
-    ///
-    /// Small: takes the pressure at the origin as known. Large: needs another source of height. From 0 to 1e4.
-    ///
-    /// Unit: m. Default: 10 for 3600 s. Source: weather, a hectopascal an hour.
-    pub barometer_bias: GaussMarkov,
+/// Adds what is known of the IMU and of gravity, which is set of the filter and of the estimator alike, to a struct of
+/// parameters.
+macro_rules! imu_params {
+    ($(#[$meta:meta])* pub struct $name:ident { $($rest:tt)* }) => {
+        $crate::params::params! {
+            $(#[$meta])*
+            pub struct $name {
+                /// White noise of the gyroscope.
+                ///
+                /// Small: trusts the gyroscope. Large: the attitude follows the other sensors sooner.
+                ///
+                /// Source: data sheets of MEMS gyroscopes, 0.003–0.03°/s/√Hz.
+                gyroscope_noise: f64 = 1.7e-4, in 1e-9..=10.0, shown "0.01°/s/√Hz", plain "rad/s/√Hz";
+                /// White noise of the accelerometer.
+                ///
+                /// Small: trusts the accelerometer. Large: the velocity follows the other sensors sooner.
+                ///
+                /// Source: data sheets of MEMS accelerometers, 60–300 µg/√Hz.
+                accelerometer_noise: f64 = 2e-3, in 1e-9..=100.0, shown "200 µg/√Hz", plain "m/s²/√Hz";
+                /// Random walk of the gyroscope's bias.
+                ///
+                /// Small: steady, and slow to follow a bias that changes. Large: the bias takes up errors of the model.
+                ///
+                /// Source: calibration of the ADIS16448 in the EuRoC MAV data sets.
+                gyroscope_bias_walk: f64 = 2e-5, in 0.0..=1.0, plain "rad/s²/√Hz";
+                /// Random walk of the accelerometer's bias.
+                ///
+                /// Small: steady, and slow to follow a bias that changes. Large: the bias takes up errors of the model.
+                ///
+                /// Source: calibration of the ADIS16448 in the EuRoC MAV data sets.
+                accelerometer_bias_walk: f64 = 3e-3, in 0.0..=10.0, plain "m/s³/√Hz";
+                /// Gravity where the robot is.
+                ///
+                /// An error of it is taken for a bias of the accelerometer while the body is level.
+                ///
+                /// Source: standard gravity; it varies by 0.05 m/s² over the earth.
+                gravity: f64 = 9.80665, in 1.0..=30.0, unit "m/s^2";
+                $($rest)*
+            }
+        }
+    };
+}
+
+#[cfg(feature = "runtime")]
+pub(crate) use imu_params;
+
+imu_params! {
+    /// The tuning of [`Eskf`](super::Eskf).
+    pub struct EskfParams {
+        /// The longest time that one sample of the IMU is taken to describe. What is longer is a gap.
+        ///
+        /// Small: a late sample counts as a gap, and the covariance grows by much. Large: a lost sample is bridged as if
+        /// its successor had been measured all the time.
+        ///
+        /// Source: ten samples of a slow IMU.
+        longest_sample: f64 = 0.1, in 1e-4..=1.0, unit "s";
+        /// Acceleration that a gap in the samples of the IMU may hide, as white noise.
+        ///
+        /// Small: trusts a constant velocity. Large: the velocity is forgotten sooner.
+        ///
+        /// Source: a body that accelerates by 3 m/s² for about a second.
+        gap_acceleration: f64 = 3.0, in 0.0..=1e4, plain "m/s²/√Hz";
+        /// Angular velocity that a gap in the samples of the IMU may hide, as white noise.
+        ///
+        /// Small: trusts a constant attitude. Large: the attitude is forgotten sooner.
+        ///
+        /// Source: a body that turns by 1 rad/s for about a second.
+        gap_rotation: f64 = 1.0, in 0.0..=1e3, plain "rad/s/√Hz";
+        /// How far the scale of relative poses is from 1, [`Optional::RelativeScale`].
+        ///
+        /// Small: takes the scale as known. Large: relative translations say less about the velocity.
+        ///
+        /// Source: drift of monocular visual-inertial odometry, 1–2 %.
+        relative_scale: GaussMarkov = GaussMarkov::new(0.02, 20.0), deviation 0.0..=1.0, shown "0.02 for 20 s";
+        /// How far the GNSS antenna is from where it is said to be, [`Optional::GnssLeverArm`].
+        ///
+        /// Small: takes the mounting as measured. Large: needs rotation to be found.
+        ///
+        /// Source: a tape measure.
+        gnss_lever_arm: GaussMarkov = GaussMarkov::constant(0.1), deviation 0.0..=100.0, shown "0.1 for ever", of "m";
+        /// How late GNSS measurements are, beyond their stamps, [`Optional::GnssDelay`].
+        ///
+        /// Small: takes the stamps as they are. Large: needs acceleration to be found.
+        ///
+        /// Source: receivers that stamp at the end of a 10 Hz period.
+        gnss_delay: GaussMarkov = GaussMarkov::constant(0.1), deviation 0.0..=10.0, shown "0.1 for ever", of "s";
+        /// How far the scale of the wheel speed is from 1, [`Optional::WheelScale`].
+        ///
+        /// Small: takes the wheel's radius as known. Large: needs another source of speed to be found.
+        ///
+        /// Source: wear and pressure of a tyre.
+        wheel_scale: GaussMarkov = GaussMarkov::new(0.03, 1000.0), deviation 0.0..=1.0, shown "0.03 for 1000 s";
+        /// Magnetic field of the body itself, [`Optional::HardIron`].
+        ///
+        /// Small: takes the magnetometer as calibrated. Large: needs rotation to be found.
+        ///
+        /// Source: a tenth of the earth's field.
+        hard_iron: GaussMarkov = GaussMarkov::new(5e-6, 1000.0), deviation 0.0..=1.0, shown "5e-6 for 1000 s", of "T";
+        /// How far the barometric height is off, [`Optional::BarometerBias`].
+        ///
+        /// Small: takes the pressure at the origin as known. Large: needs another source of height.
+        ///
+        /// Source: weather, a hectopascal an hour.
+        barometer_bias: GaussMarkov = GaussMarkov::new(10.0, 3600.0), deviation 0.0..=1e4, shown "10 for 3600 s", of "m";
+    }
 }
 
 /// A first-order Gauss–Markov process: a state that wanders, but not away.
@@ -115,23 +131,17 @@ impl GaussMarkov {
     }
 }
 
-impl Default for EskfParams {
-    fn default() -> Self {
-        Self {
-            gyroscope_noise: 1.7e-4,
-            accelerometer_noise: 2e-3,
-            gyroscope_bias_walk: 2e-5,
-            accelerometer_bias_walk: 3e-3,
-            gravity: 9.80665,
-            longest_sample: 0.1,
-            gap_acceleration: 3.0,
-            gap_rotation: 1.0,
-            relative_scale: GaussMarkov::new(0.02, 20.0),
-            gnss_lever_arm: GaussMarkov::constant(0.1),
-            gnss_delay: GaussMarkov::constant(0.1),
-            wheel_scale: GaussMarkov::new(0.03, 1000.0),
-            hard_iron: GaussMarkov::new(5e-6, 1000.0),
-            barometer_bias: GaussMarkov::new(10.0, 3600.0),
+impl Field for GaussMarkov {
+    const KIND: Kind = Kind::Process;
+
+    fn to_value(self) -> Value {
+        Value::Process { deviation: self.deviation, time_s: self.time_s }
+    }
+
+    fn from_value(value: Value) -> Option<Self> {
+        match value {
+            Value::Process { deviation, time_s } => Some(Self { deviation, time_s }),
+            _ => None,
         }
     }
 }
@@ -148,33 +158,5 @@ impl EskfParams {
             Optional::HardIron => Some(self.hard_iron),
             Optional::BarometerBias => Some(self.barometer_bias),
         }
-    }
-
-    pub(crate) fn check(&self) -> Result<(), ParamsError> {
-        accept("gyroscope_noise", self.gyroscope_noise, (1e-9, 10.0), "rad/s/√Hz")?;
-        accept("accelerometer_noise", self.accelerometer_noise, (1e-9, 100.0), "m/s²/√Hz")?;
-        accept("gyroscope_bias_walk", self.gyroscope_bias_walk, (0.0, 1.0), "rad/s²/√Hz")?;
-        accept("accelerometer_bias_walk", self.accelerometer_bias_walk, (0.0, 10.0), "m/s³/√Hz")?;
-        accept("gravity", self.gravity, (1.0, 30.0), "m/s²")?;
-        accept("longest_sample", self.longest_sample, (1e-4, 1.0), "s")?;
-        accept("gap_acceleration", self.gap_acceleration, (0.0, 1e4), "m/s²/√Hz")?;
-        accept("gap_rotation", self.gap_rotation, (0.0, 1e3), "rad/s/√Hz")?;
-        self.relative_scale.check("relative_scale", 1.0, "")?;
-        self.gnss_lever_arm.check("gnss_lever_arm", 100.0, "m")?;
-        self.gnss_delay.check("gnss_delay", 10.0, "s")?;
-        self.wheel_scale.check("wheel_scale", 1.0, "")?;
-        self.hard_iron.check("hard_iron", 1.0, "T")?;
-        self.barometer_bias.check("barometer_bias", 1e4, "m")
-    }
-}
-
-impl GaussMarkov {
-    fn check(&self, parameter: &'static str, max: f64, unit: &'static str) -> Result<(), ParamsError> {
-        accept(parameter, self.deviation, (0.0, max), unit)?;
-        // Infinite is a constant.
-        if self.time_s == f64::INFINITY {
-            return Ok(());
-        }
-        accept(parameter, self.time_s, (1e-3, f64::MAX), "s")
     }
 }

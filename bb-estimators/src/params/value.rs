@@ -1,0 +1,173 @@
+//! Values of parameters, and how they are read from text.
+
+use core::fmt;
+use core::ops::RangeInclusive;
+
+use super::units::{self, Quantity};
+use super::{Parameter, SetError};
+
+/// The kinds of parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// On or off.
+    Switch,
+    /// A natural number.
+    Count,
+    /// A real number, in SI.
+    Number,
+    /// A state that wanders: standard deviation and correlation time.
+    Process,
+}
+
+/// The value of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// Of a [`Kind::Switch`].
+    Switch(bool),
+    /// Of a [`Kind::Count`].
+    Count(u32),
+    /// Of a [`Kind::Number`], in the parameter's unit.
+    Number(f64),
+    /// Of a [`Kind::Process`].
+    Process {
+        /// In the parameter's unit.
+        deviation: f64,
+        /// Correlation time, s; infinite for a constant.
+        time_s: f64,
+    },
+}
+
+impl fmt::Display for Value {
+    /// As [`Params::set`](super::Params::set) reads it, without the unit.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Switch(switch) => write!(f, "{switch}"),
+            Self::Count(count) => write!(f, "{count}"),
+            Self::Number(number) => fmt_number(*number, f),
+            Self::Process { deviation, time_s } => {
+                fmt_number(*deviation, f)?;
+                if time_s.is_infinite() {
+                    return f.write_str(" for ever");
+                }
+                f.write_str(" for ")?;
+                fmt_number(*time_s, f)?;
+                f.write_str(" s")
+            }
+        }
+    }
+}
+
+/// In the shorter notation; both are read back as the same number.
+fn fmt_number(number: f64, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let is_plain = number == 0.0 || !number.is_finite() || (1e-3..1e6).contains(&number.abs());
+    if is_plain { write!(f, "{number}") } else { write!(f, "{number:e}") }
+}
+
+/// The accepted numbers, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The least.
+    pub min: f64,
+    /// The greatest; may be infinite.
+    pub max: f64,
+}
+
+impl Range {
+    /// All there are.
+    pub const ALL: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY };
+
+    /// What a statement says; all numbers, if it says nothing.
+    pub(crate) const fn stated(ranges: &[RangeInclusive<f64>]) -> Self {
+        match ranges {
+            [range, ..] => Self { min: *range.start(), max: *range.end() },
+            [] => Self::ALL,
+        }
+    }
+
+    /// Whether a number is within; NaN never is.
+    pub(crate) const fn has(&self, value: f64) -> bool {
+        self.min <= value && value <= self.max
+    }
+}
+
+impl fmt::Display for Range {
+    /// `from 0 to 1000`, `from 1`; nothing for [`Range::ALL`].
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { min, max } = *self;
+        match (min.is_finite(), max.is_finite()) {
+            (false, false) => Ok(()),
+            (true, false) => write!(f, "from {}", Value::Number(min)),
+            (false, true) => write!(f, "to {}", Value::Number(max)),
+            (true, true) => write!(f, "from {} to {}", Value::Number(min), Value::Number(max)),
+        }
+    }
+}
+
+/// A type that a parameter can have.
+pub trait Field: Copy {
+    /// Its kind.
+    const KIND: Kind;
+
+    /// As a value.
+    fn to_value(self) -> Value;
+
+    /// From a value of its kind.
+    fn from_value(value: Value) -> Option<Self>;
+}
+
+/// Writes the implementation for a type that is one variant of [`Value`].
+macro_rules! field {
+    ($type:ty, $variant:ident) => {
+        impl Field for $type {
+            const KIND: Kind = Kind::$variant;
+
+            fn to_value(self) -> Value {
+                Value::$variant(self)
+            }
+
+            fn from_value(value: Value) -> Option<Self> {
+                if let Value::$variant(value) = value { Some(value) } else { None }
+            }
+        }
+    };
+}
+
+field!(bool, Switch);
+field!(u32, Count);
+field!(f64, Number);
+
+/// What `text` says, for a parameter that has the value `now`.
+pub(super) fn parse<'t>(
+    parameter: &'static Parameter,
+    text: &'t str,
+    now: Option<Value>,
+) -> Result<Value, SetError<'t>> {
+    let text = text.trim();
+    let no_value = || SetError::NoValue { parameter, text };
+    match parameter.kind {
+        Kind::Switch => text.parse().map(Value::Switch).map_err(|_| no_value()),
+        Kind::Count => text.parse().map(Value::Count).map_err(|_| no_value()),
+        Kind::Number => number(parameter, text, text).map(Value::Number),
+        Kind::Process => {
+            let (deviation, time_s) = match (text.split_once(" for "), now) {
+                (Some((deviation, time)), _) if time.trim() == "ever" => (deviation, f64::INFINITY),
+                (Some((deviation, time)), _) => match units::quantity(time, "s") {
+                    Quantity::Number(time_s) => (deviation, time_s),
+                    _ => return Err(no_value()),
+                },
+                (None, Some(Value::Process { time_s, .. })) => (text, time_s),
+                (None, _) => return Err(no_value()),
+            };
+            Ok(Value::Process { deviation: number(parameter, deviation, text)?, time_s })
+        }
+    }
+}
+
+/// A number with or without a unit, out of the whole `text`.
+fn number<'t>(parameter: &'static Parameter, number: &str, text: &'t str) -> Result<f64, SetError<'t>> {
+    match units::quantity(number, parameter.unit) {
+        Quantity::Number(number) => Ok(number),
+        Quantity::OtherUnit => Err(SetError::OtherUnit { parameter, text }),
+        Quantity::None => Err(SetError::NoValue { parameter, text }),
+    }
+}

@@ -1,0 +1,140 @@
+//! Tables in the guides that are made from the list of filters, from their parameters and from their figures.
+//! `UPDATE_DOCS=1 cargo test -p bb-tests --test tables` renews them.
+
+// The accuracy tests use the rest of it.
+#[allow(dead_code)]
+#[path = "accuracy/known.rs"]
+mod known;
+
+use bb_cli::Axes;
+use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample};
+use bb_estimators::navigation::{AlignmentParams, EskfParams, NavigationOptions, StreamParams};
+use bb_estimators::params::{Kind, Params};
+use known::{Errors, Row};
+use std::error::Error;
+use std::fmt::Write;
+use std::path::Path;
+
+fn filters() -> impl Iterator<Item = FilterParams> {
+    FilterParams::ALL.iter().map(|default| default())
+}
+
+/// What stands between `<!-- NAME -->` and `<!-- end -->` is `table`, or becomes it.
+fn hold(file: &str, name: &str, table: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let start = format!("<!-- {name} -->\n");
+    let (before, rest) = text.split_once(&start).unwrap_or_else(|| panic!("{file} has no `{}`", start.trim()));
+    let (now, after) = rest.split_once("<!-- end -->").unwrap_or_else(|| panic!("{file}: `{name}` has no end"));
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        std::fs::write(&path, format!("{before}{start}{table}<!-- end -->{after}")).expect("it was read");
+    } else {
+        assert_eq!(now, table, "{file}: the table `{name}` is another; UPDATE_DOCS=1 renews it");
+    }
+}
+
+#[test]
+fn the_filters_and_when_to_take_them() {
+    let mut table = String::from("| filter | when to use it | idea |\n|---|---|---|\n");
+    for filter in filters() {
+        let _ = writeln!(table, "| `{}` | {} | {} |", filter.estimator(), filter.about().when, filter.about().idea);
+    }
+    hold("docs/attitude.md", "filters", &table);
+}
+
+#[test]
+fn what_filters_know() {
+    type Tells = fn(&AnyFilter) -> bool;
+    let rows: [(&str, Tells); 5] = [
+        ("orientation_uncertainty", |filter| filter.orientation_uncertainty().is_some()),
+        ("gyroscope_bias", |filter| filter.gyroscope_bias().is_some()),
+        ("is_at_rest", |filter| filter.is_at_rest().is_some()),
+        ("is_magnetically_disturbed", |filter| filter.is_magnetically_disturbed().is_some()),
+        ("is_heading_trusted", |filter| filter.is_heading_trusted().is_some()),
+    ];
+    let started = |filter| {
+        let mut filter = AnyFilter::<f64>::new(AnyParams { filter }).expect("defaults are good");
+        let sample = ImuSample {
+            time_ns: 0,
+            angular_velocity: [0.0; 3].into(),
+            specific_force: [0.0, 0.0, 9.81].into(),
+            magnetic_field: Some([0.0, 20e-6, -45e-6].into()),
+        };
+        filter.update(&sample).expect("a good sample");
+        filter
+    };
+    let filters: Vec<_> = filters().map(|params| (params.estimator(), started(params))).collect();
+    let telling: Vec<_> =
+        filters.iter().filter(|(_, filter)| rows.iter().any(|(_, tells)| tells(filter))).collect();
+    let mut table = String::from("| |");
+    for (name, _) in &telling {
+        let _ = write!(table, " `{name}` |");
+    }
+    table += "\n|---|";
+    table += &"---|".repeat(telling.len());
+    for (name, tells) in rows {
+        let _ = write!(table, "\n| `{name}` |");
+        for (_, filter) in &telling {
+            table += if tells(filter) { " yes |" } else { " |" };
+        }
+    }
+    hold("docs/attitude.md", "knowledge", &(table + "\n"));
+}
+
+#[test]
+fn what_filters_reach() -> Result<(), Box<dyn Error>> {
+    let mut table = String::from("| filter | settings | total | heading | inclination |\n|---|---|---|---|---|\n");
+    let rows = known::rows()?;
+    for axes in [Axes::Nine, Axes::Six] {
+        for row in rows.iter().filter(|row| row.axes == axes) {
+            let Row { filter, settings, errors: Some(Errors { mean, worst }), .. } = row else {
+                return Err(format!("{} is not measured", row.name()).into());
+            };
+            let settings = if settings.is_empty() { String::new() } else { format!("`{settings}`") };
+            let inclination = format!("{:.2} / {:.2}", mean.inclination, worst.inclination);
+            let _ = match axes {
+                Axes::Nine => writeln!(
+                    table,
+                    "| `{filter}` | {settings} | {:.2} / {:.2} | {:.2} / {:.2} | {inclination} |",
+                    mean.total, worst.total, mean.heading, worst.heading
+                ),
+                Axes::Six => writeln!(table, "| `{filter}`, six axes | {settings} | | | {inclination} |"),
+            };
+        }
+    }
+    hold("docs/attitude.md", "accuracy", &table);
+    Ok(())
+}
+
+#[test]
+fn the_parameters() {
+    let mut text = String::new();
+    let eskf = (EskfParams::default(), NavigationOptions::default());
+    let (alignment, stream) = (AlignmentParams::default(), StreamParams::default());
+    let other: [(&str, &dyn Params); 4] = [
+        ("`Eskf` in `robot!` (`NavigationOptions`)", &eskf.1),
+        ("The navigation filter by itself (`EskfParams`)", &eskf.0),
+        ("Its start (`AlignmentParams`)", &alignment),
+        ("Its sensors (`StreamParams`)", &stream),
+    ];
+    for filter in filters() {
+        section(&mut text, &format!("`{}`", filter.estimator()), &filter);
+    }
+    for (title, params) in other {
+        section(&mut text, title, params);
+    }
+    hold("docs/parameters.md", "parameters", &text);
+}
+
+fn section(text: &mut String, title: &str, params: &dyn Params) {
+    let _ = write!(text, "\n## {title}\n\n| parameter | default | range | unit | |\n|---|---|---|---|---|\n");
+    for row in params.parameters() {
+        let value = params.get(row.name).expect("it is there");
+        let range =
+            if matches!(row.kind, Kind::Switch | Kind::Count) { String::new() } else { row.range.to_string() };
+        let summary = row.summary().split_whitespace().collect::<Vec<_>>().join(" ");
+        // Links are those of the code's documentation.
+        let summary = summary.replace("[`", "`").replace("`]", "`");
+        let _ = writeln!(text, "| `{}` | {value} | {range} | {} | {summary} |", row.name, row.unit);
+    }
+}
