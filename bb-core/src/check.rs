@@ -3,6 +3,7 @@
 //! The macro cannot see types. It emits constants that call these functions at the user's token; a fault is a panic
 //! while the constant is evaluated, which rustc reports there with the message made here.
 
+mod estimator;
 mod find;
 mod names;
 mod options;
@@ -10,10 +11,9 @@ mod positions;
 mod roles;
 mod text;
 
-pub use find::{find_input, find_nested, find_output};
-pub use names::{
-    check_dynamic, check_input, check_inputs, check_nested, check_optional, check_output, check_outputs,
-};
+pub use estimator::check_estimator;
+pub use find::{find_input, find_output};
+pub use names::{check_dynamic, check_input, check_optional, check_output};
 pub use options::{Given, check_option, check_required};
 pub use positions::check_position;
 pub use roles::{check_reachable, check_role};

@@ -104,19 +104,18 @@ pub mod prelude {
 pub mod __private {
     pub use crate::__stub_robot as stub_robot;
     pub use crate::check::{
-        Given, check_dynamic, check_input, check_inputs, check_nested, check_option, check_optional, check_output,
-        check_outputs, check_position, check_reachable, check_required, check_role, find_input, find_nested,
-        find_output,
+        Given, check_dynamic, check_estimator, check_input, check_option, check_optional, check_output,
+        check_position, check_reachable, check_required, check_role, find_input, find_output,
     };
     pub use crate::component::{
-        Binding, Command, FieldIndex, FromParameter, FromQuantity, FromText, Input, InputAt, InputField,
-        OptionField, OutputAt, Slot, SyncMiss, declare,
+        At, Binding, Command, EmittedAt, FieldIndex, FromParameter, FromQuantity, FromText, Input, InputAt,
+        InputField, OptionField, OutputAt, Slot, SyncMiss, TakenAt, declare,
     };
     pub use crate::control::Prepared;
     pub use crate::declaration::{
         ActuatorDeclaration, Cancel, CommandDeclaration, Dimension, EstimatorDeclaration, HealthDeclaration,
-        InputDeclaration, IslandDeclaration, ParameterDeclaration, ParameterDefault, ParameterValues, Range,
-        SensorDeclaration, WorkerDeclaration,
+        InletDeclaration, InputDeclaration, IslandDeclaration, ParameterDeclaration, ParameterDefault,
+        ParameterValues, Range, SensorDeclaration, WorkerDeclaration, join,
     };
     pub use crate::event::CategoryDeclaration;
     pub use crate::lifecycle::{AsSensor, AsService, Periodic};
@@ -126,19 +125,28 @@ pub mod __private {
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{
-        AnyIsland, Environment, Island, IslandState, IslandWiring, Key, Next, Node, NodeEntry, Turn,
+        Act, Environment, Island, IslandState, IslandWiring, Key, Member, Node, Turn, act, alone, enter, feed,
+        island_of, receive, start,
     };
     pub use crate::pubsub::{AnyTopic, DynamicMessage, Topic};
     pub use crate::run::{
         ActuatorHandle, ActuatorNode, AnyActuator, Assembly, BridgeHandle, CommandHandle, ControllerHandle,
-        EstimatorHandle, EstimatorOfSeveralHandle, FeedOf, IslandOf, OutputHandle, ParameterHandle, Report, Robot,
-        SensorHandle, Source, StartError, Visit,
+        EstimatorHandle, EstimatorOfSeveralHandle, IslandOf, OutputHandle, ParameterHandle, Report, Robot,
+        SensorHandle, Source, StartError, visit,
     };
-    pub use crate::stub::{Known, NotProbed, Probe, Unknown, as_known, both_known, stub};
+    pub use crate::stub::{Known, NoField, NotProbed, Probe, Unknown, as_known, both_known, stub};
     pub use crate::time::MonotonicTime;
     pub use crate::topology::{
         Collision, Dynamics, Geometry, Inertial, Joint, JointKind, Limit, Link, Material, Mimic, Origin, Topology,
         Transform, Transmission, Visual,
     };
+    pub use std::any::Any;
+    pub use std::convert::identity;
     pub use std::sync::Arc;
+    // Shorter to write, and to read, where they are written for every component.
+    pub use std::boxed::Box;
+    pub use std::clone::Clone;
+    pub use std::default::Default;
+    pub use std::option::Option::{self, None, Some};
+    pub use std::vec::Vec;
 }

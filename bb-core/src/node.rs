@@ -21,7 +21,11 @@ pub(crate) use entry::{HealthReport, Report};
 pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Mode, Overseer};
 pub(crate) use island::CallError;
-pub use island::{AnyIsland, Island, IslandState, IslandWiring, Key, Replayed};
+pub(crate) use island::take_turn;
+pub use island::{
+    Act, AnyIsland, Island, IslandState, IslandWiring, Key, Member, Replayed, act, alone, enter, feed,
+    island as island_of, receive, start,
+};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
 pub use running::{Next, Node};

@@ -34,8 +34,8 @@ pub use handle::{
 pub use live::Live;
 pub use replay::{Replay, ReplayError};
 pub use report::Report;
-pub use robot::{FeedOf, IslandOf, Robot};
+pub use robot::{IslandOf, Robot};
 pub use running::Running;
 pub use simulation::Simulation;
 pub use source::{Assembly, Source, SourceStatistics};
-pub use visit::{Visit, Visitable};
+pub use visit::{Visit, Visitable, visit};

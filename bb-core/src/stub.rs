@@ -8,7 +8,7 @@
 mod unknown;
 
 pub(crate) use unknown::UNKNOWN_INDEX;
-pub use unknown::Unknown;
+pub use unknown::{NoField, Unknown};
 
 use crate::component::{Actuator, Command, Estimator, Inputs, Options, Outputs, Sensor, Service};
 use crate::message::Payload;
@@ -126,7 +126,6 @@ macro_rules! __stub_robot {
             const COMMANDS: &'static [$crate::__private::CommandDeclaration] = &[];
             const PARAMETERS: &'static [$crate::__private::ParameterDeclaration] = &[];
             const ISLANDS: &'static [$crate::__private::IslandOf<()>] = &[];
-            const FEEDS: &'static [::core::option::Option<$crate::__private::FeedOf<()>>] = &[];
             type Options = ();
             type Topics = ();
             type Wiring = ();
@@ -143,11 +142,22 @@ macro_rules! __stub_robot {
             fn wired_topics(_: &()) -> &() {
                 &()
             }
-            fn all_topics(_: &()) -> ::std::vec::Vec<&dyn $crate::__private::AnyTopic> {
-                ::std::vec::Vec::new()
+            fn topic(_: &(), _: usize) -> ::core::option::Option<&dyn $crate::__private::AnyTopic> {
+                ::core::option::Option::None
             }
-            fn all_actuators(_: &()) -> ::std::vec::Vec<&dyn $crate::__private::AnyActuator> {
-                ::std::vec::Vec::new()
+            fn options_of(_: &mut (), _: usize) -> ::core::option::Option<&mut dyn ::core::any::Any> {
+                ::core::option::Option::None
+            }
+            fn actuator(_: &(), _: usize) -> ::core::option::Option<&dyn $crate::__private::AnyActuator> {
+                ::core::option::Option::None
+            }
+            fn feed(
+                _: &(),
+                _: usize,
+                _: &$crate::__private::DynamicMessage,
+                _: $crate::__private::MonotonicTime,
+            ) -> bool {
+                false
             }
             fn commands(_: &()) -> ::std::vec::Vec<$crate::__private::Prepared> {
                 ::std::vec::Vec::new()

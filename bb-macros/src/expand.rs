@@ -1,19 +1,20 @@
 //! A verified robot to its wiring: declarations and calls; loops and decisions live in `bb_core`.
 //!
 //! ```text
-//! pub struct Rover;                         // the robot's type
-//! impl Rover { pub fn builder() … }         // so that no trait need be in scope
-//! type __RoverS0 = Bmi270;                  // one alias per component: its type is named once
+//! pub struct Rover;                                    // the robot's type
+//! impl Rover { pub fn builder() … }                    // so that no trait need be in scope
+//! type __Rover__sensor_base_imu = Bmi270;              // one alias per component: its type is named once
+//! enum __Rover__member__sensor_base_imu_tilt {}        // what stands for an estimator in its island
 //! const _: () = {
-//!     …                                     // constants that check type facts at the user's tokens
-//!     static __SENSORS, __ESTIMATORS, …     // what was declared, as data
-//!     struct __Options, __Topics, __Wiring  // a field per component, publisher, island
-//!     struct __Island0 { … }                // estimators that always run together
-//!     impl __Wiring { fn p0(&self, …) }     // what lies downstream of each publisher, by direct calls
+//!     …                                                // constants that check type facts at the user's tokens
+//!     static __SENSORS, __ESTIMATORS, …                // what was declared, as data
+//!     struct __Options, __Topics, __Wiring             // a field per component, publisher, island
+//!     struct __Island_sensor_base_imu_tilt { … }       // estimators that always run together
+//!     impl __Wiring { fn sensor_base_imu(&self, …) }   // what is downstream of each publisher, by direct calls
 //!     impl Robot for Rover { … }
 //! };
-//! const _: () = { use rover::… as _; … };   // what the user refers to, for his editor
-//! pub mod rover { … }                       // a handle per publisher, at its path
+//! const _: () = { use rover::… as _; … };              // what the user refers to, for his editor
+//! pub mod rover { … }                                  // a handle per publisher, at its path
 //! ```
 
 mod checks;
@@ -23,6 +24,7 @@ mod group;
 mod handles;
 mod islands;
 mod literal;
+mod naming;
 mod options;
 mod order;
 mod part;
@@ -33,7 +35,6 @@ mod topology;
 mod types;
 mod wiring;
 
-pub(crate) use literal::dimension;
 pub(crate) use stub::stub;
 
 use crate::model::Robot;
@@ -46,20 +47,25 @@ use syn::Attribute;
 pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let (robot, name) = (verified.robot, verified.name);
     let definition = definition(robot, name);
-    let aliases = types::aliases(robot, name);
-    let checks = checks::checks(verified);
+    let naming = naming::Naming::of(robot, name);
+    let types = types::Types::new(robot, &naming, name, 0);
+    let aliases = types::aliases(&types);
+    let members = types::members(&types);
+    let checks = checks::checks(verified, &types);
     let islands = islands::Islands::of(verified);
     let declarations = declarations::declarations(verified, &islands);
-    let options = options::options(robot, name);
-    let wiring = wiring::wiring(verified, &islands);
-    let implementation = robot_impl::robot_impl(verified);
+    let options = options::options(&types);
+    let wiring = wiring::wiring(verified, &types, &islands);
+    let implementation = robot_impl::robot_impl(verified, &types);
     let references = references::references(verified);
-    let handles = handles::handles(robot, name, &verified.module, handles::Accessors::Wired);
+    let handles = handles::handles(&types, name, &verified.module, handles::Accessors::Wired);
     quote! {
         #definition
         #aliases
+        #members
         #[allow(clippy::all, non_snake_case, unused_variables)]
         const _: () = {
+            use ::bb_core::__private;
             #checks
             #declarations
             #options

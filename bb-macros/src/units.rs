@@ -1,6 +1,7 @@
 //! Units and their dimensions. Everything inside is SI; a unit is a factor to it.
 
-use proc_macro2::{Ident, Span};
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::{ToTokens, quote};
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{LitInt, Token};
@@ -10,6 +11,14 @@ use syn::{LitInt, Token};
 /// An angle counts as a dimension, so that degrees cannot stand where a plain number or a length belongs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dimension(pub(crate) [i8; 6]);
+
+/// A `bb_core::declaration::Dimension`.
+impl ToTokens for Dimension {
+    fn to_tokens(&self, tokens: &mut TokenStream) {
+        let (exponents, name) = (self.0, self.name());
+        tokens.extend(quote!(::bb_core::__private::Dimension { exponents: [#(#exponents),*], name: #name }));
+    }
+}
 
 impl Dimension {
     pub(crate) const NONE: Self = Self([0; 6]);

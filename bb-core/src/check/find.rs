@@ -19,31 +19,6 @@ pub const fn find_input<I: Inputs>(name: &str) -> usize {
     if fields.is_empty() && I::KNOWN { 0 } else { UNKNOWN_INDEX }
 }
 
-/// The field that takes what the parent sensor of a nested estimator publishes: the only one that the algorithm cannot
-/// do without.
-pub const fn find_nested<I: Inputs>() -> usize {
-    let fields = I::FIELDS;
-    if fields.len() == 1 {
-        return 0;
-    }
-    let mut only = None;
-    let mut index = 0;
-    while index < fields.len() {
-        if !fields[index].optional {
-            if only.is_some() {
-                return UNKNOWN_INDEX;
-            }
-            only = Some(index);
-        }
-        index += 1;
-    }
-    match only {
-        Some(index) => index,
-        None if fields.is_empty() && I::KNOWN => 0,
-        None => UNKNOWN_INDEX,
-    }
-}
-
 /// The field that holds the declared output `name`; `out` is a single payload.
 pub const fn find_output<O: Outputs>(name: &str) -> usize {
     let fields = O::FIELDS;

@@ -32,6 +32,13 @@ pub const fn check_option(component: &str, fields: &[OptionField], given: Given)
 /// That every required option is given.
 #[track_caller]
 pub const fn check_required(component: &str, fields: &[OptionField], given: &[&str]) {
+    if let Some(text) = missing_option(component, fields, given) {
+        panic!("{}", text.as_str())
+    }
+}
+
+/// The first required option that is not given.
+pub(super) const fn missing_option(component: &str, fields: &[OptionField], given: &[&str]) -> Option<Text> {
     let mut index = 0;
     while index < fields.len() {
         let field = fields[index];
@@ -43,11 +50,11 @@ pub const fn check_required(component: &str, fields: &[OptionField], given: &[&s
         }
         if !found {
             let text = Text::new("").name(component).push(" needs the option ").name(field.name);
-            let text = text.push("; give it: `").push(component).push("(").push(field.name).push(" = …)`");
-            panic!("{}", text.as_str())
+            return Some(text.push("; give it: `").push(component).push("(").push(field.name).push(" = …)`"));
         }
         index += 1;
     }
+    None
 }
 
 #[track_caller]

@@ -1,6 +1,7 @@
 //! Text put together at compile time, and how near two names are.
 
 /// A text of bounded length, made in a constant.
+#[derive(Clone, Copy)]
 pub(super) struct Text {
     bytes: [u8; 1024],
     length: usize,

@@ -45,6 +45,9 @@ pub trait Inputs: 'static {
     /// The last known message of each input.
     #[doc(hidden)]
     type Cache: Default + Send + 'static;
+    /// The field that a nested estimator's sensor feeds: the only one that the estimator cannot do without.
+    #[doc(hidden)]
+    type Nested: TakenAt<Self>;
     /// The inputs by name; none if the input is a single payload.
     const FIELDS: &'static [InputField];
 
@@ -62,8 +65,13 @@ pub struct InputField {
     pub optional: bool,
 }
 
-/// The number of a field in an input or output struct, as a type.
+/// The number of a field in an input or output struct.
 pub type FieldIndex = usize;
+
+/// A field of an input or output struct, as a type: what the expansion of `robot!` names it by.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct At<const I: FieldIndex>;
 
 /// One input of a struct: its message, and whether it is new since the last dispatch.
 #[derive(Debug)]
@@ -125,9 +133,41 @@ pub trait InputAt<const I: FieldIndex>: Inputs {
     ) -> Result<Self::View<'a>, SyncMiss>;
 }
 
+/// The same, asked of the field: a type is named once, where a number would be computed at each use.
+#[doc(hidden)]
+pub trait TakenAt<T: Inputs + ?Sized>: 'static {
+    /// Its number.
+    const INDEX: FieldIndex;
+
+    /// The payload it takes.
+    type Payload: Payload;
+
+    /// See [`InputAt::slot`].
+    fn slot(cache: &mut T::Cache) -> Option<&mut Slot<Self::Payload>>;
+
+    /// See [`InputAt::snapshot`].
+    fn snapshot<'a>(cache: &'a mut T::Cache, message: &'a Stamped<Self::Payload>) -> Result<T::View<'a>, SyncMiss>;
+}
+
+impl<T: InputAt<I>, const I: FieldIndex> TakenAt<T> for At<I> {
+    const INDEX: FieldIndex = I;
+    type Payload = T::Payload;
+
+    #[inline(always)]
+    fn slot(cache: &mut T::Cache) -> Option<&mut Slot<T::Payload>> {
+        T::slot(cache)
+    }
+
+    #[inline(always)]
+    fn snapshot<'a>(cache: &'a mut T::Cache, message: &'a Stamped<T::Payload>) -> Result<T::View<'a>, SyncMiss> {
+        T::snapshot(cache, message)
+    }
+}
+
 impl<T: Payload> Inputs for T {
     type View<'a> = &'a Stamped<T>;
     type Cache = ();
+    type Nested = At<0>;
     const FIELDS: &'static [InputField] = &[];
 }
 
@@ -210,14 +250,14 @@ impl<T: Payload> Slot<T> {
     }
 }
 
-/// Says which declared input of an estimator fills field `I`.
+/// Says which declared input of an estimator fills the field `F`.
 #[doc(hidden)]
-pub fn declare<const I: FieldIndex, T: InputAt<I>>(
+pub fn declare<F: TakenAt<T>, T: Inputs>(
     cache: &mut T::Cache,
     estimator: &'static EstimatorDeclaration,
     input: usize,
 ) {
-    if let (Some(slot), Some(declared)) = (T::slot(cache), estimator.inputs.get(input)) {
+    if let (Some(slot), Some(declared)) = (F::slot(cache), estimator.inputs.get(input)) {
         slot.declare(declared);
     }
 }

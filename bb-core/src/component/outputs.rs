@@ -1,6 +1,6 @@
 //! What an estimator emits: one payload, or a struct with a field per output.
 
-use super::FieldIndex;
+use super::{At, FieldIndex};
 use crate::Payload;
 
 /// What an estimator emits.
@@ -26,13 +26,17 @@ use crate::Payload;
     label = "neither a payload nor a struct of outputs",
     note = "name a payload, or derive a struct of several: `#[derive(Outputs)]`"
 )]
-pub trait Outputs: Send + 'static {
+pub trait Outputs: Sized + Send + 'static {
     /// The outputs by name; none if the output is a single payload, whose name is `out`.
     const FIELDS: &'static [&'static str];
 
     /// False for the stand-in of an estimator that is not known, in a robot that does not compile.
     #[doc(hidden)]
     const KNOWN: bool = true;
+
+    /// What is published if no output is declared: the single payload.
+    #[doc(hidden)]
+    type Only: EmittedAt<Self>;
 }
 
 /// That output number `I` of `Self` exists, and how to take it out of what was emitted.
@@ -42,13 +46,41 @@ pub trait OutputAt<const I: FieldIndex>: Outputs {
     type Payload: Payload;
 
     /// Takes it, if it was emitted.
-    fn take(emitted: &mut Option<Self>) -> Option<Self::Payload>
-    where
-        Self: Sized;
+    fn take(emitted: &mut Option<Self>) -> Option<Self::Payload>;
+
+    /// What emits this output alone.
+    fn alone(payload: Self::Payload) -> Self;
+}
+
+/// The same, asked of the field; see [`TakenAt`](super::TakenAt).
+#[doc(hidden)]
+pub trait EmittedAt<T>: 'static {
+    /// What it carries.
+    type Payload: Payload;
+
+    /// See [`OutputAt::take`].
+    fn take(emitted: &mut Option<T>) -> Option<Self::Payload>;
+
+    /// See [`OutputAt::alone`].
+    fn alone(payload: Self::Payload) -> T;
+}
+
+impl<T: OutputAt<I>, const I: FieldIndex> EmittedAt<T> for At<I> {
+    type Payload = T::Payload;
+
+    #[inline(always)]
+    fn take(emitted: &mut Option<T>) -> Option<T::Payload> {
+        T::take(emitted)
+    }
+
+    fn alone(payload: T::Payload) -> T {
+        T::alone(payload)
+    }
 }
 
 impl<T: Payload> Outputs for T {
     const FIELDS: &'static [&'static str] = &[];
+    type Only = At<0>;
 }
 
 impl<T: Payload> OutputAt<0> for T {
@@ -57,5 +89,9 @@ impl<T: Payload> OutputAt<0> for T {
     #[inline(always)]
     fn take(emitted: &mut Option<T>) -> Option<T> {
         emitted.take()
+    }
+
+    fn alone(payload: T) -> T {
+        payload
     }
 }

@@ -90,6 +90,19 @@ pub struct IslandDeclaration {
     pub worker: Option<WorkerDeclaration>,
     /// Whether one of its estimators has a latency budget, so that callbacks are measured.
     pub is_measured: bool,
+    /// The numbers of its estimators, in the order in which a message reaches them.
+    pub estimators: &'static [usize],
+    /// What comes in from outside.
+    pub inlets: &'static [InletDeclaration],
+}
+
+/// A publisher outside of an island, and whom it feeds there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InletDeclaration {
+    /// The publisher, as the island numbers them.
+    pub entry: usize,
+    /// Its estimators that take it, each with the number of the input.
+    pub inputs: &'static [(usize, usize)],
 }
 
 /// `runs_on: worker`: how its thread runs.

@@ -2,7 +2,7 @@
 
 use super::running::Node;
 use super::turn::Turn;
-use crate::component::{Estimator, InputAt};
+use crate::component::{Estimator, TakenAt};
 use crate::message::{Stamp, Stamped};
 use std::collections::VecDeque;
 
@@ -33,19 +33,16 @@ impl<E: Estimator> Backlog<E> {
     }
 
     /// Keeps a clone of a message; the input of the oldest one, if that had to make room.
-    pub(super) fn push<const I: usize>(
+    pub(super) fn push<F: TakenAt<E::Input>>(
         &mut self,
         input: usize,
-        message: &Stamped<<E::Input as InputAt<I>>::Payload>,
-    ) -> Option<usize>
-    where
-        E::Input: InputAt<I>,
-    {
+        message: &Stamped<F::Payload>,
+    ) -> Option<usize> {
         let dropped = if self.0.len() == CAPACITY { self.0.pop_front() } else { None };
         let message = message.clone();
         self.0.push_back(Delivery {
             input,
-            deliver: Box::new(move |node, turn, emitted| node.take_in::<I>(input, &message, turn, emitted)),
+            deliver: Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted)),
         });
         dropped.map(|dropped| dropped.input)
     }

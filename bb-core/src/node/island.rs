@@ -17,12 +17,15 @@
 mod any;
 mod inbox;
 mod inside;
+mod member;
 #[cfg(all(test, loom))]
 mod model;
 
 pub use self::any::{AnyIsland, Replayed};
 use self::inbox::{Entry, Inbox, Pending, Taken};
 use self::inside::{Inside, Within};
+pub(crate) use self::member::take_turn;
+pub use self::member::{Act, Member, act, alone, enter, feed, island, receive, start};
 use super::environment::Environment;
 use super::{NodeEntry, Turn};
 use crate::declaration::IslandDeclaration;
@@ -63,21 +66,45 @@ pub trait IslandState: Sized {
     /// The island as declared.
     const DECLARATION: IslandDeclaration;
 
+    /// Where it is.
+    fn find(wiring: &Self::Wiring) -> &Island<Self>;
     /// Runs all that lies downstream of a message.
     fn deliver(&mut self, wiring: &Self::Wiring, message: &Self::Message, turn: &Turn<'_>);
+    /// Does something with the estimator of that number; false if it cannot.
+    fn act(&mut self, wiring: &Self::Wiring, estimator: usize, act: Act<'_, '_>) -> bool;
+
     /// Does what is due: timers, ticks, restarts.
-    fn wake(&mut self, wiring: &Self::Wiring, turn: &Turn<'_>);
+    fn wake(&mut self, wiring: &Self::Wiring, turn: &Turn<'_>) {
+        for estimator in Self::DECLARATION.estimators {
+            self.act(wiring, *estimator, Act::Turn(turn));
+        }
+    }
+
     /// Hands an entry to the estimator of that number.
-    fn handle(&mut self, wiring: &Self::Wiring, estimator: usize, entry: NodeEntry, turn: &Turn<'_>);
-    /// Calls `each` with the numbers of its estimators, in order.
-    fn estimators() -> &'static [usize];
+    fn handle(&mut self, wiring: &Self::Wiring, estimator: usize, entry: NodeEntry, turn: &Turn<'_>) {
+        self.act(wiring, estimator, Act::Handle(entry, turn));
+    }
+
     /// In a replay: makes its estimators.
-    fn begin_replay(&mut self);
+    fn begin_replay(&mut self, wiring: &Self::Wiring) {
+        for estimator in Self::DECLARATION.estimators {
+            self.act(wiring, *estimator, Act::BeginReplay);
+        }
+    }
+
     /// In a replay: publishes what one of its estimators emitted in reply to a request that the journal does not hold; false
     /// if no estimator of this island has such a publisher.
-    fn emit(&mut self, wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, turn: &Turn<'_>) -> bool;
+    fn emit(&mut self, wiring: &Self::Wiring, message: &DynamicMessage, turn: &Turn<'_>) -> bool {
+        Self::DECLARATION.estimators.iter().any(|estimator| self.act(wiring, *estimator, Act::Emit(message, turn)))
+    }
+
     /// Counts a message that did not fit in the inbox, for each estimator it would have reached.
-    fn dropped(wiring: &Self::Wiring, message: &Self::Message);
+    fn dropped(wiring: &Self::Wiring, key: Key) {
+        let inlets = Self::DECLARATION.inlets.iter().filter(|inlet| inlet.entry == key.entry);
+        for (estimator, input) in inlets.flat_map(|inlet| inlet.inputs) {
+            wiring.environment().overflow(*estimator, *input);
+        }
+    }
 }
 
 /// How long a publisher waits for room in a full inbox before it takes the holder to hang.
@@ -259,7 +286,7 @@ impl<S: IslandState> Island<S> {
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         drop(inbox);
         if let Some(dropped) = dropped {
-            S::dropped(wiring, &dropped.message);
+            S::dropped(wiring, dropped.key);
             crate::fault::discard(dropped);
         }
         self.attend(wiring);
@@ -497,7 +524,7 @@ fn line_of<S: IslandState>(entry: &Entry<Keyed<S::Message>>) -> Event {
 }
 
 fn for_all<S: IslandState>(state: &mut S, wiring: &S::Wiring, turn: &Turn<'_>, entry: impl Fn() -> NodeEntry) {
-    for estimator in S::estimators() {
+    for estimator in S::DECLARATION.estimators {
         state.handle(wiring, *estimator, entry(), turn);
     }
 }

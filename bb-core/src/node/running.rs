@@ -12,7 +12,7 @@ use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
 use super::turn::Turn;
 use super::{DropReason, HealthReport, Report};
-use crate::component::{Binding, Context, Estimator, Guardian, InputAt, Inputs, Reply, Request, SyncMiss};
+use crate::component::{Binding, Context, Estimator, Guardian, Inputs, Reply, Request, SyncMiss, TakenAt};
 use crate::declaration::{EstimatorDeclaration, InputDeclaration, ParameterValues};
 use crate::event::{HealthReason, HealthState, HealthTransition};
 use crate::fault::{Failed, Fault, caught};
@@ -140,42 +140,36 @@ impl<E: Estimator> Node<E> {
         node
     }
 
-    /// Takes a message of the declared input number `input`, which is the algorithm's field `I`. If it is the driver and all
+    /// Takes a message of the declared input number `input`, which is the algorithm's field `F`. If it is the driver and all
     /// is well, the estimator runs; the stamp of what it put into `emitted`, if anything.
     #[inline]
-    pub fn receive<const I: usize>(
+    pub fn receive<F: TakenAt<E::Input>>(
         &mut self,
         input: usize,
-        message: &Stamped<<E::Input as InputAt<I>>::Payload>,
+        message: &Stamped<F::Payload>,
         turn: &Turn<'_>,
         emitted: &mut Option<E::Output>,
-    ) -> Option<Stamp>
-    where
-        E::Input: InputAt<I>,
-    {
+    ) -> Option<Stamp> {
         self.shared.counters().inputs.get(input)?.received.increment();
         if turn.is_observed() {
             self.tell_input(input, message.stamp(), turn);
         }
         if self.slot.is_running() && self.backlog.is_empty() {
-            return self.take_in::<I>(input, message, turn, emitted);
+            return self.take_in::<F>(input, message, turn, emitted);
         }
-        self.keep::<I>(input, message);
+        self.keep::<F>(input, message);
         None
     }
 
     /// The same for a message that was counted.
     #[inline]
-    pub(super) fn take_in<const I: usize>(
+    pub(super) fn take_in<F: TakenAt<E::Input>>(
         &mut self,
         input: usize,
-        message: &Stamped<<E::Input as InputAt<I>>::Payload>,
+        message: &Stamped<F::Payload>,
         turn: &Turn<'_>,
         emitted: &mut Option<E::Output>,
-    ) -> Option<Stamp>
-    where
-        E::Input: InputAt<I>,
-    {
+    ) -> Option<Stamp> {
         let declared = self.declaration.inputs.get(input)?;
         let AsEstimator(running) = self.slot.running()?;
         let (admission, cache) = (&mut self.admission, &mut self.cache);
@@ -191,12 +185,12 @@ impl<E: Estimator> Node<E> {
                 return Ok(Handled::Refused(reason));
             }
             if !declared.driver {
-                if let Some(slot) = <E::Input as InputAt<I>>::slot(cache) {
+                if let Some(slot) = F::slot(cache) {
                     slot.store(message);
                 }
                 return Ok(Handled::Stored);
             }
-            let view = match <E::Input as InputAt<I>>::snapshot(cache, message) {
+            let view = match F::snapshot(cache, message) {
                 Ok(view) => view,
                 Err(miss) => return Ok(Handled::Missed(miss)),
             };
@@ -454,16 +448,13 @@ impl<E: Estimator> Node<E> {
 
     /// Keeps a message for after the restart, or counts it as dropped if there will be none.
     #[cold]
-    fn keep<const I: usize>(&mut self, input: usize, message: &Stamped<<E::Input as InputAt<I>>::Payload>)
-    where
-        E::Input: InputAt<I>,
-    {
+    fn keep<F: TakenAt<E::Input>>(&mut self, input: usize, message: &Stamped<F::Payload>) {
         let is_kept = self.slot.is_running() || self.slot.restart_at().is_some();
         if !is_kept {
             self.shared.counters().drop(input, DropReason::Stopped);
             return;
         }
-        let kept = caught(|| Ok(self.backlog.push::<I>(input, message)));
+        let kept = caught(|| Ok(self.backlog.push::<F>(input, message)));
         match kept {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
             Ok(None) => {}

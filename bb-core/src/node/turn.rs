@@ -4,7 +4,7 @@ use super::environment::{Environment, Mode};
 use crate::declaration::EstimatorDeclaration;
 use crate::journal::{Callback, Event, Recorded, checksum};
 use crate::message::{Payload, Stamped};
-use crate::pubsub::DynamicMessage;
+use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
 use crate::time::{MonotonicTime, WallTime};
 use std::cell::{Cell, RefCell};
 use std::fmt;
@@ -134,10 +134,11 @@ impl<'a> Turn<'a> {
 
     /// An estimator emits `message` at the publisher of that number.
     #[inline]
-    pub fn emits<T: Payload>(&self, publisher: usize, path: &'static str, message: &Stamped<T>) {
+    pub fn emit<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
         if self.is_observed {
-            self.follow(publisher, path, message);
+            self.follow(publisher, topic.path(), message);
         }
+        topic.publish_alone(message);
     }
 
     #[cold]

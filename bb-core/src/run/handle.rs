@@ -10,6 +10,7 @@ use crate::event::{
 use crate::journal::JournalLine;
 use crate::message::{Frame, Payload, Stamp, Stamped};
 use crate::pubsub::Topic;
+
 use crate::time::MonotonicTime;
 use std::fmt;
 use std::marker::PhantomData;
@@ -32,8 +33,23 @@ pub trait Publisher<R: Robot>: Copy {
     fn topic<'a>(self, topics: &'a R::Topics, system: &'a SystemTopics) -> &'a Topic<Self::Payload>;
 }
 
-type TopicOf<R, T> = fn(&<R as Robot>::Topics) -> &Topic<T>;
-type OptionsOf<R, O> = fn(&mut <R as Robot>::Options) -> &mut O;
+/// The topic of a publisher. The expansion numbers handles as it numbers topics; a robot that failed to verify has none, and
+/// never runs.
+fn topic<R: Robot, T: Payload>(topics: &R::Topics, publisher: usize) -> &Topic<T> {
+    let topic = R::topic(topics, publisher).and_then(|topic| topic.as_any().downcast_ref());
+    topic.unwrap_or_else(unverified)
+}
+
+/// The same for the options of a component.
+fn options<R: Robot, O: 'static>(options: &mut R::Options, component: usize) -> &mut O {
+    R::options_of(options, component).and_then(|options| options.downcast_mut()).unwrap_or_else(unverified)
+}
+
+#[allow(clippy::panic, reason = "only a robot that failed to verify gets here, and such a robot does not compile")]
+fn unverified<T>() -> T {
+    panic!("this robot did not verify")
+}
+
 type NodeOf<R, A> = fn(&<R as Robot>::Wiring) -> &ActuatorNode<A>;
 type PublishOf<R, T> = fn(&<R as Robot>::Wiring, &Stamped<T>, MonotonicTime);
 /// Has a function called with an estimator once it is free, and publishes what that emits.
@@ -79,8 +95,8 @@ handle! {
     /// Names a sensor of the robot `R`.
     SensorHandle<S: Sensor> {
         frame: Frame,
-        topic: TopicOf<R, S::Output>,
-        options: OptionsOf<R, S::Options>,
+        publisher: usize,
+        component: usize,
         publish: PublishOf<R, S::Output>
     }
 }
@@ -89,9 +105,10 @@ handle! {
     /// Names an estimator of one output, `T`, of the robot `R`.
     EstimatorHandle<E: Estimator, T: Payload> {
         number: usize,
-        topic: TopicOf<R, T>,
-        options: OptionsOf<R, E::Options>,
-        visit: VisitOf<R, E>
+        publisher: usize,
+        component: usize,
+        visit: VisitOf<R, E>,
+        kind: PhantomData<fn() -> T>
     }
 }
 
@@ -99,7 +116,7 @@ handle! {
     /// Names an estimator of several outputs of the robot `R`; each has an [`OutputHandle`] below it.
     EstimatorOfSeveralHandle<E: Estimator> {
         number: usize,
-        options: OptionsOf<R, E::Options>,
+        component: usize,
         visit: VisitOf<R, E>
     }
 }
@@ -108,7 +125,7 @@ macro_rules! service_handle {
     ($(#[$doc:meta])* $name:ident) => {
         handle! {
             $(#[$doc])*
-            $name<S: Service> { topic: TopicOf<R, S::Output>, options: OptionsOf<R, S::Options> }
+            $name<S: Service> { publisher: usize, component: usize, kind: PhantomData<fn() -> (R, S)> }
         }
 
         #[diagnostic::do_not_recommend]
@@ -118,14 +135,14 @@ macro_rules! service_handle {
                 self.path
             }
             fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<S::Output> {
-                (self.topic)(topics)
+                topic::<R, _>(topics, self.publisher)
             }
         }
 
         impl<R: Robot, S: Service> Configurable<R> for $name<R, S> {
             type Options = S::Options;
             fn options(self, options: &mut R::Options) -> &mut S::Options {
-                (self.options)(options)
+                self::options::<R, _>(options, self.component)
             }
         }
     };
@@ -143,12 +160,12 @@ service_handle! {
 
 handle! {
     /// Names an actuator of the robot `R`.
-    ActuatorHandle<A: Actuator> { node: NodeOf<R, A>, options: OptionsOf<R, A::Options> }
+    ActuatorHandle<A: Actuator> { node: NodeOf<R, A>, component: usize }
 }
 
 handle! {
     /// Names a command of the robot `R`. What becomes of it is published at its path.
-    CommandHandle<C: Command> { number: usize, options: OptionsOf<R, C::Options> }
+    CommandHandle<C: Command> { number: usize, component: usize, kind: PhantomData<fn() -> (R, C)> }
 }
 
 handle! {
@@ -165,7 +182,7 @@ impl<R: Robot, A: Actuator> ActuatorHandle<R, A> {
 impl<R: Robot, A: Actuator> Configurable<R> for ActuatorHandle<R, A> {
     type Options = A::Options;
     fn options(self, options: &mut R::Options) -> &mut A::Options {
-        (self.options)(options)
+        self::options::<R, _>(options, self.component)
     }
 }
 
@@ -178,7 +195,7 @@ impl<R: Robot, C: Command> CommandHandle<R, C> {
 impl<R: Robot, C: Command> Configurable<R> for CommandHandle<R, C> {
     type Options = C::Options;
     fn options(self, options: &mut R::Options) -> &mut C::Options {
-        (self.options)(options)
+        self::options::<R, _>(options, self.component)
     }
 }
 
@@ -244,7 +261,7 @@ system_topic! {
 
 handle! {
     /// Names one output of an estimator of the robot `R`.
-    OutputHandle<T: Payload> { topic: TopicOf<R, T> }
+    OutputHandle<T: Payload> { publisher: usize, kind: PhantomData<fn() -> (R, T)> }
 }
 
 impl<R: Robot, S: Sensor> SensorHandle<R, S> {
@@ -261,7 +278,7 @@ impl<R: Robot, S: Sensor> Publisher<R> for SensorHandle<R, S> {
         self.path
     }
     fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<S::Output> {
-        (self.topic)(topics)
+        topic::<R, _>(topics, self.publisher)
     }
 }
 
@@ -272,7 +289,7 @@ impl<R: Robot, E: Estimator, T: Payload> Publisher<R> for EstimatorHandle<R, E, 
         self.path
     }
     fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<T> {
-        (self.topic)(topics)
+        topic::<R, _>(topics, self.publisher)
     }
 }
 
@@ -283,7 +300,7 @@ impl<R: Robot, T: Payload> Publisher<R> for OutputHandle<R, T> {
         self.path
     }
     fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<T> {
-        (self.topic)(topics)
+        topic::<R, _>(topics, self.publisher)
     }
 }
 
@@ -320,20 +337,20 @@ pub trait Configurable<R: Robot>: Copy {
 impl<R: Robot, S: Sensor> Configurable<R> for SensorHandle<R, S> {
     type Options = S::Options;
     fn options(self, options: &mut R::Options) -> &mut S::Options {
-        (self.options)(options)
+        self::options::<R, _>(options, self.component)
     }
 }
 
 impl<R: Robot, E: Estimator, T: Payload> Configurable<R> for EstimatorHandle<R, E, T> {
     type Options = E::Options;
     fn options(self, options: &mut R::Options) -> &mut E::Options {
-        (self.options)(options)
+        self::options::<R, _>(options, self.component)
     }
 }
 
 impl<R: Robot, E: Estimator> Configurable<R> for EstimatorOfSeveralHandle<R, E> {
     type Options = E::Options;
     fn options(self, options: &mut R::Options) -> &mut E::Options {
-        (self.options)(options)
+        self::options::<R, _>(options, self.component)
     }
 }

@@ -191,11 +191,10 @@ impl<R: Robot> Replay<R> {
             Event::Begin { .. } => return Err("the journal begins again".to_owned()),
             Event::WallClock { offset_nanos } => machine.environment.clock().set_wall_offset_nanos(offset_nanos),
             Event::Message { publisher, message } => {
-                let feed = R::FEEDS.get(publisher).copied().flatten().ok_or("the robot has no such sensor")?;
                 let message = self.message(publisher, message)?;
                 machine.environment.set_replayed_line(number);
-                if !feed(&machine.wiring, &message, time) {
-                    return Err("the sensor has another payload".to_owned());
+                if !R::feed(&machine.wiring, publisher, &message, time) {
+                    return Err("the robot has no such sensor, or one of another payload".to_owned());
                 }
             }
             Event::Own { path, message } => self.publish_own(path, message)?,
@@ -370,7 +369,7 @@ impl<R: Robot> Replay<R> {
         if is_first {
             self.live.0.environment.node(number).counters().emitted.increment();
         }
-        self.island(island, time, Replayed::Emission(publisher, &message))?;
+        self.island(island, time, Replayed::Emission(&message))?;
         // It is as it was.
         let _ = self.live.0.environment.replayed().take(island);
         Ok(())

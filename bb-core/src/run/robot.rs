@@ -10,13 +10,11 @@ use crate::node::AnyIsland;
 use crate::pubsub::{AnyTopic, DynamicMessage};
 use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology};
+use std::any::Any;
 use std::sync::Arc;
 
 /// Finds an island in a wiring.
 pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
-
-/// Publishes a message of a sensor or a service; false if its payload is another.
-pub type FeedOf<W> = fn(&W, &DynamicMessage, MonotonicTime) -> bool;
 
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
 pub trait Robot: Sized + Send + Sync + 'static {
@@ -43,9 +41,6 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// Where its islands are in the wiring.
     #[doc(hidden)]
     const ISLANDS: &'static [IslandOf<Self::Wiring>];
-    /// By publisher, how its messages are published again; none for an estimator's.
-    #[doc(hidden)]
-    const FEEDS: &'static [Option<FeedOf<Self::Wiring>>];
 
     /// The options of all components.
     #[doc(hidden)]
@@ -70,13 +65,32 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, assembly: &Assembly) -> Vec<Box<dyn Source>>;
     #[doc(hidden)]
     fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
+    /// The topic of that publisher; none beyond the last.
     #[doc(hidden)]
-    fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic>;
+    fn topic(topics: &Self::Topics, publisher: usize) -> Option<&dyn AnyTopic>;
+    /// The options of that component, an `S::Options`; none beyond the last.
     #[doc(hidden)]
-    fn all_actuators(wiring: &Self::Wiring) -> Vec<&dyn AnyActuator>;
+    fn options_of(options: &mut Self::Options, component: usize) -> Option<&mut dyn Any>;
+    /// The actuator of that number; none beyond the last.
+    #[doc(hidden)]
+    fn actuator(wiring: &Self::Wiring, actuator: usize) -> Option<&dyn AnyActuator>;
+    /// Publishes a recorded message of a sensor or a service; false if the publisher of that number is none, or has another
+    /// payload.
+    #[doc(hidden)]
+    fn feed(wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, now: MonotonicTime) -> bool;
     /// The commands with their options.
     #[doc(hidden)]
     fn commands(options: &Self::Options) -> Vec<Prepared>;
+
+    #[doc(hidden)]
+    fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic> {
+        (0..).map_while(|publisher| Self::topic(topics, publisher)).collect()
+    }
+
+    #[doc(hidden)]
+    fn all_actuators(wiring: &Self::Wiring) -> Vec<&dyn AnyActuator> {
+        (0..).map_while(|actuator| Self::actuator(wiring, actuator)).collect()
+    }
 
     /// Its links and joints as a URDF file.
     fn to_urdf() -> String {

@@ -4,7 +4,7 @@ use super::Robot;
 use crate::component::Estimator;
 use crate::journal::{Event, Request};
 use crate::message::Stamp;
-use crate::node::{CallError, Island, IslandState, Node, Turn};
+use crate::node::{CallError, IslandState, Member, Node, Turn, take_turn};
 use crate::time::MonotonicTime;
 
 /// What is called with an estimator, and the slot for what it emits.
@@ -21,29 +21,22 @@ pub struct Visit<'a, E: Estimator> {
     pub(super) error: &'a mut Option<CallError>,
 }
 
-impl<E: Estimator> Visit<'_, E> {
-    /// Enters the estimator's island as a caller: `node` finds the estimator there, `emit` publishes what it emits, and
-    /// `finish` does what is due afterwards.
-    pub fn enter<S: IslandState>(
-        self,
-        island: &Island<S>,
-        wiring: &S::Wiring,
-        now: MonotonicTime,
-        node: impl Fn(&mut S) -> &mut Node<E>,
-        emit: impl Fn(&mut S, &mut Option<E::Output>, Stamp, &Turn<'_>),
-        finish: impl Fn(&mut S, &Turn<'_>),
-    ) {
-        let Self { estimator, request, call, error } = self;
-        let line = Event::Request { estimator, request };
-        let called = island.call(wiring, now, line, |state, turn| {
-            let mut emitted = None;
-            if let Some(stamp) = call(node(state), turn, &mut emitted) {
-                emit(state, &mut emitted, stamp, turn);
-            }
-            finish(state, turn);
-        });
-        *error = called.err();
-    }
+/// Enters the estimator's island as a caller, publishes what it emits, and does what is due afterwards.
+pub fn visit<M: Member>(
+    wiring: &<M::State as IslandState>::Wiring,
+    now: MonotonicTime,
+    visit: Visit<'_, M::Estimator>,
+) {
+    let Visit { estimator, request, call, error } = visit;
+    let line = Event::Request { estimator, request };
+    let called = M::State::find(wiring).call(wiring, now, line, |state, turn| {
+        let mut emitted = None;
+        if let Some(stamp) = call(M::node(state), turn, &mut emitted) {
+            M::publish(wiring, state, &mut emitted, stamp, turn);
+        }
+        take_turn::<M>(state, wiring, turn);
+    });
+    *error = called.err();
 }
 
 /// What answers requests: the handle of an estimator.

@@ -2,7 +2,7 @@
 
 use super::stub;
 use crate::component::{
-    Actuator, ActuatorContext, Command, CommandContext, Context, Estimator, Fault, InputAt, InputField, Inputs,
+    Actuator, ActuatorContext, At, Command, CommandContext, Context, Estimator, Fault, InputAt, InputField, Inputs,
     NoArguments, NoOptions, Outcome, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, Service,
     ServiceContext, Slot, SyncMiss,
 };
@@ -24,6 +24,9 @@ pub struct UnknownOutput;
 
 /// The number of an input or output that does not exist.
 pub(crate) const UNKNOWN_INDEX: usize = usize::MAX;
+
+/// The same as a field.
+pub type NoField = At<UNKNOWN_INDEX>;
 
 impl Finite for Unknown {
     fn is_finite(&self) -> bool {
@@ -125,11 +128,13 @@ impl Command for Unknown {
 impl Inputs for UnknownInput {
     type View<'a> = ();
     type Cache = ();
+    type Nested = NoField;
     const FIELDS: &'static [InputField] = &[];
     const KNOWN: bool = false;
 }
 
 impl Outputs for UnknownOutput {
+    type Only = NoField;
     const FIELDS: &'static [&'static str] = &[];
     const KNOWN: bool = false;
 }
@@ -150,6 +155,10 @@ impl<O: Outputs> OutputAt<UNKNOWN_INDEX> for O {
     type Payload = Unknown;
 
     fn take(_: &mut Option<O>) -> Option<Unknown> {
+        stub()
+    }
+
+    fn alone(_: Unknown) -> O {
         stub()
     }
 }

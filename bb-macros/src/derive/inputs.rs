@@ -42,6 +42,7 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
             impl ::bb_core::Inputs for #name<'static> {
                 type View<'a> = #name<'a>;
                 type Cache = ();
+                type Nested = ::bb_core::__private::NoField;
                 const FIELDS: &'static [::bb_core::__private::InputField] = &[];
                 const KNOWN: bool = false;
             }
@@ -53,6 +54,10 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
         let name = crate::names::text(name);
         quote!(::bb_core::__private::InputField { name: #name, optional: #optional },)
     });
+    let nested = match nested(&inputs) {
+        Some(index) => quote!(::bb_core::__private::At<#index>),
+        None => quote!(::bb_core::__private::NoField),
+    };
     let fields = (0..inputs.len()).map(|index| input_at(name, &inputs, index));
     quote! {
         const _: () = {
@@ -63,11 +68,19 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
             impl ::bb_core::Inputs for #name<'static> {
                 type View<'a> = #name<'a>;
                 type Cache = __Cache;
+                type Nested = #nested;
                 const FIELDS: &'static [::bb_core::__private::InputField] = &[#(#schema)*];
             }
             #(#fields)*
         };
     }
+}
+
+/// The field that the sensor of a nested estimator feeds: the only one that the estimator cannot do without.
+fn nested(inputs: &[Field<'_>]) -> Option<usize> {
+    let mut needed = inputs.iter().enumerate().filter(|(_, field)| !field.optional || inputs.len() == 1);
+    let (first, _) = needed.next()?;
+    needed.next().is_none().then_some(first)
 }
 
 /// What happens when field number `driver` is the driver: nothing counts as seen before all others are known to be

@@ -2,7 +2,6 @@
 
 use super::fields;
 use crate::diagnostics::Diagnostics;
-use crate::expand;
 use crate::units::Unit;
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote, quote_spanned};
@@ -84,7 +83,7 @@ impl Attribute {
         let required = self.required;
         let (dimension, unit) = match &self.unit {
             Some((unit, text)) => {
-                let dimension = expand::dimension(unit.dimension);
+                let dimension = unit.dimension;
                 (quote!(::core::option::Option::Some(#dimension)), text.as_str())
             }
             None => (quote!(::core::option::Option::None), ""),

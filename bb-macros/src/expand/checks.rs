@@ -1,7 +1,7 @@
 //! Constants that check type facts: each calls a function of `bb_core` at the user's token, and a fault is a panic
 //! there while rustc evaluates it.
 
-use super::literal::{dimension, option, spanned_call};
+use super::literal::{option, spanned_call};
 use super::part::Part;
 use super::types::{Types, type_name};
 use crate::diagnostics::Place;
@@ -9,35 +9,63 @@ use crate::model::{EstimatorId, Robot};
 use crate::parse::{Component, ComponentOption, OptionValue, Value};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{ToTokens, quote};
 
-pub(super) fn checks(verified: &Verified<'_>) -> TokenStream {
+pub(super) fn checks(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let robot = verified.robot;
-    let types = Types::new(robot, verified.name, 0);
     let mut checks = TokenStream::new();
     for part in Part::all(robot) {
+        checks.extend(match part {
+            Part::Estimator(id) => estimator(robot, types, id),
+            _ => required(part.component(robot), &types.options(part)),
+        });
         checks.extend(options(robot, part.component(robot), &types.options(part)));
     }
     for id in robot.estimators.ids() {
-        checks.extend(inputs(robot, &types, id));
-        checks.extend(outputs(robot, &types, id));
+        checks.extend(inputs(robot, types, id));
+        checks.extend(outputs(robot, types, id));
     }
-    checks.extend(moving_joints(verified, &types));
-    checks.extend(positions(robot, &types));
-    checks.extend(roles(robot, &types));
+    checks.extend(moving_joints(verified, types));
+    checks.extend(positions(robot, types));
+    checks.extend(roles(robot, types));
     checks
 }
 
-/// Required options are given; literals have the right dimension and keep their range.
-fn options(robot: &Robot, component: &Component, options: &TokenStream) -> TokenStream {
-    let name = type_name(component);
-    let given = component.options.iter().map(|option| crate::names::text(&option.name));
-    let fields = quote!(<#options as ::bb_core::Options>::FIELDS);
-    let mut checks = spanned_call(
+/// Required options are given.
+fn required(component: &Component, options: &TokenStream) -> TokenStream {
+    let (name, given) = (type_name(component), given(component));
+    spanned_call(
         Place::of(&component.kind),
         quote!(::bb_core::__private::check_required),
-        quote!(#name, #fields, &[#(#given),*]),
-    );
+        quote!(#name, <#options as ::bb_core::Options>::FIELDS, #given),
+    )
+}
+
+/// An estimator has its required options, all inputs that the algorithm needs, and an output if it has several.
+fn estimator(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
+    let estimator = &robot.estimators[id];
+    let (name, kind, given) = (type_name(&estimator.component), types.estimator(id), given(&estimator.component));
+    let declared = estimator.inputs.iter().map(|input| crate::names::text(&input.name));
+    let declared = option((!estimator.is_nested()).then(|| quote!(&[#(#declared),*])));
+    let has_outputs = !estimator.outputs.is_empty();
+    spanned_call(
+        Place::of(&estimator.component.kind),
+        quote!(::bb_core::__private::check_estimator::<#kind>),
+        quote!(#name, #given, #declared, #has_outputs),
+    )
+}
+
+/// The names of the options given.
+fn given(component: &Component) -> TokenStream {
+    let names = component.options.iter().map(|option| crate::names::text(&option.name));
+    quote!(&[#(#names),*])
+}
+
+/// Literals have the right dimension and keep their range.
+fn options(robot: &Robot, component: &Component, options: &TokenStream) -> TokenStream {
+    let name = type_name(component);
+    let fields = quote!(<#options as ::bb_core::Options>::FIELDS);
+    let mut checks = TokenStream::new();
     for option in &component.options {
         if let Some((place, given)) = given_number(robot, option) {
             checks.extend(spanned_call(
@@ -54,13 +82,13 @@ fn options(robot: &Robot, component: &Component, options: &TokenStream) -> Token
 fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenStream)> {
     let (place, unit, number) = match &given.value {
         OptionValue::Quantity(quantity) => {
-            let unit = quantity.has_unit.then(|| dimension(quantity.dimension));
+            let unit = quantity.has_unit.then(|| quantity.dimension.to_token_stream());
             (quantity.place, option(unit), quantity.value)
         }
         // Its default stands for it.
         OptionValue::Parameter(path) => {
             let default = &robot.parameters[robot.parameter(path)?].default;
-            let unit = default.has_unit.then(|| dimension(default.dimension));
+            let unit = default.has_unit.then(|| default.dimension.to_token_stream());
             let number = match default.value {
                 Value::Number(number) => number,
                 // Whether an integer fits is rustc's to say, and the range the start's.
@@ -77,20 +105,12 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenS
     Some((place, quote!(::bb_core::__private::Given { name: #name, dimension: #unit, number: #number })))
 }
 
-/// All inputs that the algorithm needs are declared, and all that are declared are the algorithm's.
+/// The declared inputs are the algorithm's, and those that are optional are so there.
 fn inputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let estimator = &robot.estimators[id];
     let (name, taken) = (type_name(&estimator.component), types.estimator_input(id));
-    let place = Place::of(&estimator.component.kind);
-    if estimator.is_nested() {
-        return spanned_call(place, quote!(::bb_core::__private::check_nested::<#taken>), quote!(#name));
-    }
-    let declared = estimator.inputs.iter().map(|input| crate::names::text(&input.name));
-    let needed =
-        spanned_call(place, quote!(::bb_core::__private::check_inputs::<#taken>), quote!(#name, &[#(#declared),*]));
     let known = estimator.inputs.iter().map(|input| {
-        let input_name = crate::names::text(&input.name);
-        let place = Place::of(&input.name);
+        let (input_name, place) = (crate::names::text(&input.name), Place::of(&input.name));
         spanned_call(place, quote!(::bb_core::__private::check_input::<#taken>), quote!(#name, #input_name))
     });
     let optional = estimator.inputs.iter().filter_map(|input| {
@@ -98,17 +118,13 @@ fn inputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
         let check = quote!(::bb_core::__private::check_optional::<#taken>);
         Some(spanned_call(place, check, quote!(#name, #input_name)))
     });
-    known.chain(optional).chain([needed]).collect()
+    known.chain(optional).collect()
 }
 
-/// The declared outputs are the algorithm's, and one of several outputs has some declared.
+/// The declared outputs are the algorithm's.
 fn outputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let estimator = &robot.estimators[id];
     let (name, emitted) = (type_name(&estimator.component), types.estimator_output(id));
-    if estimator.outputs.is_empty() {
-        let place = Place::of(&estimator.component.kind);
-        return spanned_call(place, quote!(::bb_core::__private::check_outputs::<#emitted>), quote!(#name));
-    }
     let known = estimator.outputs.iter().map(|output| {
         let (output_name, place) = (crate::names::text(&output.name), Place::of(&output.name));
         spanned_call(place, quote!(::bb_core::__private::check_output::<#emitted>), quote!(#name, #output_name))

@@ -15,13 +15,13 @@ pub(super) fn states(robot: &Robot) -> TokenStream {
     quote!(&[#(#names),*])
 }
 
-/// `static __CATEGORYS`
+/// `static __CATEGORIES`
 pub(super) fn categories(robot: &Robot) -> TokenStream {
     let categories = robot.categories.iter().map(|category| {
         let (name, concurrency) = (text(&category.name), category.concurrency as usize);
-        quote!(::bb_core::__private::CategoryDeclaration { name: #name, concurrency: #concurrency })
+        quote!(__private::CategoryDeclaration { name: #name, concurrency: #concurrency })
     });
-    array("__CATEGORY", quote!(::bb_core::__private::CategoryDeclaration), categories.collect())
+    array("__CATEGORIES", quote!(__private::CategoryDeclaration), categories.collect())
 }
 
 /// `static __COMMANDS`
@@ -37,13 +37,13 @@ pub(super) fn commands(robot: &Robot) -> TokenStream {
             quote!(#timeout)
         }));
         let cancel = match &command.cancel {
-            Cancel::Nothing => quote!(::bb_core::__private::Cancel::Nothing),
-            Cancel::All => quote!(::bb_core::__private::Cancel::All),
+            Cancel::Nothing => quote!(__private::Cancel::Nothing),
+            Cancel::All => quote!(__private::Cancel::All),
             Cancel::Categories(categories) => {
-                quote!(::bb_core::__private::Cancel::Categories(&[#(#categories),*]))
+                quote!(__private::Cancel::Categories(&[#(#categories),*]))
             }
         };
-        quote!(::bb_core::__private::CommandDeclaration {
+        quote!(__private::CommandDeclaration {
             name: #name,
             path: #path,
             allowed_states: #allowed,
@@ -52,32 +52,32 @@ pub(super) fn commands(robot: &Robot) -> TokenStream {
             cancel: #cancel,
         })
     });
-    array("__COMMAND", quote!(::bb_core::__private::CommandDeclaration), commands.collect())
+    array("__COMMANDS", quote!(__private::CommandDeclaration), commands.collect())
 }
 
 /// `static __PARAMETERS`
 pub(super) fn parameters(robot: &Robot) -> TokenStream {
     let parameters = robot.parameters.iter().map(parameter).collect();
-    array("__PARAMETER", quote!(::bb_core::__private::ParameterDeclaration), parameters)
+    array("__PARAMETERS", quote!(__private::ParameterDeclaration), parameters)
 }
 
 fn parameter(parameter: &Parameter) -> TokenStream {
     let (path, doc, unit) =
         (path_text(&parameter.path), crate::derive::doc(&parameter.attributes), parameter.unit());
     let default = match &parameter.default.value {
-        Value::Bool(value) => quote!(::bb_core::__private::ParameterDefault::Bool(#value)),
-        Value::Integer(value) => quote!(::bb_core::__private::ParameterDefault::Integer(#value)),
-        Value::Number(value) => quote!(::bb_core::__private::ParameterDefault::Float(#value)),
-        Value::Text(value) => quote!(::bb_core::__private::ParameterDefault::Text(#value)),
+        Value::Bool(value) => quote!(__private::ParameterDefault::Bool(#value)),
+        Value::Integer(value) => quote!(__private::ParameterDefault::Integer(#value)),
+        Value::Number(value) => quote!(__private::ParameterDefault::Float(#value)),
+        Value::Text(value) => quote!(__private::ParameterDefault::Text(#value)),
     };
     let range = option(parameter.range.as_ref().and_then(|range| {
         let (start, end) = (number(&range.start)?, number(&range.end)?);
         // In SI, as the values that it is held against.
         let text =
             if unit.is_empty() { format!("{start:?}..={end:?}") } else { format!("{start:?}..={end:?} {unit}") };
-        Some(quote!(::bb_core::__private::Range { start: #start, end: #end, text: #text }))
+        Some(quote!(__private::Range { start: #start, end: #end, text: #text }))
     }));
-    quote!(::bb_core::__private::ParameterDeclaration {
+    quote!(__private::ParameterDeclaration {
         path: #path,
         doc: #doc,
         default: #default,

@@ -16,10 +16,10 @@ pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenS
     let actuators = robot.actuators.iter().map(|actuator| actuator_declaration(robot, actuator)).collect();
     let services = robot.services.iter().map(service_declaration).collect();
     let arrays = [
-        array("__SENSOR", quote!(::bb_core::__private::SensorDeclaration), sensors),
-        array("__ESTIMATOR", quote!(::bb_core::__private::EstimatorDeclaration), estimators),
-        array("__ACTUATOR", quote!(::bb_core::__private::ActuatorDeclaration), actuators),
-        array("__SERVICE", quote!(::bb_core::__private::SensorDeclaration), services),
+        array("__SENSORS", quote!(__private::SensorDeclaration), sensors),
+        array("__ESTIMATORS", quote!(__private::EstimatorDeclaration), estimators),
+        array("__ACTUATORS", quote!(__private::ActuatorDeclaration), actuators),
+        array("__SERVICES", quote!(__private::SensorDeclaration), services),
         control::categories(robot),
         control::commands(robot),
         control::parameters(robot),
@@ -27,18 +27,27 @@ pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenS
     let topology = topology::topology(verified);
     quote! {
         #(#arrays)*
-        static __TOPOLOGY: ::bb_core::__private::Topology = #topology;
+        static __TOPOLOGY: __private::Topology = #topology;
     }
 }
 
-/// `static __SENSORS: [SensorDeclaration; 2] = [__SENSOR0, __SENSOR1];`, each value in a constant of its own: the time
-/// that rustc takes for one grows with its square.
+/// Values of one constant: the time that rustc takes for one grows with its square.
+const SIZE: usize = 16;
+
+/// `static __SENSORS: [SensorDeclaration; 20] = join(&[&__SENSORS_0, &__SENSORS_1]);`
 pub(super) fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> TokenStream {
-    let (array, count) = (format_ident!("{name}S"), values.len());
-    let names: Vec<_> = (0..count).map(|number| format_ident!("{name}{number}")).collect();
+    let (array, count) = (format_ident!("{name}"), values.len());
+    if count <= SIZE {
+        return quote!(static #array: [#kind; #count] = [#(#values),*];);
+    }
+    let parts = values.chunks(SIZE).enumerate().map(|(number, values)| {
+        let (part, count) = (format_ident!("{name}_{number}"), values.len());
+        quote!(const #part: [#kind; #count] = [#(#values),*];)
+    });
+    let names = (0..count.div_ceil(SIZE)).map(|number| format_ident!("{name}_{number}"));
     quote! {
-        #(const #names: #kind = #values;)*
-        static #array: [#kind; #count] = [#(#names),*];
+        #(#parts)*
+        static #array: [#kind; #count] = __private::join(&[#(&#names),*]);
     }
 }
 
@@ -48,9 +57,9 @@ fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let period = period(sensor.period_s);
     let root = root_from(robot, sensor.mount);
     let supervisor = supervisor(robot, sensor.mount);
-    quote!(::bb_core::__private::SensorDeclaration {
+    quote!(__private::SensorDeclaration {
         path: #path,
-        frame: ::bb_core::__private::Frame::new(#frame),
+        frame: __private::Frame::new(#frame),
         period_nanos: #period,
         root_from_frame: #root,
         supervisor: #supervisor,
@@ -101,9 +110,9 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: Estimat
         });
     let inputs = nested.into_iter().chain(declared);
     let outputs = estimator.publishers.iter().map(|publisher| path_text(&robot.publishers[*publisher].path));
-    quote!(::bb_core::__private::EstimatorDeclaration {
+    quote!(__private::EstimatorDeclaration {
         path: #path,
-        frame: ::bb_core::__private::Frame::new(#frame),
+        frame: __private::Frame::new(#frame),
         inputs: &[#(#inputs),*],
         outputs: &[#(#outputs),*],
         island: #island,
@@ -133,16 +142,16 @@ fn actuator_declaration(robot: &Robot, actuator: &Actuator) -> TokenStream {
     let path = path_text(&actuator.path);
     let joint = &robot.joints[actuator.joint].label;
     let supervisor = supervisor(robot, Mount::Joint(actuator.joint));
-    quote!(::bb_core::__private::ActuatorDeclaration { path: #path, joint: #joint, supervisor: #supervisor })
+    quote!(__private::ActuatorDeclaration { path: #path, joint: #joint, supervisor: #supervisor })
 }
 
 fn service_declaration(service: &Service) -> TokenStream {
     let (path, period) = (path_text(&service.path), period(service.period_s));
-    quote!(::bb_core::__private::SensorDeclaration {
+    quote!(__private::SensorDeclaration {
         path: #path,
-        frame: ::bb_core::__private::Frame::NONE,
+        frame: __private::Frame::NONE,
         period_nanos: #period,
-        root_from_frame: ::core::option::Option::None,
+        root_from_frame: __private::None,
         supervisor: 0,
     })
 }
@@ -161,7 +170,7 @@ fn health(
     });
     let [degraded, lost_command, recovered] = [health.on_degraded, health.on_lost, health.on_recovered]
         .map(|command| option(command.map(|command| quote!(#command))));
-    quote!(::bb_core::__private::HealthDeclaration {
+    quote!(__private::HealthDeclaration {
         latency_budget_nanos: #budget,
         lost_after_nanos: #lost,
         recover_after: #recover_after,
@@ -180,7 +189,7 @@ pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
             let core = core as usize;
             quote!(#core)
         }));
-        quote!(::bb_core::__private::WorkerDeclaration { priority: #priority, core: #core })
+        quote!(__private::WorkerDeclaration { priority: #priority, core: #core })
     }))
 }
 
@@ -188,7 +197,7 @@ pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
 fn nested_input(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let name = crate::names::text(&sensor.name);
     let path = path_text(&robot.publishers[sensor.publisher].path);
-    let identity = option(Some(quote!(::bb_core::__private::Transform::IDENTITY)));
+    let identity = option(Some(quote!(__private::Transform::IDENTITY)));
     input_declaration(0, &name, &path, true, false, [&option(None), &option(None)], &identity)
 }
 
@@ -201,7 +210,7 @@ fn input_declaration(
     [tolerance, stale]: [&TokenStream; 2],
     frame_from_input: &TokenStream,
 ) -> TokenStream {
-    quote!(::bb_core::__private::InputDeclaration {
+    quote!(__private::InputDeclaration {
         index: #index,
         name: #name,
         source: #source,

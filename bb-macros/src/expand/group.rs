@@ -9,6 +9,9 @@
 
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
+use syn::Token;
+
+type Mut = Token![mut];
 
 /// Fields in a group.
 const SIZE: usize = 16;
@@ -62,27 +65,32 @@ pub(super) fn structs(
     }
 }
 
-/// `fn list`, which lists all fields as trait objects.
-pub(super) fn list(name: &str, function: &str, fields: &[Field], object: &TokenStream) -> TokenStream {
-    let (whole, list_whole) = (format_ident!("{name}"), format_ident!("{function}"));
-    let (mut groups, mut calls) = (TokenStream::new(), TokenStream::new());
+/// `fn function(whole, number) -> Option<&object>`: the field of that number as a trait object.
+pub(super) fn by_number(
+    name: &str,
+    function: &str,
+    fields: &[Field],
+    object: &TokenStream,
+    mutability: Option<Mut>,
+) -> TokenStream {
+    let (whole, find) = (format_ident!("{name}"), format_ident!("{function}"));
+    let (mut groups, mut arms) = (TokenStream::new(), TokenStream::new());
     for (number, fields) in fields.chunks(SIZE).enumerate() {
         let (field, group, function) =
             (group_name(number), format_ident!("{name}{number}"), format_ident!("{function}{number}"));
-        let pushes = fields.iter().map(|Field { name, .. }| quote!(list.push(&group.#name);));
+        let fields = fields.iter().enumerate().map(|(number, Field { name, .. })| {
+            quote!(#number => __private::Some(& #mutability group.#name),)
+        });
         groups.extend(quote! {
-            fn #function<'a>(group: &'a #group, list: &mut ::std::vec::Vec<&'a #object>) {
-                #(#pushes)*
+            fn #function(group: & #mutability #group, number: usize) -> __private::Option<& #mutability #object> {
+                match number { #(#fields)* _ => __private::None }
             }
         });
-        calls.extend(quote!(#function(&whole.#field, &mut list);));
+        arms.extend(quote!(#number => #function(& #mutability whole.#field, number % #SIZE),));
     }
     quote! {
-        #[allow(unused_mut)]
-        fn #list_whole(whole: &#whole) -> ::std::vec::Vec<&#object> {
-            let mut list = ::std::vec::Vec::new();
-            #calls
-            list
+        fn #find(whole: & #mutability #whole, number: usize) -> __private::Option<& #mutability #object> {
+            match number / #SIZE { #arms _ => __private::None }
         }
 
         #groups

@@ -6,18 +6,18 @@
 
 use super::group;
 use super::literal::ident;
-use super::options::{parameter_type, place};
+use super::options::parameter_type;
 use super::part::Part;
 use super::types::{Types, imports};
-use super::wiring::{topic, visit_function};
 use super::{docs, path_text};
 use crate::model::{
-    ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, Robot, SensorId,
+    ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, SensorId,
     ServiceId,
 };
 use crate::parse::ServiceKind;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::quote;
+use std::collections::{HashMap, HashSet};
 use syn::Attribute;
 
 /// How handles reach what they name.
@@ -34,6 +34,9 @@ pub(super) enum Accessors {
 struct Module {
     constants: Vec<(Ident, Handle)>,
     modules: Vec<(String, Module)>,
+    /// Which constants there are, and where each module is in the list.
+    known: HashSet<String>,
+    places: HashMap<String, usize>,
     docs: Vec<Attribute>,
     /// Where its name was declared, if it was: an editor jumps there.
     span: Option<Span>,
@@ -57,7 +60,8 @@ enum Handle {
     Category(CategoryId),
 }
 
-pub(super) fn handles(robot: &Robot, name: &Ident, module: &str, accessors: Accessors) -> TokenStream {
+pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: Accessors) -> TokenStream {
+    let robot = types.model();
     let mut root = Module::default();
     for (id, sensor) in robot.sensors.enumerate() {
         root.add(&robot.publishers[sensor.publisher].path, &sensor.name, Handle::Sensor(id));
@@ -110,11 +114,19 @@ pub(super) fn handles(robot: &Robot, name: &Ident, module: &str, accessors: Acce
     }
     let module = ident(module);
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
-    let content = root.tokens(robot, name, accessors, 1);
-    let imports = imports(robot, name);
+    let content = root.tokens(types, accessors, 1);
+    let imports = imports(types, accessors);
     quote! {
         #[doc = #text]
-        #[allow(non_upper_case_globals, non_snake_case, dead_code, private_interfaces, unreachable_pub, clippy::all)]
+        #[allow(
+            missing_docs,
+            non_upper_case_globals,
+            non_snake_case,
+            dead_code,
+            private_interfaces,
+            unreachable_pub,
+            clippy::all
+        )]
         #visibility mod #module { #imports #content }
     }
 }
@@ -127,15 +139,16 @@ impl Module {
         };
         let mut module = self;
         for segment in above {
-            let position = module.modules.iter().position(|(name, _)| name == segment).unwrap_or_else(|| {
+            let next = module.modules.len();
+            let place = *module.places.entry(segment.clone()).or_insert(next);
+            if place == next {
                 module.modules.push((segment.clone(), Self::default()));
-                module.modules.len() - 1
-            });
-            module = &mut module.modules[position].1;
+            }
+            module = &mut module.modules[place].1;
         }
         let mut constant = ident(last);
         constant.set_span(name.span());
-        if module.constants.iter().all(|(name, _)| *name != constant) {
+        if module.known.insert(last.clone()) {
             module.constants.push((constant, handle));
         }
     }
@@ -144,25 +157,24 @@ impl Module {
     fn describe(&mut self, path: &[String], name: &Ident, attributes: &[Attribute]) {
         let mut module = self;
         for segment in path {
-            let Some((_, below)) = module.modules.iter_mut().find(|(name, _)| name == segment) else { return };
-            module = below;
+            let Some(place) = module.places.get(segment) else { return };
+            module = &mut module.modules[*place].1;
         }
         module.docs = docs(attributes).cloned().collect();
         module.span = Some(name.span());
     }
 
-    fn tokens(&self, robot: &Robot, name: &Ident, accessors: Accessors, depth: usize) -> TokenStream {
-        let types = Types::new(robot, name, depth);
-        let constants = self.constants.iter().map(|(name, handle)| handle.tokens(robot, &types, name, accessors));
+    fn tokens(&self, types: &Types<'_>, accessors: Accessors, depth: usize) -> TokenStream {
+        let here = types.below(depth);
+        let constants = self.constants.iter().map(|(name, handle)| handle.tokens(&here, name, accessors));
         let modules = self.modules.iter().map(|(segment, module)| {
-            let (mut segment, content) = (ident(segment), module.tokens(robot, name, accessors, depth + 1));
+            let (mut segment, content) = (ident(segment), module.tokens(types, accessors, depth + 1));
             if let Some(span) = module.span {
                 segment.set_span(span.resolved_at(Span::call_site()));
             }
             let docs = &module.docs;
             quote! {
                 #(#docs)*
-                #[allow(missing_docs)]
                 pub mod #segment { #content }
             }
         });
@@ -172,159 +184,110 @@ impl Module {
 
 impl Handle {
     /// `pub const imu: SensorHandle<Rover, Bmi270> = SensorHandle::new(…);`
-    fn tokens(self, robot: &Robot, types: &Types<'_>, name: &Ident, accessors: Accessors) -> TokenStream {
-        let this = types.robot();
-        let (attributes, path, kind, function, arguments) = match self {
+    fn tokens(self, types: &Types<'_>, name: &Ident, accessors: Accessors) -> TokenStream {
+        let (robot, this) = (types.model(), types.robot());
+        let (attributes, path, (handle, kinds), arguments) = match self {
             Self::Sensor(id) => {
                 let sensor = &robot.sensors[id];
                 let (component, frame) = (types.sensor(id), robot.frame_name(sensor.mount));
-                let path = path_text(&robot.publishers[sensor.publisher].path);
-                let (publish, options) = (topic(sensor.publisher), place(robot, Part::Sensor(id)));
-                let topic = group::path(sensor.publisher.number(), &publish);
-                let arguments = match accessors {
-                    Accessors::Wired => quote!(
-                        |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
-                        |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options,
-                        |wiring: &<#this as ::bb_core::Robot>::Wiring, message, now| wiring.#publish(message, now)
-                    ),
-                    Accessors::Stub => {
-                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub(), |_, _, _| {})
-                    }
+                let publish = types.publisher(sensor.publisher);
+                let publish = match accessors {
+                    Accessors::Wired => quote!(<<#this as ::bb_core::Robot>::Wiring>::#publish),
+                    Accessors::Stub => quote!(|_, _, _| {}),
                 };
-                let arguments = quote!(::bb_core::__private::Frame::new(#frame), #arguments);
-                let kind = quote!(::bb_core::SensorHandle<#this, #component>);
-                (&sensor.attributes, path, kind, quote!(::bb_core::SensorHandle::new), arguments)
+                let (publisher, position) = (sensor.publisher, Part::Sensor(id).position(robot));
+                let arguments =
+                    quote!(::bb_core::__private::Frame::new(#frame), #publisher, #position, #publish);
+                let kind = (quote!(SensorHandle), quote!(#this, #component));
+                (&sensor.attributes, &robot.publishers[sensor.publisher].path, kind, arguments)
             }
             Self::Estimator(id, publisher) => {
                 let estimator = &robot.estimators[id];
                 let (component, payload) = (types.estimator(id), types.payload(publisher));
-                let path = path_text(&estimator.path);
-                let topic = group::path(publisher.number(), &topic(publisher));
-                let options = place(robot, Part::Estimator(id));
-                let arguments = match accessors {
-                    Accessors::Wired => {
-                        let visit = visit_function(id);
-                        quote!(
-                            |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
-                            |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options,
-                            |wiring: &<#this as ::bb_core::Robot>::Wiring, now, visit| wiring.#visit(now, visit)
-                        )
-                    }
-                    Accessors::Stub => {
-                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub(), |_, _, _| {})
-                    }
-                };
-                let arguments = quote!(#id, #arguments);
-                let kind = quote!(::bb_core::EstimatorHandle<#this, #component, #payload>);
-                (&estimator.attributes, path, kind, quote!(::bb_core::EstimatorHandle::new), arguments)
+                let (visit, position) = (visit(types, id, accessors), Part::Estimator(id).position(robot));
+                let arguments = quote!(#id, #publisher, #position, #visit, ::core::marker::PhantomData);
+                let kind = (quote!(EstimatorHandle), quote!(#this, #component, #payload));
+                (&estimator.attributes, &estimator.path, kind, arguments)
             }
             Self::Several(id) => {
-                let estimator = &robot.estimators[id];
-                let (component, path) = (types.estimator(id), path_text(&estimator.path));
-                let options = place(robot, Part::Estimator(id));
-                let arguments = match accessors {
-                    Accessors::Wired => {
-                        let visit = visit_function(id);
-                        quote!(
-                            |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options,
-                            |wiring: &<#this as ::bb_core::Robot>::Wiring, now, visit| wiring.#visit(now, visit)
-                        )
-                    }
-                    Accessors::Stub => quote!(|_| ::bb_core::__private::stub(), |_, _, _| {}),
-                };
-                let arguments = quote!(#id, #arguments);
-                let kind = quote!(::bb_core::EstimatorOfSeveralHandle<#this, #component>);
-                (&estimator.attributes, path, kind, quote!(::bb_core::EstimatorOfSeveralHandle::new), arguments)
+                let (estimator, component) = (&robot.estimators[id], types.estimator(id));
+                let (visit, position) = (visit(types, id, accessors), Part::Estimator(id).position(robot));
+                let kind = (quote!(EstimatorOfSeveralHandle), quote!(#this, #component));
+                (&estimator.attributes, &estimator.path, kind, quote!(#id, #position, #visit))
             }
             Self::Output(id, publisher) => {
-                let estimator = &robot.estimators[id];
-                let path = path_text(&robot.publishers[publisher].path);
-                let (payload, topic) =
-                    (types.payload(publisher), group::path(publisher.number(), &topic(publisher)));
-                let arguments = match accessors {
-                    Accessors::Wired => quote!(|topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic),
-                    Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),
-                };
-                let kind = quote!(::bb_core::OutputHandle<#this, #payload>);
+                let (estimator, payload) = (&robot.estimators[id], types.payload(publisher));
                 let output = match robot.publishers[publisher].from {
                     From::Estimator(_, output) => output.and_then(|output| estimator.outputs.get(output)),
                     From::Sensor(_) | From::Service(_) => None,
                 };
                 let attributes = output.map_or(&estimator.attributes, |output| &output.attributes);
-                (attributes, path, kind, quote!(::bb_core::OutputHandle::new), arguments)
+                let kind = (quote!(OutputHandle), quote!(#this, #payload));
+                let arguments = quote!(#publisher, ::core::marker::PhantomData);
+                (attributes, &robot.publishers[publisher].path, kind, arguments)
             }
             Self::Service(id) => {
-                let service = &robot.services[id];
+                let (service, part) = (&robot.services[id], Part::Service(id));
                 let handle = match service.kind {
                     ServiceKind::Controller => quote!(ControllerHandle),
                     ServiceKind::Bridge => quote!(BridgeHandle),
                 };
-                let (component, options) = (types.part(Part::Service(id)), place(robot, Part::Service(id)));
-                let topic = group::path(service.publisher.number(), &topic(service.publisher));
-                let arguments = match accessors {
-                    Accessors::Wired => quote!(
-                        |topics: &<#this as ::bb_core::Robot>::Topics| &topics.#topic,
-                        |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options
-                    ),
-                    Accessors::Stub => {
-                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub())
-                    }
-                };
-                let kind = quote!(::bb_core::__private::#handle<#this, #component>);
-                let function = quote!(::bb_core::__private::#handle::new);
-                (&service.attributes, path_text(&service.path), kind, function, arguments)
+                let (component, publisher, position) =
+                    (types.part(part), service.publisher, part.position(robot));
+                let kind = (handle, quote!(#this, #component));
+                let arguments = quote!(#publisher, #position, ::core::marker::PhantomData);
+                (&service.attributes, &service.path, kind, arguments)
             }
             Self::Actuator(id) => {
-                let actuator = &robot.actuators[id];
-                let part = Part::Actuator(id);
-                let (component, options, name) = (types.part(part), place(robot, part), part.name());
-                let node = group::path(id.number(), &name);
-                let arguments = match accessors {
-                    Accessors::Wired => quote!(
-                        |wiring: &<#this as ::bb_core::Robot>::Wiring| &wiring.actuators.#node,
-                        |options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options
-                    ),
-                    Accessors::Stub => {
-                        quote!(|_| ::bb_core::__private::stub(), |_| ::bb_core::__private::stub())
-                    }
-                };
-                let kind = quote!(::bb_core::ActuatorHandle<#this, #component>);
-                let function = quote!(::bb_core::ActuatorHandle::new);
-                (&actuator.attributes, path_text(&actuator.path), kind, function, arguments)
-            }
-            Self::Command(id) => {
-                let command = &robot.commands[id];
-                let (component, options) = (types.part(Part::Command(id)), place(robot, Part::Command(id)));
-                let arguments = match accessors {
+                let (actuator, part) = (&robot.actuators[id], Part::Actuator(id));
+                let (component, position) = (types.part(part), part.position(robot));
+                let place = group::path(id.number(), types.name_of(part));
+                let node = match accessors {
                     Accessors::Wired => {
-                        quote!(|options: &mut <#this as ::bb_core::Robot>::Options| &mut options.#options)
+                        quote!(|wiring: &<#this as ::bb_core::Robot>::Wiring| &wiring.actuators.#place)
                     }
                     Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),
                 };
-                let kind = quote!(::bb_core::CommandHandle<#this, #component>);
-                let arguments = quote!(#id, #arguments);
-                let function = quote!(::bb_core::CommandHandle::new);
-                (&command.attributes, path_text(&command.path), kind, function, arguments)
+                let kind = (quote!(ActuatorHandle), quote!(#this, #component));
+                (&actuator.attributes, &actuator.path, kind, quote!(#node, #position))
             }
-            Self::State(id) => return text(name, &robot.states[id].attributes, &robot.states[id].name),
-            Self::Category(id) => return text(name, &robot.categories[id].attributes, &robot.categories[id].name),
+            Self::Command(id) => {
+                let (command, part) = (&robot.commands[id], Part::Command(id));
+                let (component, position) = (types.part(part), part.position(robot));
+                let kind = (quote!(CommandHandle), quote!(#this, #component));
+                (&command.attributes, &command.path, kind, quote!(#id, #position, ::core::marker::PhantomData))
+            }
             Self::Parameter(id) => {
                 let parameter = &robot.parameters[id];
                 let value = parameter_type(parameter.kind);
-                let kind = quote!(::bb_core::ParameterHandle<#this, #value>);
-                let arguments = quote!(#id, ::core::marker::PhantomData);
-                let function = quote!(::bb_core::ParameterHandle::new);
-                (&parameter.attributes, path_text(&parameter.path), kind, function, arguments)
+                let kind = (quote!(ParameterHandle), quote!(#this, #value));
+                (&parameter.attributes, &parameter.path, kind, quote!(#id, ::core::marker::PhantomData))
             }
+            Self::State(id) => return text(name, &robot.states[id].attributes, &robot.states[id].name),
+            Self::Category(id) => return text(name, &robot.categories[id].attributes, &robot.categories[id].name),
         };
-        let docs = docs(attributes);
+        let docs: Vec<_> = docs(attributes).collect();
+        let handle = quote!(::bb_core::__private::#handle);
+        let gap = (!docs.is_empty()).then(|| quote!(#[doc = ""]));
+        let path = path_text(path);
         let text = format!("`{path}`");
         quote! {
             #(#docs)*
-            #[doc = ""]
+            #gap
             #[doc = #text]
-            pub const #name: #kind = #function(#path, #arguments);
+            pub const #name: #handle<#kinds> = #handle::new(#path, #arguments);
         }
+    }
+}
+
+/// How a caller reaches an estimator.
+fn visit(types: &Types<'_>, id: EstimatorId, accessors: Accessors) -> TokenStream {
+    match accessors {
+        Accessors::Wired => {
+            let member = types.member(id);
+            quote!(::bb_core::__private::visit::<#member>)
+        }
+        Accessors::Stub => quote!(|_, _, _| {}),
     }
 }
 

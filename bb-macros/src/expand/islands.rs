@@ -11,8 +11,10 @@ use std::collections::HashMap;
 ids! { IslandId }
 
 /// Estimators behind one lock, in the order in which a message reaches them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Island {
+    /// The first of them, which the island is named by.
+    pub(super) first: EstimatorId,
     pub(super) estimators: Vec<EstimatorId>,
 }
 
@@ -52,8 +54,8 @@ impl Islands {
             drop(feeds);
             let island = match alone {
                 Some(Feed::Island(island)) => island,
-                Some(feed) => *begun.entry(feed).or_insert_with(|| islands.begin()),
-                None => islands.begin(),
+                Some(feed) => *begun.entry(feed).or_insert_with(|| islands.begin(id)),
+                None => islands.begin(id),
             };
             islands.of[id] = island;
             islands.all[island].estimators.push(id);
@@ -61,8 +63,8 @@ impl Islands {
         islands
     }
 
-    fn begin(&mut self) -> IslandId {
-        self.all.push(Island::default())
+    fn begin(&mut self, first: EstimatorId) -> IslandId {
+        self.all.push(Island { first, estimators: Vec::new() })
     }
 
     fn feed(&self, robot: &Robot, publisher: PublisherId) -> Feed {

@@ -2,31 +2,24 @@
 
 use crate::diagnostics::Place;
 use crate::model::Rigid;
-use crate::units::Dimension;
 use proc_macro2::{Group, Ident, Span, TokenStream, TokenTree};
 use quote::quote;
 
-/// A `bb_core::component::Dimension`.
-pub(crate) fn dimension(dimension: Dimension) -> TokenStream {
-    let (exponents, name) = (dimension.0, dimension.name());
-    quote!(::bb_core::__private::Dimension { exponents: [#(#exponents),*], name: #name })
-}
-
 pub(super) fn option(value: Option<TokenStream>) -> TokenStream {
     match value {
-        Some(value) => quote!(::core::option::Option::Some(#value)),
-        None => quote!(::core::option::Option::None),
+        Some(value) => quote!(__private::Some(#value)),
+        None => quote!(__private::None),
     }
 }
 
 /// A `bb_core::topology::Transform`.
 pub(super) fn transform(rigid: Rigid) -> TokenStream {
     if rigid == Rigid::IDENTITY {
-        return quote!(::bb_core::__private::Transform::IDENTITY);
+        return quote!(__private::Transform::IDENTITY);
     }
     // Tokens of negative numbers are a minus and a literal; quote does that for floats by itself.
     let Rigid { translation, rotation } = rigid;
-    quote!(::bb_core::__private::Transform { translation: [#(#translation),*], rotation: [#(#rotation),*] })
+    quote!(__private::Transform { translation: [#(#translation),*], rotation: [#(#rotation),*] })
 }
 
 /// Nanoseconds of a time in seconds.

@@ -6,33 +6,37 @@ use super::part::Part;
 use super::types::Types;
 use crate::derive::into_if_text;
 use crate::diagnostics::Place;
-use crate::model::Robot;
 use crate::parse::{Component, OptionValue, ParameterKind};
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
+use syn::Token;
 
 /// The structs, and `fn __declared_options() -> __Options`.
-pub(super) fn options(robot: &Robot, name: &Ident) -> TokenStream {
-    let types = Types::new(robot, name, 0);
+pub(super) fn options(types: &Types<'_>) -> TokenStream {
+    let robot = types.model();
     let (mut fields, mut functions) = (Vec::new(), TokenStream::new());
     for part in Part::all(robot) {
         let component = part.component(robot);
         let (options, given) = (types.options(part), types.given_options(part));
-        // Values are expressions of the user's, so the names around them must be none of his.
-        let (field, function) = (part.name(), format_ident!("__{}", part.name()));
-        functions.extend(filled(&function, &options, &given, component));
-        fields.push(Field { name: field, kind: options, value: quote!(#function()) });
+        let name = types.name_of(part).clone();
+        let value = if component.options.is_empty() {
+            let defaults = quote!(<#given as ::bb_core::Options>::defaults());
+            respan(quote!(__private::as_known(#defaults)), Place::of(&component.kind).start)
+        } else {
+            // Values are expressions of the user's, so the names around them must be none of his.
+            let function = format_ident!("__declared_{name}");
+            functions.extend(filled(&function, &options, &given, component));
+            quote!(#function())
+        };
+        fields.push(Field { name, kind: options, value });
     }
     let structs = group::structs("__Options", "__declared_options", &fields, &quote!(), &quote!());
-    quote!(#structs #functions)
+    let any = quote!(dyn __private::Any);
+    let by_number = group::by_number("__Options", "__options_of", &fields, &any, Some(<Token![mut]>::default()));
+    quote!(#structs #by_number #functions)
 }
 
-/// Where the options of a part stand in `__Options`.
-pub(super) fn place(robot: &Robot, part: Part) -> TokenStream {
-    group::path(part.position(robot), &part.name())
-}
-
-/// `fn e0() -> … { let mut options = defaults(); options.beta = 0.1; options }`
+/// `fn __declared_sensor_base_imu() -> … { let mut options = defaults(); options.beta = 0.1; options }`
 ///
 /// The only place that names the type as the user wrote it: that it is none of the kind is reported here.
 fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
@@ -45,7 +49,7 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
                 OptionValue::Quantity(quantity) => {
                     let number = quantity.value;
                     let place = quantity.place.start;
-                    respan(quote!(::bb_core::__private::FromQuantity::from_quantity(#number)), place)
+                    respan(quote!(__private::FromQuantity::from_quantity(#number)), place)
                 }
                 OptionValue::Expression { expression, .. } => into_if_text(expression),
                 // It has the parameter's value from the start on, see `binding`.
@@ -64,7 +68,7 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
         fn #function() -> #options {
             #start
             #(#settings)*
-            ::bb_core::__private::as_known(__options)
+            __private::as_known(__options)
         }
     }
 }
@@ -83,19 +87,19 @@ pub(super) fn binding(types: &Types<'_>, part: Part) -> TokenStream {
         })
         .collect();
     if bound.is_empty() {
-        return quote!(::bb_core::__private::Binding::NONE);
+        return quote!(__private::Binding::NONE);
     }
     let numbers = bound.iter().map(|(_, _, id, _)| id);
     let settings = bound.iter().map(|(name, path, id, kind)| {
         let kind = parameter_type(*kind);
-        let value = quote!(::bb_core::__private::FromParameter::from_parameter(values.get::<#kind>(#id)));
+        let value = quote!(__private::FromParameter::from_parameter(values.get::<#kind>(#id)));
         let value = respan(value, path.place().start);
         quote!(options.#name = #value;)
     });
     let options = types.options(part);
     quote! {
-        ::bb_core::__private::Binding {
-            apply: |options: &mut #options, values: &::bb_core::__private::ParameterValues| { #(#settings)* },
+        __private::Binding {
+            apply: |options: &mut #options, values: &__private::ParameterValues| { #(#settings)* },
             parameters: &[#(#numbers),*],
         }
     }

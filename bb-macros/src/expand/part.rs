@@ -3,8 +3,8 @@
 use crate::model::Id as _;
 use crate::model::{ActuatorId, CommandId, EstimatorId, Robot, SensorId, ServiceId};
 use crate::parse::Component;
-use proc_macro2::{Ident, Span, TokenStream};
-use quote::{format_ident, quote};
+use proc_macro2::TokenStream;
+use quote::quote;
 
 /// One of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,26 +63,13 @@ impl Part {
         }
     }
 
-    /// `s0`, `e3`: unique in the robot.
-    pub(super) fn name(self) -> Ident {
+    pub(super) fn path(self, robot: &Robot) -> &[String] {
         match self {
-            Self::Sensor(id) => format_ident!("s{id}"),
-            Self::Estimator(id) => format_ident!("e{id}"),
-            Self::Actuator(id) => format_ident!("a{id}"),
-            Self::Service(id) => format_ident!("v{id}"),
-            Self::Command(id) => format_ident!("c{id}"),
+            Self::Sensor(id) => &robot.publishers[robot.sensors[id].publisher].path,
+            Self::Estimator(id) => &robot.estimators[id].path,
+            Self::Actuator(id) => &robot.actuators[id].path,
+            Self::Service(id) => &robot.services[id].path,
+            Self::Command(id) => &robot.commands[id].path,
         }
-    }
-
-    /// `__RoverS0`: the alias of its type.
-    pub(super) fn alias(self, robot: &Ident) -> Ident {
-        let name = self.name().to_string().to_uppercase();
-        format_ident!("__{robot}{name}", span = Span::call_site())
-    }
-
-    /// `__RoverS0Given`: the alias of its type as the user wrote it.
-    pub(super) fn given(self, robot: &Ident) -> Ident {
-        let alias = self.alias(robot);
-        format_ident!("{alias}Given")
     }
 }

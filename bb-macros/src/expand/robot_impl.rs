@@ -1,101 +1,73 @@
 //! `impl Robot`: how all is made, started and listed.
 
-use super::options::{binding, place};
+use super::options::binding;
 use super::part::Part;
 use super::types::Types;
-use super::wiring::{index_name, start_function, topic};
 use super::{control, order};
-use crate::model::PublisherId;
+use crate::model::{From, PublisherId};
 use crate::verify::Verified;
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
-pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
+/// Sources that one function opens.
+const SIZE: usize = 16;
+
+pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let (robot, name) = (verified.robot, verified.name);
     let text = name.to_string();
-    let types = Types::new(robot, name, 0);
-    // A function for each component: one for all would have a way out behind every one of them, and the time to check it
-    // would grow with their square.
-    let starts = robot.estimators.enumerate().map(|(id, estimator)| {
-        let part = Part::Estimator(id);
-        let (function, options, kind) = (start_function(id), place(robot, part), types.estimator(id));
-        let (taken, binding) = (types.estimator_input(id), binding(&types, part));
-        let inputs = if estimator.is_nested() { 1 } else { estimator.inputs.len() };
-        let declared = (0..inputs).map(|input| {
-            let index = index_name(id, Some(input));
-            quote!(::bb_core::__private::declare::<{ #index }, #taken>(&mut cache, &__ESTIMATORS[#id], #input);)
-        });
-        quote! {
-            fn #function(
-                options: &__Options,
-                assembly: &::bb_core::__private::Assembly,
-            ) -> ::bb_core::__private::Node<#kind> {
-                ::bb_core::__private::Node::<#kind>::new(
-                    #id,
-                    &options.#options,
-                    #binding,
-                    || {
-                        let mut cache: <#taken as ::bb_core::Inputs>::Cache = ::core::default::Default::default();
-                        #(#declared)*
-                        cache
-                    },
-                    assembly.environment(),
-                )
-            }
-        }
-    });
-    let sensors = robot.sensors.enumerate().map(|(id, sensor)| {
-        source(&types, Part::Sensor(id), sensor.publisher, quote!(AsSensor), quote!(&__SENSORS[#id]))
+    let sensors = order::sensors(verified).into_iter().map(|id| {
+        source(types, Part::Sensor(id), robot.sensors[id].publisher, quote!(AsSensor), quote!(&__SENSORS[#id]))
     });
     let services = robot.services.enumerate().map(|(id, service)| {
-        source(&types, Part::Service(id), service.publisher, quote!(AsService), quote!(&__SERVICES[#id]))
+        source(types, Part::Service(id), service.publisher, quote!(AsService), quote!(&__SERVICES[#id]))
     });
-    let sources = sensors.chain(services);
-    let functions: TokenStream = starts.chain(sources).collect();
-    // In groups, for the same reason.
-    let sensors = order::sensors(verified).into_iter().map(Part::Sensor);
-    let order: Vec<Part> = sensors.chain(robot.services.ids().map(Part::Service)).collect();
-    let groups = order.chunks(16).enumerate().map(|(number, parts)| {
-        let (group, functions) =
-            (format_ident!("__open_group_{number}"), parts.iter().map(|part| source_function(*part)));
+    let sources: Vec<TokenStream> = sensors.chain(services).collect();
+    // In groups: rustc takes longer for one function of all.
+    let groups = sources.chunks(SIZE).enumerate().map(|(number, sources)| {
+        let group = format_ident!("__open_group_{number}");
         quote! {
             fn #group(
-                wiring: &::bb_core::__private::Arc<__Wiring>,
+                wiring: &__private::Arc<__Wiring>,
                 options: &__Options,
-                assembly: &::bb_core::__private::Assembly,
-                sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
+                assembly: &__private::Assembly,
+                sources: &mut __private::Vec<__private::Box<dyn __private::Source>>,
             ) {
-                #(#functions(wiring, options, assembly, sources);)*
+                #(#sources)*
             }
         }
     });
-    let functions: TokenStream = functions.into_iter().chain(groups.flatten()).collect();
-    let open_sources = (0..order.len().div_ceil(16)).map(|number| {
+    let open_sources = (0..sources.len().div_ceil(SIZE)).map(|number| {
         let group = format_ident!("__open_group_{number}");
         quote!(#group(wiring, options, assembly, &mut sources);)
+    });
+    let feeds = robot.publishers.ids().filter_map(|id| match types.from(id) {
+        From::Sensor(_) | From::Service(_) => {
+            let publish = types.publisher(id);
+            Some(quote!(#id => __private::feed(wiring, message, now, __Wiring::#publish),))
+        }
+        From::Estimator(..) => None,
     });
     let states = control::states(robot);
     let commands = robot.commands.ids().map(|id| {
         let part = Part::Command(id);
-        let (kind, options, binding) = (types.part(part), place(robot, part), binding(&types, part));
-        quote!(::bb_core::__private::Prepared::new::<#kind>(&options.#options, #binding))
+        let (kind, options, binding) = (types.part(part), types.options_place(part), binding(types, part));
+        quote!(__private::Prepared::new::<#kind>(&options.#options, #binding))
     });
     quote! {
-        #functions
+        #(#groups)*
 
         impl ::bb_core::Robot for #name {
             const NAME: &'static str = #text;
-            const TOPOLOGY: &'static ::bb_core::__private::Topology = &__TOPOLOGY;
-            const SENSORS: &'static [::bb_core::__private::SensorDeclaration] = &__SENSORS;
-            const ESTIMATORS: &'static [::bb_core::__private::EstimatorDeclaration] = &__ESTIMATORS;
-            const ACTUATORS: &'static [::bb_core::__private::ActuatorDeclaration] = &__ACTUATORS;
-            const SERVICES: &'static [::bb_core::__private::SensorDeclaration] = &__SERVICES;
+            const TOPOLOGY: &'static __private::Topology = &__TOPOLOGY;
+            const SENSORS: &'static [__private::SensorDeclaration] = &__SENSORS;
+            const ESTIMATORS: &'static [__private::EstimatorDeclaration] = &__ESTIMATORS;
+            const ACTUATORS: &'static [__private::ActuatorDeclaration] = &__ACTUATORS;
+            const SERVICES: &'static [__private::SensorDeclaration] = &__SERVICES;
             const STATES: &'static [&'static str] = #states;
-            const CATEGORIES: &'static [::bb_core::__private::CategoryDeclaration] = &__CATEGORYS;
-            const COMMANDS: &'static [::bb_core::__private::CommandDeclaration] = &__COMMANDS;
-            const PARAMETERS: &'static [::bb_core::__private::ParameterDeclaration] = &__PARAMETERS;
-            const ISLANDS: &'static [::bb_core::__private::IslandOf<__Wiring>] = &__ISLANDS;
-            const FEEDS: &'static [::core::option::Option<::bb_core::__private::FeedOf<__Wiring>>] = &__FEEDS;
+            const CATEGORIES: &'static [__private::CategoryDeclaration] = &__CATEGORIES;
+            const COMMANDS: &'static [__private::CommandDeclaration] = &__COMMANDS;
+            const PARAMETERS: &'static [__private::ParameterDeclaration] = &__PARAMETERS;
+            const ISLANDS: &'static [__private::IslandOf<__Wiring>] = &__ISLANDS;
 
             type Options = __Options;
             type Topics = __Topics;
@@ -109,21 +81,21 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                 __new_topics()
             }
 
-            fn wire(topics: __Topics, options: &__Options, assembly: &::bb_core::__private::Assembly) -> __Wiring {
+            fn wire(topics: __Topics, options: &__Options, assembly: &__private::Assembly) -> __Wiring {
                 __Wiring {
                     topics,
                     islands: __new_islands(options, assembly),
                     actuators: __new_actuators(options, assembly),
-                    environment: ::core::clone::Clone::clone(assembly.environment()),
+                    environment: __private::Clone::clone(assembly.environment()),
                 }
             }
 
             fn sources(
-                wiring: &::bb_core::__private::Arc<__Wiring>,
+                wiring: &__private::Arc<__Wiring>,
                 options: &__Options,
-                assembly: &::bb_core::__private::Assembly,
-            ) -> ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>> {
-                let mut sources = ::std::vec::Vec::new();
+                assembly: &__private::Assembly,
+            ) -> __private::Vec<__private::Box<dyn __private::Source>> {
+                let mut sources = __private::Vec::new();
                 #(#open_sources)*
                 sources
             }
@@ -132,22 +104,44 @@ pub(super) fn robot_impl(verified: &Verified<'_>) -> TokenStream {
                 &wiring.topics
             }
 
-            fn all_topics(topics: &__Topics) -> ::std::vec::Vec<&dyn ::bb_core::__private::AnyTopic> {
-                __list_topics(topics)
+            fn topic(
+                topics: &__Topics,
+                publisher: usize,
+            ) -> __private::Option<&dyn __private::AnyTopic> {
+                __topic(topics, publisher)
             }
 
-            fn all_actuators(wiring: &__Wiring) -> ::std::vec::Vec<&dyn ::bb_core::__private::AnyActuator> {
-                __list_actuators(&wiring.actuators)
+            fn options_of(
+                options: &mut __Options,
+                component: usize,
+            ) -> __private::Option<&mut dyn __private::Any> {
+                __options_of(options, component)
             }
 
-            fn commands(options: &__Options) -> ::std::vec::Vec<::bb_core::__private::Prepared> {
+            fn actuator(
+                wiring: &__Wiring,
+                actuator: usize,
+            ) -> __private::Option<&dyn __private::AnyActuator> {
+                __actuator(&wiring.actuators, actuator)
+            }
+
+            fn feed(
+                wiring: &__Wiring,
+                publisher: usize,
+                message: &__private::DynamicMessage,
+                now: __private::MonotonicTime,
+            ) -> bool {
+                match publisher { #(#feeds)* _ => false }
+            }
+
+            fn commands(options: &__Options) -> __private::Vec<__private::Prepared> {
                 ::std::vec![#(#commands),*]
             }
         }
     }
 }
 
-/// `fn __open_s0`: makes one sensor or service, whose readings go to its publisher.
+/// Makes one sensor or service, whose readings go to its publisher.
 fn source(
     types: &Types<'_>,
     part: Part,
@@ -155,27 +149,16 @@ fn source(
     wrapper: TokenStream,
     declaration: TokenStream,
 ) -> TokenStream {
-    let (function, options) = (source_function(part), place(types.model(), part));
-    let (publish, kind, binding, robot) = (topic(publisher), types.part(part), binding(types, part), types.robot());
+    let (options, publish) = (types.options_place(part), types.publisher(publisher));
+    let (kind, binding, robot) = (types.part(part), binding(types, part), types.robot());
     quote! {
-        fn #function(
-            wiring: &::bb_core::__private::Arc<__Wiring>,
-            options: &__Options,
-            assembly: &::bb_core::__private::Assembly,
-            sources: &mut ::std::vec::Vec<::std::boxed::Box<dyn ::bb_core::__private::Source>>,
-        ) {
-            assembly.source::<#robot, ::bb_core::__private::#wrapper<#kind>>(
-                #declaration,
-                &options.#options,
-                #binding,
-                wiring,
-                __Wiring::#publish,
-                sources,
-            );
-        }
+        assembly.source::<#robot, __private::#wrapper<#kind>>(
+            #declaration,
+            &options.#options,
+            #binding,
+            wiring,
+            __Wiring::#publish,
+            sources,
+        );
     }
-}
-
-fn source_function(part: Part) -> Ident {
-    format_ident!("__open_{}", part.name())
 }

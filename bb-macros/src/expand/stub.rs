@@ -1,7 +1,7 @@
 //! A robot that failed: its type and handles only, so that code which uses them gives no errors of its own.
 
 use super::handles::{Accessors, handles};
-use super::{definition, types};
+use super::{definition, naming, types};
 use crate::model::Robot;
 use crate::names::module_name;
 use proc_macro2::TokenStream;
@@ -13,9 +13,11 @@ pub(crate) fn stub(robot: &Robot) -> TokenStream {
         return TokenStream::new();
     };
     let definition = definition(robot, name);
-    let aliases = types::aliases(robot, name);
+    let naming = naming::Naming::of(robot, name);
+    let types = types::Types::new(robot, &naming, name, 0);
+    let aliases = types::aliases(&types);
     // A name that leaves none for the module is what failed.
-    let handles = module_name(name).map(|module| handles(robot, name, &module, Accessors::Stub));
+    let handles = module_name(name).map(|module| handles(&types, name, &module, Accessors::Stub));
     let text = name.to_string();
     quote! {
         #[allow(non_camel_case_types)]

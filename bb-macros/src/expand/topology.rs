@@ -14,7 +14,7 @@ pub(super) fn topology(verified: &Verified<'_>) -> TokenStream {
     let robot = verified.robot;
     let links = robot.links.enumerate().map(|(id, data)| link(robot, id, data));
     let joints = robot.joints.enumerate().map(|(id, data)| joint(robot, data, verified.children[id]));
-    quote!(::bb_core::__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
+    quote!(__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
 }
 
 fn link(robot: &Robot, id: LinkId, link: &Link) -> TokenStream {
@@ -24,7 +24,7 @@ fn link(robot: &Robot, id: LinkId, link: &Link) -> TokenStream {
     let inertial = option(link.inertials.first().map(inertial));
     let visuals = link.visuals.iter().map(visual);
     let collisions = link.collisions.iter().map(collision);
-    quote!(::bb_core::__private::Link {
+    quote!(__private::Link {
         name: #name,
         parent_joint: #joint,
         root_from_link: #root,
@@ -49,11 +49,11 @@ fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
     let reduction = joint.transmissions.first().and_then(|transmission| transmission.reduction.as_ref());
     let transmission = option(reduction.map(|reduction| {
         let reduction = reduction.value;
-        quote!(::bb_core::__private::Transmission { reduction: #reduction })
+        quote!(__private::Transmission { reduction: #reduction })
     }));
-    quote!(::bb_core::__private::Joint {
+    quote!(__private::Joint {
         name: #name,
-        kind: ::bb_core::__private::JointKind::#kind,
+        kind: __private::JointKind::#kind,
         parent: #parent,
         child: #child,
         parent_from_joint: #parent_from_joint,
@@ -67,9 +67,9 @@ fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
 
 /// As declared, so that URDF gets the same numbers.
 fn origin(origin: Option<&Origin>) -> TokenStream {
-    let Some(origin) = origin else { return quote!(::bb_core::__private::Origin::IDENTITY) };
+    let Some(origin) = origin else { return quote!(__private::Origin::IDENTITY) };
     let (xyz, rpy) = (values(origin.xyz.as_ref(), 0.0), values(origin.rpy.as_ref(), 0.0));
-    quote!(::bb_core::__private::Origin { xyz: [#(#xyz),*], rpy: [#(#rpy),*] })
+    quote!(__private::Origin { xyz: [#(#xyz),*], rpy: [#(#rpy),*] })
 }
 
 fn limit(limit: &Limit) -> TokenStream {
@@ -81,24 +81,24 @@ fn limit(limit: &Limit) -> TokenStream {
     };
     let (lower, upper, velocity, effort) =
         (value(&limit.lower), value(&limit.upper), value(&limit.velocity), value(&limit.effort));
-    quote!(::bb_core::__private::Limit { lower: #lower, upper: #upper, velocity: #velocity, effort: #effort })
+    quote!(__private::Limit { lower: #lower, upper: #upper, velocity: #velocity, effort: #effort })
 }
 
 fn dynamics(dynamics: &Dynamics) -> TokenStream {
     let (damping, friction) = (value(dynamics.damping.as_ref(), 0.0), value(dynamics.friction.as_ref(), 0.0));
-    quote!(::bb_core::__private::Dynamics { damping: #damping, friction: #friction })
+    quote!(__private::Dynamics { damping: #damping, friction: #friction })
 }
 
 fn mimic(robot: &Robot, mimic: &Mimic) -> Option<TokenStream> {
     let joint = robot.joints.position(|joint| Some(&joint.name) == mimic.joint.as_ref())?;
     let (multiplier, offset) = (value(mimic.multiplier.as_ref(), 1.0), value(mimic.offset.as_ref(), 0.0));
-    Some(quote!(::bb_core::__private::Mimic { joint: #joint, multiplier: #multiplier, offset: #offset }))
+    Some(quote!(__private::Mimic { joint: #joint, multiplier: #multiplier, offset: #offset }))
 }
 
 fn inertial(inertial: &Inertial) -> TokenStream {
     let (link_from_inertia, mass) = (origin(inertial.origin.as_ref()), value(inertial.mass.as_ref(), 0.0));
     let moments = inertial.inertia.each_ref().map(|moment| value(moment.as_ref(), 0.0));
-    quote!(::bb_core::__private::Inertial {
+    quote!(__private::Inertial {
         link_from_inertia: #link_from_inertia,
         mass: #mass,
         inertia: [#(#moments),*],
@@ -114,9 +114,9 @@ fn visual(shape: &Shape) -> TokenStream {
             let color = color.each_ref().map(|part| part.value);
             quote!([#(#color),*])
         }));
-        quote!(::bb_core::__private::Material { name: #name, color: #color, texture: #texture })
+        quote!(__private::Material { name: #name, color: #color, texture: #texture })
     }));
-    quote!(::bb_core::__private::Visual {
+    quote!(__private::Visual {
         link_from_shape: #link_from_shape,
         geometry: #geometry,
         material: #material,
@@ -125,7 +125,7 @@ fn visual(shape: &Shape) -> TokenStream {
 
 fn collision(shape: &Shape) -> TokenStream {
     let (link_from_shape, geometry) = (origin(shape.origin.as_ref()), geometry(shape));
-    quote!(::bb_core::__private::Collision { link_from_shape: #link_from_shape, geometry: #geometry })
+    quote!(__private::Collision { link_from_shape: #link_from_shape, geometry: #geometry })
 }
 
 /// A verified shape has exactly one geometry, with all that it needs.
@@ -134,20 +134,20 @@ fn geometry(shape: &Shape) -> TokenStream {
     match shape.geometries.first().map_or(&none, |(_, geometry)| geometry) {
         Geometry::Box(size) => {
             let size = size.each_ref().map(|length| length.value);
-            quote!(::bb_core::__private::Geometry::Box([#(#size),*]))
+            quote!(__private::Geometry::Box([#(#size),*]))
         }
         Geometry::Cylinder { radius, length } => {
             let (radius, length) = (value(radius.as_ref(), 0.0), value(length.as_ref(), 0.0));
-            quote!(::bb_core::__private::Geometry::Cylinder { radius: #radius, length: #length })
+            quote!(__private::Geometry::Cylinder { radius: #radius, length: #length })
         }
         Geometry::Sphere { radius } => {
             let radius = value(radius.as_ref(), 0.0);
-            quote!(::bb_core::__private::Geometry::Sphere { radius: #radius })
+            quote!(__private::Geometry::Sphere { radius: #radius })
         }
         Geometry::Mesh { file, scale } => {
             let file = file.as_ref().map_or(String::new(), LitStr::value);
             let scale = values(scale.as_ref(), 1.0);
-            quote!(::bb_core::__private::Geometry::Mesh { file: #file, scale: [#(#scale),*] })
+            quote!(__private::Geometry::Mesh { file: #file, scale: [#(#scale),*] })
         }
     }
 }

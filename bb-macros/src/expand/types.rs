@@ -3,53 +3,87 @@
 //! Each type that the user wrote is aliased once. The alias is then used at the span of the user's type, so that what
 //! rustc has to say of it is said there, and once.
 
+use super::handles::Accessors;
 use super::literal::{ident, respan};
+use super::naming::{Naming, PartNames};
 use super::part::Part;
-use crate::diagnostics::Place;
-use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId};
+use super::group;
+use crate::model::{EstimatorId, From, Id as _, PublisherId, Robot, SensorId};
 use crate::parse::Component;
 use proc_macro2::{Ident, Span, TokenStream};
-use quote::{format_ident, quote};
+use quote::{format_ident, quote, quote_spanned};
 
-/// `type __RoverS0 = Bmi270;`, if it is a sensor, else `Unknown`; and as the user wrote it, `__RoverS0Given`.
-pub(super) fn aliases(robot: &Robot, name: &Ident) -> TokenStream {
-    let aliases = Part::all(robot).map(|part| {
+/// `type __Rover__sensor_base_imu = Bmi270;`, if it is a sensor, else `Unknown`; as the user wrote it,
+/// `__Rover__given__sensor_base_imu`; and the payload of each estimator's output,
+/// `__Rover__payload__sensor_base_imu_tilt`.
+pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
+    let (robot, name) = (types.robot, types.name);
+    let parts = Part::all(robot).map(|part| {
         let kind = &part.component(robot).kind;
-        let (alias, given, (_, is_known)) = (part.alias(name), part.given(name), part.contract());
+        let PartNames { alias, given, .. } = types.names(part);
+        let (_, is_known) = part.contract();
+        let known = quote!(<#given as ::bb_core::__private::Known<{
+            use ::bb_core::__private::NotProbed as _;
+            <::bb_core::__private::Probe<#given>>::#is_known
+        }>>::Type);
+        [(without_span(given), quote!(#kind)), (without_span(alias), known)]
+    });
+    let outputs = robot.publishers.ids().filter_map(|id| match types.from(id) {
+        From::Estimator(estimator, output) => {
+            let (field, emitted) = (types.output_field(estimator, output), types.estimator_output(estimator));
+            let span = types.span(Part::Estimator(estimator));
+            let payload =
+                quote_spanned!(span=> <#field as ::bb_core::__private::EmittedAt<#emitted>>::Payload);
+            Some((types.naming.publisher(id).payload.clone(), payload))
+        }
+        From::Sensor(_) | From::Service(_) => None,
+    });
+    let marker = (marker(name), quote!(#name));
+    let aliases = parts.flatten().chain(outputs).chain([marker]).map(|(alias, kind)| {
         quote! {
-            #[doc(hidden)]
             #[allow(non_camel_case_types, dead_code)]
-            type #given = #kind;
-            #[doc(hidden)]
-            #[allow(non_camel_case_types, dead_code)]
-            type #alias = <#given as ::bb_core::__private::Known<{
-                use ::bb_core::__private::NotProbed as _;
-                <::bb_core::__private::Probe<#given>>::#is_known
-            }>>::Type;
+            type #alias = #kind;
         }
     });
-    let marker = marker(name);
-    let marker = quote! {
-        #[doc(hidden)]
-        #[allow(non_camel_case_types, dead_code)]
-        type #marker = #name;
-    };
-    aliases.chain([marker]).collect()
+    aliases.collect()
+}
+
+/// `enum __Rover__member__sensor_base_imu_tilt {}`: what stands for an estimator in its island.
+pub(super) fn members(types: &Types<'_>) -> TokenStream {
+    let members = types.robot.estimators.ids().map(|id| types.member_item(id));
+    quote! {
+        #(
+            #[allow(non_camel_case_types, dead_code)]
+            enum #members {}
+        )*
+    }
 }
 
 /// The robot's type in its module.
 const ROBOT: &str = "__Robot";
 
-/// `use super::{Rover as __Robot, __RoverS0, …};` in the robot's module.
+/// `use super::{Rover as __Robot, __Rover__sensor_base_imu, …};` in the robot's module.
 ///
 /// One import, so that it is one error where there is nothing to import: in a function, whose items no module can name. The
 /// first name says so, since rustc writes it.
-pub(super) fn imports(robot: &Robot, name: &Ident) -> TokenStream {
-    let aliases = Part::all(robot).map(|part| part.alias(name));
+pub(super) fn imports(types: &Types<'_>, accessors: Accessors) -> TokenStream {
+    let (robot, name) = (types.robot, types.name);
+    let parts = Part::all(robot).map(|part| &types.names(part).alias);
+    let outputs = robot.publishers.ids().filter(|id| matches!(types.from(*id), From::Estimator(..)));
+    let payloads = outputs.map(|id| &types.naming.publisher(id).payload);
+    let is_wired = accessors == Accessors::Wired;
+    let members = robot.estimators.ids().filter(|_| is_wired).map(|id| types.member_item(id));
+    let items = parts.chain(payloads).chain(members);
     let (marker, this) = (marker(name), ident(ROBOT));
-    let imports = quote!(use super::{#marker as _, #name as #this, #(#aliases),*};);
+    let imports = quote!(use super::{#marker as _, #name as #this, #(#items),*};);
     let imports = respan(imports, name.span());
     quote!(#[allow(unused_imports)] #imports)
+}
+
+fn without_span(name: &Ident) -> Ident {
+    let mut name = name.clone();
+    name.set_span(Span::call_site());
+    name
 }
 
 /// An item beside the robot's type that only its module imports.
@@ -66,6 +100,7 @@ pub(super) fn type_name(component: &Component) -> String {
 #[derive(Clone)]
 pub(super) struct Types<'a> {
     robot: &'a Robot,
+    naming: &'a Naming,
     name: &'a Ident,
     /// `super::super::`, up to the robot's module, which imports what is named here.
     above: TokenStream,
@@ -73,9 +108,48 @@ pub(super) struct Types<'a> {
 }
 
 impl<'a> Types<'a> {
-    pub(super) fn new(robot: &'a Robot, name: &'a Ident, depth: usize) -> Self {
+    pub(super) fn new(robot: &'a Robot, naming: &'a Naming, name: &'a Ident, depth: usize) -> Self {
         let above = (1..depth).map(|_| quote!(super::)).collect();
-        Self { robot, name, above, is_in_module: depth > 0 }
+        Self { robot, naming, name, above, is_in_module: depth > 0 }
+    }
+
+    /// The same, named from `depth` modules below.
+    pub(super) fn below(&self, depth: usize) -> Self {
+        Self::new(self.robot, self.naming, self.name, depth)
+    }
+
+    /// The name of a part.
+    pub(super) fn name_of(&self, part: Part) -> &'a Ident {
+        &self.names(part).name
+    }
+
+    /// The name of a publisher.
+    pub(super) fn publisher(&self, id: PublisherId) -> &'a Ident {
+        &self.naming.publisher(id).name
+    }
+
+    fn names(&self, part: Part) -> &'a PartNames {
+        self.naming.part(self.robot, part)
+    }
+
+    /// Where the options of a part are in `__Options`.
+    pub(super) fn options_place(&self, part: Part) -> TokenStream {
+        group::path(part.position(self.robot), self.name_of(part))
+    }
+
+    /// Where the topic of a publisher is in `__Topics`.
+    pub(super) fn topic_place(&self, id: PublisherId) -> TokenStream {
+        group::path(id.number(), self.publisher(id))
+    }
+
+    /// What stands for an estimator in its island.
+    fn member_item(&self, id: EstimatorId) -> &'a Ident {
+        &self.names(Part::Estimator(id)).member
+    }
+
+    pub(super) fn member(&self, id: EstimatorId) -> TokenStream {
+        let (above, member) = (&self.above, self.member_item(id));
+        quote!(#above #member)
     }
 
     pub(super) fn model(&self) -> &'a Robot {
@@ -87,16 +161,6 @@ impl<'a> Types<'a> {
         self.robot.publishers[publisher].from
     }
 
-    /// The path of a publisher.
-    pub(super) fn path_of_publisher(&self, id: PublisherId) -> String {
-        super::path_text(&self.robot.publishers[id].path)
-    }
-
-    /// The path of an estimator.
-    pub(super) fn path_of_estimator(&self, id: EstimatorId) -> String {
-        super::path_text(&self.robot.estimators[id].path)
-    }
-
     /// The robot's type.
     pub(super) fn robot(&self) -> TokenStream {
         let above = &self.above;
@@ -106,8 +170,8 @@ impl<'a> Types<'a> {
 
     /// The type of a part, at the span of the user's type.
     pub(super) fn part(&self, part: Part) -> TokenStream {
-        let (above, alias) = (&self.above, part.alias(self.name));
-        self.at(part, quote!(#above #alias))
+        let (above, alias) = (&self.above, &self.names(part).alias);
+        quote!(#above #alias)
     }
 
     pub(super) fn sensor(&self, id: SensorId) -> TokenStream {
@@ -125,73 +189,72 @@ impl<'a> Types<'a> {
 
     /// The same for the type as the user wrote it.
     pub(super) fn given_options(&self, part: Part) -> TokenStream {
-        let (above, given) = (&self.above, part.given(self.name));
+        let (above, given) = (&self.above, &self.names(part).given);
         self.options_of(part, quote!(#above #given))
     }
 
     fn options_of(&self, part: Part, kind: TokenStream) -> TokenStream {
         let (contract, _) = part.contract();
-        self.at(part, quote!(<#kind as #contract>::Options))
+        quote_spanned!(self.span(part)=> <#kind as #contract>::Options)
     }
 
     pub(super) fn estimator_input(&self, id: EstimatorId) -> TokenStream {
-        let estimator = self.estimator(id);
-        self.at_estimator(id, quote!(<#estimator as ::bb_core::Estimator>::Input))
+        let (estimator, span) = (self.estimator(id), self.span(Part::Estimator(id)));
+        quote_spanned!(span=> <#estimator as ::bb_core::Estimator>::Input)
     }
 
     pub(super) fn estimator_output(&self, id: EstimatorId) -> TokenStream {
-        let estimator = self.estimator(id);
-        self.at_estimator(id, quote!(<#estimator as ::bb_core::Estimator>::Output))
+        let (estimator, span) = (self.estimator(id), self.span(Part::Estimator(id)));
+        quote_spanned!(span=> <#estimator as ::bb_core::Estimator>::Output)
     }
 
-    /// The payload of a publisher. That of an estimator's output is named through its number, see `output_index`.
+    /// The payload of a publisher.
     pub(super) fn payload(&self, publisher: PublisherId) -> TokenStream {
         match self.from(publisher) {
             From::Sensor(id) => self.output(Part::Sensor(id)),
             From::Service(id) => self.output(Part::Service(id)),
-            From::Estimator(id, output) => {
-                let emitted = self.estimator_output(id);
-                let index = self.output_index(id, output);
-                self.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::Payload))
+            From::Estimator(id, _) => {
+                let (above, mut alias) = (&self.above, self.naming.publisher(publisher).payload.clone());
+                alias.set_span(self.span(Part::Estimator(id)));
+                quote!(#above #alias)
             }
         }
     }
 
-    /// The number of a declared output in the algorithm's output type, looked up by name at compile time. An
-    /// estimator without declared outputs publishes its only one.
-    pub(super) fn output_index(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
-        let estimator = &self.robot.estimators[id];
-        let output = output.and_then(|output| estimator.outputs.get(output));
-        let name = output.map_or("out".to_owned(), |output| crate::names::text(&output.name));
-        let emitted = self.estimator_output(id);
-        self.at_estimator(id, quote!(::bb_core::__private::find_output::<#emitted>(#name)))
+    /// A declared output as a field of the algorithm's output type, looked up by name at compile time; or its only one.
+    pub(super) fn output_field(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
+        let (emitted, span) = (self.estimator_output(id), self.span(Part::Estimator(id)));
+        match output.and_then(|output| self.robot.estimators[id].outputs.get(output)) {
+            Some(output) => {
+                let name = crate::names::text(&output.name);
+                let find = quote_spanned!(span=> ::bb_core::__private::find_output::<#emitted>(#name));
+                quote_spanned!(span=> ::bb_core::__private::At<{ #find }>)
+            }
+            None => quote_spanned!(span=> <#emitted as ::bb_core::Outputs>::Only),
+        }
     }
 
-    /// The number of a declared input in the algorithm's input type, looked up by name at compile time.
-    pub(super) fn input_index(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
-        let estimator = &self.robot.estimators[id];
-        let taken = self.estimator_input(id);
-        let find = match input.and_then(|input| estimator.inputs.get(input)) {
+    /// A declared input as a field of the algorithm's input type, looked up by name at compile time; or the one of a nested
+    /// estimator.
+    pub(super) fn input_field(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
+        let (taken, span) = (self.estimator_input(id), self.span(Part::Estimator(id)));
+        match input.and_then(|input| self.robot.estimators[id].inputs.get(input)) {
             Some(input) => {
                 let name = crate::names::text(&input.name);
-                quote!(::bb_core::__private::find_input::<#taken>(#name))
+                let find = quote_spanned!(span=> ::bb_core::__private::find_input::<#taken>(#name));
+                quote_spanned!(span=> ::bb_core::__private::At<{ #find }>)
             }
-            None => quote!(::bb_core::__private::find_nested::<#taken>()),
-        };
-        self.at_estimator(id, find)
+            None => quote_spanned!(span=> <#taken as ::bb_core::Inputs>::Nested),
+        }
     }
 
     fn output(&self, part: Part) -> TokenStream {
         let (kind, (contract, _)) = (self.part(part), part.contract());
-        self.at(part, quote!(<#kind as #contract>::Output))
+        quote_spanned!(self.span(part)=> <#kind as #contract>::Output)
     }
 
-    pub(super) fn at_estimator(&self, id: EstimatorId, tokens: TokenStream) -> TokenStream {
-        self.at(Part::Estimator(id), tokens)
-    }
-
-    /// The tokens at the span of the user's type.
-    fn at(&self, part: Part, tokens: TokenStream) -> TokenStream {
-        respan(tokens, Place::of(&part.component(self.robot).kind).start)
+    /// Where the user wrote the type.
+    pub(super) fn span(&self, part: Part) -> Span {
+        self.names(part).span
     }
 }

@@ -1,26 +1,28 @@
-//! `struct __Topics`, `struct __Wiring`, the islands, and what lies downstream of each publisher, by direct calls.
+//! `struct __Topics`, `struct __Wiring`, the islands, and what is downstream of each publisher, by direct calls.
 //!
 //! ```text
-//! fn p0(&self, message: &Stamped<Imu>, now: MonotonicTime) {   // sensor::base::imu
-//!     let line = self.environment.publish(0, &self.topics.g0.p0, message, now);
-//!     self.islands.g0.i0.enter(self, now, key, |island, turn| self.p0_i0(island, message, turn), || …);
-//! }
-//! fn p0_i0(&self, island: &mut __Island0, message: &Stamped<Imu>, turn: &Turn) {
-//!     let mut emitted = None;
-//!     if let Some(stamp) = island.n0.receive::<…>(0, feed(message), turn, &mut emitted) {
-//!         self.e0(island, &mut emitted, stamp, turn);
+//! impl __Wiring {
+//!     fn sensor_base_imu(&self, message: &Stamped<Imu>, now: MonotonicTime) {
+//!         let line = self.environment.publish(0, &self.topics.g0.sensor_base_imu, message, now);
+//!         enter::<__Island_sensor_base_imu_tilt, _>(self, now, key, message, IslandState::deliver, identity);
 //!     }
-//!     if island.n0.is_unfinished() { self.t0(island, turn); }
 //! }
-//! fn e0(&self, island: &mut __Island0, emitted: &mut Option<Orientation>, stamp: Stamp, turn: &Turn) {
-//!     if let Some(payload) = take(emitted) { self.p1(island, &stamp.message(payload), turn); }
+//! impl IslandState for __Island_sensor_base_imu_tilt {
+//!     fn deliver(&mut self, wiring: &__Wiring, message: &Stamped<Imu>, turn: &Turn) {
+//!         receive::<__Rover__member__sensor_base_imu_tilt, …>(self, wiring, 0, feed(message), turn);
+//!     }
+//! }
+//! impl Member for __Rover__member__sensor_base_imu_tilt {
+//!     fn publish(wiring: &__Wiring, island: &mut __Island…, emitted: &mut Option<Orientation>, stamp: Stamp, turn: &Turn) {
+//!         if let Some(payload) = take(emitted) { … }
+//!     }
 //! }
 //! ```
 
 use super::group::{self, Field};
 use super::islands::{IslandId, Islands};
 use super::literal::respan;
-use super::options::{self, binding};
+use super::options::binding;
 use super::part::Part;
 use super::types::Types;
 use super::{order, path_text};
@@ -29,103 +31,79 @@ use crate::verify::Verified;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{format_ident, quote};
 
-pub(super) fn wiring(verified: &Verified<'_>, islands: &Islands) -> TokenStream {
+/// What all functions here are made of.
+struct Wiring<'a> {
+    types: &'a Types<'a>,
+    islands: &'a Islands,
+    consumers: &'a Table<PublisherId, Vec<Consumer>>,
+    /// What comes into each island from outside.
+    inlets: Table<IslandId, Vec<(PublisherId, Visit<'a>)>>,
+}
+
+pub(super) fn wiring(verified: &Verified<'_>, types: &Types<'_>, islands: &Islands) -> TokenStream {
     let robot = verified.robot;
-    let types = Types::new(robot, verified.name, 0);
     let consumers = consumers(verified);
-    let mut indices = TokenStream::new();
-    let mut functions = TokenStream::new();
-    let mut states = TokenStream::new();
-    let mut topics = Vec::new();
-    for (id, publisher) in robot.publishers.enumerate() {
-        let (payload, path) = (types.payload(id), path_text(&publisher.path));
-        topics.push(Field {
-            name: topic(id),
-            kind: quote!(::bb_core::__private::Topic<#payload>),
-            value: quote!(::bb_core::__private::Topic::new(#path)),
-        });
-        functions.extend(published(&types, islands, id, &consumers[id]));
-    }
-    for (id, estimator) in robot.estimators.enumerate() {
-        let inputs: Vec<Option<usize>> =
-            if estimator.is_nested() { vec![None] } else { (0..estimator.inputs.len()).map(Some).collect() };
-        for input in inputs {
-            let (name, index) = (index_name(id, input), types.input_index(id, input));
-            indices.extend(quote!(const #name: usize = #index;));
-        }
-        functions.extend(emitted(&types, islands, id, &estimator.publishers));
-        functions.extend(turn(&types, islands, id));
-    }
-    let mut places = Vec::new();
-    for (number, data) in islands.all.enumerate() {
-        let name = island_struct(number);
-        let nodes = data.estimators.iter().map(|id| {
-            let (node, start) = (node(*id), start_function(*id));
-            quote!(#node: #start(options, assembly),)
-        });
-        places.push(Field {
-            name: island(number),
-            kind: quote!(::bb_core::__private::Island<#name>),
-            value: quote!(::bb_core::__private::Island::new(#name { #(#nodes)* })),
-        });
-        states.extend(island_state(&types, islands, number, &consumers));
-    }
+    let wiring = Wiring::new(types, islands, &consumers);
+    let topics: Vec<Field> = robot
+        .publishers
+        .enumerate()
+        .map(|(id, publisher)| {
+            let (payload, path) = (types.payload(id), path_text(&publisher.path));
+            Field {
+                name: types.publisher(id).clone(),
+                kind: quote!(__private::Topic<#payload>),
+                value: quote!(__private::Topic::new(#path)),
+            }
+        })
+        .collect();
+    let places: Vec<Field> = islands
+        .all
+        .enumerate()
+        .map(|(number, island)| {
+            let kind = wiring.island_struct(number);
+            let nodes = island.estimators.iter().map(|id| wiring.start(*id));
+            Field {
+                name: wiring.island_name(number).clone(),
+                kind: quote!(__private::Island<#kind>),
+                value: quote!(__private::Island::new(#kind { #(#nodes)* })),
+            }
+        })
+        .collect();
     let topic_structs = group::structs("__Topics", "__new_topics", &topics, &quote!(), &quote!());
-    let parameters = quote!(options: &__Options, assembly: &::bb_core::__private::Assembly);
+    let parameters = quote!(options: &__Options, assembly: &__private::Assembly);
     let island_structs =
         group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, assembly));
-    let list_topics =
-        group::list("__Topics", "__list_topics", &topics, &quote!(dyn ::bb_core::__private::AnyTopic));
-    let finders = islands.all.ids().map(|number| {
-        let place = group::path(number.number(), &island(number));
-        quote!(|wiring| &wiring.islands.#place)
-    });
-    let count = islands.all.len();
-    let actuators = actuators(&types);
-    let feeds = feeds(&types);
+    let object = quote!(dyn __private::AnyTopic);
+    let topic_by_number = group::by_number("__Topics", "__topic", &topics, &object, None);
+    let (count, states) = (islands.all.len(), islands.all.ids().map(|number| wiring.island_struct(number)));
+    let actuators = actuators(types);
+    let published = robot.publishers.ids().map(|id| wiring.published(id));
+    let members = robot.estimators.ids().map(|id| wiring.member(id));
+    let island_states = islands.all.ids().map(|number| wiring.island(number));
     quote! {
         pub struct __Wiring {
             topics: __Topics,
             islands: __Islands,
             actuators: __Actuators,
-            environment: ::bb_core::__private::Environment,
+            environment: __private::Environment,
         }
         #topic_structs
         #island_structs
         #actuators
-        #list_topics
-        #indices
-        #states
-        #feeds
-        static __ISLANDS: [::bb_core::__private::IslandOf<__Wiring>; #count] = [#(#finders),*];
+        #topic_by_number
+        static __ISLANDS: [__private::IslandOf<__Wiring>; #count] =
+            [#(__private::island_of::<#states>),*];
 
-        impl ::bb_core::__private::IslandWiring for __Wiring {
+        impl __private::IslandWiring for __Wiring {
             #[inline]
-            fn environment(&self) -> &::bb_core::__private::Environment {
+            fn environment(&self) -> &__private::Environment {
                 &self.environment
             }
         }
 
-        impl __Wiring { #functions }
-    }
-}
-
-/// `static __FEEDS`: how a message of each publisher outside is published again.
-fn feeds(types: &Types<'_>) -> TokenStream {
-    let count = types.model().publishers.len();
-    let feeds = types.model().publishers.ids().map(|id| match types.from(id) {
-        From::Sensor(_) | From::Service(_) => {
-            let (name, payload) = (topic(id), types.payload(id));
-            let feed = quote!(|wiring, message, now| {
-                let message = message.downcast::<#payload>();
-                message.map(|message| wiring.#name(message, now)).is_some()
-            });
-            super::literal::option(Some(feed))
-        }
-        From::Estimator(..) => super::literal::option(None),
-    });
-    quote! {
-        static __FEEDS: [::core::option::Option<::bb_core::__private::FeedOf<__Wiring>>; #count] = [#(#feeds),*];
+        impl __Wiring { #(#published)* }
+        #(#members)*
+        #(#island_states)*
     }
 }
 
@@ -137,21 +115,21 @@ fn actuators(types: &Types<'_>) -> TokenStream {
         .ids()
         .map(|id| {
             let part = Part::Actuator(id);
-            let (kind, options, binding) = (types.part(part), options::place(robot, part), binding(types, part));
-            let node = quote!(::bb_core::__private::ActuatorNode);
+            let (kind, options, binding) = (types.part(part), types.options_place(part), binding(types, part));
+            let node = quote!(__private::ActuatorNode);
             Field {
-                name: part.name(),
+                name: types.name_of(part).clone(),
                 kind: quote!(#node<#kind>),
                 value: quote!(#node::<#kind>::new(#id, &__ACTUATORS[#id], &options.#options, #binding, assembly)),
             }
         })
         .collect();
-    let parameters = quote!(options: &__Options, assembly: &::bb_core::__private::Assembly);
+    let parameters = quote!(options: &__Options, assembly: &__private::Assembly);
     let arguments = quote!(options, assembly);
     let structs = group::structs("__Actuators", "__new_actuators", &fields, &parameters, &arguments);
-    let object = quote!(dyn ::bb_core::__private::AnyActuator);
-    let list = group::list("__Actuators", "__list_actuators", &fields, &object);
-    quote!(#structs #list)
+    let object = quote!(dyn __private::AnyActuator);
+    let by_number = group::by_number("__Actuators", "__actuator", &fields, &object, None);
+    quote!(#structs #by_number)
 }
 
 /// A declared input of an estimator, or the implicit one of a nested estimator.
@@ -193,71 +171,6 @@ fn consumers(verified: &Verified<'_>) -> Table<PublisherId, Vec<Consumer>> {
     consumers
 }
 
-/// `fn p0`: publishes, then runs what lies downstream, island by island.
-///
-/// One that an estimator publishes is called with the estimator's island open. There, what other islands keep for later
-/// goes first, then its own estimators run, then those of the others.
-fn published(types: &Types<'_>, islands: &Islands, id: PublisherId, consumers: &[Consumer]) -> TokenStream {
-    let (name, payload, topic) = (topic(id), types.payload(id), group::path(id.number(), &topic(id)));
-    let own = match types.from(id) {
-        From::Estimator(estimator, _) => Some(islands.of[estimator]),
-        From::Sensor(_) | From::Service(_) => None,
-    };
-    let path = types.path_of_publisher(id);
-    let message = quote!(message: &::bb_core::__private::Stamped<#payload>);
-    let turn = quote!(turn: &::bb_core::__private::Turn<'_>);
-    let mut functions = TokenStream::new();
-    // What other islands take of an estimator came at the time of the turn in which it was emitted.
-    let (now, line) = if own.is_some() { (quote!(turn.now()), quote!(0)) } else { (quote!(now), quote!(line)) };
-    let calls: Vec<TokenStream> = visits(consumers, islands)
-        .iter()
-        .map(|Visit { island, runs, consumers }| {
-            let (deliver, kind) = (deliver_function(id, *island, *runs), island_struct(*island));
-            let receive = consumers.iter().map(|consumer| receive(types, &payload, consumer));
-            functions.extend(quote! {
-                #[inline]
-                fn #deliver(&self, island: &mut #kind, #message, #turn) { #(#receive)* }
-            });
-            if own == Some(*island) {
-                return quote!(self.#deliver(island, message, turn););
-            }
-            let (place, kind) = (group::path(island.number(), &self::island(*island)), message_enum(*island));
-            let variant = variant(id, *runs);
-            let entry = 2 * id.number() + usize::from(*runs);
-            quote! {
-                self.islands.#place.enter(
-                    self,
-                    #now,
-                    ::bb_core::__private::Key { entry: #entry, line: #line },
-                    |island, turn| self.#deliver(island, message, turn),
-                    || #kind::#variant(::core::clone::Clone::clone(message)),
-                );
-            }
-        })
-        .collect();
-    let function = match own {
-        Some(own) => {
-            let kind = island_struct(own);
-            quote! {
-                #[inline]
-                fn #name(&self, island: &mut #kind, #message, #turn) {
-                    turn.emits(#id, #path, message);
-                    self.topics.#topic.publish_alone(message);
-                    #(#calls)*
-                }
-            }
-        }
-        None => quote! {
-            #[inline]
-            fn #name(&self, #message, now: ::bb_core::__private::MonotonicTime) {
-                let line = self.environment.publish(#id, &self.topics.#topic, message, now);
-                #(#calls)*
-            }
-        },
-    };
-    quote!(#function #functions)
-}
-
 /// The consumers of a publisher that belong to one island and are reached in one go: first what islands keep for later,
 /// then what runs.
 struct Visit<'a> {
@@ -278,285 +191,340 @@ fn visits<'a>(consumers: &'a [Consumer], islands: &Islands) -> Vec<Visit<'a>> {
     visits
 }
 
-/// Hands the message to one estimator, publishes what it emits, and lets it go on if it wants to.
-fn receive(types: &Types<'_>, payload: &TokenStream, consumer: &Consumer) -> TokenStream {
-    let Consumer { estimator, input, span, .. } = consumer;
-    let (node, emit, turn) = (node(*estimator), emit_function(*estimator), turn_function(*estimator));
-    let (index, number) = (index_name(*estimator, *input), input_number(*input));
-    let taken = types.estimator_input(*estimator);
-    let taken = quote!(<#taken as ::bb_core::__private::InputAt<{ #index }>>::Payload);
-    let known = quote!({ ::bb_core::__private::both_known::<#payload, #taken>() });
-    let feed = quote!(<#payload as ::bb_core::__private::Feeds<#taken, #known>>::feed(message));
-    let feed = respan(feed, *span);
-    quote! {
-        let mut emitted = ::core::option::Option::None;
-        if let ::core::option::Option::Some(stamp) =
-            island.#node.receive::<{ #index }>(#number, #feed, turn, &mut emitted)
-        {
-            self.#emit(island, &mut emitted, stamp, turn);
-        }
-        if island.#node.is_unfinished() {
-            self.#turn(island, turn);
-        }
-    }
-}
-
-/// `fn e0`: publishes what an estimator has emitted, output by output.
-fn emitted(types: &Types<'_>, islands: &Islands, id: EstimatorId, publishers: &[PublisherId]) -> TokenStream {
-    let (name, emitted) = (emit_function(id), types.estimator_output(id));
-    let island = island_struct(islands.of[id]);
-    let outputs = publishers.iter().filter_map(|publisher| {
-        let From::Estimator(_, output) = types.from(*publisher) else { return None };
-        let (index, publish) = (types.output_index(id, output), topic(*publisher));
-        let take = types.at_estimator(id, quote!(<#emitted as ::bb_core::__private::OutputAt<{ #index }>>::take));
-        Some(quote! {
-            if let ::core::option::Option::Some(payload) = #take(emitted) {
-                self.#publish(island, &stamp.message(payload), turn);
-            }
-        })
-    });
-    quote! {
-        #[inline]
-        fn #name(
-            &self,
-            island: &mut #island,
-            emitted: &mut ::core::option::Option<#emitted>,
-            stamp: ::bb_core::__private::Stamp,
-            turn: &::bb_core::__private::Turn<'_>,
-        ) {
-            #(#outputs)*
-        }
-    }
-}
-
-/// `fn t0`: does all that is due in an estimator; `fn h0`: hands it an entry; `fn v0`: lets a caller reach it.
-fn turn(types: &Types<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
-    let number = islands.of[id];
-    let (island, place) = (island_struct(number), group::path(number.number(), &self::island(number)));
-    let (node, emit, turn, visit) = (node(id), emit_function(id), turn_function(id), visit_function(id));
-    let handle = handle_function(id);
-    let kind = types.estimator(id);
-    quote! {
-        #[cold]
-        fn #turn(&self, island: &mut #island, turn: &::bb_core::__private::Turn<'_>) {
-            loop {
-                let mut emitted = ::core::option::Option::None;
-                match island.#node.turn(turn, &mut emitted) {
-                    ::bb_core::__private::Next::Idle => return,
-                    ::bb_core::__private::Next::Quiet => {}
-                    ::bb_core::__private::Next::Emitted(stamp) => self.#emit(island, &mut emitted, stamp, turn),
+impl<'a> Wiring<'a> {
+    fn new(types: &'a Types<'a>, islands: &'a Islands, consumers: &'a Table<PublisherId, Vec<Consumer>>) -> Self {
+        let mut inlets: Table<IslandId, Vec<(PublisherId, Visit<'a>)>> = islands.all.map(|_| Vec::new());
+        for (id, consumers) in consumers.enumerate() {
+            for visit in visits(consumers, islands) {
+                if island_of(types, islands, id) != Some(visit.island) {
+                    inlets[visit.island].push((id, visit));
                 }
             }
         }
+        Self { types, islands, consumers, inlets }
+    }
 
-        #[cold]
-        fn #handle(
-            &self,
-            island: &mut #island,
-            entry: ::bb_core::__private::NodeEntry,
-            turn: &::bb_core::__private::Turn<'_>,
-        ) {
-            let mut emitted = ::core::option::Option::None;
-            if let ::bb_core::__private::Next::Emitted(stamp) = island.#node.handle(entry, turn, &mut emitted) {
-                self.#emit(island, &mut emitted, stamp, turn);
-            }
-            self.#turn(island, turn);
+    /// `__Island_sensor_base_imu_tilt`, by its first estimator.
+    fn island_struct(&self, number: IslandId) -> Ident {
+        format_ident!("__Island_{}", self.island_name(number))
+    }
+
+    fn island_name(&self, number: IslandId) -> &Ident {
+        self.types.name_of(Part::Estimator(self.islands.all[number].first))
+    }
+
+    /// The messages that may wait for an island: an enum, unless all come from one publisher.
+    fn message_enum(&self, number: IslandId) -> Ident {
+        format_ident!("__Message_{}", self.island_name(number))
+    }
+
+    /// `sensor_base_imu`, or `sensor_base_imu__kept` for those that keep the message for later: what delivers it in an
+    /// island, and the variant of the island's messages.
+    fn inlet_name(&self, publisher: PublisherId, runs: bool) -> Ident {
+        let name = self.types.publisher(publisher);
+        if runs { name.clone() } else { format_ident!("{name}__kept") }
+    }
+
+    /// `fn sensor_base_imu` of the wiring, for a publisher that is no estimator: publishes, then runs what is downstream,
+    /// island by island.
+    fn published(&self, id: PublisherId) -> TokenStream {
+        if island_of(self.types, self.islands, id).is_some() {
+            return quote!();
         }
+        let (name, payload) = (self.types.publisher(id), self.types.payload(id));
+        let topic = self.types.topic_place(id);
+        let enters = visits(&self.consumers[id], self.islands)
+            .into_iter()
+            .map(|visit| self.enter(id, &visit, quote!(self), quote!(now), quote!(line)));
+        quote! {
+            #[inline]
+            fn #name(
+                &self,
+                message: &__private::Stamped<#payload>,
+                now: __private::MonotonicTime,
+            ) {
+                let line = self.environment.publish(#id, &self.topics.#topic, message, now);
+                #(#enters)*
+            }
+        }
+    }
 
-        #[cold]
-        fn #visit(
-            &self,
-            now: ::bb_core::__private::MonotonicTime,
-            visit: ::bb_core::__private::Visit<'_, #kind>,
-        ) {
-            visit.enter(
-                &self.islands.#place,
-                self,
-                now,
-                |island| &mut island.#node,
-                |island, emitted, stamp, turn| self.#emit(island, emitted, stamp, turn),
-                |island, turn| self.#turn(island, turn),
+    /// Hands a message to another island.
+    fn enter(
+        &self,
+        id: PublisherId,
+        visit: &Visit<'_>,
+        wiring: TokenStream,
+        now: TokenStream,
+        line: TokenStream,
+    ) -> TokenStream {
+        let (kind, entry) = (self.island_struct(visit.island), entry(id, visit.runs));
+        let (deliver, keep) = if self.inlets[visit.island].len() == 1 {
+            let deliver = quote!(<#kind as __private::IslandState>::deliver);
+            (deliver, quote!(__private::identity))
+        } else {
+            let (name, message) = (self.inlet_name(id, visit.runs), self.message_enum(visit.island));
+            (quote!(#kind::#name), quote!(#message::#name))
+        };
+        quote! {
+            __private::enter::<#kind, _>(
+                #wiring,
+                #now,
+                __private::Key { entry: #entry, line: #line },
+                message,
+                #deliver,
+                #keep,
             );
         }
     }
-}
 
-/// The struct of an island, the messages that may wait for it, and how entries are processed.
-fn island_state(
-    types: &Types<'_>,
-    islands: &Islands,
-    number: IslandId,
-    consumers: &Table<PublisherId, Vec<Consumer>>,
-) -> TokenStream {
-    let island = &islands.all[number];
-    let (name, message) = (island_struct(number), message_enum(number));
-    let fields = island.estimators.iter().map(|id| {
-        let (node, kind) = (node(*id), types.estimator(*id));
-        quote!(#node: ::bb_core::__private::Node<#kind>,)
-    });
-    let mut variants = TokenStream::new();
-    let mut deliveries = TokenStream::new();
-    let mut drops = TokenStream::new();
-    let mut emissions = TokenStream::new();
-    for (publisher, consumers) in consumers.enumerate() {
-        let is_inside = match types.from(publisher) {
-            From::Estimator(id, _) => islands.of[id] == number,
-            From::Sensor(_) | From::Service(_) => false,
+    /// Hands a message to one estimator.
+    fn receive(&self, payload: &TokenStream, consumer: &Consumer, island: &TokenStream) -> TokenStream {
+        let Consumer { estimator, input, span, .. } = consumer;
+        let (member, field) = (self.types.member(*estimator), self.field(*estimator, *input));
+        let taken = self.types.estimator_input(*estimator);
+        let taken = quote!(<#field as __private::TakenAt<#taken>>::Payload);
+        let known = quote!({ __private::both_known::<#payload, #taken>() });
+        let feed = quote!(<#payload as __private::Feeds<#taken, #known>>::feed(message));
+        let (feed, number) = (respan(feed, *span), input.unwrap_or_default());
+        quote!(__private::receive::<#member, #field>(#island, wiring, #number, #feed, turn);)
+    }
+
+    /// The alias of an input's field.
+    fn field(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
+        let estimator = &self.types.model().estimators[id];
+        let name = input.and_then(|input| estimator.inputs.get(input)).map_or_else(String::new, |input| {
+            format!("__{}", crate::names::text(&input.name))
+        });
+        let field = format_ident!("__input__{}{}", self.types.name_of(Part::Estimator(id)), name);
+        quote!(#field)
+    }
+
+    /// `impl Member`: where an estimator is, and where its outputs go.
+    fn member(&self, id: EstimatorId) -> TokenStream {
+        let (types, estimator) = (self.types, &self.types.model().estimators[id]);
+        let (member, name) = (types.member(id), types.name_of(Part::Estimator(id)));
+        let (kind, island) = (types.estimator(id), self.island_struct(self.islands.of[id]));
+        let (taken, emitted) = (types.estimator_input(id), types.estimator_output(id));
+        let numbers: Vec<Option<usize>> =
+            if estimator.is_nested() { vec![None] } else { (0..estimator.inputs.len()).map(Some).collect() };
+        let fields = numbers.iter().map(|input| {
+            let (field, found) = (self.field(id, *input), types.input_field(id, *input));
+            quote!(type #field = #found;)
+        });
+        // One input is the driver's, which is not kept.
+        let cache = (numbers.len() > 1).then(|| {
+            let fields = numbers.iter().map(|input| self.field(id, *input));
+            let numbers = 0..numbers.len();
+            quote! {
+                fn cache() -> <#taken as ::bb_core::Inputs>::Cache {
+                    let mut cache = __private::Default::default();
+                    #(__private::declare::<#fields, #taken>(&mut cache, &__ESTIMATORS[#id], #numbers);)*
+                    cache
+                }
+            }
+        });
+        let outputs = estimator.publishers.iter().map(|publisher| self.emitted(id, *publisher));
+        let again = (!estimator.outputs.is_empty()).then(|| {
+            let arms = estimator.publishers.iter().enumerate().map(|(number, publisher)| {
+                let field = self.output_field(id, *publisher);
+                quote!(#number => __private::alone::<#field, _>(message),)
+            });
+            quote! {
+                fn emitted(
+                    output: usize,
+                    message: &__private::DynamicMessage,
+                ) -> __private::Option<#emitted> {
+                    match output { #(#arms)* _ => __private::None }
+                }
+            }
+        });
+        quote! {
+            #(#fields)*
+            impl __private::Member for #member {
+                type State = #island;
+                type Estimator = #kind;
+                const NUMBER: usize = #id;
+
+                #[inline(always)]
+                fn node(island: &mut #island) -> &mut __private::Node<#kind> {
+                    &mut island.#name
+                }
+
+                #[inline]
+                fn publish(
+                    wiring: &__Wiring,
+                    island: &mut #island,
+                    emitted: &mut __private::Option<#emitted>,
+                    stamp: __private::Stamp,
+                    turn: &__private::Turn<'_>,
+                ) {
+                    #(#outputs)*
+                }
+                #cache
+                #again
+            }
+        }
+    }
+
+    fn output_field(&self, id: EstimatorId, publisher: PublisherId) -> TokenStream {
+        match self.types.from(publisher) {
+            From::Estimator(_, output) => self.types.output_field(id, output),
+            From::Sensor(_) | From::Service(_) => self.types.output_field(id, None),
+        }
+    }
+
+    /// Publishes one output, then runs what is downstream of it: what other islands keep for later goes first, then its own
+    /// estimators run, then those of the others. What others take came at the time of the turn.
+    fn emitted(&self, id: EstimatorId, publisher: PublisherId) -> TokenStream {
+        let (types, own) = (self.types, self.islands.of[id]);
+        let (field, payload, topic) =
+            (self.output_field(id, publisher), types.payload(publisher), types.topic_place(publisher));
+        let calls = visits(&self.consumers[publisher], self.islands).into_iter().map(|visit| {
+            if visit.island == own {
+                let receives = visit.consumers.iter().map(|consumer| self.receive(&payload, consumer, &quote!(island)));
+                return quote!(#(#receives)*);
+            }
+            self.enter(publisher, &visit, quote!(wiring), quote!(turn.now()), quote!(0))
+        });
+        quote! {
+            if let __private::Some(payload) =
+                <#field as __private::EmittedAt<_>>::take(emitted)
+            {
+                let message = &stamp.message(payload);
+                turn.emit(#publisher, &wiring.topics.#topic, message);
+                #(#calls)*
+            }
+        }
+    }
+
+    /// The struct of an island, the messages that may wait for it, and how entries are processed.
+    fn island(&self, number: IslandId) -> TokenStream {
+        let (types, island) = (self.types, &self.islands.all[number]);
+        let (kind, place) = (self.island_struct(number), group::path(number.number(), self.island_name(number)));
+        let nodes = island.estimators.iter().map(|id| {
+            let (name, estimator) = (types.name_of(Part::Estimator(*id)), types.estimator(*id));
+            quote!(#name: __private::Node<#estimator>,)
+        });
+        let inlets = &self.inlets[number];
+        let declared = inlets.iter().map(|(publisher, visit)| {
+            let entry = entry(*publisher, visit.runs);
+            let inputs = visit.consumers.iter().map(|Consumer { estimator, input, .. }| {
+                let input = input.unwrap_or_default();
+                quote!((#estimator, #input))
+            });
+            quote!(__private::InletDeclaration { entry: #entry, inputs: &[#(#inputs),*] })
+        });
+        let (message, items, deliver) = self.deliver(number, inlets);
+        let acts = island.estimators.iter().map(|id| {
+            let member = types.member(*id);
+            quote!(#id => __private::act::<#member>(self, wiring, act),)
+        });
+        let path = path_text(&types.model().estimators[island.first].path);
+        let worker = super::declarations::worker(types.model(), island.first);
+        let numbers = &island.estimators;
+        let is_measured =
+            island.estimators.iter().any(|id| types.model().estimators[*id].timing.latency_budget_s.is_some());
+        quote! {
+            struct #kind { #(#nodes)* }
+            #items
+            impl __private::IslandState for #kind {
+                type Wiring = __Wiring;
+                type Message = #message;
+                const DECLARATION: __private::IslandDeclaration = __private::IslandDeclaration {
+                    number: #number,
+                    name: #path,
+                    worker: #worker,
+                    is_measured: #is_measured,
+                    estimators: &[#(#numbers),*],
+                    inlets: &[#(#declared),*],
+                };
+
+                #[inline(always)]
+                fn find(wiring: &__Wiring) -> &__private::Island<Self> {
+                    &wiring.islands.#place
+                }
+
+                #[inline]
+                fn deliver(&mut self, wiring: &__Wiring, message: &#message, turn: &__private::Turn<'_>) {
+                    #deliver
+                }
+
+                fn act(
+                    &mut self,
+                    wiring: &__Wiring,
+                    estimator: usize,
+                    act: __private::Act<'_, '_>,
+                ) -> bool {
+                    match estimator { #(#acts)* _ => false }
+                }
+            }
+        }
+    }
+
+    /// The type of an island's messages, its items, and what is done with one.
+    fn deliver(
+        &self,
+        number: IslandId,
+        inlets: &[(PublisherId, Visit<'_>)],
+    ) -> (TokenStream, TokenStream, TokenStream) {
+        let (kind, enumeration) = (self.island_struct(number), self.message_enum(number));
+        let receives = |publisher: PublisherId, visit: &Visit<'_>| -> TokenStream {
+            let payload = self.types.payload(publisher);
+            let consumers = visit.consumers.iter();
+            consumers.map(|consumer| self.receive(&payload, consumer, &quote!(self))).collect()
         };
-        if is_inside {
-            let (publish, payload) = (topic(publisher), types.payload(publisher));
-            emissions.extend(quote! {
-                #publisher => match message.downcast::<#payload>() {
-                    ::core::option::Option::Some(message) => wiring.#publish(self, message, turn),
-                    ::core::option::Option::None => return false,
-                },
-            });
-            continue;
+        if let [(publisher, visit)] = inlets {
+            let (payload, receives) = (self.types.payload(*publisher), receives(*publisher, visit));
+            return (quote!(__private::Stamped<#payload>), quote!(), receives);
         }
-        for visit in visits(consumers, islands).iter().filter(|visit| visit.island == number) {
-            let (variant, payload) = (variant(publisher, visit.runs), types.payload(publisher));
-            let deliver = deliver_function(publisher, number, visit.runs);
-            let counts = visit.consumers.iter().map(|Consumer { estimator, input, .. }| {
-                let input = input_number(*input);
-                quote!(wiring.environment.overflow(#estimator, #input);)
+        let (mut variants, mut functions, mut arms) = (TokenStream::new(), TokenStream::new(), TokenStream::new());
+        for (publisher, visit) in inlets {
+            let (name, payload) = (self.inlet_name(*publisher, visit.runs), self.types.payload(*publisher));
+            let receives = receives(*publisher, visit);
+            variants.extend(quote!(#name(__private::Stamped<#payload>),));
+            arms.extend(quote!(#enumeration::#name(message) => self.#name(wiring, message, turn),));
+            functions.extend(quote! {
+                #[inline]
+                fn #name(
+                    &mut self,
+                    wiring: &__Wiring,
+                    message: &__private::Stamped<#payload>,
+                    turn: &__private::Turn<'_>,
+                ) {
+                    #receives
+                }
             });
-            variants.extend(quote!(#variant(::bb_core::__private::Stamped<#payload>),));
-            deliveries.extend(quote!(#message::#variant(message) => wiring.#deliver(self, message, turn),));
-            drops.extend(quote!(#message::#variant(_) => { #(#counts)* }));
         }
+        let items = quote! {
+            #[allow(non_camel_case_types, clippy::large_enum_variant)]
+            enum #enumeration { #variants }
+
+            impl #kind { #functions }
+        };
+        (quote!(#enumeration), items, quote!(match message { #arms }))
     }
-    let turns = island.estimators.iter().map(|id| turn_function(*id));
-    let handles = island.estimators.iter().map(|id| {
-        let handle = handle_function(*id);
-        quote!(#id => wiring.#handle(self, entry, turn),)
-    });
-    let made = island.estimators.iter().map(|id| node(*id));
-    let first = island.estimators.first();
-    let path = first.map_or(String::new(), |id| types.path_of_estimator(*id));
-    let worker = first.map_or_else(TokenStream::new, |id| super::declarations::worker(types.model(), *id));
-    let numbers = &island.estimators;
-    let is_measured =
-        island.estimators.iter().any(|id| types.model().estimators[*id].timing.latency_budget_s.is_some());
-    quote! {
-        pub struct #name { #(#fields)* }
 
-        #[allow(non_camel_case_types, clippy::large_enum_variant)]
-        pub enum #message { #variants }
-
-        impl ::bb_core::__private::IslandState for #name {
-            type Wiring = __Wiring;
-            type Message = #message;
-            const DECLARATION: ::bb_core::__private::IslandDeclaration = ::bb_core::__private::IslandDeclaration {
-                number: #number,
-                name: #path,
-                worker: #worker,
-                is_measured: #is_measured,
-            };
-
-            fn deliver(&mut self, wiring: &__Wiring, message: &#message, turn: &::bb_core::__private::Turn<'_>) {
-                match message { #deliveries }
-            }
-
-            fn wake(&mut self, wiring: &__Wiring, turn: &::bb_core::__private::Turn<'_>) {
-                #(wiring.#turns(self, turn);)*
-            }
-
-            fn handle(
-                &mut self,
-                wiring: &__Wiring,
-                estimator: usize,
-                entry: ::bb_core::__private::NodeEntry,
-                turn: &::bb_core::__private::Turn<'_>,
-            ) {
-                match estimator { #(#handles)* _ => {} }
-            }
-
-            fn estimators() -> &'static [usize] {
-                &[#(#numbers),*]
-            }
-
-            fn begin_replay(&mut self) {
-                #(self.#made.begin_replay();)*
-            }
-
-            fn emit(
-                &mut self,
-                wiring: &__Wiring,
-                publisher: usize,
-                message: &::bb_core::__private::DynamicMessage,
-                turn: &::bb_core::__private::Turn<'_>,
-            ) -> bool {
-                match publisher { #emissions _ => return false }
-                true
-            }
-
-            fn dropped(wiring: &__Wiring, message: &#message) {
-                match message { #drops }
-            }
+    /// `sensor_base_imu_tilt: start::<…>(…),`
+    fn start(&self, id: EstimatorId) -> TokenStream {
+        let (types, part) = (self.types, Part::Estimator(id));
+        let (name, member) = (types.name_of(part), types.member(id));
+        let (options, binding) = (types.options_place(part), binding(types, part));
+        quote! {
+            #name: __private::start::<#member>(&options.#options, #binding, assembly.environment()),
         }
     }
 }
 
-/// The topic of a publisher, and the function that publishes there.
-pub(super) fn topic(id: PublisherId) -> Ident {
-    format_ident!("p{id}")
+/// The island that a publisher is in.
+fn island_of(types: &Types<'_>, islands: &Islands, publisher: PublisherId) -> Option<IslandId> {
+    match types.from(publisher) {
+        From::Estimator(id, _) => Some(islands.of[id]),
+        From::Sensor(_) | From::Service(_) => None,
+    }
 }
 
-/// The function that starts an estimator.
-pub(super) fn start_function(id: EstimatorId) -> Ident {
-    format_ident!("__start_{id}")
-}
-
-pub(super) fn node(id: EstimatorId) -> Ident {
-    format_ident!("n{id}")
-}
-
-/// The constant that holds the number of an input in the algorithm's input type.
-pub(super) fn index_name(id: EstimatorId, input: Option<usize>) -> Ident {
-    format_ident!("__E{id}_INPUT_{}", input_number(input))
-}
-
-/// The number of an input in its estimator's declaration; the implicit one of a nested estimator is the only one.
-fn input_number(input: Option<usize>) -> usize {
-    input.unwrap_or_default()
-}
-
-fn emit_function(id: EstimatorId) -> Ident {
-    format_ident!("e{id}")
-}
-
-fn turn_function(id: EstimatorId) -> Ident {
-    format_ident!("t{id}")
-}
-
-/// The function that hands an entry to an estimator.
-fn handle_function(id: EstimatorId) -> Ident {
-    format_ident!("h{id}")
-}
-
-/// The function through which a caller reaches an estimator.
-pub(super) fn visit_function(id: EstimatorId) -> Ident {
-    format_ident!("v{id}")
-}
-
-/// What a publisher's message does in one island: what is kept for later, or what runs.
-fn deliver_function(publisher: PublisherId, island: IslandId, runs: bool) -> Ident {
-    let variant = variant(publisher, runs);
-    format_ident!("{variant}_i{island}")
-}
-
-fn variant(publisher: PublisherId, runs: bool) -> Ident {
-    if runs { topic(publisher) } else { format_ident!("p{publisher}_kept") }
-}
-
-fn island(number: IslandId) -> Ident {
-    format_ident!("i{number}")
-}
-
-fn island_struct(number: IslandId) -> Ident {
-    format_ident!("__Island{number}")
-}
-
-fn message_enum(number: IslandId) -> Ident {
-    format_ident!("__Message{number}")
+/// What a message from outside is known by in the journal.
+fn entry(publisher: PublisherId, runs: bool) -> usize {
+    2 * publisher.number() + usize::from(runs)
 }

@@ -1,4 +1,4 @@
-//! The expansion of a robot: it is Rust, it says what is to be checked of types, and its size is linear.
+//! The expansion of a robot: it is Rust that can be read, it says what is to be checked of types, and its size is linear.
 
 use super::{diagnostics, sensing, tokens};
 use crate::pipeline;
@@ -103,6 +103,45 @@ pub(super) const ACTING: &str = r#"
         }
     }
 "#;
+
+/// One of everything that a robot may have.
+const EVERYTHING: &str = include_str!("expansion/everything.txt");
+
+/// Where its expansion is stored, so that a change of the macro can be read as a change of what it writes.
+const EXPANDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests/expansion/everything.rs");
+
+#[test]
+fn the_expansion_is_as_stored() {
+    assert!(diagnostics(tokens(EVERYTHING)).is_empty(), "{:?}", super::faults(EVERYTHING));
+    let file = syn::parse2::<syn::File>(pipeline(tokens(EVERYTHING))).expect("it is Rust");
+    let expanded = format!(
+        "// What `robot!` makes of everything.txt. Written by a test: `UPDATE_EXPANSION=1 cargo test -p bb-macros expansion`.\n\n{}",
+        prettyplease::unparse(&file)
+    );
+    if std::env::var_os("UPDATE_EXPANSION").is_some() {
+        std::fs::write(EXPANDED, &expanded).expect("the folder is there");
+    }
+    let stored = std::fs::read_to_string(EXPANDED).unwrap_or_default();
+    let difference = stored.lines().zip(expanded.lines()).find(|(stored, now)| stored != now);
+    assert!(
+        stored == expanded,
+        "read the difference, then renew it: UPDATE_EXPANSION=1 cargo test -p bb-macros expansion\n{difference:?}"
+    );
+}
+
+/// Everything in the expansion is called by a path, a field or a role, so that one can read what it is for.
+#[test]
+fn no_name_in_the_expansion_is_a_number() {
+    let expansion = pipeline(tokens(EVERYTHING)).to_string();
+    let words = expansion.split(|c: char| !c.is_alphanumeric() && c != '_');
+    // The groups of fields of `__Options`, `__Topics` and `__Islands`, of which each has its number.
+    let is_numbered = |word: &&str| {
+        let letters = word.trim_start_matches('_').trim_end_matches(|c: char| c.is_ascii_digit());
+        letters.len() == 1 && letters.len() < word.trim_start_matches('_').len() && letters != "g"
+    };
+    let numbered: Vec<&str> = words.filter(is_numbered).filter(|word| !["f64", "i64", "u64"].contains(word)).collect();
+    assert_eq!(numbered, [] as [&str; 0]);
+}
 
 #[test]
 fn a_right_robot_expands_to_rust() {

@@ -67,8 +67,8 @@ pub enum Replayed<'a> {
     Retire,
     /// An entry for an estimator.
     Node(usize, NodeEntry),
-    /// What an estimator emitted in reply to a request that the journal does not hold, at that publisher.
-    Emission(usize, &'a DynamicMessage),
+    /// What an estimator emitted in reply to a request that the journal does not hold.
+    Emission(&'a DynamicMessage),
 }
 
 #[cfg(not(loom))]
@@ -78,7 +78,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn estimators(&self) -> &'static [usize] {
-        S::estimators()
+        S::DECLARATION.estimators
     }
 
     fn wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
@@ -166,7 +166,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         // So that publishers never enter directly.
         self.pending.store(usize::MAX, Ordering::Relaxed);
         if let Some(mut state) = self.try_hold(wiring) {
-            state.begin_replay();
+            state.begin_replay(wiring);
         }
     }
 
@@ -174,7 +174,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         let message = match &entry {
             Replayed::Deliver(key) | Replayed::Drop(key) => {
                 match self.inbox().take_message(|waiting| waiting.key == *key) {
-                    Some(keyed) => Some(keyed.message),
+                    Some(keyed) => Some(keyed),
                     None => return false,
                 }
             }
@@ -184,15 +184,11 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         self.process_line(wiring, now, None, |turn| {
             match entry {
                 Replayed::Deliver(_) => {
-                    if let Some(message) = &message {
-                        state.deliver(wiring, message, turn);
+                    if let Some(keyed) = &message {
+                        state.deliver(wiring, &keyed.message, turn);
                     }
                 }
-                Replayed::Drop(_) => {
-                    if let Some(message) = &message {
-                        S::dropped(wiring, message);
-                    }
-                }
+                Replayed::Drop(key) => S::dropped(wiring, key),
                 Replayed::Wake => state.wake(wiring, turn),
                 Replayed::Start => for_all(&mut *state, wiring, turn, || NodeEntry::Start),
                 Replayed::Retire => {
@@ -200,7 +196,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
                     self.has_retired.store(true, Ordering::SeqCst);
                 }
                 Replayed::Node(estimator, entry) => state.handle(wiring, estimator, entry, turn),
-                Replayed::Emission(publisher, message) => return state.emit(wiring, publisher, message, turn),
+                Replayed::Emission(message) => return state.emit(wiring, message, turn),
             }
             true
         })

@@ -4,14 +4,13 @@
 //! effect, and nothing stays in the inbox. That one thread at a time is inside follows from the lock's type. (The checker's
 //! locks order more than real ones do: the comments at the fences say what the fences are for.)
 
-use super::{Island, IslandDeclaration, IslandState, IslandWiring, Key};
+use super::{Act, Island, IslandDeclaration, IslandState, IslandWiring, Key};
 use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
 use crate::journal::Event;
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
 use crate::node::{BindTarget, Check, Environment, EnvironmentParts, Mode, NodeEntry, Overseer, Report, Turn};
-use crate::pubsub::DynamicMessage;
 use crate::schedule::{Agenda, Bell, Pool};
 use crate::time::{Clock, MonotonicTime};
 use loom::sync::Arc;
@@ -100,36 +99,34 @@ impl<const CAPACITY: usize> IslandState for Seen<CAPACITY> {
     type Wiring = Wiring;
     type Message = Message;
     const CAPACITY: usize = CAPACITY;
-    const DECLARATION: IslandDeclaration =
-        IslandDeclaration { number: 0, name: "model", worker: None, is_measured: false };
+    const DECLARATION: IslandDeclaration = IslandDeclaration {
+        number: 0,
+        name: "model",
+        worker: None,
+        is_measured: false,
+        estimators: &[0],
+        inlets: &[],
+    };
+
+    fn find(_: &Wiring) -> &Island<Self> {
+        unreachable!("a model's island is not in its wiring")
+    }
 
     fn deliver(&mut self, _: &Wiring, message: &Message, _: &Turn<'_>) {
         self.see(*message);
     }
 
-    fn wake(&mut self, _: &Wiring, _: &Turn<'_>) {
-        self.wakes += 1;
-    }
-
-    fn handle(&mut self, _: &Wiring, _: usize, entry: NodeEntry, _: &Turn<'_>) {
-        match entry {
-            NodeEntry::Restart => self.restarts += 1,
-            NodeEntry::Retire => self.has_retired = true,
-            _ => {}
+    fn act(&mut self, _: &Wiring, _: usize, act: Act<'_, '_>) -> bool {
+        match act {
+            Act::Turn(_) => self.wakes += 1,
+            Act::Handle(NodeEntry::Restart, _) => self.restarts += 1,
+            Act::Handle(NodeEntry::Retire, _) => self.has_retired = true,
+            Act::Handle(..) | Act::BeginReplay | Act::Emit(..) => {}
         }
+        true
     }
 
-    fn estimators() -> &'static [usize] {
-        &[0]
-    }
-
-    fn begin_replay(&mut self) {}
-
-    fn emit(&mut self, _: &Wiring, _: usize, _: &DynamicMessage, _: &Turn<'_>) -> bool {
-        false
-    }
-
-    fn dropped(wiring: &Wiring, _: &Message) {
+    fn dropped(wiring: &Wiring, _: Key) {
         wiring.dropped.fetch_add(1, Ordering::Relaxed);
     }
 }

@@ -78,6 +78,11 @@ impl<E: Estimator> Node<E> {
         Some(Box::new(move |estimator| handle(estimator, &bytes)))
     }
 
+    /// The number of its declared output of that path.
+    pub(crate) fn output_at(&self, path: &str) -> Option<usize> {
+        self.declaration.outputs.iter().position(|output| *output == path)
+    }
+
     /// In a replay: makes it, as the journal begins.
     pub fn begin_replay(&mut self) {
         self.make_first(self.environment.clock().now());

@@ -1,0 +1,162 @@
+//! An estimator in its island. The expansion of `robot!` says where it is and where its outputs go; what is done with it is
+//! here, once for all estimators.
+
+use super::{Island, IslandState, Key};
+use crate::component::{Binding, EmittedAt, Estimator, Inputs, Outputs, TakenAt};
+use crate::message::{Payload, Stamp, Stamped};
+use crate::node::{AnyIsland, Next, Node, NodeEntry, Turn};
+use crate::pubsub::DynamicMessage;
+use crate::time::MonotonicTime;
+
+type WiringOf<M> = <<M as Member>::State as IslandState>::Wiring;
+type InputOf<M> = <<M as Member>::Estimator as Estimator>::Input;
+type OutputOf<M> = <<M as Member>::Estimator as Estimator>::Output;
+type OptionsOf<M> = <<M as Member>::Estimator as Estimator>::Options;
+
+/// What `robot!` implements for each estimator.
+pub trait Member {
+    /// Its island.
+    type State: IslandState;
+    /// It.
+    type Estimator: Estimator;
+    /// Its number.
+    const NUMBER: usize;
+
+    /// It, in its island.
+    fn node(island: &mut Self::State) -> &mut Node<Self::Estimator>;
+
+    /// Publishes what it has emitted, output by output.
+    fn publish(
+        wiring: &WiringOf<Self>,
+        island: &mut Self::State,
+        emitted: &mut Option<OutputOf<Self>>,
+        stamp: Stamp,
+        turn: &Turn<'_>,
+    );
+
+    /// The slots of its inputs. One input alone is the driver's, whose message is not kept.
+    fn cache() -> <InputOf<Self> as Inputs>::Cache {
+        Default::default()
+    }
+
+    /// What emits a message at its output of that number alone; none if the payload is another.
+    fn emitted(output: usize, message: &DynamicMessage) -> Option<OutputOf<Self>> {
+        if output == 0 { alone::<<OutputOf<Self> as Outputs>::Only, _>(message) } else { None }
+    }
+}
+
+/// What emits `message` alone at the output `F`.
+pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
+    message.downcast::<F::Payload>().map(|message| F::alone(message.payload.clone()))
+}
+
+/// What is done with one estimator of an island beside handing it messages.
+#[allow(missing_debug_implementations)]
+pub enum Act<'a, 'b> {
+    /// All that is due.
+    Turn(&'a Turn<'b>),
+    /// It gets an entry.
+    Handle(NodeEntry, &'a Turn<'b>),
+    /// In a replay: it is made.
+    BeginReplay,
+    /// In a replay: it publishes what it emitted in reply to a request that the journal does not hold.
+    Emit(&'a DynamicMessage, &'a Turn<'b>),
+}
+
+/// Makes an estimator.
+pub fn start<M: Member>(
+    options: &OptionsOf<M>,
+    binding: Binding<OptionsOf<M>>,
+    environment: &super::Environment,
+) -> Node<M::Estimator> {
+    Node::new(M::NUMBER, options, binding, M::cache, environment)
+}
+
+/// Hands a message to an estimator's input of that number, publishes what it emits, and lets it go on if it wants to.
+#[inline]
+pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
+    island: &mut M::State,
+    wiring: &WiringOf<M>,
+    input: usize,
+    message: &Stamped<F::Payload>,
+    turn: &Turn<'_>,
+) {
+    let mut emitted = None;
+    if let Some(stamp) = M::node(island).receive::<F>(input, message, turn, &mut emitted) {
+        M::publish(wiring, island, &mut emitted, stamp, turn);
+    }
+    if M::node(island).is_unfinished() {
+        take_turn::<M>(island, wiring, turn);
+    }
+}
+
+/// Does something with an estimator; false if it cannot emit that message.
+#[cold]
+pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, '_>) -> bool {
+    match act {
+        Act::Turn(turn) => take_turn::<M>(island, wiring, turn),
+        Act::Handle(entry, turn) => {
+            let mut emitted = None;
+            if let Next::Emitted(stamp) = M::node(island).handle(entry, turn, &mut emitted) {
+                M::publish(wiring, island, &mut emitted, stamp, turn);
+            }
+            take_turn::<M>(island, wiring, turn);
+        }
+        Act::BeginReplay => M::node(island).begin_replay(),
+        Act::Emit(message, turn) => {
+            let output = M::node(island).output_at(message.path());
+            let mut emitted = output.and_then(|output| M::emitted(output, message));
+            if emitted.is_none() {
+                return false;
+            }
+            M::publish(wiring, island, &mut emitted, message.stamp(), turn);
+        }
+    }
+    true
+}
+
+/// Does all that is due in an estimator.
+#[cold]
+pub(crate) fn take_turn<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, turn: &Turn<'_>) {
+    loop {
+        let mut emitted = None;
+        match M::node(island).turn(turn, &mut emitted) {
+            Next::Idle => return,
+            Next::Quiet => {}
+            Next::Emitted(stamp) => M::publish(wiring, island, &mut emitted, stamp, turn),
+        }
+    }
+}
+
+/// Runs what an island does with a message, or keeps it for the thread that holds the island.
+#[inline]
+pub fn enter<S: IslandState, T: Payload>(
+    wiring: &S::Wiring,
+    now: MonotonicTime,
+    key: Key,
+    message: &Stamped<T>,
+    deliver: impl FnOnce(&mut S, &S::Wiring, &Stamped<T>, &Turn<'_>),
+    keep: impl FnOnce(Stamped<T>) -> S::Message,
+) {
+    let direct = |state: &mut S, turn: &Turn<'_>| deliver(state, wiring, message, turn);
+    S::find(wiring).enter(wiring, now, key, direct, || keep(message.clone()));
+}
+
+/// An island of a wiring, whatever its estimators.
+pub fn island<S: IslandState + 'static>(wiring: &S::Wiring) -> &dyn AnyIsland<S::Wiring>
+where
+    Island<S>: AnyIsland<S::Wiring>,
+{
+    S::find(wiring)
+}
+
+/// Publishes a recorded message of a sensor or a service again; false if its payload is another.
+pub fn feed<W, T: Payload>(
+    wiring: &W,
+    message: &DynamicMessage,
+    now: MonotonicTime,
+    publish: impl FnOnce(&W, &Stamped<T>, MonotonicTime),
+) -> bool {
+    let message = message.downcast::<T>();
+    message.map(|message| publish(wiring, message, now)).is_some()
+}

@@ -1,0 +1,82 @@
+//! What the items of the expansion are called: by the path of what they are for, so that the expansion can be read.
+//!
+//! `sensor/base/imu` is `sensor_base_imu`. Where two paths would give one name, the second has a number at its end.
+
+use super::part::Part;
+use crate::diagnostics::Place;
+use crate::model::{PublisherId, Robot, Table};
+use proc_macro2::{Ident, Span};
+use quote::format_ident;
+use std::collections::HashSet;
+
+/// The names of a robot's parts and publishers.
+#[derive(Debug)]
+pub(super) struct Naming {
+    /// By position, see [`Part::position`].
+    parts: Vec<PartNames>,
+    publishers: Table<PublisherId, PublisherNames>,
+}
+
+/// What stands for a part.
+#[derive(Debug)]
+pub(super) struct PartNames {
+    /// `sensor_base_imu`
+    pub(super) name: Ident,
+    /// `__Rover__sensor_base_imu`: its type.
+    pub(super) alias: Ident,
+    /// `__Rover__given__sensor_base_imu`: its type as the user wrote it.
+    pub(super) given: Ident,
+    /// `__Rover__member__sensor_base_imu_tilt`: an estimator in its island.
+    pub(super) member: Ident,
+    /// Where the user wrote its type. Names are looked up as in the expansion.
+    pub(super) span: Span,
+}
+
+/// What stands for a publisher.
+#[derive(Debug)]
+pub(super) struct PublisherNames {
+    /// `sensor_base_imu`
+    pub(super) name: Ident,
+    /// `__Rover__payload__sensor_base_imu_tilt`
+    pub(super) payload: Ident,
+}
+
+impl Naming {
+    pub(super) fn of(robot: &Robot, robot_name: &Ident) -> Self {
+        let (mut taken_by_parts, mut taken_by_publishers) = (HashSet::new(), HashSet::new());
+        let call_site = Span::call_site();
+        let item = |kind: &str, name: &Ident, span: Span| format_ident!("__{robot_name}__{kind}{name}", span = span);
+        let parts = Part::all(robot).map(|part| {
+            let name = fresh(part.path(robot), &mut taken_by_parts);
+            let span = Place::of(&part.component(robot).kind).start.resolved_at(call_site);
+            PartNames {
+                alias: item("", &name, span),
+                given: item("given__", &name, span),
+                member: item("member__", &name, call_site),
+                name,
+                span,
+            }
+        });
+        let parts = parts.collect();
+        let publishers = robot.publishers.map(|id| {
+            let name = fresh(&robot.publishers[id].path, &mut taken_by_publishers);
+            PublisherNames { payload: item("payload__", &name, call_site), name }
+        });
+        Self { parts, publishers }
+    }
+
+    pub(super) fn part(&self, robot: &Robot, part: Part) -> &PartNames {
+        &self.parts[part.position(robot)]
+    }
+
+    pub(super) fn publisher(&self, id: PublisherId) -> &PublisherNames {
+        &self.publishers[id]
+    }
+}
+
+fn fresh(path: &[String], taken: &mut HashSet<String>) -> Ident {
+    let name = path.join("_");
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|name| taken.insert(name.clone()));
+    super::literal::ident(&free.unwrap_or(name))
+}

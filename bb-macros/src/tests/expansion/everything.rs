@@ -1,0 +1,1716 @@
+// What `robot!` makes of everything.txt. Written by a test: `UPDATE_EXPANSION=1 cargo test -p bb-macros expansion`.
+
+/// One of everything.
+#[derive(Clone, Copy, Debug)]
+pub struct Rover;
+impl Rover {
+    /// Assembles the robot: options may be changed and topics subscribed to before it starts.
+    #[allow(dead_code)]
+    pub fn builder() -> ::bb_core::Builder<Self> {
+        <Self as ::bb_core::Robot>::builder()
+    }
+}
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__sensor_battery = Ina219;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__sensor_battery = <__Rover__given__sensor_battery as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__sensor_battery>>::IS_SENSOR
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__sensor_base_imu = Bmi270;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__sensor_base_imu = <__Rover__given__sensor_base_imu as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__sensor_base_imu>>::IS_SENSOR
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__sensor_base_pan_encoder = Encoder;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__sensor_base_pan_encoder = <__Rover__given__sensor_base_pan_encoder as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__sensor_base_pan_encoder>>::IS_SENSOR
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__sensor_base_imu_tilt = Madgwick;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__sensor_base_imu_tilt = <__Rover__given__sensor_base_imu_tilt as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__sensor_base_imu_tilt>>::IS_ESTIMATOR
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__estimator_base_pose = Eskf;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__estimator_base_pose = <__Rover__given__estimator_base_pose as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__estimator_base_pose>>::IS_ESTIMATOR
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__actuator_base_pan_servo = Dynamixel;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__actuator_base_pan_servo = <__Rover__given__actuator_base_pan_servo as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<
+            __Rover__given__actuator_base_pan_servo,
+        >>::IS_ACTUATOR
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__controller_stability = Stability;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__controller_stability = <__Rover__given__controller_stability as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__controller_stability>>::IS_SERVICE
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__bridge_ros = RosBridge;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__bridge_ros = <__Rover__given__bridge_ros as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__bridge_ros>>::IS_SERVICE
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__command_arm = Arm;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__command_arm = <__Rover__given__command_arm as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__command_arm>>::IS_COMMAND
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__command_move_to = MoveTo;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__command_move_to = <__Rover__given__command_move_to as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__command_move_to>>::IS_COMMAND
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__given__command_stop = Stop;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__command_stop = <__Rover__given__command_stop as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<__Rover__given__command_stop>>::IS_COMMAND
+    },
+>>::Type;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__payload__sensor_base_imu_tilt = <<<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as ::bb_core::__private::EmittedAt<
+    <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
+>>::Payload;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__payload__estimator_base_pose_pose = <::bb_core::__private::At<
+    {
+        ::bb_core::__private::find_output::<
+            <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+        >("pose")
+    },
+> as ::bb_core::__private::EmittedAt<
+    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+>>::Payload;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover__payload__nav_velocity = <::bb_core::__private::At<
+    {
+        ::bb_core::__private::find_output::<
+            <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+        >("velocity")
+    },
+> as ::bb_core::__private::EmittedAt<
+    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+>>::Payload;
+#[allow(non_camel_case_types, dead_code)]
+type __Rover_must_be_declared_outside_of_functions = Rover;
+#[allow(non_camel_case_types, dead_code)]
+enum __Rover__member__sensor_base_imu_tilt {}
+#[allow(non_camel_case_types, dead_code)]
+enum __Rover__member__estimator_base_pose {}
+#[allow(clippy::all, non_snake_case, unused_variables)]
+const _: () = {
+    use ::bb_core::__private;
+    const _: () = ::bb_core::__private::check_required(
+        "Ina219",
+        <<__Rover__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        &[],
+    );
+    const _: () = ::bb_core::__private::check_required(
+        "Bmi270",
+        <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        &["bus"],
+    );
+    const _: () = ::bb_core::__private::check_required(
+        "Encoder",
+        <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        &["id"],
+    );
+    const _: () = ::bb_core::__private::check_option(
+        "Encoder",
+        <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        ::bb_core::__private::Given {
+            name: "id",
+            dimension: __private::None,
+            number: __private::Some(3f64),
+        },
+    );
+    const _: () = ::bb_core::__private::check_estimator::<
+        __Rover__sensor_base_imu_tilt,
+    >("Madgwick", &["beta"], __private::None, false);
+    const _: () = ::bb_core::__private::check_option(
+        "Madgwick",
+        <<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options as ::bb_core::Options>::FIELDS,
+        ::bb_core::__private::Given {
+            name: "beta",
+            dimension: __private::None,
+            number: __private::Some(0.1f64),
+        },
+    );
+    const _: () = ::bb_core::__private::check_estimator::<
+        __Rover__estimator_base_pose,
+    >("Eskf", &[], __private::Some(&["imu", "tilt", "wheel"]), true);
+    const _: () = ::bb_core::__private::check_required(
+        "Dynamixel",
+        <<__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
+        &["id"],
+    );
+    const _: () = ::bb_core::__private::check_option(
+        "Dynamixel",
+        <<__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
+        ::bb_core::__private::Given {
+            name: "id",
+            dimension: __private::None,
+            number: __private::Some(3f64),
+        },
+    );
+    const _: () = ::bb_core::__private::check_required(
+        "Stability",
+        <<__Rover__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
+        &[],
+    );
+    const _: () = ::bb_core::__private::check_required(
+        "RosBridge",
+        <<__Rover__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
+        &["port"],
+    );
+    const _: () = ::bb_core::__private::check_option(
+        "RosBridge",
+        <<__Rover__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
+        ::bb_core::__private::Given {
+            name: "port",
+            dimension: __private::None,
+            number: __private::Some(1f64),
+        },
+    );
+    const _: () = ::bb_core::__private::check_required(
+        "Arm",
+        <<__Rover__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        &[],
+    );
+    const _: () = ::bb_core::__private::check_required(
+        "MoveTo",
+        <<__Rover__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        &["speed"],
+    );
+    const _: () = ::bb_core::__private::check_option(
+        "MoveTo",
+        <<__Rover__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        ::bb_core::__private::Given {
+            name: "speed",
+            dimension: __private::Some(::bb_core::__private::Dimension {
+                exponents: [1i8, 0i8, -1i8, 0i8, 0i8, 0i8],
+                name: "a velocity",
+            }),
+            number: __private::Some(1f64),
+        },
+    );
+    const _: () = ::bb_core::__private::check_required(
+        "Stop",
+        <<__Rover__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        &[],
+    );
+    const _: () = ::bb_core::__private::check_input::<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+    >("Eskf", "imu");
+    const _: () = ::bb_core::__private::check_input::<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+    >("Eskf", "tilt");
+    const _: () = ::bb_core::__private::check_input::<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+    >("Eskf", "wheel");
+    const _: () = ::bb_core::__private::check_optional::<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+    >("Eskf", "wheel");
+    const _: () = ::bb_core::__private::check_output::<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+    >("Eskf", "pose");
+    const _: () = ::bb_core::__private::check_output::<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+    >("Eskf", "velocity");
+    const _: () = ::bb_core::__private::check_position(
+        "servo",
+        "pan",
+        &[
+            <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as ::bb_core::Payload>::TELLS_JOINT_POSITION,
+        ],
+    );
+    const _: () = ::bb_core::__private::check_role(
+        "arm",
+        <__Rover__command_arm as ::bb_core::Command>::ROLE,
+        &[],
+    );
+    const _: () = ::bb_core::__private::check_role(
+        "move_to",
+        <__Rover__command_move_to as ::bb_core::Command>::ROLE,
+        &[("arm", <__Rover__command_arm as ::bb_core::Command>::ROLE)],
+    );
+    const _: () = ::bb_core::__private::check_reachable(
+        "move_to",
+        <__Rover__command_move_to as ::bb_core::Command>::ROLE,
+        &["idle", "degraded"],
+    );
+    const _: () = ::bb_core::__private::check_role(
+        "stop",
+        <__Rover__command_stop as ::bb_core::Command>::ROLE,
+        &[
+            ("arm", <__Rover__command_arm as ::bb_core::Command>::ROLE),
+            ("move_to", <__Rover__command_move_to as ::bb_core::Command>::ROLE),
+        ],
+    );
+    static __SENSORS: [__private::SensorDeclaration; 3usize] = [
+        __private::SensorDeclaration {
+            path: "sensor/battery",
+            frame: __private::Frame::new(""),
+            period_nanos: __private::None,
+            root_from_frame: __private::None,
+            supervisor: 0usize,
+        },
+        __private::SensorDeclaration {
+            path: "sensor/base/imu",
+            frame: __private::Frame::new("base"),
+            period_nanos: __private::Some(5000000i64),
+            root_from_frame: __private::Some(__private::Transform::IDENTITY),
+            supervisor: 1usize,
+        },
+        __private::SensorDeclaration {
+            path: "sensor/base/pan/encoder",
+            frame: __private::Frame::new("pan"),
+            period_nanos: __private::Some(20000000i64),
+            root_from_frame: __private::Some(__private::Transform {
+                translation: [0.2f64, 0f64, 0.9f64],
+                rotation: [0.7071067811865476f64, 0f64, 0f64, 0.7071067811865475f64],
+            }),
+            supervisor: 3usize,
+        },
+    ];
+    static __ESTIMATORS: [__private::EstimatorDeclaration; 2usize] = [
+        __private::EstimatorDeclaration {
+            path: "sensor/base/imu/tilt",
+            frame: __private::Frame::new("base"),
+            inputs: &[
+                __private::InputDeclaration {
+                    index: 0usize,
+                    name: "imu",
+                    source: "sensor/base/imu",
+                    driver: true,
+                    optional: false,
+                    tolerance_nanos: __private::None,
+                    stale_after_nanos: __private::None,
+                    frame_from_input: __private::Some(__private::Transform::IDENTITY),
+                },
+            ],
+            outputs: &["sensor/base/imu/tilt"],
+            island: 0usize,
+            supervisor: 1usize,
+            health: __private::HealthDeclaration {
+                latency_budget_nanos: __private::Some(1000000i64),
+                lost_after_nanos: __private::Some(100000000i64),
+                recover_after: 1u32,
+                on_degraded: __private::None,
+                on_lost: __private::Some(2usize),
+                on_recovered: __private::None,
+            },
+            worker: __private::None,
+        },
+        __private::EstimatorDeclaration {
+            path: "estimator/base/pose",
+            frame: __private::Frame::new("base"),
+            inputs: &[
+                __private::InputDeclaration {
+                    index: 0usize,
+                    name: "imu",
+                    source: "sensor/base/imu",
+                    driver: true,
+                    optional: false,
+                    tolerance_nanos: __private::Some(20000000i64),
+                    stale_after_nanos: __private::None,
+                    frame_from_input: __private::Some(__private::Transform::IDENTITY),
+                },
+                __private::InputDeclaration {
+                    index: 1usize,
+                    name: "tilt",
+                    source: "sensor/base/imu/tilt",
+                    driver: false,
+                    optional: false,
+                    tolerance_nanos: __private::Some(20000000i64),
+                    stale_after_nanos: __private::None,
+                    frame_from_input: __private::Some(__private::Transform::IDENTITY),
+                },
+                __private::InputDeclaration {
+                    index: 2usize,
+                    name: "wheel",
+                    source: "sensor/base/pan/encoder",
+                    driver: false,
+                    optional: true,
+                    tolerance_nanos: __private::Some(50000000i64),
+                    stale_after_nanos: __private::None,
+                    frame_from_input: __private::Some(__private::Transform {
+                        translation: [0.2f64, 0f64, 0.9f64],
+                        rotation: [
+                            0.7071067811865476f64,
+                            0f64,
+                            0f64,
+                            0.7071067811865475f64,
+                        ],
+                    }),
+                },
+            ],
+            outputs: &["estimator/base/pose/pose", "nav/velocity"],
+            island: 1usize,
+            supervisor: 1usize,
+            health: __private::HealthDeclaration {
+                latency_budget_nanos: __private::None,
+                lost_after_nanos: __private::None,
+                recover_after: 1u32,
+                on_degraded: __private::None,
+                on_lost: __private::None,
+                on_recovered: __private::None,
+            },
+            worker: __private::Some(__private::WorkerDeclaration {
+                priority: __private::Some(80u8),
+                core: __private::None,
+            }),
+        },
+    ];
+    static __ACTUATORS: [__private::ActuatorDeclaration; 1usize] = [
+        __private::ActuatorDeclaration {
+            path: "actuator/base/pan/servo",
+            joint: "pan",
+            supervisor: 3usize,
+        },
+    ];
+    static __SERVICES: [__private::SensorDeclaration; 2usize] = [
+        __private::SensorDeclaration {
+            path: "controller/stability",
+            frame: __private::Frame::NONE,
+            period_nanos: __private::Some(10000000i64),
+            root_from_frame: __private::None,
+            supervisor: 0,
+        },
+        __private::SensorDeclaration {
+            path: "bridge/ros",
+            frame: __private::Frame::NONE,
+            period_nanos: __private::None,
+            root_from_frame: __private::None,
+            supervisor: 0,
+        },
+    ];
+    static __CATEGORIES: [__private::CategoryDeclaration; 2usize] = [
+        __private::CategoryDeclaration {
+            name: "default",
+            concurrency: 1usize,
+        },
+        __private::CategoryDeclaration {
+            name: "motion",
+            concurrency: 2usize,
+        },
+    ];
+    static __COMMANDS: [__private::CommandDeclaration; 3usize] = [
+        __private::CommandDeclaration {
+            name: "arm",
+            path: "command/arm",
+            allowed_states: __private::None,
+            timeout_nanos: __private::None,
+            category: 0usize,
+            cancel: __private::Cancel::Nothing,
+        },
+        __private::CommandDeclaration {
+            name: "move_to",
+            path: "command/move_to",
+            allowed_states: __private::Some(&["idle", "degraded"]),
+            timeout_nanos: __private::Some(2000000000i64),
+            category: 1usize,
+            cancel: __private::Cancel::Nothing,
+        },
+        __private::CommandDeclaration {
+            name: "stop",
+            path: "command/stop",
+            allowed_states: __private::None,
+            timeout_nanos: __private::None,
+            category: 0usize,
+            cancel: __private::Cancel::All,
+        },
+    ];
+    static __PARAMETERS: [__private::ParameterDeclaration; 1usize] = [
+        __private::ParameterDeclaration {
+            path: "param/imu/beta",
+            doc: "How far each sample moves the estimate.",
+            default: __private::ParameterDefault::Float(0.1f64),
+            range: __private::Some(__private::Range {
+                start: 0f64,
+                end: 1f64,
+                text: "0.0..=1.0",
+            }),
+            unit: "",
+        },
+    ];
+    static __TOPOLOGY: __private::Topology = __private::Topology {
+        links: &[
+            __private::Link {
+                name: "base",
+                parent_joint: __private::None,
+                root_from_link: __private::Some(__private::Transform::IDENTITY),
+                inertial: __private::Some(__private::Inertial {
+                    link_from_inertia: __private::Origin::IDENTITY,
+                    mass: 12f64,
+                    inertia: [1f64, 0f64, 0f64, 1f64, 0f64, 1f64],
+                }),
+                visuals: &[],
+                collisions: &[],
+            },
+            __private::Link {
+                name: "head",
+                parent_joint: __private::Some(0usize),
+                root_from_link: __private::None,
+                inertial: __private::None,
+                visuals: &[],
+                collisions: &[],
+            },
+        ],
+        joints: &[
+            __private::Joint {
+                name: "pan",
+                kind: __private::JointKind::Continuous,
+                parent: 0usize,
+                child: 1usize,
+                parent_from_joint: __private::Origin {
+                    xyz: [0.2f64, 0f64, 0.9f64],
+                    rpy: [0f64, 0f64, 1.5707963267948966f64],
+                },
+                axis: __private::Some([0f64, 0f64, 1f64]),
+                limit: __private::None,
+                dynamics: __private::None,
+                mimic: __private::None,
+                transmission: __private::None,
+            },
+        ],
+    };
+    pub struct __Options {
+        g0: __Options0,
+    }
+    fn __declared_options() -> __Options {
+        __Options {
+            g0: __declared_options0(),
+        }
+    }
+    pub struct __Options0 {
+        sensor_battery: <__Rover__sensor_battery as ::bb_core::Sensor>::Options,
+        sensor_base_imu: <__Rover__sensor_base_imu as ::bb_core::Sensor>::Options,
+        sensor_base_pan_encoder: <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
+        sensor_base_imu_tilt: <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+        estimator_base_pose: <__Rover__estimator_base_pose as ::bb_core::Estimator>::Options,
+        actuator_base_pan_servo: <__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
+        controller_stability: <__Rover__controller_stability as ::bb_core::Service>::Options,
+        bridge_ros: <__Rover__bridge_ros as ::bb_core::Service>::Options,
+        command_arm: <__Rover__command_arm as ::bb_core::Command>::Options,
+        command_move_to: <__Rover__command_move_to as ::bb_core::Command>::Options,
+        command_stop: <__Rover__command_stop as ::bb_core::Command>::Options,
+    }
+    fn __declared_options0() -> __Options0 {
+        __Options0 {
+            sensor_battery: __private::as_known(
+                <<__Rover__given__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::defaults(),
+            ),
+            sensor_base_imu: __declared_sensor_base_imu(),
+            sensor_base_pan_encoder: __declared_sensor_base_pan_encoder(),
+            sensor_base_imu_tilt: __declared_sensor_base_imu_tilt(),
+            estimator_base_pose: __private::as_known(
+                <<__Rover__given__estimator_base_pose as ::bb_core::Estimator>::Options as ::bb_core::Options>::defaults(),
+            ),
+            actuator_base_pan_servo: __declared_actuator_base_pan_servo(),
+            controller_stability: __private::as_known(
+                <<__Rover__given__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::defaults(),
+            ),
+            bridge_ros: __declared_bridge_ros(),
+            command_arm: __private::as_known(
+                <<__Rover__given__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+            ),
+            command_move_to: __declared_command_move_to(),
+            command_stop: __private::as_known(
+                <<__Rover__given__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+            ),
+        }
+    }
+    fn __options_of(
+        whole: &mut __Options,
+        number: usize,
+    ) -> __private::Option<&mut dyn __private::Any> {
+        match number / 16usize {
+            0usize => __options_of0(&mut whole.g0, number % 16usize),
+            _ => __private::None,
+        }
+    }
+    fn __options_of0(
+        group: &mut __Options0,
+        number: usize,
+    ) -> __private::Option<&mut dyn __private::Any> {
+        match number {
+            0usize => __private::Some(&mut group.sensor_battery),
+            1usize => __private::Some(&mut group.sensor_base_imu),
+            2usize => __private::Some(&mut group.sensor_base_pan_encoder),
+            3usize => __private::Some(&mut group.sensor_base_imu_tilt),
+            4usize => __private::Some(&mut group.estimator_base_pose),
+            5usize => __private::Some(&mut group.actuator_base_pan_servo),
+            6usize => __private::Some(&mut group.controller_stability),
+            7usize => __private::Some(&mut group.bridge_ros),
+            8usize => __private::Some(&mut group.command_arm),
+            9usize => __private::Some(&mut group.command_move_to),
+            10usize => __private::Some(&mut group.command_stop),
+            _ => __private::None,
+        }
+    }
+    fn __declared_sensor_base_imu() -> <__Rover__sensor_base_imu as ::bb_core::Sensor>::Options {
+        let mut __options: <__Rover__given__sensor_base_imu as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+        __options.bus = ::bb_core::__private::FromText::from_text("i2c-1");
+        __private::as_known(__options)
+    }
+    fn __declared_sensor_base_pan_encoder() -> <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options {
+        let mut __options: <__Rover__given__sensor_base_pan_encoder as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+        __options.id = 3;
+        __private::as_known(__options)
+    }
+    fn __declared_sensor_base_imu_tilt() -> <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options {
+        let __options: <__Rover__given__sensor_base_imu_tilt as ::bb_core::Estimator>::Options = ::bb_core::Options::defaults();
+        __private::as_known(__options)
+    }
+    fn __declared_actuator_base_pan_servo() -> <__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options {
+        let mut __options: <__Rover__given__actuator_base_pan_servo as ::bb_core::Actuator>::Options = ::bb_core::Options::defaults();
+        __options.id = 3;
+        __private::as_known(__options)
+    }
+    fn __declared_bridge_ros() -> <__Rover__bridge_ros as ::bb_core::Service>::Options {
+        let mut __options: <__Rover__given__bridge_ros as ::bb_core::Service>::Options = ::bb_core::Options::defaults();
+        __options.port = 1;
+        __private::as_known(__options)
+    }
+    fn __declared_command_move_to() -> <__Rover__command_move_to as ::bb_core::Command>::Options {
+        let mut __options: <__Rover__given__command_move_to as ::bb_core::Command>::Options = ::bb_core::Options::defaults();
+        __options.speed = __private::FromQuantity::from_quantity(1f64);
+        __private::as_known(__options)
+    }
+    pub struct __Wiring {
+        topics: __Topics,
+        islands: __Islands,
+        actuators: __Actuators,
+        environment: __private::Environment,
+    }
+    pub struct __Topics {
+        g0: __Topics0,
+    }
+    fn __new_topics() -> __Topics {
+        __Topics { g0: __new_topics0() }
+    }
+    pub struct __Topics0 {
+        sensor_battery: __private::Topic<
+            <__Rover__sensor_battery as ::bb_core::Sensor>::Output,
+        >,
+        controller_stability: __private::Topic<
+            <__Rover__controller_stability as ::bb_core::Service>::Output,
+        >,
+        bridge_ros: __private::Topic<
+            <__Rover__bridge_ros as ::bb_core::Service>::Output,
+        >,
+        sensor_base_imu: __private::Topic<
+            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+        >,
+        sensor_base_imu_tilt: __private::Topic<__Rover__payload__sensor_base_imu_tilt>,
+        estimator_base_pose_pose: __private::Topic<
+            __Rover__payload__estimator_base_pose_pose,
+        >,
+        nav_velocity: __private::Topic<__Rover__payload__nav_velocity>,
+        sensor_base_pan_encoder: __private::Topic<
+            <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+        >,
+    }
+    fn __new_topics0() -> __Topics0 {
+        __Topics0 {
+            sensor_battery: __private::Topic::new("sensor/battery"),
+            controller_stability: __private::Topic::new("controller/stability"),
+            bridge_ros: __private::Topic::new("bridge/ros"),
+            sensor_base_imu: __private::Topic::new("sensor/base/imu"),
+            sensor_base_imu_tilt: __private::Topic::new("sensor/base/imu/tilt"),
+            estimator_base_pose_pose: __private::Topic::new("estimator/base/pose/pose"),
+            nav_velocity: __private::Topic::new("nav/velocity"),
+            sensor_base_pan_encoder: __private::Topic::new("sensor/base/pan/encoder"),
+        }
+    }
+    pub struct __Islands {
+        g0: __Islands0,
+    }
+    fn __new_islands(options: &__Options, assembly: &__private::Assembly) -> __Islands {
+        __Islands {
+            g0: __new_islands0(options, assembly),
+        }
+    }
+    pub struct __Islands0 {
+        sensor_base_imu_tilt: __private::Island<__Island_sensor_base_imu_tilt>,
+        estimator_base_pose: __private::Island<__Island_estimator_base_pose>,
+    }
+    fn __new_islands0(
+        options: &__Options,
+        assembly: &__private::Assembly,
+    ) -> __Islands0 {
+        __Islands0 {
+            sensor_base_imu_tilt: __private::Island::new(__Island_sensor_base_imu_tilt {
+                sensor_base_imu_tilt: __private::start::<
+                    __Rover__member__sensor_base_imu_tilt,
+                >(
+                    &options.g0.sensor_base_imu_tilt,
+                    __private::Binding {
+                        apply: |
+                            options: &mut <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+                            values: &__private::ParameterValues|
+                        {
+                            options.beta = __private::FromParameter::from_parameter(
+                                values.get::<f64>(0usize),
+                            );
+                        },
+                        parameters: &[0usize],
+                    },
+                    assembly.environment(),
+                ),
+            }),
+            estimator_base_pose: __private::Island::new(__Island_estimator_base_pose {
+                estimator_base_pose: __private::start::<
+                    __Rover__member__estimator_base_pose,
+                >(
+                    &options.g0.estimator_base_pose,
+                    __private::Binding::NONE,
+                    assembly.environment(),
+                ),
+            }),
+        }
+    }
+    pub struct __Actuators {
+        g0: __Actuators0,
+    }
+    fn __new_actuators(
+        options: &__Options,
+        assembly: &__private::Assembly,
+    ) -> __Actuators {
+        __Actuators {
+            g0: __new_actuators0(options, assembly),
+        }
+    }
+    pub struct __Actuators0 {
+        actuator_base_pan_servo: __private::ActuatorNode<
+            __Rover__actuator_base_pan_servo,
+        >,
+    }
+    fn __new_actuators0(
+        options: &__Options,
+        assembly: &__private::Assembly,
+    ) -> __Actuators0 {
+        __Actuators0 {
+            actuator_base_pan_servo: __private::ActuatorNode::<
+                __Rover__actuator_base_pan_servo,
+            >::new(
+                0usize,
+                &__ACTUATORS[0usize],
+                &options.g0.actuator_base_pan_servo,
+                __private::Binding::NONE,
+                assembly,
+            ),
+        }
+    }
+    fn __actuator(
+        whole: &__Actuators,
+        number: usize,
+    ) -> __private::Option<&dyn __private::AnyActuator> {
+        match number / 16usize {
+            0usize => __actuator0(&whole.g0, number % 16usize),
+            _ => __private::None,
+        }
+    }
+    fn __actuator0(
+        group: &__Actuators0,
+        number: usize,
+    ) -> __private::Option<&dyn __private::AnyActuator> {
+        match number {
+            0usize => __private::Some(&group.actuator_base_pan_servo),
+            _ => __private::None,
+        }
+    }
+    fn __topic(
+        whole: &__Topics,
+        number: usize,
+    ) -> __private::Option<&dyn __private::AnyTopic> {
+        match number / 16usize {
+            0usize => __topic0(&whole.g0, number % 16usize),
+            _ => __private::None,
+        }
+    }
+    fn __topic0(
+        group: &__Topics0,
+        number: usize,
+    ) -> __private::Option<&dyn __private::AnyTopic> {
+        match number {
+            0usize => __private::Some(&group.sensor_battery),
+            1usize => __private::Some(&group.controller_stability),
+            2usize => __private::Some(&group.bridge_ros),
+            3usize => __private::Some(&group.sensor_base_imu),
+            4usize => __private::Some(&group.sensor_base_imu_tilt),
+            5usize => __private::Some(&group.estimator_base_pose_pose),
+            6usize => __private::Some(&group.nav_velocity),
+            7usize => __private::Some(&group.sensor_base_pan_encoder),
+            _ => __private::None,
+        }
+    }
+    static __ISLANDS: [__private::IslandOf<__Wiring>; 2usize] = [
+        __private::island_of::<__Island_sensor_base_imu_tilt>,
+        __private::island_of::<__Island_estimator_base_pose>,
+    ];
+    impl __private::IslandWiring for __Wiring {
+        #[inline]
+        fn environment(&self) -> &__private::Environment {
+            &self.environment
+        }
+    }
+    impl __Wiring {
+        #[inline]
+        fn sensor_battery(
+            &self,
+            message: &__private::Stamped<
+                <__Rover__sensor_battery as ::bb_core::Sensor>::Output,
+            >,
+            now: __private::MonotonicTime,
+        ) {
+            let line = self
+                .environment
+                .publish(0usize, &self.topics.g0.sensor_battery, message, now);
+        }
+        #[inline]
+        fn controller_stability(
+            &self,
+            message: &__private::Stamped<
+                <__Rover__controller_stability as ::bb_core::Service>::Output,
+            >,
+            now: __private::MonotonicTime,
+        ) {
+            let line = self
+                .environment
+                .publish(1usize, &self.topics.g0.controller_stability, message, now);
+        }
+        #[inline]
+        fn bridge_ros(
+            &self,
+            message: &__private::Stamped<
+                <__Rover__bridge_ros as ::bb_core::Service>::Output,
+            >,
+            now: __private::MonotonicTime,
+        ) {
+            let line = self
+                .environment
+                .publish(2usize, &self.topics.g0.bridge_ros, message, now);
+        }
+        #[inline]
+        fn sensor_base_imu(
+            &self,
+            message: &__private::Stamped<
+                <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+            >,
+            now: __private::MonotonicTime,
+        ) {
+            let line = self
+                .environment
+                .publish(3usize, &self.topics.g0.sensor_base_imu, message, now);
+            __private::enter::<
+                __Island_sensor_base_imu_tilt,
+                _,
+            >(
+                self,
+                now,
+                __private::Key {
+                    entry: 7usize,
+                    line: line,
+                },
+                message,
+                <__Island_sensor_base_imu_tilt as __private::IslandState>::deliver,
+                __private::identity,
+            );
+            __private::enter::<
+                __Island_estimator_base_pose,
+                _,
+            >(
+                self,
+                now,
+                __private::Key {
+                    entry: 7usize,
+                    line: line,
+                },
+                message,
+                __Island_estimator_base_pose::sensor_base_imu,
+                __Message_estimator_base_pose::sensor_base_imu,
+            );
+        }
+        #[inline]
+        fn sensor_base_pan_encoder(
+            &self,
+            message: &__private::Stamped<
+                <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+            >,
+            now: __private::MonotonicTime,
+        ) {
+            let line = self
+                .environment
+                .publish(7usize, &self.topics.g0.sensor_base_pan_encoder, message, now);
+            __private::enter::<
+                __Island_estimator_base_pose,
+                _,
+            >(
+                self,
+                now,
+                __private::Key {
+                    entry: 14usize,
+                    line: line,
+                },
+                message,
+                __Island_estimator_base_pose::sensor_base_pan_encoder__kept,
+                __Message_estimator_base_pose::sensor_base_pan_encoder__kept,
+            );
+        }
+    }
+    type __input__sensor_base_imu_tilt = <<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Nested;
+    impl __private::Member for __Rover__member__sensor_base_imu_tilt {
+        type State = __Island_sensor_base_imu_tilt;
+        type Estimator = __Rover__sensor_base_imu_tilt;
+        const NUMBER: usize = 0usize;
+        #[inline(always)]
+        fn node(
+            island: &mut __Island_sensor_base_imu_tilt,
+        ) -> &mut __private::Node<__Rover__sensor_base_imu_tilt> {
+            &mut island.sensor_base_imu_tilt
+        }
+        #[inline]
+        fn publish(
+            wiring: &__Wiring,
+            island: &mut __Island_sensor_base_imu_tilt,
+            emitted: &mut __private::Option<
+                <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
+            >,
+            stamp: __private::Stamp,
+            turn: &__private::Turn<'_>,
+        ) {
+            if let __private::Some(payload) = <<<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as __private::EmittedAt<
+                _,
+            >>::take(emitted) {
+                let message = &stamp.message(payload);
+                turn.emit(4usize, &wiring.topics.g0.sensor_base_imu_tilt, message);
+                __private::enter::<
+                    __Island_estimator_base_pose,
+                    _,
+                >(
+                    wiring,
+                    turn.now(),
+                    __private::Key {
+                        entry: 8usize,
+                        line: 0,
+                    },
+                    message,
+                    __Island_estimator_base_pose::sensor_base_imu_tilt__kept,
+                    __Message_estimator_base_pose::sensor_base_imu_tilt__kept,
+                );
+            }
+        }
+    }
+    type __input__estimator_base_pose__imu = ::bb_core::__private::At<
+        {
+            ::bb_core::__private::find_input::<
+                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+            >("imu")
+        },
+    >;
+    type __input__estimator_base_pose__tilt = ::bb_core::__private::At<
+        {
+            ::bb_core::__private::find_input::<
+                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+            >("tilt")
+        },
+    >;
+    type __input__estimator_base_pose__wheel = ::bb_core::__private::At<
+        {
+            ::bb_core::__private::find_input::<
+                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+            >("wheel")
+        },
+    >;
+    impl __private::Member for __Rover__member__estimator_base_pose {
+        type State = __Island_estimator_base_pose;
+        type Estimator = __Rover__estimator_base_pose;
+        const NUMBER: usize = 1usize;
+        #[inline(always)]
+        fn node(
+            island: &mut __Island_estimator_base_pose,
+        ) -> &mut __private::Node<__Rover__estimator_base_pose> {
+            &mut island.estimator_base_pose
+        }
+        #[inline]
+        fn publish(
+            wiring: &__Wiring,
+            island: &mut __Island_estimator_base_pose,
+            emitted: &mut __private::Option<
+                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+            >,
+            stamp: __private::Stamp,
+            turn: &__private::Turn<'_>,
+        ) {
+            if let __private::Some(payload) = <::bb_core::__private::At<
+                {
+                    ::bb_core::__private::find_output::<
+                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                    >("pose")
+                },
+            > as __private::EmittedAt<_>>::take(emitted) {
+                let message = &stamp.message(payload);
+                turn.emit(5usize, &wiring.topics.g0.estimator_base_pose_pose, message);
+            }
+            if let __private::Some(payload) = <::bb_core::__private::At<
+                {
+                    ::bb_core::__private::find_output::<
+                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                    >("velocity")
+                },
+            > as __private::EmittedAt<_>>::take(emitted) {
+                let message = &stamp.message(payload);
+                turn.emit(6usize, &wiring.topics.g0.nav_velocity, message);
+            }
+        }
+        fn cache() -> <<__Rover__estimator_base_pose as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Cache {
+            let mut cache = __private::Default::default();
+            __private::declare::<
+                __input__estimator_base_pose__imu,
+                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+            >(&mut cache, &__ESTIMATORS[1usize], 0usize);
+            __private::declare::<
+                __input__estimator_base_pose__tilt,
+                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+            >(&mut cache, &__ESTIMATORS[1usize], 1usize);
+            __private::declare::<
+                __input__estimator_base_pose__wheel,
+                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+            >(&mut cache, &__ESTIMATORS[1usize], 2usize);
+            cache
+        }
+        fn emitted(
+            output: usize,
+            message: &__private::DynamicMessage,
+        ) -> __private::Option<
+            <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+        > {
+            match output {
+                0usize => {
+                    __private::alone::<
+                        ::bb_core::__private::At<
+                            {
+                                ::bb_core::__private::find_output::<
+                                    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                                >("pose")
+                            },
+                        >,
+                        _,
+                    >(message)
+                }
+                1usize => {
+                    __private::alone::<
+                        ::bb_core::__private::At<
+                            {
+                                ::bb_core::__private::find_output::<
+                                    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                                >("velocity")
+                            },
+                        >,
+                        _,
+                    >(message)
+                }
+                _ => __private::None,
+            }
+        }
+    }
+    struct __Island_sensor_base_imu_tilt {
+        sensor_base_imu_tilt: __private::Node<__Rover__sensor_base_imu_tilt>,
+    }
+    impl __private::IslandState for __Island_sensor_base_imu_tilt {
+        type Wiring = __Wiring;
+        type Message = __private::Stamped<
+            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+        >;
+        const DECLARATION: __private::IslandDeclaration = __private::IslandDeclaration {
+            number: 0usize,
+            name: "sensor/base/imu/tilt",
+            worker: __private::None,
+            is_measured: true,
+            estimators: &[0usize],
+            inlets: &[
+                __private::InletDeclaration {
+                    entry: 7usize,
+                    inputs: &[(0usize, 0usize)],
+                },
+            ],
+        };
+        #[inline(always)]
+        fn find(wiring: &__Wiring) -> &__private::Island<Self> {
+            &wiring.islands.g0.sensor_base_imu_tilt
+        }
+        #[inline]
+        fn deliver(
+            &mut self,
+            wiring: &__Wiring,
+            message: &__private::Stamped<
+                <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+            >,
+            turn: &__private::Turn<'_>,
+        ) {
+            __private::receive::<
+                __Rover__member__sensor_base_imu_tilt,
+                __input__sensor_base_imu_tilt,
+            >(
+                self,
+                wiring,
+                0usize,
+                <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
+                    <__input__sensor_base_imu_tilt as __private::TakenAt<
+                        <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
+                    >>::Payload,
+                    {
+                        __private::both_known::<
+                            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+                            <__input__sensor_base_imu_tilt as __private::TakenAt<
+                                <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
+                            >>::Payload,
+                        >()
+                    },
+                >>::feed(message),
+                turn,
+            );
+        }
+        fn act(
+            &mut self,
+            wiring: &__Wiring,
+            estimator: usize,
+            act: __private::Act<'_, '_>,
+        ) -> bool {
+            match estimator {
+                0usize => {
+                    __private::act::<
+                        __Rover__member__sensor_base_imu_tilt,
+                    >(self, wiring, act)
+                }
+                _ => false,
+            }
+        }
+    }
+    struct __Island_estimator_base_pose {
+        estimator_base_pose: __private::Node<__Rover__estimator_base_pose>,
+    }
+    #[allow(non_camel_case_types, clippy::large_enum_variant)]
+    enum __Message_estimator_base_pose {
+        sensor_base_imu(
+            __private::Stamped<<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output>,
+        ),
+        sensor_base_imu_tilt__kept(
+            __private::Stamped<__Rover__payload__sensor_base_imu_tilt>,
+        ),
+        sensor_base_pan_encoder__kept(
+            __private::Stamped<
+                <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+            >,
+        ),
+    }
+    impl __Island_estimator_base_pose {
+        #[inline]
+        fn sensor_base_imu(
+            &mut self,
+            wiring: &__Wiring,
+            message: &__private::Stamped<
+                <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+            >,
+            turn: &__private::Turn<'_>,
+        ) {
+            __private::receive::<
+                __Rover__member__estimator_base_pose,
+                __input__estimator_base_pose__imu,
+            >(
+                self,
+                wiring,
+                0usize,
+                <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
+                    <__input__estimator_base_pose__imu as __private::TakenAt<
+                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                    >>::Payload,
+                    {
+                        __private::both_known::<
+                            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+                            <__input__estimator_base_pose__imu as __private::TakenAt<
+                                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                            >>::Payload,
+                        >()
+                    },
+                >>::feed(message),
+                turn,
+            );
+        }
+        #[inline]
+        fn sensor_base_imu_tilt__kept(
+            &mut self,
+            wiring: &__Wiring,
+            message: &__private::Stamped<__Rover__payload__sensor_base_imu_tilt>,
+            turn: &__private::Turn<'_>,
+        ) {
+            __private::receive::<
+                __Rover__member__estimator_base_pose,
+                __input__estimator_base_pose__tilt,
+            >(
+                self,
+                wiring,
+                1usize,
+                <__Rover__payload__sensor_base_imu_tilt as __private::Feeds<
+                    <__input__estimator_base_pose__tilt as __private::TakenAt<
+                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                    >>::Payload,
+                    {
+                        __private::both_known::<
+                            __Rover__payload__sensor_base_imu_tilt,
+                            <__input__estimator_base_pose__tilt as __private::TakenAt<
+                                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                            >>::Payload,
+                        >()
+                    },
+                >>::feed(message),
+                turn,
+            );
+        }
+        #[inline]
+        fn sensor_base_pan_encoder__kept(
+            &mut self,
+            wiring: &__Wiring,
+            message: &__private::Stamped<
+                <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+            >,
+            turn: &__private::Turn<'_>,
+        ) {
+            __private::receive::<
+                __Rover__member__estimator_base_pose,
+                __input__estimator_base_pose__wheel,
+            >(
+                self,
+                wiring,
+                2usize,
+                <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as __private::Feeds<
+                    <__input__estimator_base_pose__wheel as __private::TakenAt<
+                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                    >>::Payload,
+                    {
+                        __private::both_known::<
+                            <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+                            <__input__estimator_base_pose__wheel as __private::TakenAt<
+                                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                            >>::Payload,
+                        >()
+                    },
+                >>::feed(message),
+                turn,
+            );
+        }
+    }
+    impl __private::IslandState for __Island_estimator_base_pose {
+        type Wiring = __Wiring;
+        type Message = __Message_estimator_base_pose;
+        const DECLARATION: __private::IslandDeclaration = __private::IslandDeclaration {
+            number: 1usize,
+            name: "estimator/base/pose",
+            worker: __private::Some(__private::WorkerDeclaration {
+                priority: __private::Some(80u8),
+                core: __private::None,
+            }),
+            is_measured: false,
+            estimators: &[1usize],
+            inlets: &[
+                __private::InletDeclaration {
+                    entry: 7usize,
+                    inputs: &[(1usize, 0usize)],
+                },
+                __private::InletDeclaration {
+                    entry: 8usize,
+                    inputs: &[(1usize, 1usize)],
+                },
+                __private::InletDeclaration {
+                    entry: 14usize,
+                    inputs: &[(1usize, 2usize)],
+                },
+            ],
+        };
+        #[inline(always)]
+        fn find(wiring: &__Wiring) -> &__private::Island<Self> {
+            &wiring.islands.g0.estimator_base_pose
+        }
+        #[inline]
+        fn deliver(
+            &mut self,
+            wiring: &__Wiring,
+            message: &__Message_estimator_base_pose,
+            turn: &__private::Turn<'_>,
+        ) {
+            match message {
+                __Message_estimator_base_pose::sensor_base_imu(message) => {
+                    self.sensor_base_imu(wiring, message, turn)
+                }
+                __Message_estimator_base_pose::sensor_base_imu_tilt__kept(message) => {
+                    self.sensor_base_imu_tilt__kept(wiring, message, turn)
+                }
+                __Message_estimator_base_pose::sensor_base_pan_encoder__kept(message) => {
+                    self.sensor_base_pan_encoder__kept(wiring, message, turn)
+                }
+            }
+        }
+        fn act(
+            &mut self,
+            wiring: &__Wiring,
+            estimator: usize,
+            act: __private::Act<'_, '_>,
+        ) -> bool {
+            match estimator {
+                1usize => {
+                    __private::act::<
+                        __Rover__member__estimator_base_pose,
+                    >(self, wiring, act)
+                }
+                _ => false,
+            }
+        }
+    }
+    fn __open_group_0(
+        wiring: &__private::Arc<__Wiring>,
+        options: &__Options,
+        assembly: &__private::Assembly,
+        sources: &mut __private::Vec<__private::Box<dyn __private::Source>>,
+    ) {
+        assembly
+            .source::<
+                Rover,
+                __private::AsSensor<__Rover__sensor_battery>,
+            >(
+                &__SENSORS[0usize],
+                &options.g0.sensor_battery,
+                __private::Binding::NONE,
+                wiring,
+                __Wiring::sensor_battery,
+                sources,
+            );
+        assembly
+            .source::<
+                Rover,
+                __private::AsSensor<__Rover__sensor_base_pan_encoder>,
+            >(
+                &__SENSORS[2usize],
+                &options.g0.sensor_base_pan_encoder,
+                __private::Binding::NONE,
+                wiring,
+                __Wiring::sensor_base_pan_encoder,
+                sources,
+            );
+        assembly
+            .source::<
+                Rover,
+                __private::AsSensor<__Rover__sensor_base_imu>,
+            >(
+                &__SENSORS[1usize],
+                &options.g0.sensor_base_imu,
+                __private::Binding::NONE,
+                wiring,
+                __Wiring::sensor_base_imu,
+                sources,
+            );
+        assembly
+            .source::<
+                Rover,
+                __private::AsService<__Rover__controller_stability>,
+            >(
+                &__SERVICES[0usize],
+                &options.g0.controller_stability,
+                __private::Binding::NONE,
+                wiring,
+                __Wiring::controller_stability,
+                sources,
+            );
+        assembly
+            .source::<
+                Rover,
+                __private::AsService<__Rover__bridge_ros>,
+            >(
+                &__SERVICES[1usize],
+                &options.g0.bridge_ros,
+                __private::Binding::NONE,
+                wiring,
+                __Wiring::bridge_ros,
+                sources,
+            );
+    }
+    impl ::bb_core::Robot for Rover {
+        const NAME: &'static str = "Rover";
+        const TOPOLOGY: &'static __private::Topology = &__TOPOLOGY;
+        const SENSORS: &'static [__private::SensorDeclaration] = &__SENSORS;
+        const ESTIMATORS: &'static [__private::EstimatorDeclaration] = &__ESTIMATORS;
+        const ACTUATORS: &'static [__private::ActuatorDeclaration] = &__ACTUATORS;
+        const SERVICES: &'static [__private::SensorDeclaration] = &__SERVICES;
+        const STATES: &'static [&'static str] = &["degraded"];
+        const CATEGORIES: &'static [__private::CategoryDeclaration] = &__CATEGORIES;
+        const COMMANDS: &'static [__private::CommandDeclaration] = &__COMMANDS;
+        const PARAMETERS: &'static [__private::ParameterDeclaration] = &__PARAMETERS;
+        const ISLANDS: &'static [__private::IslandOf<__Wiring>] = &__ISLANDS;
+        type Options = __Options;
+        type Topics = __Topics;
+        type Wiring = __Wiring;
+        fn options() -> __Options {
+            __declared_options()
+        }
+        fn topics() -> __Topics {
+            __new_topics()
+        }
+        fn wire(
+            topics: __Topics,
+            options: &__Options,
+            assembly: &__private::Assembly,
+        ) -> __Wiring {
+            __Wiring {
+                topics,
+                islands: __new_islands(options, assembly),
+                actuators: __new_actuators(options, assembly),
+                environment: __private::Clone::clone(assembly.environment()),
+            }
+        }
+        fn sources(
+            wiring: &__private::Arc<__Wiring>,
+            options: &__Options,
+            assembly: &__private::Assembly,
+        ) -> __private::Vec<__private::Box<dyn __private::Source>> {
+            let mut sources = __private::Vec::new();
+            __open_group_0(wiring, options, assembly, &mut sources);
+            sources
+        }
+        fn wired_topics(wiring: &__Wiring) -> &__Topics {
+            &wiring.topics
+        }
+        fn topic(
+            topics: &__Topics,
+            publisher: usize,
+        ) -> __private::Option<&dyn __private::AnyTopic> {
+            __topic(topics, publisher)
+        }
+        fn options_of(
+            options: &mut __Options,
+            component: usize,
+        ) -> __private::Option<&mut dyn __private::Any> {
+            __options_of(options, component)
+        }
+        fn actuator(
+            wiring: &__Wiring,
+            actuator: usize,
+        ) -> __private::Option<&dyn __private::AnyActuator> {
+            __actuator(&wiring.actuators, actuator)
+        }
+        fn feed(
+            wiring: &__Wiring,
+            publisher: usize,
+            message: &__private::DynamicMessage,
+            now: __private::MonotonicTime,
+        ) -> bool {
+            match publisher {
+                0usize => __private::feed(wiring, message, now, __Wiring::sensor_battery),
+                1usize => {
+                    __private::feed(wiring, message, now, __Wiring::controller_stability)
+                }
+                2usize => __private::feed(wiring, message, now, __Wiring::bridge_ros),
+                3usize => {
+                    __private::feed(wiring, message, now, __Wiring::sensor_base_imu)
+                }
+                7usize => {
+                    __private::feed(
+                        wiring,
+                        message,
+                        now,
+                        __Wiring::sensor_base_pan_encoder,
+                    )
+                }
+                _ => false,
+            }
+        }
+        fn commands(options: &__Options) -> __private::Vec<__private::Prepared> {
+            ::std::vec![
+                __private::Prepared::new:: < __Rover__command_arm > (& options.g0
+                .command_arm, __private::Binding::NONE), __private::Prepared::new:: <
+                __Rover__command_move_to > (& options.g0.command_move_to,
+                __private::Binding::NONE), __private::Prepared::new:: <
+                __Rover__command_stop > (& options.g0.command_stop,
+                __private::Binding::NONE)
+            ]
+        }
+    }
+};
+#[allow(unused_imports, unused_variables)]
+const _: () = {
+    use rover::sensor::base::imu as _;
+    use rover::sensor::base::imu::tilt as _;
+    use rover::sensor::base::pan::encoder as _;
+    use rover::param::imu::beta as _;
+    use rover::command::stop as _;
+    use rover::state::degraded as _;
+    use rover::category::motion as _;
+    {}
+    {
+        let imu = 1usize;
+        let tilt = 1usize;
+        let wheel = 1usize;
+    }
+};
+///Handles of what [`Rover`] declares, each at its path.
+#[allow(
+    missing_docs,
+    non_upper_case_globals,
+    non_snake_case,
+    dead_code,
+    private_interfaces,
+    unreachable_pub,
+    clippy::all
+)]
+pub mod rover {
+    #[allow(unused_imports)]
+    use super::{
+        __Rover_must_be_declared_outside_of_functions as _, Rover as __Robot,
+        __Rover__sensor_battery, __Rover__sensor_base_imu,
+        __Rover__sensor_base_pan_encoder, __Rover__sensor_base_imu_tilt,
+        __Rover__estimator_base_pose, __Rover__actuator_base_pan_servo,
+        __Rover__controller_stability, __Rover__bridge_ros, __Rover__command_arm,
+        __Rover__command_move_to, __Rover__command_stop,
+        __Rover__payload__sensor_base_imu_tilt,
+        __Rover__payload__estimator_base_pose_pose, __Rover__payload__nav_velocity,
+        __Rover__member__sensor_base_imu_tilt, __Rover__member__estimator_base_pose,
+    };
+    pub mod sensor {
+        ///`sensor/battery`
+        pub const battery: ::bb_core::__private::SensorHandle<
+            super::__Robot,
+            super::__Rover__sensor_battery,
+        > = ::bb_core::__private::SensorHandle::new(
+            "sensor/battery",
+            ::bb_core::__private::Frame::new(""),
+            0usize,
+            0usize,
+            <<super::__Robot as ::bb_core::Robot>::Wiring>::sensor_battery,
+        );
+        pub mod base {
+            /// Fixed to the body.
+            ///
+            ///`sensor/base/imu`
+            pub const imu: ::bb_core::__private::SensorHandle<
+                super::super::__Robot,
+                super::super::__Rover__sensor_base_imu,
+            > = ::bb_core::__private::SensorHandle::new(
+                "sensor/base/imu",
+                ::bb_core::__private::Frame::new("base"),
+                3usize,
+                1usize,
+                <<super::super::__Robot as ::bb_core::Robot>::Wiring>::sensor_base_imu,
+            );
+            pub mod pan {
+                ///`sensor/base/pan/encoder`
+                pub const encoder: ::bb_core::__private::SensorHandle<
+                    super::super::super::__Robot,
+                    super::super::super::__Rover__sensor_base_pan_encoder,
+                > = ::bb_core::__private::SensorHandle::new(
+                    "sensor/base/pan/encoder",
+                    ::bb_core::__private::Frame::new("pan"),
+                    7usize,
+                    2usize,
+                    <<super::super::super::__Robot as ::bb_core::Robot>::Wiring>::sensor_base_pan_encoder,
+                );
+            }
+            pub mod imu {
+                ///`sensor/base/imu/tilt`
+                pub const tilt: ::bb_core::__private::EstimatorHandle<
+                    super::super::super::__Robot,
+                    super::super::super::__Rover__sensor_base_imu_tilt,
+                    super::super::super::__Rover__payload__sensor_base_imu_tilt,
+                > = ::bb_core::__private::EstimatorHandle::new(
+                    "sensor/base/imu/tilt",
+                    0usize,
+                    4usize,
+                    3usize,
+                    ::bb_core::__private::visit::<
+                        super::super::super::__Rover__member__sensor_base_imu_tilt,
+                    >,
+                    ::core::marker::PhantomData,
+                );
+            }
+        }
+    }
+    pub mod estimator {
+        pub mod base {
+            ///`estimator/base/pose`
+            pub const pose: ::bb_core::__private::EstimatorOfSeveralHandle<
+                super::super::__Robot,
+                super::super::__Rover__estimator_base_pose,
+            > = ::bb_core::__private::EstimatorOfSeveralHandle::new(
+                "estimator/base/pose",
+                1usize,
+                4usize,
+                ::bb_core::__private::visit::<
+                    super::super::__Rover__member__estimator_base_pose,
+                >,
+            );
+            pub mod pose {
+                /// Where it is.
+                ///
+                ///`estimator/base/pose/pose`
+                pub const pose: ::bb_core::__private::OutputHandle<
+                    super::super::super::__Robot,
+                    super::super::super::__Rover__payload__estimator_base_pose_pose,
+                > = ::bb_core::__private::OutputHandle::new(
+                    "estimator/base/pose/pose",
+                    5usize,
+                    ::core::marker::PhantomData,
+                );
+            }
+        }
+    }
+    pub mod nav {
+        ///`nav/velocity`
+        pub const velocity: ::bb_core::__private::OutputHandle<
+            super::__Robot,
+            super::__Rover__payload__nav_velocity,
+        > = ::bb_core::__private::OutputHandle::new(
+            "nav/velocity",
+            6usize,
+            ::core::marker::PhantomData,
+        );
+    }
+    pub mod controller {
+        ///`controller/stability`
+        pub const stability: ::bb_core::__private::ControllerHandle<
+            super::__Robot,
+            super::__Rover__controller_stability,
+        > = ::bb_core::__private::ControllerHandle::new(
+            "controller/stability",
+            1usize,
+            6usize,
+            ::core::marker::PhantomData,
+        );
+    }
+    pub mod bridge {
+        ///`bridge/ros`
+        pub const ros: ::bb_core::__private::BridgeHandle<
+            super::__Robot,
+            super::__Rover__bridge_ros,
+        > = ::bb_core::__private::BridgeHandle::new(
+            "bridge/ros",
+            2usize,
+            7usize,
+            ::core::marker::PhantomData,
+        );
+    }
+    pub mod actuator {
+        pub mod base {
+            pub mod pan {
+                ///`actuator/base/pan/servo`
+                pub const servo: ::bb_core::__private::ActuatorHandle<
+                    super::super::super::__Robot,
+                    super::super::super::__Rover__actuator_base_pan_servo,
+                > = ::bb_core::__private::ActuatorHandle::new(
+                    "actuator/base/pan/servo",
+                    |
+                        wiring: &<super::super::super::__Robot as ::bb_core::Robot>::Wiring|
+                    &wiring.actuators.g0.actuator_base_pan_servo,
+                    5usize,
+                );
+            }
+        }
+    }
+    pub mod command {
+        ///`command/arm`
+        pub const arm: ::bb_core::__private::CommandHandle<
+            super::__Robot,
+            super::__Rover__command_arm,
+        > = ::bb_core::__private::CommandHandle::new(
+            "command/arm",
+            0usize,
+            8usize,
+            ::core::marker::PhantomData,
+        );
+        /// It moves.
+        ///
+        ///`command/move_to`
+        pub const move_to: ::bb_core::__private::CommandHandle<
+            super::__Robot,
+            super::__Rover__command_move_to,
+        > = ::bb_core::__private::CommandHandle::new(
+            "command/move_to",
+            1usize,
+            9usize,
+            ::core::marker::PhantomData,
+        );
+        ///`command/stop`
+        pub const stop: ::bb_core::__private::CommandHandle<
+            super::__Robot,
+            super::__Rover__command_stop,
+        > = ::bb_core::__private::CommandHandle::new(
+            "command/stop",
+            2usize,
+            10usize,
+            ::core::marker::PhantomData,
+        );
+    }
+    pub mod param {
+        pub mod imu {
+            /// How far each sample moves the estimate.
+            ///
+            ///`param/imu/beta`
+            pub const beta: ::bb_core::__private::ParameterHandle<
+                super::super::__Robot,
+                f64,
+            > = ::bb_core::__private::ParameterHandle::new(
+                "param/imu/beta",
+                0usize,
+                ::core::marker::PhantomData,
+            );
+        }
+    }
+    pub mod state {
+        pub const degraded: &str = "degraded";
+    }
+    pub mod category {
+        pub const motion: &str = "motion";
+    }
+}
