@@ -230,14 +230,27 @@ fn power(input: ParseStream<'_>) -> syn::Result<Unit> {
     factor(input, &symbol.to_string(), symbol.span())
 }
 
+/// The two units that are written as one word, `Nm`. Newtons alone: other first letters may be prefixes.
+fn product(name: &str) -> Option<(&str, &str)> {
+    let is_unit = |text: &str| UNITS.iter().any(|(unit, ..)| *unit == text);
+    let (first, second) = name.split_at_checked(1)?;
+    (first == "N" && is_unit(second)).then_some((first, second))
+}
+
 /// A symbol with its exponent, if it has one: `s`, `s^2`.
 fn factor(input: ParseStream<'_>, name: &str, place: Span) -> syn::Result<Unit> {
     // Keyboards have the micro sign, U+00B5, or the Greek letter, U+03BC.
     let name = name.replace('\u{3bc}', "\u{b5}");
     let Some((_, dimension, factor)) = UNITS.iter().find(|(unit, ..)| *unit == name) else {
-        let hint = match crate::names::nearest(&name, UNITS.iter().map(|(unit, ..)| *unit)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => "units are symbols, as in `m`, `s`, `deg` or `Hz`".to_owned(),
+        let symbols = || UNITS.iter().map(|(unit, ..)| *unit);
+        let in_other_case = symbols().find(|unit| unit.eq_ignore_ascii_case(&name));
+        let near = in_other_case.or_else(|| crate::names::nearest(&name, symbols()));
+        let hint = match (product(&name), near) {
+            (Some((first, second)), _) if in_other_case.is_none() => {
+                format!("a product is written with `*`: `{first}*{second}`")
+            }
+            (_, Some(near)) => format!("did you mean `{near}`?"),
+            (_, None) => "units are symbols, as in `m`, `s`, `deg` or `Hz`".to_owned(),
         };
         return Err(syn::Error::new(place, format!("unknown unit `{name}`; {hint}")));
     };

@@ -122,6 +122,10 @@ pub(super) fn semicolon(input: ParseStream<'_>, after: &str, notes: &mut Notes<'
 /// Reads the `:` behind `name`, in front of `what`.
 pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Result<()> {
     let place = input.span();
+    let is_type = name.to_string().starts_with(char::is_uppercase);
+    if is_type && let Ok(other) = input.fork().call(Ident::parse_any) {
+        return Err(syn::Error::new(place, format!("the name comes first, then the type: `{other}: {name}`")));
+    }
     let colon: syn::Result<Token![:]> = input.parse();
     colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }
@@ -165,6 +169,11 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
         notes.error(attribute, message.into());
     }
     let place = input.span();
+    let expected = if input.peek(Token![<]) {
+        "a robot is not written in XML; `topology: urdf(\"robot.urdf\");` takes links and joints from a URDF"
+    } else {
+        expected
+    };
     let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, expected))?;
     Ok(Some(Head { attributes, word }))
 }

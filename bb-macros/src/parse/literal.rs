@@ -43,6 +43,7 @@ impl Literal {
             let Quantity { value, dimension, has_unit, place } = Quantity::parse(input)?;
             return Ok(Self { value: Value::Number(value), dimension, has_unit, place });
         } else {
+            capitalized(&input.fork()).map_or(Ok(()), Err)?;
             match input.parse() {
                 Ok(Lit::Bool(value)) => Value::Bool(value.value),
                 Ok(Lit::Str(value)) => Value::Text(value.value()),
@@ -54,6 +55,17 @@ impl Literal {
         };
         Ok(Self { value, dimension: Dimension::NONE, has_unit: false, place: place_since(start, input) })
     }
+}
+
+/// The error for `True` and `False`, as Python writes them, if one starts here.
+pub(super) fn capitalized(input: ParseStream<'_>) -> Option<syn::Error> {
+    let word: Ident = input.parse().ok()?;
+    let lower = match &*word.to_string() {
+        "True" | "TRUE" => "true",
+        "False" | "FALSE" => "false",
+        _ => return None,
+    };
+    Some(syn::Error::new(word.span(), format!("`{word}` is written `{lower}`")))
 }
 
 /// The integer that stands here, if it has no unit and fits.

@@ -139,7 +139,8 @@ fn no_name_in_the_expansion_is_a_number() {
         let letters = word.trim_start_matches('_').trim_end_matches(|c: char| c.is_ascii_digit());
         letters.len() == 1 && letters.len() < word.trim_start_matches('_').len() && letters != "g"
     };
-    let numbered: Vec<&str> = words.filter(is_numbered).filter(|word| !["f64", "i64", "u64"].contains(word)).collect();
+    let numbered: Vec<&str> =
+        words.filter(is_numbered).filter(|word| !["f64", "i64", "u64"].contains(word)).collect();
     assert_eq!(numbered, [] as [&str; 0]);
 }
 
