@@ -31,6 +31,7 @@ mod part;
 mod references;
 mod robot_impl;
 mod stub;
+mod table;
 mod topology;
 mod types;
 mod wiring;
@@ -58,7 +59,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let wiring = wiring::wiring(verified, &types, &islands);
     let implementation = robot_impl::robot_impl(verified, &types);
     let references = references::references(verified);
-    let handles = handles::handles(&types, name, &verified.module, handles::Accessors::Wired);
+    let handles = handles::handles(&types, name, &verified.module, types::Accessors::Wired);
     quote! {
         #definition
         #aliases

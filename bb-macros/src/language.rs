@@ -8,9 +8,11 @@
 //! `EstimatorSetting` below, and give it its meaning in the model, whose `match` is exhaustive.
 
 mod foreign;
+mod joint_kind;
 mod measure;
 pub(crate) mod words;
 
+pub(crate) use joint_kind::JointKind;
 pub(crate) use measure::{Bounds, Measure};
 
 use crate::names::{did_you_mean, one_of};

@@ -78,9 +78,10 @@ pub(super) fn by_number(
     for (number, fields) in fields.chunks(SIZE).enumerate() {
         let (field, group, function) =
             (group_name(number), format_ident!("{name}{number}"), format_ident!("{function}{number}"));
-        let fields = fields.iter().enumerate().map(|(number, Field { name, .. })| {
-            quote!(#number => __private::Some(& #mutability group.#name),)
-        });
+        let fields = fields
+            .iter()
+            .enumerate()
+            .map(|(number, Field { name, .. })| quote!(#number => __private::Some(& #mutability group.#name),));
         groups.extend(quote! {
             fn #function(group: & #mutability #group, number: usize) -> __private::Option<& #mutability #object> {
                 match number { #(#fields)* _ => __private::None }

@@ -8,26 +8,16 @@ use super::group;
 use super::literal::ident;
 use super::options::parameter_type;
 use super::part::Part;
-use super::types::{Types, imports};
+use super::types::{Accessors, Types, imports};
 use super::{docs, path_text};
 use crate::model::{
-    ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, SensorId,
-    ServiceId,
+    ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, SensorId, ServiceId,
 };
 use crate::parse::ServiceKind;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::quote;
 use std::collections::{HashMap, HashSet};
 use syn::Attribute;
-
-/// How handles reach what they name.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Accessors {
-    /// Into the wiring.
-    Wired,
-    /// Nowhere: the robot has failed, and its handles only keep names and types.
-    Stub,
-}
 
 /// A module with handles and modules below it, in the order of declaration.
 #[derive(Default)]
@@ -196,8 +186,7 @@ impl Handle {
                     Accessors::Stub => quote!(|_, _, _| {}),
                 };
                 let (publisher, position) = (sensor.publisher, Part::Sensor(id).position(robot));
-                let arguments =
-                    quote!(::bb_core::__private::Frame::new(#frame), #publisher, #position, #publish);
+                let arguments = quote!(::bb_core::__private::Frame::new(#frame), #publisher, #position, #publish);
                 let kind = (quote!(SensorHandle), quote!(#this, #component));
                 (&sensor.attributes, &robot.publishers[sensor.publisher].path, kind, arguments)
             }
@@ -232,8 +221,7 @@ impl Handle {
                     ServiceKind::Controller => quote!(ControllerHandle),
                     ServiceKind::Bridge => quote!(BridgeHandle),
                 };
-                let (component, publisher, position) =
-                    (types.part(part), service.publisher, part.position(robot));
+                let (component, publisher, position) = (types.part(part), service.publisher, part.position(robot));
                 let kind = (handle, quote!(#this, #component));
                 let arguments = quote!(#publisher, #position, ::core::marker::PhantomData);
                 (&service.attributes, &service.path, kind, arguments)

@@ -45,7 +45,8 @@ impl Naming {
     pub(super) fn of(robot: &Robot, robot_name: &Ident) -> Self {
         let (mut taken_by_parts, mut taken_by_publishers) = (HashSet::new(), HashSet::new());
         let call_site = Span::call_site();
-        let item = |kind: &str, name: &Ident, span: Span| format_ident!("__{robot_name}__{kind}{name}", span = span);
+        let item =
+            |kind: &str, name: &Ident, span: Span| format_ident!("__{robot_name}__{kind}{name}", span = span);
         let parts = Part::all(robot).map(|part| {
             let name = fresh(part.path(robot), &mut taken_by_parts);
             let span = Place::of(&part.component(robot).kind).start.resolved_at(call_site);

@@ -3,11 +3,10 @@
 //! Each type that the user wrote is aliased once. The alias is then used at the span of the user's type, so that what
 //! rustc has to say of it is said there, and once.
 
-use super::handles::Accessors;
+use super::group;
 use super::literal::{ident, respan};
 use super::naming::{Naming, PartNames};
 use super::part::Part;
-use super::group;
 use crate::model::{EstimatorId, From, Id as _, PublisherId, Robot, SensorId};
 use crate::parse::Component;
 use proc_macro2::{Ident, Span, TokenStream};
@@ -32,8 +31,7 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
         From::Estimator(estimator, output) => {
             let (field, emitted) = (types.output_field(estimator, output), types.estimator_output(estimator));
             let span = types.span(Part::Estimator(estimator));
-            let payload =
-                quote_spanned!(span=> <#field as ::bb_core::__private::EmittedAt<#emitted>>::Payload);
+            let payload = quote_spanned!(span=> <#field as ::bb_core::__private::EmittedAt<#emitted>>::Payload);
             Some((types.naming.publisher(id).payload.clone(), payload))
         }
         From::Sensor(_) | From::Service(_) => None,
@@ -57,6 +55,15 @@ pub(super) fn members(types: &Types<'_>) -> TokenStream {
             enum #members {}
         )*
     }
+}
+
+/// How handles reach what they name.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Accessors {
+    /// Into the wiring.
+    Wired,
+    /// Nowhere: the robot has failed, and its handles only keep names and types.
+    Stub,
 }
 
 /// The robot's type in its module.

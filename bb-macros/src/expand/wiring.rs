@@ -293,9 +293,9 @@ impl<'a> Wiring<'a> {
     /// The alias of an input's field.
     fn field(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
         let estimator = &self.types.model().estimators[id];
-        let name = input.and_then(|input| estimator.inputs.get(input)).map_or_else(String::new, |input| {
-            format!("__{}", crate::names::text(&input.name))
-        });
+        let name = input
+            .and_then(|input| estimator.inputs.get(input))
+            .map_or_else(String::new, |input| format!("__{}", crate::names::text(&input.name)));
         let field = format_ident!("__input__{}{}", self.types.name_of(Part::Estimator(id)), name);
         quote!(#field)
     }
@@ -382,7 +382,8 @@ impl<'a> Wiring<'a> {
             (self.output_field(id, publisher), types.payload(publisher), types.topic_place(publisher));
         let calls = visits(&self.consumers[publisher], self.islands).into_iter().map(|visit| {
             if visit.island == own {
-                let receives = visit.consumers.iter().map(|consumer| self.receive(&payload, consumer, &quote!(island)));
+                let receives =
+                    visit.consumers.iter().map(|consumer| self.receive(&payload, consumer, &quote!(island)));
                 return quote!(#(#receives)*);
             }
             self.enter(publisher, &visit, quote!(wiring), quote!(turn.now()), quote!(0))
