@@ -4,7 +4,7 @@
 //! pub struct Rover;                                    // the robot's type
 //! impl Rover { pub fn builder() … }                    // so that no trait need be in scope
 //! type __Rover__sensor_base_imu = Bmi270;              // one alias per component: its type is named once
-//! enum __Rover__member__sensor_base_imu_tilt {}        // what stands for an estimator in its island
+//! enum __Rover__member__sensor_base_imu_tilt {}        // the marker of an estimator in its island
 //! const _: () = {
 //!     …                                                // constants that check type facts at the user's tokens
 //!     static __SENSORS, __ESTIMATORS, …                // what was declared, as data
@@ -13,7 +13,7 @@
 //!     impl __Wiring { fn sensor_base_imu(&self, …) }   // what is downstream of each publisher, by direct calls
 //!     impl Robot for Rover { … }
 //! };
-//! const _: () = { use rover::… as _; … };              // what the user refers to, for his editor
+//! const _: () = { use rover::… as _; … };              // what the user refers to, for the editor
 //! pub mod rover { … }                                  // a handle per publisher, at its path
 //! ```
 

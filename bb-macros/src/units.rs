@@ -8,7 +8,7 @@ use syn::{LitInt, Token};
 
 /// Exponents of metre, kilogram, second, ampere, kelvin and radian.
 ///
-/// An angle counts as a dimension, so that degrees cannot stand where a plain number or a length belongs.
+/// An angle counts as a dimension, so that degrees are refused for a plain number or a length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dimension(pub(crate) [i8; 6]);
 
@@ -171,7 +171,7 @@ pub(crate) fn time_text(seconds: f64) -> String {
         s if s >= 1e-6 => (1e6, "us"),
         _ => (1e9, "ns"),
     };
-    // Three digits behind the point, without zeros at the end; an error in the last place of the double is no more.
+    // Three decimals, without trailing zeros: that hides an error in the last place of the double.
     let number = format!("{:.3}", (seconds * factor * 1e3 - 1e-6).ceil() / 1e3);
     let number = number.trim_end_matches('0').trim_end_matches('.');
     format!("{number} {unit}")
@@ -188,7 +188,7 @@ impl Unit {
     const ONE: Self = Self { dimension: Dimension::NONE, factor: 1.0 };
     pub(crate) const SECOND: Self = Self { dimension: Dimension::TIME, factor: 1.0 };
 
-    /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` belongs to the symbol behind it alone.
+    /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` applies to the next symbol alone.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let first = power(input)?;
         Self::ONE.times(first, 1).rest(input)

@@ -46,7 +46,7 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     aliases.collect()
 }
 
-/// `enum __Rover__member__sensor_base_imu_tilt {}`: what stands for an estimator in its island.
+/// `enum __Rover__member__sensor_base_imu_tilt {}`: the marker of an estimator in its island.
 pub(super) fn members(types: &Types<'_>) -> TokenStream {
     let members = types.robot.estimators.ids().map(|id| types.member_item(id));
     quote! {
@@ -103,7 +103,7 @@ pub(super) fn type_name(component: &Component) -> String {
     component.kind.segments.last().map_or(String::new(), |segment| segment.ident.to_string())
 }
 
-/// Names types from the module where the robot stands, or from one below it.
+/// Names types from the module that the robot is declared in, or from one below it.
 #[derive(Clone)]
 pub(super) struct Types<'a> {
     robot: &'a Robot,
@@ -149,7 +149,7 @@ impl<'a> Types<'a> {
         group::path(id.number(), self.publisher(id))
     }
 
-    /// What stands for an estimator in its island.
+    /// The marker of an estimator in its island.
     fn member_item(&self, id: EstimatorId) -> &'a Ident {
         &self.names(Part::Estimator(id)).member
     }

@@ -525,7 +525,7 @@ fn island_of(types: &Types<'_>, islands: &Islands, publisher: PublisherId) -> Op
     }
 }
 
-/// What a message from outside is known by in the journal.
+/// The number by which the journal knows a publisher outside of an island.
 fn entry(publisher: PublisherId, runs: bool) -> usize {
     2 * publisher.number() + usize::from(runs)
 }

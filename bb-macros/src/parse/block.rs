@@ -67,7 +67,7 @@ pub(super) fn items<I: Words, S: Words>(
     });
 }
 
-/// The same where items start with a name; `expected` is the error for what is none.
+/// The same where items start with a name; `expected` is the error for anything else.
 pub(super) fn items_of(
     input: ParseStream<'_>,
     expected: &str,
@@ -119,7 +119,7 @@ pub(super) fn semicolon(input: ParseStream<'_>, after: &str, notes: &mut Notes<'
     skip_to_item(input);
 }
 
-/// Reads the `:` behind `name`, in front of `what`.
+/// Reads the `:` after `name`, before `what`.
 pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Result<()> {
     let place = input.span();
     let is_type = name.to_string().starts_with(char::is_uppercase);
@@ -130,7 +130,7 @@ pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Re
     colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }
 
-/// The tokens from `start` up to where `input` stands.
+/// The tokens from `start` up to the position of `input`.
 pub(super) fn place_since(start: Cursor<'_>, input: ParseStream<'_>) -> Place {
     let (mut cursor, mut place) = (start, Place::from(input.span()));
     while cursor != input.cursor()
@@ -151,7 +151,7 @@ pub(super) fn skip_to_item(input: ParseStream<'_>) {
     }
 }
 
-/// Whether an item starts here: with a word of the language, or a name with a `:` or with braces behind it.
+/// Whether an item starts here: with a word of the language, or a name followed by `:` or braces.
 pub(super) fn starts_item(input: ParseStream<'_>) -> bool {
     let is_word = input.fork().call(Ident::parse_any).map(|word| language::starts_item(&word.to_string()));
     let is_name = input.peek2(Token![:]) && !input.peek2(Token![::]) || input.peek2(syn::token::Brace);
@@ -207,7 +207,7 @@ fn skip(input: ParseStream<'_>) {
         match token {
             TokenTree::Punct(punct) if punct.as_char() == ';' => return,
             TokenTree::Group(group) if group.delimiter() == Delimiter::Brace => {
-                // A `;` behind braces, as in `origin: { … };`, belongs to the same item; `items` passes it over.
+                // A `;` after braces, as in `origin: { … };`, belongs to the same item; `items` passes it over.
                 return;
             }
             _ => {}

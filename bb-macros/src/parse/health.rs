@@ -6,7 +6,7 @@ use super::name::{one_name, whole};
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
 
-/// All that were written; each may stand once.
+/// All that were written; a rule reports a second one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reactions {
     pub(crate) on_degraded: Vec<Reaction>,

@@ -13,7 +13,7 @@ use syn::{Lit, Token};
 #[derive(Clone, Debug)]
 pub(crate) struct Literal {
     pub(crate) value: Value,
-    /// That of a number; what is none has none.
+    /// Dimension, if the literal is a number.
     pub(crate) dimension: Dimension,
     /// Whether a unit was written.
     pub(crate) has_unit: bool,
@@ -68,7 +68,7 @@ pub(super) fn capitalized(input: ParseStream<'_>) -> Option<syn::Error> {
     Some(syn::Error::new(word.span(), format!("`{word}` is written `{lower}`")))
 }
 
-/// The integer that stands here, if it has no unit and fits.
+/// The integer that comes next, if it has no unit and fits.
 fn integer(input: ParseStream<'_>) -> Option<i64> {
     let ahead = input.fork();
     let sign = if ahead.parse::<Option<Token![-]>>().ok()?.is_some() { "-" } else { "" };

@@ -29,7 +29,7 @@ pub(super) fn name(input: ParseStream<'_>, word: &Ident) -> syn::Result<Ident> {
     Ok(name)
 }
 
-/// Reads a name that is declared elsewhere; `expected` is the error for what is none.
+/// Reads a name that is declared elsewhere; `expected` is the error for anything else.
 pub(super) fn one_name(input: ParseStream<'_>, expected: &str) -> syn::Result<Ident> {
     let place = input.span();
     if input.peek(LitStr) {

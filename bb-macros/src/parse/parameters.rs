@@ -11,7 +11,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
-/// What stands in `parameters` or in a group of them.
+/// An item of `parameters`, or of a group in it.
 #[derive(Clone, Debug)]
 pub(crate) enum ParameterItem {
     Group { attributes: Vec<Attribute>, name: Ident, items: Vec<ParameterItem> },

@@ -24,7 +24,7 @@ impl Path {
         }
     }
 
-    /// Reads a path; `expected` is what it is one of, for the error if there is none.
+    /// Reads a path; `expected` names what the path is for, in the error if there is no path.
     pub(super) fn parse(input: ParseStream<'_>, expected: &str) -> syn::Result<Self> {
         let mut segments = vec![Self::segment(input, expected)?];
         while input.peek(Token![::]) {

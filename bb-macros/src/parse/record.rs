@@ -12,8 +12,8 @@ use syn::Token;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
-/// Reads the `{ field: value, … }` of a word; each field may be written once, in any order. `value` gets each field, the
-/// word that it is and as it is written.
+/// Reads the `{ field: value, … }` of a word; each field may be written once, in any order. `value` gets each field, its
+/// word and the identifier as written.
 pub(super) fn record<F: Words>(
     word: &Word,
     input: ParseStream<'_>,

@@ -9,7 +9,7 @@ use proc_macro2::Ident;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
-/// All that were written; each may stand once.
+/// All that were written; a rule reports a second one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CommandSettings {
     pub(crate) allowed_states: Vec<AllowedStates>,
