@@ -138,6 +138,10 @@ fn health(
     lost_after_s: Option<f64>,
     recover_after: u32,
 ) -> TokenStream {
+    let is_declared = latency_budget_s.is_some() || lost_after_s.is_some() || recover_after != 1;
+    if !is_declared && health.on_degraded.or(health.on_lost).or(health.on_recovered).is_none() {
+        return quote!(__private::HealthDeclaration::NONE);
+    }
     let [budget, lost] = [latency_budget_s, lost_after_s].map(|time| {
         option(time.map(|time| {
             let time = nanos(time);
@@ -173,8 +177,7 @@ pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
 fn nested_input(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let name = crate::names::text(&sensor.name);
     let path = path_text(&robot.publishers[sensor.publisher].path);
-    let identity = option(Some(quote!(__private::Transform::IDENTITY)));
-    input_declaration(0, &name, &path, true, false, [&option(None), &option(None)], &identity)
+    quote!(__private::InputDeclaration::nested(#name, #path))
 }
 
 fn input_declaration(
