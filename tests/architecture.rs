@@ -1,6 +1,7 @@
 //! What ARCHITECTURE.md claims: every path in it exists, and arrows between crates point one way.
 
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
@@ -171,7 +172,7 @@ fn names_are_found_in_paths_and_groups() {
 }
 
 /// All files of code below a folder, without those of tests.
-fn code_below(folder: &Path, files: &mut Vec<std::path::PathBuf>) {
+fn code_below(folder: &Path, files: &mut Vec<PathBuf>) {
     let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -192,7 +193,7 @@ fn folders_of_the_runtime_import_only_from_below() {
     let mut files = Vec::new();
     code_below(&source, &mut files);
     let mut upward = Vec::new();
-    let mut seen = std::collections::BTreeSet::new();
+    let mut seen = BTreeSet::new();
     for file in files {
         let inside = file.strip_prefix(&source).expect("it is below").to_string_lossy().into_owned();
         let folder = inside.split('/').next().unwrap_or("").trim_end_matches(".rs").to_owned();
@@ -216,4 +217,119 @@ fn folders_of_the_runtime_import_only_from_below() {
     }
     assert_eq!(seen.len(), LAYERS.len(), "every layer is there");
     assert!(upward.is_empty(), "{upward:#?}");
+}
+
+/// The modules of `bb-macros` by path, each with its code.
+fn modules_of_the_macros() -> BTreeMap<Vec<String>, String> {
+    let source = root().join("bb-macros/src");
+    let mut files = Vec::new();
+    code_below(&source, &mut files);
+    // That name is left out above for the model checker's.
+    code_below(&source.join("model"), &mut files);
+    files.push(source.join("model.rs"));
+    let module = |file: PathBuf| {
+        let inside = file.strip_prefix(&source).expect("it is below").with_extension("");
+        let path: Vec<String> = inside.iter().map(|name| name.to_string_lossy().into_owned()).collect();
+        let text = std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        let text = text.split("#[cfg(test)]\nmod ").next().unwrap_or("").to_owned();
+        let code: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+        (path, code.join("\n"))
+    };
+    files.into_iter().map(module).filter(|(path, _)| *path != ["lib"]).collect()
+}
+
+/// The paths that begin with `start`, as far as they are names: those in a group one by one.
+fn paths_from(code: &str, start: &str) -> Vec<Vec<String>> {
+    let mut paths = Vec::new();
+    for (at, _) in code.match_indices(start) {
+        if code[..at].ends_with(|c: char| c == '$' || c == '_' || c == ':' || c.is_alphanumeric()) {
+            continue;
+        }
+        read_paths(&code[at + start.len()..], &mut Vec::new(), &mut paths);
+    }
+    paths
+}
+
+/// Reads `a::b` or `a::{b, c::d}` to `paths`, each behind the names `before`; the length that was read.
+fn read_paths(code: &str, before: &mut Vec<String>, paths: &mut Vec<Vec<String>>) -> usize {
+    let depth = before.len();
+    let mut at = 0;
+    loop {
+        let rest = &code[at..];
+        if rest.starts_with('{') {
+            at += 1;
+            while !code[at..].starts_with('}') && at < code.len() {
+                let read = read_paths(&code[at..], before, paths);
+                at += read.max(1);
+            }
+            before.truncate(depth);
+            return at + 1;
+        }
+        let length =
+            rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').map(char::len_utf8).sum::<usize>();
+        if length == 0 {
+            break;
+        }
+        before.push(rest[..length].to_owned());
+        at += length;
+        match code[at..].strip_prefix("::") {
+            Some(_) => at += 2,
+            None => break,
+        }
+    }
+    if before.len() > depth {
+        paths.push(before.clone());
+    }
+    before.truncate(depth);
+    at
+}
+
+#[test]
+fn groups_of_paths_are_read_one_by_one() {
+    let code = "use super::a::{b, c::{d, e}};\nlet x = super::f();\nmy_super::g();";
+    let paths: Vec<String> = paths_from(code, "super::").iter().map(|path| path.join("::")).collect();
+    assert_eq!(paths, ["a::b", "a::c::d", "a::c::e", "f"]);
+}
+
+/// Neither the folders of the macros' crate nor the files in one of them import each other in a circle. What a folder's own
+/// file offers to those in it, as types that hold each other, is no import of theirs.
+#[test]
+fn the_macros_have_no_circle_of_modules() {
+    let modules = modules_of_the_macros();
+    assert!(modules.len() > 100, "{} modules", modules.len());
+    // Of each folder, which of its modules import which others.
+    let mut imports: BTreeMap<Vec<String>, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
+    for (module, code) in &modules {
+        let absolute = paths_from(code, "crate::");
+        let above = &module[..module.len() - 1];
+        let beside = paths_from(code, "super::").into_iter().map(|path| [above.to_vec(), path].concat());
+        for path in absolute.into_iter().chain(beside) {
+            // The part of the path that is modules.
+            let is_module = |length: &usize| modules.contains_key(&path[..*length]);
+            let Some(length) = (1..=path.len()).rev().find(is_module) else { continue };
+            let shared = module.iter().zip(&path[..length]).take_while(|(one, other)| one == other).count();
+            if shared < module.len() && shared < length {
+                let folder = imports.entry(module[..shared].to_vec()).or_default();
+                folder.entry(module[shared].clone()).or_default().insert(path[shared].clone());
+            }
+        }
+    }
+    assert!(imports[&Vec::new()]["verify"].contains("model"), "imports are found");
+    assert!(imports[&vec!["expand".to_owned()]]["wiring"].contains("types"), "imports are found");
+    for (folder, imports) in &imports {
+        for start in imports.keys() {
+            let mut reached: BTreeSet<&String> = BTreeSet::new();
+            let mut next: Vec<&String> = imports[start].iter().collect();
+            while let Some(module) = next.pop() {
+                if reached.insert(module) {
+                    next.extend(imports.get(module).into_iter().flatten());
+                }
+            }
+            assert!(
+                !reached.contains(start),
+                "crate/{}: {start} imports itself, through {reached:?}",
+                folder.join("/")
+            );
+        }
+    }
 }

@@ -4,7 +4,7 @@
 //! pub struct Rover;                                    // the robot's type
 //! impl Rover { pub fn builder() … }                    // so that no trait need be in scope
 //! type __Rover__sensor_base_imu = Bmi270;              // one alias per component: its type is named once
-//! enum __Rover__member__sensor_base_imu_tilt {}        // what stands for an estimator in its island
+//! enum __Rover__member__sensor_base_imu_tilt {}        // the marker of an estimator in its island
 //! const _: () = {
 //!     …                                                // constants that check type facts at the user's tokens
 //!     static __SENSORS, __ESTIMATORS, …                // what was declared, as data
@@ -13,7 +13,7 @@
 //!     impl __Wiring { fn sensor_base_imu(&self, …) }   // what is downstream of each publisher, by direct calls
 //!     impl Robot for Rover { … }
 //! };
-//! const _: () = { use rover::… as _; … };              // what the user refers to, for his editor
+//! const _: () = { use rover::… as _; … };              // what the user refers to, for the editor
 //! pub mod rover { … }                                  // a handle per publisher, at its path
 //! ```
 
@@ -31,6 +31,7 @@ mod part;
 mod references;
 mod robot_impl;
 mod stub;
+mod table;
 mod topology;
 mod types;
 mod wiring;
@@ -58,7 +59,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let wiring = wiring::wiring(verified, &types, &islands);
     let implementation = robot_impl::robot_impl(verified, &types);
     let references = references::references(verified);
-    let handles = handles::handles(&types, name, &verified.module, handles::Accessors::Wired);
+    let handles = handles::handles(&types, name, &verified.module, types::Accessors::Wired);
     quote! {
         #definition
         #aliases

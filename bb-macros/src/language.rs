@@ -7,9 +7,12 @@
 //! To add a setting such as `deadline: 5 ms;` of an estimator: state the word in `language/words.rs`, name it in
 //! `EstimatorSetting` below, and give it its meaning in the model, whose `match` is exhaustive.
 
+mod foreign;
+mod joint_kind;
 mod measure;
 pub(crate) mod words;
 
+pub(crate) use joint_kind::JointKind;
 pub(crate) use measure::{Bounds, Measure};
 
 use crate::names::{did_you_mean, one_of};
@@ -299,6 +302,12 @@ pub(crate) fn unexpected<I: Words, S: Words>(word: &Ident) -> syn::Error {
     let allowed: Vec<&str> = I::texts().into_iter().chain(S::texts()).collect();
     let message = if allowed.is_empty() {
         format!("{place} holds nothing; leave this out")
+    } else if let Some(way) = foreign::way_out(place, &name) {
+        if starts_item(&name) {
+            format!("`{name}` does not belong in {place}; {way}")
+        } else {
+            format!("unknown word `{name}`; {way}")
+        }
     } else if starts_item(&name) {
         format!("`{name}` does not belong in {place}, which holds {}", one_of(&allowed))
     } else {

@@ -8,6 +8,8 @@
 //! 3. `verify`: the rules of the language, one a file. Gives a `verify::Verified` only if all hold.
 //! 4. `expand`: a verified robot to its wiring; one that failed to stubs, so that one mistake gives one message.
 
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
 use proc_macro::TokenStream;
 
 mod derive;

@@ -67,7 +67,7 @@ pub(crate) struct Robot {
 pub(crate) struct Link {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// Its name at run time; differs from the identifier only where a URDF's name is none.
+    /// Its name at run time; differs from the identifier only where a URDF's name is not an identifier.
     pub(crate) label: String,
     /// The joint that carries it; none for a root.
     pub(crate) joint: Option<JointId>,
@@ -140,7 +140,7 @@ pub(crate) struct Service {
     pub(crate) path: Vec<String>,
 }
 
-/// Where an estimator stands.
+/// Where an estimator is declared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Home {
     Sensor(SensorId),

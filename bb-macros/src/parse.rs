@@ -26,6 +26,7 @@ mod setting;
 mod states;
 mod topology;
 
+pub(crate) use crate::language::JointKind;
 pub(crate) use actuator::Actuator;
 #[cfg(feature = "urdf")]
 pub(crate) use body::Material;
@@ -35,7 +36,7 @@ pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
 pub(crate) use health::{Reaction, Reactions};
 pub(crate) use input::Input;
-pub(crate) use joint::{Axis, Dynamics, Joint, JointKind, Limit, Mimic, Origin, Transmission};
+pub(crate) use joint::{Axis, Dynamics, Joint, Limit, Mimic, Origin, Transmission};
 pub(crate) use link::Link;
 pub(crate) use literal::{Literal, Value};
 pub(crate) use notes::Given;

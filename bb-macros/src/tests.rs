@@ -3,6 +3,7 @@
 mod commands;
 mod expansion;
 mod health;
+mod mistakes;
 mod model;
 mod mutations;
 mod notation;

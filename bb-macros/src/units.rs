@@ -8,7 +8,7 @@ use syn::{LitInt, Token};
 
 /// Exponents of metre, kilogram, second, ampere, kelvin and radian.
 ///
-/// An angle counts as a dimension, so that degrees cannot stand where a plain number or a length belongs.
+/// An angle counts as a dimension, so that degrees are refused for a plain number or a length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dimension(pub(crate) [i8; 6]);
 
@@ -189,7 +189,7 @@ pub(crate) fn time_text(seconds: f64) -> String {
         s if s >= 1e-6 => (1e6, "us"),
         _ => (1e9, "ns"),
     };
-    // Three digits behind the point, without zeros at the end; an error in the last place of the double is no more.
+    // Three decimals, without trailing zeros: that hides an error in the last place of the double.
     let number = format!("{:.3}", (seconds * factor * 1e3 - 1e-6).ceil() / 1e3);
     let number = number.trim_end_matches('0').trim_end_matches('.');
     format!("{number} {unit}")
@@ -206,7 +206,7 @@ impl Unit {
     const ONE: Self = Self { dimension: Dimension::NONE, factor: 1.0 };
     pub(crate) const SECOND: Self = Self { dimension: Dimension::TIME, factor: 1.0 };
 
-    /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` belongs to the symbol behind it alone.
+    /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` applies to the next symbol alone.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let first = power(input)?;
         Self::ONE.times(first, 1).rest(input)
@@ -248,14 +248,27 @@ fn power(input: ParseStream<'_>) -> syn::Result<Unit> {
     factor(input, &symbol.to_string(), symbol.span())
 }
 
+/// The two units that are written as one word, `Nm`. Newtons alone: other first letters may be prefixes.
+fn product(name: &str) -> Option<(&str, &str)> {
+    let is_unit = |text: &str| UNITS.iter().any(|(unit, ..)| *unit == text);
+    let (first, second) = name.split_at_checked(1)?;
+    (first == "N" && is_unit(second)).then_some((first, second))
+}
+
 /// A symbol with its exponent, if it has one: `s`, `s^2`.
 fn factor(input: ParseStream<'_>, name: &str, place: Span) -> syn::Result<Unit> {
     // Keyboards have the micro sign, U+00B5, or the Greek letter, U+03BC.
     let name = name.replace('\u{3bc}', "\u{b5}");
     let Some((_, dimension, factor)) = UNITS.iter().find(|(unit, ..)| *unit == name) else {
-        let hint = match crate::names::nearest(&name, UNITS.iter().map(|(unit, ..)| *unit)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => "units are symbols, as in `m`, `s`, `deg` or `Hz`".to_owned(),
+        let symbols = || UNITS.iter().map(|(unit, ..)| *unit);
+        let in_other_case = symbols().find(|unit| unit.eq_ignore_ascii_case(&name));
+        let near = in_other_case.or_else(|| crate::names::nearest(&name, symbols()));
+        let hint = match (product(&name), near) {
+            (Some((first, second)), _) if in_other_case.is_none() => {
+                format!("a product is written with `*`: `{first}*{second}`")
+            }
+            (_, Some(near)) => format!("did you mean `{near}`?"),
+            (_, None) => "units are symbols, as in `m`, `s`, `deg` or `Hz`".to_owned(),
         };
         return Err(syn::Error::new(place, format!("unknown unit `{name}`; {hint}")));
     };

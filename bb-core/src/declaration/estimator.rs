@@ -136,6 +136,20 @@ pub struct InputDeclaration {
 }
 
 impl InputDeclaration {
+    /// The one input of a nested estimator: its sensor, which is in the same frame.
+    pub const fn nested(name: &'static str, source: &'static str) -> Self {
+        Self {
+            index: 0,
+            name,
+            source,
+            driver: true,
+            optional: false,
+            tolerance_nanos: None,
+            stale_after_nanos: None,
+            frame_from_input: Some(Transform::IDENTITY),
+        }
+    }
+
     /// Whether a message that is `age_nanos` older than the driver is too old. A newer one never is.
     pub(crate) fn is_too_old(&self, age_nanos: i64) -> bool {
         self.tolerance_nanos.is_some_and(|tolerance| age_nanos > tolerance)

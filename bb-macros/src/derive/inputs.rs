@@ -1,4 +1,4 @@
-//! `#[derive(Inputs)]`: the cache behind a struct of several inputs, and how the struct is made of it.
+//! `#[derive(Inputs)]`: the cache of a struct of several inputs, and how the struct is made from it.
 
 use super::fields;
 use crate::diagnostics::Diagnostics;
@@ -37,7 +37,7 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
     }
     let name = &item.ident;
     if diagnostics.any() {
-        // It takes inputs all the same, so that nothing else has to be said of it.
+        // It still implements `Inputs`, so that this is the only error.
         return quote! {
             impl ::bb_core::Inputs for #name<'static> {
                 type View<'a> = #name<'a>;

@@ -20,7 +20,7 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
         let mut take = quote!(emitted.as_mut()?.#field_name.take());
         if payload.is_none() {
             diagnostics.error(&field.ty, "expected `Option<Payload>`: none when there is nothing to emit".into());
-            // The field is there all the same, so that nothing else has to be said of it.
+            // The field still exists, so that this is the only error.
             payload = Some(quote!(::bb_core::__private::Unknown));
             take = quote!(::bb_core::__private::stub());
         }

@@ -85,7 +85,7 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenS
             let unit = quantity.has_unit.then(|| quantity.dimension.to_token_stream());
             (quantity.place, option(unit), quantity.value)
         }
-        // Its default stands for it.
+        // Its default is checked in its place.
         OptionValue::Parameter(path) => {
             let default = &robot.parameters[robot.parameter(path)?].default;
             let unit = default.has_unit.then(|| default.dimension.to_token_stream());

@@ -1,8 +1,8 @@
 //! States, categories, commands and parameters as constant data.
 
-use super::declarations::array;
 use super::literal::{nanos, option};
 use super::path_text;
+use super::table::array;
 use crate::model::{Cancel, Parameter, Robot};
 use crate::names::text;
 use crate::parse::{Literal, Value};

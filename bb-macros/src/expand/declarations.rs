@@ -2,11 +2,13 @@
 
 use super::islands::Islands;
 use super::literal::{nanos, option, transform};
-use super::{control, path_text, topology};
+use super::table::array;
+use super::topology::{self, root_from};
+use super::{control, path_text};
 use crate::model::{Actuator, EstimatorId, Health, Home, Id as _, Mount, Robot, Sensor, Service, Timing};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
-use quote::{format_ident, quote};
+use quote::quote;
 
 /// `static __SENSORS`, `__ESTIMATORS` and `__TOPOLOGY`.
 pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenStream {
@@ -31,26 +33,6 @@ pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenS
     }
 }
 
-/// Values of one constant: the time that rustc takes for one grows with its square.
-const SIZE: usize = 16;
-
-/// `static __SENSORS: [SensorDeclaration; 20] = join(&[&__SENSORS_0, &__SENSORS_1]);`
-pub(super) fn array(name: &str, kind: TokenStream, values: Vec<TokenStream>) -> TokenStream {
-    let (array, count) = (format_ident!("{name}"), values.len());
-    if count <= SIZE {
-        return quote!(static #array: [#kind; #count] = [#(#values),*];);
-    }
-    let parts = values.chunks(SIZE).enumerate().map(|(number, values)| {
-        let (part, count) = (format_ident!("{name}_{number}"), values.len());
-        quote!(const #part: [#kind; #count] = [#(#values),*];)
-    });
-    let names = (0..count.div_ceil(SIZE)).map(|number| format_ident!("{name}_{number}"));
-    quote! {
-        #(#parts)*
-        static #array: [#kind; #count] = __private::join(&[#(&#names),*]);
-    }
-}
-
 fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let path = path_text(&robot.publishers[sensor.publisher].path);
     let frame = robot.frame_name(sensor.mount);
@@ -64,12 +46,6 @@ fn sensor_declaration(robot: &Robot, sensor: &Sensor) -> TokenStream {
         root_from_frame: #root,
         supervisor: #supervisor,
     })
-}
-
-/// The transform to the root, if only fixed joints lie between.
-pub(super) fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
-    let route = robot.route_to_root(mount).filter(|route| route.moving.is_empty());
-    option(route.map(|route| transform(route.transform)))
 }
 
 fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: EstimatorId) -> TokenStream {
@@ -162,6 +138,10 @@ fn health(
     lost_after_s: Option<f64>,
     recover_after: u32,
 ) -> TokenStream {
+    let is_declared = latency_budget_s.is_some() || lost_after_s.is_some() || recover_after != 1;
+    if !is_declared && health.on_degraded.or(health.on_lost).or(health.on_recovered).is_none() {
+        return quote!(__private::HealthDeclaration::NONE);
+    }
     let [budget, lost] = [latency_budget_s, lost_after_s].map(|time| {
         option(time.map(|time| {
             let time = nanos(time);
@@ -197,8 +177,7 @@ pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
 fn nested_input(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let name = crate::names::text(&sensor.name);
     let path = path_text(&robot.publishers[sensor.publisher].path);
-    let identity = option(Some(quote!(__private::Transform::IDENTITY)));
-    input_declaration(0, &name, &path, true, false, [&option(None), &option(None)], &identity)
+    quote!(__private::InputDeclaration::nested(#name, #path))
 }
 
 fn input_declaration(

@@ -23,7 +23,7 @@ pub(super) struct Field {
     pub(super) value: TokenStream,
 }
 
-/// `g3.p50`: where the field number `position` stands.
+/// `g3.sensor_base_imu`: the path of the field number `position`.
 pub(super) fn path(position: usize, name: &Ident) -> TokenStream {
     let group = group_name(position / SIZE);
     quote!(#group.#name)

@@ -8,7 +8,7 @@ use super::group;
 use super::literal::ident;
 use super::options::parameter_type;
 use super::part::Part;
-use super::types::{Types, imports};
+use super::types::{Accessors, Types, imports};
 use super::{docs, path_text};
 use crate::model::{
     ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, SensorId, ServiceId,
@@ -18,15 +18,6 @@ use proc_macro2::{Ident, Span, TokenStream};
 use quote::quote;
 use std::collections::{HashMap, HashSet};
 use syn::Attribute;
-
-/// How handles reach what they name.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Accessors {
-    /// Into the wiring.
-    Wired,
-    /// Nowhere: the robot has failed, and its handles only keep names and types.
-    Stub,
-}
 
 /// A module with handles and modules below it, in the order of declaration.
 #[derive(Default)]

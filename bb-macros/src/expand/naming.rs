@@ -17,7 +17,7 @@ pub(super) struct Naming {
     publishers: Table<PublisherId, PublisherNames>,
 }
 
-/// What stands for a part.
+/// The names that a part has in the expansion.
 #[derive(Debug)]
 pub(super) struct PartNames {
     /// `sensor_base_imu`
@@ -32,7 +32,7 @@ pub(super) struct PartNames {
     pub(super) span: Span,
 }
 
-/// What stands for a publisher.
+/// The names that a publisher has in the expansion.
 #[derive(Debug)]
 pub(super) struct PublisherNames {
     /// `sensor_base_imu`

@@ -24,7 +24,7 @@ pub(super) fn options(types: &Types<'_>) -> TokenStream {
             let defaults = quote!(<#given as ::bb_core::Options>::defaults());
             respan(quote!(__private::as_known(#defaults)), Place::of(&component.kind).start)
         } else {
-            // Values are expressions of the user's, so the names around them must be none of his.
+            // Values are expressions of the user's, so the names in scope must not be ones that a user writes.
             let function = format_ident!("__declared_{name}");
             functions.extend(filled(&function, &options, &given, component));
             quote!(#function())
@@ -53,7 +53,7 @@ pub(super) fn bound(robot: &Robot) -> TokenStream {
 
 /// `fn __declared_sensor_base_imu() -> … { let mut options = defaults(); options.beta = 0.1; options }`
 ///
-/// The only place that names the type as the user wrote it: that it is none of the kind is reported here.
+/// The only place that names the type as the user wrote it, so a type of another kind is reported here.
 fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
     let settings: Vec<TokenStream> = component
         .options

@@ -1,4 +1,4 @@
-//! Every name that the user refers to, once more at its place, so that an editor finds what it stands for: jump and rename
+//! Every name that the user refers to, repeated at its place, so that an editor finds its declaration: jump and rename
 //! work on paths, commands, states, categories, parameters and on the names of inputs.
 //!
 //! ```text

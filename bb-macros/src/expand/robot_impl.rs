@@ -69,7 +69,6 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
             const COMMANDS: &'static [__private::CommandDeclaration] = &__COMMANDS;
             const PARAMETERS: &'static [__private::ParameterDeclaration] = &__PARAMETERS;
             const ISLANDS: &'static [__private::IslandOf<__Wiring>] = &__ISLANDS;
-
             const BOUND_OPTIONS: &'static [(usize, &'static str, usize)] = #bound;
 
             type Options = __Options;

@@ -1,6 +1,7 @@
 //! A robot that failed: its type and handles only, so that code which uses them gives no errors of its own.
 
-use super::handles::{Accessors, handles};
+use super::handles::handles;
+use super::types::Accessors;
 use super::{definition, naming, types};
 use crate::model::Robot;
 use crate::names::module_name;

@@ -1,7 +1,6 @@
 //! Links and joints as constant data, with all fixed joints multiplied out.
 
-use super::declarations::root_from;
-use super::literal::option;
+use super::literal::{option, transform};
 use crate::model::{Joint, Link, LinkId, Mount, Robot};
 use crate::parse::{Dynamics, Geometry, Inertial, JointKind, Limit, Mimic, Origin, Quantity, Shape};
 use crate::verify::Verified;
@@ -15,6 +14,12 @@ pub(super) fn topology(verified: &Verified<'_>) -> TokenStream {
     let links = robot.links.enumerate().map(|(id, data)| link(robot, id, data));
     let joints = robot.joints.enumerate().map(|(id, data)| joint(robot, data, verified.children[id]));
     quote!(__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
+}
+
+/// The transform to the root, if there are only fixed joints between.
+pub(super) fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
+    let route = robot.route_to_root(mount).filter(|route| route.moving.is_empty());
+    option(route.map(|route| transform(route.transform)))
 }
 
 fn link(robot: &Robot, id: LinkId, link: &Link) -> TokenStream {

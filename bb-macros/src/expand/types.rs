@@ -4,7 +4,6 @@
 //! rustc has to say of it is said there, and once.
 
 use super::group;
-use super::handles::Accessors;
 use super::literal::{ident, respan};
 use super::naming::{Naming, PartNames};
 use super::part::Part;
@@ -47,7 +46,7 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     aliases.collect()
 }
 
-/// `enum __Rover__member__sensor_base_imu_tilt {}`: what stands for an estimator in its island.
+/// `enum __Rover__member__sensor_base_imu_tilt {}`: the marker of an estimator in its island.
 pub(super) fn members(types: &Types<'_>) -> TokenStream {
     let members = types.robot.estimators.ids().map(|id| types.member_item(id));
     quote! {
@@ -56,6 +55,15 @@ pub(super) fn members(types: &Types<'_>) -> TokenStream {
             enum #members {}
         )*
     }
+}
+
+/// How handles reach what they name.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Accessors {
+    /// Into the wiring.
+    Wired,
+    /// Nowhere: the robot has failed, and its handles only keep names and types.
+    Stub,
 }
 
 /// The robot's type in its module.
@@ -95,7 +103,7 @@ pub(super) fn type_name(component: &Component) -> String {
     component.kind.segments.last().map_or(String::new(), |segment| segment.ident.to_string())
 }
 
-/// Names types from the module where the robot stands, or from one below it.
+/// Names types from the module that the robot is declared in, or from one below it.
 #[derive(Clone)]
 pub(super) struct Types<'a> {
     robot: &'a Robot,
@@ -141,7 +149,7 @@ impl<'a> Types<'a> {
         group::path(id.number(), self.publisher(id))
     }
 
-    /// What stands for an estimator in its island.
+    /// The marker of an estimator in its island.
     fn member_item(&self, id: EstimatorId) -> &'a Ident {
         &self.names(Part::Estimator(id)).member
     }

@@ -282,8 +282,7 @@ impl<'a> Wiring<'a> {
     fn receive(&self, payload: &TokenStream, consumer: &Consumer, island: &TokenStream) -> TokenStream {
         let Consumer { estimator, input, span, .. } = consumer;
         let (member, field) = (self.types.member(*estimator), self.field(*estimator, *input));
-        let taken = self.types.estimator_input(*estimator);
-        let taken = quote!(<#field as __private::TakenAt<#taken>>::Payload);
+        let taken = self.taken(*estimator, *input);
         let known = quote!({ __private::both_known::<#payload, #taken>() });
         let feed = quote!(<#payload as __private::Feeds<#taken, #known>>::feed(message));
         let (feed, number) = (respan(feed, *span), input.unwrap_or_default());
@@ -291,13 +290,21 @@ impl<'a> Wiring<'a> {
     }
 
     /// The alias of an input's field.
-    fn field(&self, id: EstimatorId, input: Option<usize>) -> TokenStream {
+    fn field(&self, id: EstimatorId, input: Option<usize>) -> Ident {
+        self.of_input("__input__", id, input)
+    }
+
+    /// The alias of an input's payload.
+    fn taken(&self, id: EstimatorId, input: Option<usize>) -> Ident {
+        self.of_input("__taken__", id, input)
+    }
+
+    fn of_input(&self, kind: &str, id: EstimatorId, input: Option<usize>) -> Ident {
         let estimator = &self.types.model().estimators[id];
         let name = input
             .and_then(|input| estimator.inputs.get(input))
             .map_or_else(String::new, |input| format!("__{}", crate::names::text(&input.name)));
-        let field = format_ident!("__input__{}{}", self.types.name_of(Part::Estimator(id)), name);
-        quote!(#field)
+        format_ident!("{kind}{}{name}", self.types.name_of(Part::Estimator(id)))
     }
 
     /// `impl Member`: where an estimator is, and where its outputs go.
@@ -310,7 +317,11 @@ impl<'a> Wiring<'a> {
             if estimator.is_nested() { vec![None] } else { (0..estimator.inputs.len()).map(Some).collect() };
         let fields = numbers.iter().map(|input| {
             let (field, found) = (self.field(id, *input), types.input_field(id, *input));
-            quote!(type #field = #found;)
+            let payload = self.taken(id, *input);
+            quote! {
+                type #field = #found;
+                type #payload = <#field as __private::TakenAt<#taken>>::Payload;
+            }
         });
         // One input is the driver's, which is not kept.
         let cache = (numbers.len() > 1).then(|| {
@@ -525,7 +536,7 @@ fn island_of(types: &Types<'_>, islands: &Islands, publisher: PublisherId) -> Op
     }
 }
 
-/// What a message from outside is known by in the journal.
+/// The number by which the journal knows a publisher outside of an island.
 fn entry(publisher: PublisherId, runs: bool) -> usize {
     2 * publisher.number() + usize::from(runs)
 }

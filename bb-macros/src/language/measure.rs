@@ -1,6 +1,6 @@
 //! What a number of the language measures, and within which bounds.
 
-use crate::parse::JointKind;
+use super::JointKind;
 use crate::units::Dimension;
 
 /// A dimension, or one that depends on how the joint moves in which it is written.

@@ -16,13 +16,13 @@ words! {
     TOPOLOGY: "topology", Value::Other, Often, ": urdf(\"robot.urdf\");",
         "links and joints from a URDF, see [below](#a-topology-from-a-urdf)";
     PARAMETERS: "parameters", Value::Other, Often, " { gain: f64 = 0.1; }",
-        "values that change while it runs, see [below](#parameters)";
+        "values that may change at run time, see [below](#parameters)";
     STATES: "states", Value::Other, Often, " { degraded; }",
         "operational states beside the built-in ones, see [below](#states)";
     COMMANDS: "commands", Value::Other, Often, " { stop: Stop; }",
-        "what it can be told to do, see [below](#commands)";
+        "commands it accepts, see [below](#commands)";
     CONTROLLERS: "controllers", Value::Other, Often, " { controller stability: Stability(); }",
-        "what runs beside the topology, see [below](#controllers-and-bridges)";
+        "components outside of the topology, see [below](#controllers-and-bridges)";
     BRIDGES: "bridges", Value::Other, Often, " { bridge ros: RosBridge(); }",
         "the same, by another name";
     SENSORS: "sensors", Value::Other, Often, " { sensor battery: Ina219(); }",
@@ -32,7 +32,7 @@ words! {
     JOINT: "joint", Value::Other, Often, " name: kind { … }",
         "`fixed`, `revolute`, `continuous`, `prismatic`, `planar` or `floating`";
     JOINT_OF_URDF: "joint", Value::Other, Often, " elbow { sensor encoder: Encoder(); }",
-        "sensors and actuators of a joint that a URDF has brought";
+        "sensors and actuators of a joint from a URDF";
 
     // Of joints.
     ORIGIN: "origin", Value::Other, Once, ": { xyz: [0 m, 0 m, 0.9 m], rpy: [0 deg, 0 deg, 90 deg] };",
@@ -61,17 +61,17 @@ words! {
     DYNAMICS: "dynamics", Value::Other, Once, ": { damping: 0.1 N*m*s/rad, friction: 0.2 N*m };",
         "of a joint that moves: N·m·s/rad and N·m where it turns; N·s/m and N where it slides";
     DAMPING: "damping", Value::Number(Measure::Damping, Bounds::Any), Once, ": 0.1 N*m*s/rad",
-        "what resists per speed";
+        "viscous friction";
     FRICTION: "friction", Value::Number(Measure::Effort, Bounds::Any), Once, ": 0.2 N*m",
-        "what resists at any speed";
+        "static friction";
     MIMIC: "mimic", Value::Other, Once, ": { joint: left_finger, multiplier: -1 };",
         "of a joint that moves: it follows another joint";
     JOINT_TO_MIMIC: "joint", Value::Other, Once, ": left_finger",
         "the joint that it follows";
     MULTIPLIER: "multiplier", Value::Number(Measure::Of(Dimension::NONE), Bounds::Any), Once, ": 2",
-        "how far it moves for the other. Default: 1";
+        "how far it moves per movement of the other. Default: 1";
     OFFSET: "offset", Value::Number(Measure::Position, Bounds::Any), Once, ": 0 deg",
-        "where it is when the other is at zero. Default: zero";
+        "its position when the other is at zero. Default: zero";
     TRANSMISSION: "transmission", Value::Other, Once, ": { reduction: 50 };",
         "the gear between motor and joint";
     REDUCTION: "reduction", Value::Number(Measure::Of(Dimension::NONE), Bounds::Any), Once, ": 50",
@@ -81,7 +81,7 @@ words! {
     INERTIAL: "inertial", Value::Other, Once, ": { mass: 1.2 kg, inertia: { xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 } };",
         "mass and moments of inertia";
     MASS: "mass", Value::Number(Measure::Of(Dimension::MASS), Bounds::Any), Once, ": 1 kg",
-        "it must be given";
+        "the mass, which must be given";
     INERTIA: "inertia", Value::Other, Once, ": { xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 }",
         "moments: `xx`, `yy`, `zz` must be given, `xy`, `xz`, `yz` are 0";
     XX: "xx", Value::Number(Measure::Of(Dimension::MOMENT_OF_INERTIA), Bounds::Any), Once, ": 0.1 kg*m^2",
@@ -97,17 +97,17 @@ words! {
     ZZ: "zz", Value::Number(Measure::Of(Dimension::MOMENT_OF_INERTIA), Bounds::Any), Once, ": 0.1 kg*m^2",
         "a moment of inertia";
     VISUAL: "visual", Value::Other, Often, ": { box: [0.4 m, 0.3 m, 0.1 m] };",
-        "a shape to be seen";
+        "what viewers draw";
     COLLISION: "collision", Value::Other, Often, ": { box: [0.4 m, 0.3 m, 0.1 m] };",
-        "a shape not to run into: as `visual`, without material";
+        "what collision checks use: as `visual`, without material";
     BOX: "box", Value::Number(Measure::Of(Dimension::LENGTH), Bounds::Any), Once, ": [0.1 m, 0.1 m, 0.1 m]",
-        "its sides along x, y, z";
+        "a box: its sides along x, y, z";
     CYLINDER: "cylinder", Value::Other, Once, ": { radius: 0.1 m, length: 0.3 m }",
-        "along z";
+        "a cylinder along z";
     SPHERE: "sphere", Value::Other, Once, ": { radius: 0.1 m }",
         "a sphere";
     MESH: "mesh", Value::Other, Once, ": { file: \"base.stl\" }",
-        "from a file, which URDF viewers read";
+        "a mesh from a file, which URDF viewers read";
     RADIUS: "radius", Value::Number(Measure::Of(Dimension::LENGTH), Bounds::Any), Once, ": 0.1 m",
         "a length";
     LENGTH: "length", Value::Number(Measure::Of(Dimension::LENGTH), Bounds::Any), Once, ": 0.1 m",
@@ -123,25 +123,25 @@ words! {
     COLOR: "color", Value::Number(Measure::Of(Dimension::NONE), Bounds::Any), Once, ": [0.5, 0.5, 0.5, 1]",
         "red, green, blue and opacity, from 0 to 1";
     TEXTURE: "texture", Value::Other, Once, ": \"wood.png\"",
-        "a picture";
+        "the file of an image";
 
     // Components.
     SENSOR: "sensor", Value::Other, Often, " name: Type(option = value, …) { … }",
         "a [`Sensor`]. At a joint it is fixed to the joint's parent";
     ACTUATOR: "actuator", Value::Other, Often, " name: Type(option = value, …);",
-        "what moves the joint, see [below](#actuators)";
+        "an [`Actuator`], which moves the joint, see [below](#actuators)";
     CONTROLLER: "controller", Value::Other, Often, " name: Type(option = value, …);",
         "a [`Service`], see [below](#controllers-and-bridges)";
     BRIDGE: "bridge", Value::Other, Often, " name: Type(option = value, …);",
         "a [`Service`], see [below](#controllers-and-bridges)";
     RATE: "rate", Value::Number(Measure::Of(Dimension::FREQUENCY), Bounds::Rate), Once, ": 200 Hz;",
-        "how often it is called: a frequency. Default: a sensor is read again and again; a controller or a bridge chooses itself";
+        "how often it is called: a frequency. Default: a sensor is read again as soon as it returns; a controller or bridge chooses";
     ESTIMATOR: "estimator", Value::Other, Often, " name: Type(option = value, …) { … }",
         "an [`Estimator`]: in a sensor it takes that sensor, on a link its `input`s";
 
     // Of estimators.
     INPUT: "input", Value::Other, Often, " name: path;",
-        "on a link: what it takes; the name is that of the algorithm's field, and free if it takes a single payload";
+        "on a link: an input; its name is that of the algorithm's field, and any name if the algorithm takes a single payload";
     DRIVER: "driver", Value::Other, Once, "",
         "its arrival runs the estimator; one of several inputs";
     OPTIONAL: "optional", Value::Other, Once, "",
@@ -155,11 +155,11 @@ words! {
     LATENCY_BUDGET: "latency_budget", Value::Number(Measure::Of(Dimension::TIME), Bounds::Time), Once, ": 1 ms;",
         "how long a run may take before it degrades the estimator: a time. Default: any";
     LOST_AFTER: "lost_after", Value::Number(Measure::Of(Dimension::TIME), Bounds::Time), Once, ": 100 ms;",
-        "how long it may be without a run on a message of its driver before it is lost: a time. Default: for ever";
+        "how long it may go without a run on a message of its driver before it is lost: a time. Default: any";
     RECOVER_AFTER: "recover_after", Value::Count { lowest: 1, highest: u32::MAX }, Once, ": 10;",
         "how many good runs in a row make it healthy again: a whole number of at least 1. Default: 1";
     ON_DEGRADED: "on_degraded", Value::Other, Once, ": slow_down;",
-        "the command called when a healthy one degrades: a run was too long, an input was missing or too old, the algorithm diverged, or it failed";
+        "the command called when it degrades: a run was too long, an input was missing or too old, the algorithm diverged, or it failed";
     ON_LOST: "on_lost", Value::Other, Once, ": stop;",
         "the command called when it is lost; needs `lost_after`";
     ON_RECOVERED: "on_recovered", Value::Other, Once, ": resume;",

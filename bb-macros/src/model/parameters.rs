@@ -15,7 +15,7 @@ pub(crate) struct Parameter {
     pub(crate) name: Ident,
     /// `param`, the groups, the name.
     pub(crate) path: Vec<String>,
-    /// The group that it stands in; none in `parameters` itself.
+    /// Its group; none in `parameters` itself.
     pub(crate) group: Option<ParameterGroupId>,
     pub(crate) kind: ParameterKind,
     /// Of a verified robot it is of this kind, as are the ends of the range.

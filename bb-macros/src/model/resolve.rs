@@ -225,7 +225,7 @@ impl Robot {
     }
 }
 
-/// `[a, b]` overrides, `out` is the estimator's own path, any other name stands below it.
+/// `[a, b]` overrides, `out` is the estimator's own path, any other name is below it.
 fn output_path(estimator: &[String], output: &parse::Output) -> Vec<String> {
     match &output.path {
         Some(path) => path.iter().map(text).collect(),

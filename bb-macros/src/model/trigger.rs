@@ -27,7 +27,7 @@ impl Robot {
         None
     }
 
-    /// The time between two messages of a publisher, in s, if the rate behind it is declared.
+    /// The time between two messages of a publisher, in s, if the rate of its sensor is declared.
     pub(crate) fn period_s(&self, publisher: PublisherId) -> Option<f64> {
         match self.trigger(publisher)? {
             Trigger::Sensor(id) => self.sensors[id].period_s,

@@ -67,7 +67,7 @@ pub(super) fn items<I: Words, S: Words>(
     });
 }
 
-/// The same where items start with a name; `expected` is the error for what is none.
+/// The same where items start with a name; `expected` is the error for anything else.
 pub(super) fn items_of(
     input: ParseStream<'_>,
     expected: &str,
@@ -119,14 +119,26 @@ pub(super) fn semicolon(input: ParseStream<'_>, after: &str, notes: &mut Notes<'
     skip_to_item(input);
 }
 
-/// Reads the `:` behind `name`, in front of `what`.
+/// Reads the `:` after `name`, before `what`.
 pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Result<()> {
     let place = input.span();
+    let is_type = name.to_string().starts_with(char::is_uppercase);
+    if is_type && let Ok(other) = input.fork().call(Ident::parse_any) {
+        return Err(syn::Error::new(place, format!("the name comes first, then the type: `{other}: {name}`")));
+    }
+    if input.peek(syn::token::Paren) {
+        let message = if is_type {
+            format!("a name comes first, then the type, as in `name: {name}()`")
+        } else {
+            format!("expected `:` and {what} after `{name}`; parentheses follow the type, and hold its options")
+        };
+        return Err(syn::Error::new(place, message));
+    }
     let colon: syn::Result<Token![:]> = input.parse();
     colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }
 
-/// The tokens from `start` up to where `input` stands.
+/// The tokens from `start` up to the position of `input`.
 pub(super) fn place_since(start: Cursor<'_>, input: ParseStream<'_>) -> Place {
     let (mut cursor, mut place) = (start, Place::from(input.span()));
     while cursor != input.cursor()
@@ -147,7 +159,7 @@ pub(super) fn skip_to_item(input: ParseStream<'_>) {
     }
 }
 
-/// Whether an item starts here: with a word of the language, or a name with a `:` or with braces behind it.
+/// Whether an item starts here: with a word of the language, or a name followed by `:` or braces.
 pub(super) fn starts_item(input: ParseStream<'_>) -> bool {
     let is_word = input.fork().call(Ident::parse_any).map(|word| language::starts_item(&word.to_string()));
     let is_name = input.peek2(Token![:]) && !input.peek2(Token![::]) || input.peek2(syn::token::Brace);
@@ -165,6 +177,11 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
         notes.error(attribute, message.into());
     }
     let place = input.span();
+    let expected = if input.peek(Token![<]) {
+        "a robot is not written in XML; `topology: urdf(\"robot.urdf\");` takes links and joints from a URDF"
+    } else {
+        expected
+    };
     let word = input.call(Ident::parse_any).map_err(|_| syn::Error::new(place, expected))?;
     Ok(Some(Head { attributes, word }))
 }
@@ -198,7 +215,7 @@ fn skip(input: ParseStream<'_>) {
         match token {
             TokenTree::Punct(punct) if punct.as_char() == ';' => return,
             TokenTree::Group(group) if group.delimiter() == Delimiter::Brace => {
-                // A `;` behind braces, as in `origin: { … };`, belongs to the same item; `items` passes it over.
+                // A `;` after braces, as in `origin: { … };`, belongs to the same item; `items` passes it over.
                 return;
             }
             _ => {}

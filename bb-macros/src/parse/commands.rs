@@ -14,7 +14,7 @@ use proc_macro2::Ident;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
-/// What stands in `commands`.
+/// The contents of `commands`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Commands {
     pub(crate) categories: Vec<Category>,

@@ -2,11 +2,11 @@
 
 use super::Notes;
 use super::block::{Head, colon, semicolon};
-use super::name::whole;
+use super::name::{one_name, whole};
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
 
-/// All that were written; each may stand once.
+/// All that were written; a rule reports a second one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reactions {
     pub(crate) on_degraded: Vec<Reaction>,
@@ -33,10 +33,12 @@ impl Reaction {
     /// Reads what follows the word.
     pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "the name of a command")?;
-        let place = input.span();
-        let message = "expected the name of a command";
-        let command = input.parse().map_err(|_| syn::Error::new(place, message))?;
+        let command = one_name(input, &format!("expected the name of one command, as in `{}: stop;`", head.word))?;
         whole(input, &command)?;
+        if input.peek(syn::token::Paren) {
+            let message = format!("a command is named without parentheses; write `{}: {command};`", head.word);
+            return Err(input.error(message));
+        }
         semicolon(input, &format!("`{}`", head.word), notes);
         Ok(Self { word: head.word, command })
     }

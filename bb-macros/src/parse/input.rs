@@ -41,6 +41,11 @@ impl Input {
             }
             Ok(())
         })?;
+        if input.peek(syn::token::Paren) {
+            return Err(
+                input.error("what an input is follows a comma: `, driver`, `, optional` or `, within: 250 ms`")
+            );
+        }
         semicolon(input, &format!("`{}`", parsed.name), notes);
         Ok(parsed)
     }

@@ -10,8 +10,7 @@ use super::Notes;
 use super::block::{Head, colon, items, opened, semicolon};
 use super::name::name;
 use super::{Actuator, Link, Sensor, Settings};
-use crate::language::{JointItem, Nothing};
-use crate::names::{did_you_mean, one_of};
+use crate::language::{JointItem, JointKind, Nothing};
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::ext::IdentExt;
@@ -36,47 +35,6 @@ pub(crate) struct Joint {
     pub(crate) links: Vec<Link>,
 }
 
-/// URDF's types of joints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum JointKind {
-    Fixed,
-    Revolute,
-    Continuous,
-    Prismatic,
-    Planar,
-    Floating,
-}
-
-impl JointKind {
-    const ALL: [(&'static str, Self); 6] = [
-        ("fixed", Self::Fixed),
-        ("revolute", Self::Revolute),
-        ("continuous", Self::Continuous),
-        ("prismatic", Self::Prismatic),
-        ("planar", Self::Planar),
-        ("floating", Self::Floating),
-    ];
-
-    /// The kind of that name.
-    pub(crate) fn of(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind)
-    }
-
-    /// Whether it turns about an axis, so that its position is an angle.
-    pub(crate) fn turns(self) -> bool {
-        matches!(self, Self::Revolute | Self::Continuous)
-    }
-
-    fn parse(word: &Ident) -> syn::Result<Self> {
-        let name = word.to_string();
-        Self::of(&name).ok_or_else(|| {
-            let known = Self::ALL.map(|(known, _)| known);
-            let hint = did_you_mean(&name, known);
-            syn::Error::new(word.span(), format!("unknown type of joint; expected {}{hint}", one_of(&known)))
-        })
-    }
-}
-
 impl Joint {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
@@ -85,7 +43,7 @@ impl Joint {
         let kind_word = input
             .call(Ident::parse_any)
             .map_err(|_| syn::Error::new(place, "expected the type of the joint, as in `fixed` or `revolute`"))?;
-        let kind = JointKind::parse(&kind_word);
+        let kind = JointKind::named(&kind_word);
         let mut joint = Self {
             attributes: head.attributes,
             name,

@@ -5,9 +5,9 @@ use super::block::{Head, items, opened, semicolon};
 use super::name::name;
 use super::{Estimator, Inertial, Joint, Sensor, Settings, Shape};
 use crate::language::{LinkItem, Nothing};
-use proc_macro2::Ident;
-use syn::Attribute;
+use proc_macro2::{Ident, TokenTree};
 use syn::parse::ParseStream;
+use syn::{Attribute, Token};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Link {
@@ -37,6 +37,11 @@ impl Link {
             visuals: Vec::new(),
             collisions: Vec::new(),
         };
+        let is_set = input.peek(Token![:]) || input.peek(Token![=]);
+        if is_set && input.peek2(syn::token::Brace) {
+            notes.at(input.span(), format!("braces follow the name at once: `link {} {{ … }}`", link.name));
+            input.parse::<TokenTree>()?;
+        }
         if input.peek(syn::token::Brace) {
             let body = opened(input)?;
             items(&body, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {

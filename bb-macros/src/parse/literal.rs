@@ -13,7 +13,7 @@ use syn::{Lit, Token};
 #[derive(Clone, Debug)]
 pub(crate) struct Literal {
     pub(crate) value: Value,
-    /// That of a number; what is none has none.
+    /// Dimension, if the literal is a number.
     pub(crate) dimension: Dimension,
     /// Whether a unit was written.
     pub(crate) has_unit: bool,
@@ -43,6 +43,7 @@ impl Literal {
             let Quantity { value, dimension, has_unit, place } = Quantity::parse(input)?;
             return Ok(Self { value: Value::Number(value), dimension, has_unit, place });
         } else {
+            capitalized(&input.fork()).map_or(Ok(()), Err)?;
             match input.parse() {
                 Ok(Lit::Bool(value)) => Value::Bool(value.value),
                 Ok(Lit::Str(value)) => Value::Text(value.value()),
@@ -56,7 +57,18 @@ impl Literal {
     }
 }
 
-/// The integer that stands here, if it has no unit and fits.
+/// The error for `True` and `False`, as Python writes them, if one starts here.
+pub(super) fn capitalized(input: ParseStream<'_>) -> Option<syn::Error> {
+    let word: Ident = input.parse().ok()?;
+    let lower = match &*word.to_string() {
+        "True" | "TRUE" => "true",
+        "False" | "FALSE" => "false",
+        _ => return None,
+    };
+    Some(syn::Error::new(word.span(), format!("`{word}` is written `{lower}`")))
+}
+
+/// The integer that comes next, if it has no unit and fits.
 fn integer(input: ParseStream<'_>) -> Option<i64> {
     let ahead = input.fork();
     let sign = if ahead.parse::<Option<Token![-]>>().ok()?.is_some() { "-" } else { "" };

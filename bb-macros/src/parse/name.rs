@@ -4,7 +4,7 @@ use crate::diagnostics::Place;
 use proc_macro2::{Ident, TokenStream, TokenTree};
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
-use syn::{Lit, Token};
+use syn::{Lit, LitStr, Token};
 
 /// Reads a name; `word` is what it is the name of.
 pub(super) fn name(input: ParseStream<'_>, word: &Ident) -> syn::Result<Ident> {
@@ -27,6 +27,17 @@ pub(super) fn name(input: ParseStream<'_>, word: &Ident) -> syn::Result<Ident> {
         return Err(syn::Error::new(place, message));
     }
     Ok(name)
+}
+
+/// Reads a name that is declared elsewhere; `expected` is the error for anything else.
+pub(super) fn one_name(input: ParseStream<'_>, expected: &str) -> syn::Result<Ident> {
+    let place = input.span();
+    if input.peek(LitStr) {
+        let text: LitStr = input.parse()?;
+        let message = no_name(&Lit::Str(text)).unwrap_or_else(|| expected.to_owned());
+        return Err(syn::Error::new(place, message));
+    }
+    input.parse().map_err(|_| syn::Error::new(place, expected))
 }
 
 /// That the name that was just read ends here: `left-wheel` does not.
@@ -71,7 +82,9 @@ fn no_name(literal: &Lit) -> Option<String> {
 
 /// Reads the next part of a name that is joined by characters which names do not have.
 fn joined_part(input: ParseStream<'_>) -> Option<TokenTree> {
-    if input.peek(Token![-]) {
+    if input.peek(Token![->]) {
+        return None;
+    } else if input.peek(Token![-]) {
         input.parse::<Token![-]>().ok()?;
     } else if input.peek(Token![.]) {
         input.parse::<Token![.]>().ok()?;

@@ -22,7 +22,10 @@ impl Output {
         let mut path = None;
         if input.peek(Token![:]) {
             input.parse::<Token![:]>()?;
-            path = Some(names(input, "a path has at least one name, as in `[nav, velocity]`")?);
+            path = Some(names(
+                input,
+                "expected a path in brackets, as in `[nav, velocity]`; the type is the algorithm's to say",
+            )?);
         }
         semicolon(input, &format!("`{name}`"), notes);
         Ok(Self { attributes: head.attributes, name, path })

@@ -11,7 +11,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
-/// What stands in `parameters` or in a group of them.
+/// An item of `parameters`, or of a group in it.
 #[derive(Clone, Debug)]
 pub(crate) enum ParameterItem {
     Group { attributes: Vec<Attribute>, name: Ident, items: Vec<ParameterItem> },
@@ -101,6 +101,14 @@ impl ParameterKind {
     const ALL: [(&'static str, Self); 4] =
         [("bool", Self::Bool), ("i64", Self::Integer), ("f64", Self::Number), ("String", Self::Text)];
 
+    /// What other languages call them.
+    const ELSEWHERE: [(&'static [&'static str], Self); 4] = [
+        (&["boolean", "Bool"], Self::Bool),
+        (&["int", "integer", "long", "i32", "u32", "u64", "usize"], Self::Integer),
+        (&["float", "double", "f32", "number"], Self::Number),
+        (&["str", "string"], Self::Text),
+    ];
+
     /// As it is written.
     pub(crate) fn name(self) -> &'static str {
         Self::ALL.into_iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
@@ -113,7 +121,11 @@ impl ParameterKind {
         let name = word.to_string();
         let known = Self::ALL.into_iter().find(|(known, _)| *known == name);
         known.map(|(_, kind)| kind).ok_or_else(|| {
-            let hint = did_you_mean(&name, Self::ALL.map(|(known, _)| known));
+            let other = Self::ELSEWHERE.into_iter().find(|(names, _)| names.contains(&&*name));
+            let hint = match other {
+                Some((_, kind)) => format!("; write `{}`", kind.name()),
+                None => did_you_mean(&name, Self::ALL.map(|(known, _)| known)),
+            };
             syn::Error::new(word.span(), format!("{EXPECTED}{hint}"))
         })
     }
@@ -121,6 +133,9 @@ impl ParameterKind {
 
 impl ParameterRange {
     fn parse(word: Ident, input: ParseStream<'_>) -> syn::Result<Self> {
+        if input.peek(syn::token::Bracket) || input.peek(syn::token::Paren) {
+            return Err(input.error("expected both ends of a range, as in `range: 0.0..=1.0`"));
+        }
         let start = Literal::parse(input)?;
         let place = input.span();
         let dots: syn::Result<Token![..=]> = input.parse();

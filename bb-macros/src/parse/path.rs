@@ -24,7 +24,7 @@ impl Path {
         }
     }
 
-    /// Reads a path; `expected` is what it is one of, for the error if there is none.
+    /// Reads a path; `expected` names what the path is for, in the error if there is no path.
     pub(super) fn parse(input: ParseStream<'_>, expected: &str) -> syn::Result<Self> {
         let mut segments = vec![Self::segment(input, expected)?];
         while input.peek(Token![::]) {
@@ -37,6 +37,8 @@ impl Path {
     /// Reads the path of a publisher; one in another notation, `sensor/base/imu`, is an error that gives it in this one.
     pub(super) fn parse_publisher(input: ParseStream<'_>) -> syn::Result<Self> {
         if let Some((names, place)) = other_notation(&input.fork()) {
+            // A robot has no `self` that its paths would start at.
+            let names = names.strip_prefix(&["self".to_owned()]).unwrap_or(&names);
             return Err(place.syntax(format!("paths are written with `::`; write `{}`", names.join("::"))));
         }
         Self::parse(input, "the path of a publisher, as in `sensor::base_link::imu`")

@@ -21,6 +21,10 @@ pub(crate) struct Quantity {
     pub(crate) place: Place,
 }
 
+/// What those may write for π who write angles in radians.
+const PI: [&str; 6] = ["pi", "PI", "M_PI", "math", "np", "std"];
+const ANGLES: &str = "expected a number with its unit; nothing is computed here, write `90 deg` for π / 2";
+
 impl Quantity {
     /// Whether a number starts here.
     pub(crate) fn peek(input: ParseStream<'_>) -> bool {
@@ -36,7 +40,7 @@ impl Quantity {
     /// Reads the number that is given to a word; the rules say whether it is one that the word takes.
     pub(super) fn of(word: &'static Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         if matches!(word.value, Value::Count { .. }) && !Self::peek(input) {
-            return Err(input.error("expected a whole number"));
+            return Err(input.error(format!("expected a whole number, as in `{}{}`", word.text, word.example)));
         }
         let quantity = Self::parse(input)?;
         notes.give(word, &quantity);
@@ -59,7 +63,9 @@ impl Quantity {
             1.0
         };
         let place = input.span();
-        let literal: Lit = input.parse().map_err(|_| syn::Error::new(place, "expected a number with its unit"))?;
+        let is_pi = input.fork().call(Ident::parse_any).is_ok_and(|word| PI.contains(&&*word.to_string()));
+        let expected = if is_pi { ANGLES } else { "expected a number with its unit" };
+        let literal: Lit = input.parse().map_err(|_| syn::Error::new(place, expected))?;
         let (digits, suffix) = match &literal {
             Lit::Int(literal) => {
                 let text = literal.to_string();
@@ -82,6 +88,9 @@ impl Quantity {
         } else {
             None
         };
+        if input.peek(Token![*]) || input.peek(Token![/]) || input.peek(Token![+]) {
+            return Err(input.error("a number is written out, with its unit after it; nothing is computed here"));
+        }
         let (dimension, factor) = unit.map_or((Dimension::NONE, 1.0), |unit| (unit.dimension, unit.factor));
         let value = sign * scaled(number, factor);
         if !value.is_finite() {

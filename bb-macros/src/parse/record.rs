@@ -1,6 +1,7 @@
 //! Values in braces and brackets: `{ field: value, … }`, `[1 m, 2 m]` and `[idle, executing]`.
 
 use super::block::{braced, colon};
+use super::name::one_name;
 use super::quantity::decimal_comma;
 use super::{Notes, Quantity};
 use crate::diagnostics::Place;
@@ -9,10 +10,10 @@ use crate::names::{did_you_mean, one_of};
 use proc_macro2::{Ident, TokenTree};
 use syn::Token;
 use syn::ext::IdentExt;
-use syn::parse::{Parse, ParseStream};
+use syn::parse::ParseStream;
 
-/// Reads the `{ field: value, … }` of a word; each field may be written once, in any order. `value` gets each field, the
-/// word that it is and as it is written.
+/// Reads the `{ field: value, … }` of a word; each field may be written once, in any order. `value` gets each field, its
+/// word and the identifier as written.
 pub(super) fn record<F: Words>(
     word: &Word,
     input: ParseStream<'_>,
@@ -79,6 +80,10 @@ pub(super) fn array<const N: usize>(
     input: ParseStream<'_>,
     notes: &mut Notes<'_>,
 ) -> syn::Result<[Quantity; N]> {
+    if !input.peek(syn::token::Bracket) {
+        let message = format!("expected {N} values in brackets, as in `{}{}`", word.text, word.example);
+        return Err(input.error(message));
+    }
     let content;
     let bracket = syn::bracketed!(content in input);
     let ahead = content.fork();
@@ -117,9 +122,18 @@ fn is_glued(input: ParseStream<'_>) -> bool {
 
 /// Reads `[idle, executing]`: one name or more; `expected` is the error for none.
 pub(super) fn names(input: ParseStream<'_>, expected: &str) -> syn::Result<Vec<Ident>> {
+    if !input.peek(syn::token::Bracket) {
+        return Err(input.error(expected));
+    }
     let content;
     let bracket = syn::bracketed!(content in input);
-    let names: Vec<Ident> = content.parse_terminated(Ident::parse, Token![,])?.into_iter().collect();
+    let mut names = Vec::new();
+    while !content.is_empty() {
+        names.push(one_name(&content, expected)?);
+        if !content.is_empty() {
+            content.parse::<Token![,]>()?;
+        }
+    }
     if names.is_empty() {
         return Err(syn::Error::new(bracket.span.join(), expected));
     }

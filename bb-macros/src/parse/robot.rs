@@ -9,7 +9,7 @@ use crate::language::{Nothing, RobotItem, SensorsItem, words};
 use proc_macro2::{Ident, Span};
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
-use syn::{Attribute, Visibility};
+use syn::{Attribute, Token, Visibility};
 
 /// The tree of a robot.
 #[derive(Clone, Debug, Default)]
@@ -41,6 +41,13 @@ impl Robot {
         if let Err(error) = self.header(input, notes) {
             notes.syntax(&error);
             skip_to_item(input);
+            // What stood before the header is wrong, not the header.
+            if starts_header(&input.fork())
+                && let Err(error) = self.header(input, notes)
+            {
+                notes.syntax(&error);
+                skip_to_item(input);
+            }
         }
         items(input, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
             self.item(item, head, input, notes)
@@ -63,6 +70,9 @@ impl Robot {
         self.attributes = comments;
         self.visibility = Some(input.parse()?);
         let word = input.call(Ident::parse_any)?;
+        if input.peek(Token![:]) {
+            return Err(input.error("the name follows without a colon, as in `robot Rover;`"));
+        }
         self.name = Some(super::name::name(input, &word)?);
         semicolon(input, "the robot's name", notes);
         Ok(())
@@ -104,4 +114,11 @@ impl Robot {
         }
         Ok(())
     }
+}
+
+/// Whether `robot Name` starts here, after comments and `pub`.
+fn starts_header(input: ParseStream<'_>) -> bool {
+    let _: syn::Result<Vec<Attribute>> = input.call(Attribute::parse_outer);
+    let _: syn::Result<Visibility> = input.parse();
+    input.call(Ident::parse_any).is_ok_and(|word| word == "robot") && input.peek(Ident::peek_any)
 }

@@ -89,7 +89,7 @@ fn declared_categories() {
     );
     wrong(
         &with("category all;"),
-        &[("all", "`all` stands for all categories, as in `cancel: all;`; choose another name")],
+        &[("all", "`all` means all categories, as in `cancel: all;`; choose another name")],
     );
 }
 

@@ -19,7 +19,7 @@ fn words() {
         &base("rate: 5 Hz;"),
         &[(
             "rate",
-            "`rate` does not belong in a link, which holds `sensor`, `estimator`, `joint`, `inertial`, `visual` or `collision`",
+            "`rate` does not belong in a link; the rate is the sensor's; an estimator runs when its input arrives",
         )],
     );
     wrong(
@@ -113,7 +113,7 @@ fn declarations() {
             (";", "expected the path of a publisher, as in `sensor::base_link::imu`"),
             (",", "expected the path of a publisher, as in `sensor::base_link::imu`"),
             ("fast", "expected `driver`, `optional` or `within: …`"),
-            ("[]", "a path has at least one name, as in `[nav, velocity]`"),
+            ("[]", "expected a path in brackets, as in `[nav, velocity]`; the type is the algorithm's to say"),
         ],
     );
 }
@@ -283,8 +283,8 @@ fn settings_of_estimators() {
         &[("proirity", &format!("{property}; did you mean `priority`?"))],
     );
     wrong(&nested("runs_on: worker, core: 1, core: 2;"), &[("core", "`core` is given twice; leave one out")]);
-    wrong(&nested("on_lost: \"stop\";"), &[("\"stop\"", "expected the name of a command")]);
-    wrong(&nested("recover_after: ten;"), &[("ten", "expected a whole number")]);
+    wrong(&nested("on_lost: \"stop\";"), &[("\"stop\"", "a name is written without quotes: `stop`")]);
+    wrong(&nested("recover_after: ten;"), &[("ten", "expected a whole number, as in `recover_after: 10;`")]);
 }
 
 #[test]
@@ -300,9 +300,6 @@ fn actuators() {
     );
     wrong(
         &base("actuator m: M();"),
-        &[(
-            "actuator",
-            "`actuator` does not belong in a link, which holds `sensor`, `estimator`, `joint`, `inertial`, `visual` or `collision`",
-        )],
+        &[("actuator", "`actuator` does not belong in a link; an actuator moves a joint; declare it in one")],
     );
 }

@@ -319,7 +319,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         if links.any(|link| self.name(link) == name) { self.name(&format!("{label}_joint")) } else { name }
     }
 
-    /// The identifier for a name: characters that cannot stand in one become `_`.
+    /// The identifier for a name: characters that an identifier cannot have become `_`.
     fn name(&self, label: &str) -> Ident {
         let mut name: String = label
             .chars()

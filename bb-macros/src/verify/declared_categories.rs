@@ -12,7 +12,7 @@ use std::collections::HashSet;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for name in robot.categories.iter().map(|category| &category.name).filter(|name| *name == "all") {
-        let message = "`all` stands for all categories, as in `cancel: all;`; choose another name";
+        let message = "`all` means all categories, as in `cancel: all;`; choose another name";
         diagnostics.error(name, message.into());
     }
     for settings in robot.commands.iter().map(|command| &command.settings) {

@@ -67,7 +67,7 @@ fn others(robot: &Robot) -> HashMap<&[String], String> {
     actuators.chain(parameters).chain(groups).chain(commands).collect()
 }
 
-/// The declared output behind a publisher.
+/// The declared output of a publisher.
 fn output<'a>(robot: &'a Robot, publisher: &Publisher) -> Option<&'a Output> {
     let From::Estimator(estimator, Some(output)) = publisher.from else {
         return None;

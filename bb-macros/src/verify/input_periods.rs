@@ -50,7 +50,7 @@ fn is_in_step(robot: &Robot, source: PublisherId, driver: PublisherId) -> bool {
     messages.round() >= 1.0 && (messages - messages.round()).abs() < 1e-9 * messages
 }
 
-/// A tolerance that is no positive time is a fault of its own. The rounding of `1.0 / rate` is none.
+/// A tolerance that is not positive is reported by another rule. The rounding of `1.0 / rate` is not a fault.
 fn is_exceeded(tolerance: &Quantity, period_s: f64) -> bool {
     tolerance.dimension == Dimension::TIME
         && tolerance.value > 0.0

@@ -1,4 +1,4 @@
-//! A setting that holds for a whole block stands in it once, and an option in its parentheses.
+//! A setting is written once in its block, and an option once in its parentheses.
 //!
 //! Wrong: `sensor imu: A() { rate: 100 Hz; rate: 200 Hz; }`
 //!

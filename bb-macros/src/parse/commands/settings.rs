@@ -3,12 +3,13 @@
 use crate::language::CommandItem;
 use crate::parse::Notes;
 use crate::parse::block::{Head, colon, semicolon};
+use crate::parse::name::one_name;
 use crate::parse::record::names;
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
-/// All that were written; each may stand once.
+/// All that were written; a rule reports a second one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CommandSettings {
     pub(crate) allowed_states: Vec<AllowedStates>,
@@ -65,15 +66,14 @@ impl AllowedStates {
     fn parse(word: &Ident, input: ParseStream<'_>) -> syn::Result<Self> {
         const EXPECTED: &str = "expected the names of states, as in `[idle, executing]`";
         colon(input, word, "a list of states")?;
-        Ok(Self { states: list(input, EXPECTED)? })
+        Ok(Self { states: names(input, EXPECTED)? })
     }
 }
 
 impl InCategory {
     fn parse(word: &Ident, input: ParseStream<'_>) -> syn::Result<Self> {
         colon(input, word, "its name")?;
-        let place = input.span();
-        let name = input.parse().map_err(|_| syn::Error::new(place, "expected the name of a category"))?;
+        let name = one_name(input, "expected the name of a category")?;
         Ok(Self { name })
     }
 }
@@ -87,12 +87,8 @@ impl Cancel {
             input.call(Ident::parse_any)?;
             Cancelled::All
         } else {
-            Cancelled::Categories(list(input, EXPECTED)?)
+            Cancelled::Categories(names(input, EXPECTED)?)
         };
         Ok(Self { cancelled })
     }
-}
-
-fn list(input: ParseStream<'_>, expected: &str) -> syn::Result<Vec<Ident>> {
-    if input.peek(syn::token::Bracket) { names(input, expected) } else { Err(input.error(expected)) }
 }

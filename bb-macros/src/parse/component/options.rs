@@ -1,5 +1,7 @@
 //! What a component is given: `beta = 0.1`, `gain = param::gain`.
 
+use crate::parse::block::place_since;
+use crate::parse::literal::capitalized;
 use crate::parse::name::whole;
 use crate::parse::quantity::decimal_comma;
 use crate::parse::{Path, Quantity};
@@ -44,6 +46,7 @@ impl OptionValue {
         if let Some(parameter) = Self::parameter(input)? {
             return Ok(parameter);
         }
+        elsewhere(&input.fork()).map_or(Ok(()), Err)?;
         if !Quantity::peek(input) {
             return Ok(Self::Expression { expression: Box::new(input.parse()?), number: None });
         }
@@ -73,6 +76,46 @@ impl OptionValue {
         }
         Path::parse(input, EXPECTED).map(|path| Some(Self::Parameter(path)))
     }
+}
+
+/// The error for a value in the notation of Python or of a launch file: `True`, `param.imu.beta`, `$(arg beta)`.
+fn elsewhere(input: ParseStream<'_>) -> Option<syn::Error> {
+    let (start, place) = (input.cursor(), input.span());
+    if input.peek(Token![$]) {
+        return Some(syn::Error::new(place, "a value is Rust, or a parameter, as in `param::beta`"));
+    }
+    if let Some(error) = capitalized(&input.fork()) {
+        let ahead = input.fork();
+        let is_all = ahead.parse::<Ident>().is_ok() && (ahead.is_empty() || ahead.peek(Token![,]));
+        return is_all.then_some(error);
+    }
+    let word: Ident = input.parse().ok()?;
+    if word != "param" && word != "parameters" && word != "params" {
+        return None;
+    }
+    let mut names = vec!["param".to_owned()];
+    if input.peek(syn::token::Paren) {
+        let content = parenthesized(input)?;
+        let text = content.parse::<syn::LitStr>().ok()?.value();
+        names.extend(text.split(['.', '/']).filter(|name| !name.is_empty()).map(str::to_owned));
+    } else {
+        while input.peek(Token![.]) {
+            input.parse::<Token![.]>().ok()?;
+            names.push(input.parse::<Ident>().ok()?.to_string());
+        }
+    }
+    let is_all = input.is_empty() || input.peek(Token![,]);
+    let message = format!("a parameter is written with `::`; write `{}`", names.join("::"));
+    (is_all && names.len() > 1).then(|| place_since(start, input).syntax(message))
+}
+
+fn parenthesized<'a>(input: ParseStream<'a>) -> Option<syn::parse::ParseBuffer<'a>> {
+    let parse = || {
+        let content;
+        syn::parenthesized!(content in input);
+        Ok::<_, syn::Error>(content)
+    };
+    parse().ok()
 }
 
 /// `Some(Some(number))` for a literal without a unit, `Some(None)` for an expression of several terms, and none where a

@@ -1,4 +1,4 @@
-//! Where a joint stands, about what it moves, and how far.
+//! Where a joint is, which axis it moves about, and how far.
 
 use crate::diagnostics::Place;
 use crate::language::{LimitField, OriginField, Word, words};

@@ -321,18 +321,7 @@ const _: () = {
         __private::EstimatorDeclaration {
             path: "sensor/base/imu/tilt",
             frame: __private::Frame::new("base"),
-            inputs: &[
-                __private::InputDeclaration {
-                    index: 0usize,
-                    name: "imu",
-                    source: "sensor/base/imu",
-                    driver: true,
-                    optional: false,
-                    tolerance_nanos: __private::None,
-                    stale_after_nanos: __private::None,
-                    frame_from_input: __private::Some(__private::Transform::IDENTITY),
-                },
-            ],
+            inputs: &[__private::InputDeclaration::nested("imu", "sensor/base/imu")],
             outputs: &["sensor/base/imu/tilt"],
             island: 0usize,
             supervisor: 1usize,
@@ -392,14 +381,7 @@ const _: () = {
             outputs: &["estimator/base/pose/pose", "nav/velocity"],
             island: 1usize,
             supervisor: 1usize,
-            health: __private::HealthDeclaration {
-                latency_budget_nanos: __private::None,
-                lost_after_nanos: __private::None,
-                recover_after: 1u32,
-                on_degraded: __private::None,
-                on_lost: __private::None,
-                on_recovered: __private::None,
-            },
+            health: __private::HealthDeclaration::NONE,
             worker: __private::Some(__private::WorkerDeclaration {
                 priority: __private::Some(80u8),
                 core: __private::None,
@@ -905,6 +887,9 @@ const _: () = {
         }
     }
     type __input__sensor_base_imu_tilt = <<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Nested;
+    type __taken__sensor_base_imu_tilt = <__input__sensor_base_imu_tilt as __private::TakenAt<
+        <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
+    >>::Payload;
     impl __private::Member for __Rover__member__sensor_base_imu_tilt {
         type State = __Island_sensor_base_imu_tilt;
         type Estimator = __Rover__sensor_base_imu_tilt;
@@ -954,6 +939,9 @@ const _: () = {
             >("imu")
         },
     >;
+    type __taken__estimator_base_pose__imu = <__input__estimator_base_pose__imu as __private::TakenAt<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+    >>::Payload;
     type __input__estimator_base_pose__tilt = ::bb_core::__private::At<
         {
             ::bb_core::__private::find_input::<
@@ -961,6 +949,9 @@ const _: () = {
             >("tilt")
         },
     >;
+    type __taken__estimator_base_pose__tilt = <__input__estimator_base_pose__tilt as __private::TakenAt<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+    >>::Payload;
     type __input__estimator_base_pose__wheel = ::bb_core::__private::At<
         {
             ::bb_core::__private::find_input::<
@@ -968,6 +959,9 @@ const _: () = {
             >("wheel")
         },
     >;
+    type __taken__estimator_base_pose__wheel = <__input__estimator_base_pose__wheel as __private::TakenAt<
+        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+    >>::Payload;
     impl __private::Member for __Rover__member__estimator_base_pose {
         type State = __Island_estimator_base_pose;
         type Estimator = __Rover__estimator_base_pose;
@@ -1102,15 +1096,11 @@ const _: () = {
                 wiring,
                 0usize,
                 <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
-                    <__input__sensor_base_imu_tilt as __private::TakenAt<
-                        <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
-                    >>::Payload,
+                    __taken__sensor_base_imu_tilt,
                     {
                         __private::both_known::<
                             <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
-                            <__input__sensor_base_imu_tilt as __private::TakenAt<
-                                <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
-                            >>::Payload,
+                            __taken__sensor_base_imu_tilt,
                         >()
                     },
                 >>::feed(message),
@@ -1168,15 +1158,11 @@ const _: () = {
                 wiring,
                 0usize,
                 <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
-                    <__input__estimator_base_pose__imu as __private::TakenAt<
-                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
-                    >>::Payload,
+                    __taken__estimator_base_pose__imu,
                     {
                         __private::both_known::<
                             <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
-                            <__input__estimator_base_pose__imu as __private::TakenAt<
-                                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
-                            >>::Payload,
+                            __taken__estimator_base_pose__imu,
                         >()
                     },
                 >>::feed(message),
@@ -1198,15 +1184,11 @@ const _: () = {
                 wiring,
                 1usize,
                 <__Rover__payload__sensor_base_imu_tilt as __private::Feeds<
-                    <__input__estimator_base_pose__tilt as __private::TakenAt<
-                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
-                    >>::Payload,
+                    __taken__estimator_base_pose__tilt,
                     {
                         __private::both_known::<
                             __Rover__payload__sensor_base_imu_tilt,
-                            <__input__estimator_base_pose__tilt as __private::TakenAt<
-                                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
-                            >>::Payload,
+                            __taken__estimator_base_pose__tilt,
                         >()
                     },
                 >>::feed(message),
@@ -1230,15 +1212,11 @@ const _: () = {
                 wiring,
                 2usize,
                 <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as __private::Feeds<
-                    <__input__estimator_base_pose__wheel as __private::TakenAt<
-                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
-                    >>::Payload,
+                    __taken__estimator_base_pose__wheel,
                     {
                         __private::both_known::<
                             <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
-                            <__input__estimator_base_pose__wheel as __private::TakenAt<
-                                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
-                            >>::Payload,
+                            __taken__estimator_base_pose__wheel,
                         >()
                     },
                 >>::feed(message),
