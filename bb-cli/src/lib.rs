@@ -28,7 +28,7 @@ pub use filters::{Axes, Chosen, FILTERS, Filter, Refused, Running, Setting};
 pub use navigation::{
     DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
 };
-pub use plot::{Line, Panel, Picture};
+pub use plot::{Colour, Line, PALETTE, Panel, Picture, Point};
 pub use progress::Progress;
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
