@@ -1,6 +1,7 @@
 //! The text of message definitions: <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>.
 
 use super::{Count, DEEPEST, Field, Kind, Message, MessageDefinition};
+use std::collections::HashMap;
 
 /// The definition of the type `name`; the texts of the types it is made of follow it, each after a line of `=` and a
 /// line `MSG: package/Name`.
@@ -17,7 +18,9 @@ pub(super) fn definition(name: &str, text: &str) -> Result<MessageDefinition, St
             lines.push(line);
         }
     }
-    let names: Vec<&str> = texts.iter().map(|(name, _)| &**name).collect();
+    // Of two of one name the first is taken.
+    let names: HashMap<&str, usize> =
+        texts.iter().enumerate().rev().map(|(index, (name, _))| (&**name, index)).collect();
     let mut messages = Vec::new();
     for (name, lines) in &texts {
         let fields = lines.iter().filter_map(|line| field(line, name, &names).transpose());
@@ -34,7 +37,7 @@ fn short(name: &str) -> String {
 }
 
 /// The field that a line declares; none if it is empty or a comment or declares a constant.
-fn field(line: &str, owner: &str, names: &[&str]) -> Result<Option<Field>, String> {
+fn field(line: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<Option<Field>, String> {
     // A `#` in a constant of text is none of a comment; but constants are not kept.
     let line = line.split('#').next().unwrap_or("").trim();
     let Some((kind, rest)) = line.split_once(char::is_whitespace) else {
@@ -59,7 +62,7 @@ fn field(line: &str, owner: &str, names: &[&str]) -> Result<Option<Field>, Strin
     Ok(Some(Field { name: name.into(), kind: element_kind(element, owner, names)?, count }))
 }
 
-fn element_kind(element: &str, owner: &str, names: &[&str]) -> Result<Kind, String> {
+fn element_kind(element: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<Kind, String> {
     Ok(match element.split("<=").next().unwrap_or(element) {
         "bool" => Kind::Bool,
         "int8" => Kind::I8,
@@ -79,13 +82,13 @@ fn element_kind(element: &str, owner: &str, names: &[&str]) -> Result<Kind, Stri
 }
 
 /// A type without a package is of the package of the type that names it.
-fn index(name: &str, owner: &str, names: &[&str]) -> Result<usize, String> {
+fn index(name: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<usize, String> {
     let short = short(name);
     let full = match owner.split_once('/') {
         Some((package, _)) if !short.contains('/') => format!("{package}/{short}"),
         _ => short.clone(),
     };
-    let is_named = |wanted: &str| names.iter().position(|name| *name == wanted);
+    let is_named = |wanted: &str| names.get(wanted).copied();
     let found = is_named(&full).or_else(|| (short == "Header").then(|| is_named("std_msgs/Header"))?);
     found.ok_or_else(|| format!("{full} is not defined"))
 }
