@@ -75,8 +75,10 @@ pub struct Filter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Axes {
     /// Gyroscope and accelerometer: heading starts anywhere and is no result.
+    #[value(name = "6", alias = "six")]
     Six,
     /// The magnetometer as well.
+    #[value(name = "9", alias = "nine")]
     Nine,
 }
 
@@ -100,7 +102,7 @@ impl Filter {
 }
 
 impl Axes {
-    /// As on the command line.
+    /// In words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Six => "six",

@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::filter::{ChosenParams, Kind};
+use bb_cli::Axes;
 use clap::Parser;
 use std::path::PathBuf;
 
@@ -13,16 +14,16 @@ pub(crate) struct Arguments {
     pub(crate) data: Option<PathBuf>,
     /// The topic of the IMU, where the bag has several.
     #[arg(long, value_name = "TOPIC", requires = "data")]
-    pub(crate) imu: Option<String>,
+    pub(crate) imu_topic: Option<String>,
     /// The topic of the magnetometer, where the bag has several.
     #[arg(long, value_name = "TOPIC", requires = "data")]
-    pub(crate) mag: Option<String>,
+    pub(crate) mag_topic: Option<String>,
     /// The filter.
     #[arg(long, value_enum, default_value_t = Kind::Madgwick)]
     pub(crate) filter: Kind,
     /// Six axes: gyroscope and accelerometer. Nine: the magnetometer as well.
-    #[arg(long, default_value = "9", value_parser = ["6", "9"])]
-    axes: String,
+    #[arg(long, value_enum, default_value_t = Axes::Nine)]
+    axes: Axes,
     /// Madgwick's step, rad/s. [default: 0.12]
     #[arg(long, allow_negative_numbers = true)]
     beta: Option<f64>,
@@ -38,7 +39,7 @@ impl Arguments {
     /// The filter that was asked for.
     pub(crate) fn params(&self) -> Result<ChosenParams, String> {
         let mut params =
-            ChosenParams { kind: self.filter, magnetometer: self.axes == "9", ..ChosenParams::default() };
+            ChosenParams { kind: self.filter, magnetometer: self.axes == Axes::Nine, ..ChosenParams::default() };
         match (self.beta, self.filter) {
             (Some(_), kind) if kind != Kind::Madgwick => {
                 Err("--beta belongs to --filter madgwick; leave it out".into())

@@ -23,8 +23,8 @@ robot! {
 
 pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> Result<Outcome, Box<dyn Error>> {
     let bag = Bag::open(file)?;
-    if params.magnetometer && arguments.mag.is_none() {
-        let imu = bag.choose(IMU, arguments.imu.as_deref())?;
+    if params.magnetometer && arguments.mag_topic.is_none() {
+        let imu = bag.choose(IMU, arguments.imu_topic.as_deref())?;
         bag.magnetometer_of(&imu.name, None).map_err(|error| format!("{error} (or choose --axes 6)"))?;
     }
     let truth = Truth::read(&bag)?;
@@ -32,8 +32,8 @@ pub(crate) fn run(file: &Path, arguments: &Arguments, params: ChosenParams) -> R
     let mut builder = Recorded::builder();
     let imu = builder.options(recorded::sensor::body::imu);
     imu.file = file.to_owned();
-    imu.imu_topic = arguments.imu.clone().unwrap_or_default();
-    imu.magnetometer_topic = arguments.mag.clone().unwrap_or_default();
+    imu.imu_topic = arguments.imu_topic.clone().unwrap_or_default();
+    imu.magnetometer_topic = arguments.mag_topic.clone().unwrap_or_default();
     imu.magnetometer = params.magnetometer;
     *builder.options(recorded::sensor::body::imu::orientation) = params.clone();
     let orientation = builder.subscribe(recorded::sensor::body::imu::orientation);
