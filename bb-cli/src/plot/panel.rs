@@ -113,7 +113,7 @@ fn stroke(line: &Line) -> ShapeStyle {
 
 /// A number at an axis of this span, with as many digits as tell it from its neighbours.
 fn tick(value: f64, span: f64) -> String {
-    let decimals = (1.5 - span.log10()).ceil();
+    let decimals = (1.0 - span.log10()).ceil();
     match decimals {
         ..=0.0 if span < 1e6 => format!("{value:.0}"),
         0.0..=4.0 => format!("{value:.*}", decimals as usize),
@@ -129,8 +129,9 @@ mod tests {
     #[test]
     fn ticks_have_the_digits_that_tell_them_apart() {
         assert_eq!(tick(-90.0, 360.0), "-90");
-        assert_eq!(tick(0.5, 2.0), "0.50");
-        assert_eq!(tick(0.001, 0.01), "0.0010");
+        assert_eq!(tick(0.5, 2.0), "0.5");
+        assert_eq!(tick(20.0, 22.0), "20");
+        assert_eq!(tick(0.001, 0.01), "0.001");
         assert_eq!(tick(4.5e-5, 2e-5), "4.5e-5");
         assert_eq!(tick(0.0, 2e-5), "0");
         assert_eq!(tick(3e7, 1e8), "3.0e7");
