@@ -1,5 +1,6 @@
 //! The commands that are not `bb eval`, one file each.
 
+mod convert;
 mod echo;
 mod hz;
 mod info;
@@ -14,6 +15,7 @@ pub(crate) enum Command {
     Echo(echo::Arguments),
     Hz(hz::Arguments),
     Plot(plot::Arguments),
+    Convert(convert::Arguments),
     Recover(recover::Arguments),
 }
 
@@ -25,6 +27,7 @@ impl Command {
             Self::Echo(arguments) => echo::run(arguments),
             Self::Hz(arguments) => hz::run(arguments),
             Self::Plot(arguments) => plot::run(arguments),
+            Self::Convert(arguments) => convert::run(arguments),
             Self::Recover(arguments) => recover::run(arguments),
         }
     }
