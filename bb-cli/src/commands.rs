@@ -4,6 +4,7 @@ mod convert;
 mod echo;
 mod hz;
 mod info;
+mod new;
 mod plot;
 mod recover;
 
@@ -11,6 +12,7 @@ use clap::Subcommand;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    New(new::Arguments),
     Info(info::Arguments),
     Echo(echo::Arguments),
     Hz(hz::Arguments),
@@ -23,6 +25,7 @@ impl Command {
     /// Does it; whether all went well. An error is told in words.
     pub(crate) fn run(&self) -> Result<bool, String> {
         match self {
+            Self::New(arguments) => new::run(arguments),
             Self::Info(arguments) => info::run(arguments),
             Self::Echo(arguments) => echo::run(arguments),
             Self::Hz(arguments) => hz::run(arguments),
