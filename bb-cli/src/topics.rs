@@ -40,9 +40,7 @@ impl TopicReader {
     /// For a topic; the error says why its messages cannot be read.
     pub(crate) fn new(topic: &Topic) -> Result<Self, String> {
         match &*topic.encoding {
-            "cdr" => {
-                MessageDefinition::of(topic).map(Self::Cdr).map_err(|fault| format!("{}: {fault}", topic.name))
-            }
+            "cdr" => topic.message_definition().map(Self::Cdr).map_err(|fault| format!("{}: {fault}", topic.name)),
             JSON => Ok(Self::Json),
             other => Err(format!(
                 "the messages of {} are encoded as `{other}`, and only `cdr` and `{JSON}` are read; convert the bag",

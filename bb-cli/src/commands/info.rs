@@ -1,6 +1,7 @@
 //! `bb info`: what is in recordings, and what looks wrong with them.
 
 mod date;
+mod remark;
 mod report;
 mod scan;
 mod times;
@@ -20,30 +21,6 @@ pub(crate) struct Arguments {
     /// Prints an array of objects instead of the tables.
     #[arg(long)]
     json: bool,
-}
-
-/// What a remark is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Subject {
-    Gap,
-    Clock,
-    Unit,
-    Values,
-    Messages,
-}
-
-/// What looks wrong with a topic.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub(crate) struct Remark {
-    pub(crate) subject: Subject,
-    pub(crate) text: String,
-}
-
-impl Remark {
-    fn new(subject: Subject, text: impl Into<String>) -> Self {
-        Self { subject, text: text.into() }
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {

@@ -13,6 +13,7 @@ pub use messages::{BagMessage, BagMessages};
 pub use samples::MargSamples;
 pub use truth::{Bool, MOVING, ODOMETRY, POSE, Truth};
 
+use crate::definition::MessageDefinition;
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Channels, Record, Records, full_name};
 use crate::layout::PATH;
@@ -34,8 +35,7 @@ pub struct Topic {
     pub schema: Arc<str>,
     /// How the messages are encoded, `cdr` mostly.
     pub encoding: Arc<str>,
-    /// The definition of the type in the file, for [`MessageDefinition`](crate::MessageDefinition); empty if there is
-    /// none.
+    /// The definition of the type in the file; empty if there is none.
     pub definition: Arc<str>,
     /// How the definition is written: `ros2msg`, say.
     pub definition_encoding: Arc<str>,
@@ -44,6 +44,17 @@ pub struct Topic {
     pub is_own: bool,
     /// How many messages there are, in a broken bag before the break; `None` if a summary leaves it out.
     pub messages: Option<u64>,
+}
+
+impl Topic {
+    /// What the messages consist of.
+    ///
+    /// # Errors
+    ///
+    /// If the file has no definition of the type that can be read, and it is none of those that are known; in words.
+    pub fn message_definition(&self) -> Result<MessageDefinition, String> {
+        MessageDefinition::of(&self.schema, &self.definition_encoding, &self.definition)
+    }
 }
 
 /// A recording of ROS 2 messages in an MCAP file, or with the feature `sqlite` in a `.db3` file.

@@ -10,11 +10,11 @@ mod value;
 
 pub use value::Value;
 
-use crate::bag::Topic;
 use bb_core::message::{DecodeError, Schema};
 use std::sync::Arc;
 
-/// The fields of a type of messages, to read any message of it: from the definition in the file (`ros2msg`), or else, as
+/// The fields of a type of messages, to read any message of it, by [`Topic::message_definition`](crate::Topic::message_definition):
+/// from the definition in the file (`ros2msg`), or else, as
 /// bags in SQLite have none, of the types that [`bb_core::message::codec::ros`] has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MessageDefinition {
@@ -67,25 +67,21 @@ enum Count {
 const DEEPEST: usize = 32;
 
 impl MessageDefinition {
-    /// Of a topic's messages.
+    /// Of a type in the full spelling, by what the file has of it: a text, and how that is written. Both may be empty.
     ///
     /// # Errors
-    /// The file has no definition of the type that can be read, and it is none of those that are known; in words.
-    pub fn of(topic: &Topic) -> Result<Self, String> {
-        match (&*topic.definition_encoding, &*topic.definition) {
-            (Schema::ENCODING, text) if !text.trim().is_empty() => Self::parse(&topic.schema, text),
-            (encoding, text) => match known::definition(&topic.schema) {
-                Some(text) => Self::parse(&topic.schema, &text),
-                None if topic.schema.is_empty() => Err("the file does not name the type of its messages".into()),
-                None if text.is_empty() => {
-                    Err(format!("the file has no definition of {}, and it is not a known type", topic.schema))
-                }
-                None => Err(format!(
-                    "{} is defined in `{encoding}`, and only `{}` is read",
-                    topic.schema,
-                    Schema::ENCODING
-                )),
-            },
+    /// The text cannot be read, and the type is none of those that are known; in words.
+    pub(crate) fn of(name: &str, encoding: &str, text: &str) -> Result<Self, String> {
+        if encoding == Schema::ENCODING && !text.trim().is_empty() {
+            return Self::parse(name, text);
+        }
+        match known::definition(name) {
+            Some(text) => Self::parse(name, &text),
+            None if name.is_empty() => Err("the file does not name the type of its messages".into()),
+            None if text.is_empty() => {
+                Err(format!("the file has no definition of {name}, and it is not a known type"))
+            }
+            None => Err(format!("{name} is defined in `{encoding}`, and only `{}` is read", Schema::ENCODING)),
         }
     }
 

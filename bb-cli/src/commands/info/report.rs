@@ -1,7 +1,7 @@
 //! What is printed of what is in files.
 
-use super::Remark;
 use super::date::date;
+use super::remark::Remark;
 use super::scan::{Content, TopicContent};
 use crate::periods::Periods;
 use crate::table::aligned;
@@ -82,7 +82,8 @@ fn one(content: &Content) -> String {
     };
     let mut rows = vec![["topic", "type", "messages", "rate", "longest period"].map(String::from)];
     for topic in &content.topics {
-        let periods = topic.periods.as_ref();
+        // A rate of two messages is none.
+        let periods = topic.periods.as_ref().filter(|_| topic.messages > 2);
         rows.push([
             topic.name.clone(),
             topic.schema.clone(),

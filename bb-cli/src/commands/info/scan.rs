@@ -1,6 +1,6 @@
 //! Reads a file through once.
 
-use super::Remark;
+use super::remark::{Remark, Subject};
 use super::times::Times;
 use super::units::Units;
 use crate::periods::Periods;
@@ -91,7 +91,7 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
         let open = topics.remove(&(topic.name.clone(), topic.schema.clone())).unwrap_or_default();
         let mut remarks = open.times.remarks(start_ns);
         remarks.extend(open.units.remarks());
-        remarks.extend(open.fault.map(|fault| Remark::new(super::Subject::Messages, fault)));
+        remarks.extend(open.fault.map(|fault| Remark::new(Subject::Messages, fault)));
         TopicContent {
             name: topic.name.to_string(),
             schema: topic.schema.to_string(),

@@ -1,6 +1,6 @@
 //! What looks wrong with the times of a topic.
 
-use super::{Remark, Subject};
+use super::remark::{Remark, Subject};
 use crate::periods::Periods;
 
 /// The times of the messages of a topic.

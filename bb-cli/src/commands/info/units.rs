@@ -2,7 +2,7 @@
 
 mod gyroscope;
 
-use super::{Remark, Subject};
+use super::remark::{Remark, Subject};
 use bb_core::nalgebra::Vector3;
 use bb_core::payload::{FluidPressure, Imu, MagneticField};
 use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, RecordingError};

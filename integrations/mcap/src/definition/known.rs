@@ -1,6 +1,5 @@
 //! Types that are read though the file does not define them.
 
-use crate::bag::Bool;
 use bb_core::message::codec::ros::{Text, TransformStamped, TransformsMessage};
 use bb_core::message::codec::{Field, Shape};
 use bb_core::message::{Payload, Schema, Stamped};
@@ -10,7 +9,8 @@ use bb_core::payload::{
 };
 
 /// Those that ROS has and no payload is written as.
-const PLAIN: [(&str, &str); 13] = [
+const PLAIN: [(&str, &str); 14] = [
+    ("std_msgs/msg/Bool", "bool data"),
     ("std_msgs/msg/Int8", "int8 data"),
     ("std_msgs/msg/Int16", "int16 data"),
     ("std_msgs/msg/Int32", "int32 data"),
@@ -39,7 +39,7 @@ pub(super) fn definition(name: &str) -> Option<String> {
     known.into_iter().find(|schema| schema.name == name).map(|schema| schema.text)
 }
 
-const SCHEMAS: [fn() -> Option<Schema>; 22] = [
+const SCHEMAS: [fn() -> Option<Schema>; 21] = [
     ros::<Imu>,
     ros::<MagneticField>,
     ros::<FluidPressure>,
@@ -58,7 +58,6 @@ const SCHEMAS: [fn() -> Option<Schema>; 22] = [
     ros::<Wrench>,
     ros::<Odometry>,
     ros::<Path>,
-    plain::<Bool>,
     plain::<Text>,
     plain::<TransformStamped>,
     plain::<TransformsMessage>,

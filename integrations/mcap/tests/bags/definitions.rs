@@ -155,7 +155,7 @@ fn known_types_need_no_definition() {
     maker.bytes(channel, &big(&imu(8)));
     maker.bytes(other, &little(&1_u8));
     let bag = Bag::open(file("known.mcap", &maker.finish())).expect("opens");
-    let definition = MessageDefinition::of(&bag.topics()[0]).expect("it is known");
+    let definition = bag.topics()[0].message_definition().expect("it is known");
     assert!(definition.has_header());
     for (message, sec) in bag.messages(&["/imu"]).expect("is there").zip([7, 8]) {
         let value = message.expect("is whole").value(&definition).expect("is one");
@@ -165,7 +165,7 @@ fn known_types_need_no_definition() {
         assert_eq!(at(&["angular_velocity", "z"]), Some(Value::F64(sec as f64)));
         assert_eq!(at(&["angular_velocity_covariance"]), Some(Value::List(vec![Value::F64(0.0); 9])));
     }
-    let fault = MessageDefinition::of(&bag.topics()[1]).expect_err("it is not known");
+    let fault = bag.topics()[1].message_definition().expect_err("it is not known");
     assert_eq!(fault, "the file has no definition of my/msg/Other, and it is not a known type");
 }
 

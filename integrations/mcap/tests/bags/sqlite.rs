@@ -3,7 +3,7 @@
 use crate::common::{file, imu, little};
 use bb_core::prelude::*;
 use bb_estimators::Madgwick;
-use bb_mcap::{Bag, BagImu, MargSamples, MessageDefinition, RecordingErrorKind};
+use bb_mcap::{Bag, BagImu, MargSamples, RecordingErrorKind};
 use rusqlite::Connection;
 use std::path::PathBuf;
 
@@ -107,10 +107,10 @@ fn a_database_of_something_else_says_what_is_missing() {
 #[test]
 fn types_are_read_by_the_definition_in_the_bag_or_by_name() {
     let path = bag("defined.db3", 3);
-    let fault = |bag: &Bag| MessageDefinition::of(&bag.topics()[1]).expect_err("nobody knows it");
+    let fault = |bag: &Bag| bag.topics()[1].message_definition().expect_err("nobody knows it");
     let old = Bag::open(&path).expect("opens");
     assert_eq!(fault(&old), "the file has no definition of x/msg/Y, and it is not a known type");
-    let imu = MessageDefinition::of(&old.topics()[0]).expect("it is known");
+    let imu = old.topics()[0].message_definition().expect("it is known");
     let first = old.messages(&["/imu"]).expect("is there").next().expect("is one").expect("is whole");
     assert!(first.value(&imu).expect("is one").field("angular_velocity").is_some());
 
@@ -125,5 +125,5 @@ fn types_are_read_by_the_definition_in_the_bag_or_by_name() {
     drop(database);
     let new = Bag::open(&path).expect("opens");
     assert_eq!((&*new.topics()[1].definition, &*new.topics()[1].definition_encoding), ("uint8[] data", "ros2msg"));
-    assert!(MessageDefinition::of(&new.topics()[1]).is_ok());
+    assert!(new.topics()[1].message_definition().is_ok());
 }
