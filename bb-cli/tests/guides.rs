@@ -150,9 +150,12 @@ fn check(guide: &str) {
         let printed: Vec<String> = commands.iter().map(|line| run(line, &folder, output.is_none())).collect();
         let printed = printed.concat();
         let Some(&(out, out_end, _)) = output else { continue };
+        let told = lines[out..out_end].join("\n");
         if !is_update {
-            let told = lines[out..out_end].join("\n");
             assert_eq!(lasting(&told), lasting(printed.trim_end()), "{guide}: {}", commands.join("\n"));
+        }
+        if lasting(&told) == lasting(printed.trim_end()) {
+            continue;
         }
         new.extend(lines[copied..out].iter().map(|line| (*line).to_owned()));
         new.extend(printed.trim_end().lines().map(|line| line.trim_end().to_owned()));

@@ -85,9 +85,9 @@ impl Units {
             let text = format!("{} messages hold NaN or infinity", self.not_finite);
             remarks.push(Remark::new(Subject::Values, text));
         }
-        let forces = self.imu.iter().map(|(_, _, force)| force.norm()).collect();
+        let forces: Vec<f64> = self.imu.iter().map(|(_, _, force)| force.norm()).collect();
         let units = [
-            guess("the specific force", forces, FORCE, &FORCES, "m/s²"),
+            guess("the specific force", calm(&forces), FORCE, &FORCES, "m/s²"),
             gyroscope::verdict(&self.imu),
             guess("the magnetic field", self.fields, FIELD, &FIELDS, "T"),
             guess("the pressure", self.pressures, PRESSURE_PA, &PRESSURES, "Pa"),
@@ -95,6 +95,24 @@ impl Units {
         remarks.extend(units.into_iter().flatten().map(|text| Remark::new(Subject::Unit, text)));
         remarks
     }
+}
+
+/// The means of the calmest tenth of short stretches: fast motion has other forces than gravity.
+fn calm(norms: &[f64]) -> Vec<f64> {
+    /// Samples: a fraction of a second.
+    const STRETCH: usize = 50;
+    let stretches = norms.chunks_exact(STRETCH).map(|stretch| {
+        let mean = stretch.iter().sum::<f64>() / STRETCH as f64;
+        let variance = stretch.iter().map(|norm| (norm - mean).powi(2)).sum::<f64>() / STRETCH as f64;
+        // Relative, so that the unit does not matter; without any force it is calm.
+        (if mean > 0.0 { variance.sqrt() / mean } else { 0.0 }, mean)
+    });
+    let mut stretches: Vec<(f64, f64)> = stretches.collect();
+    if stretches.is_empty() {
+        return norms.to_vec();
+    }
+    stretches.sort_by(|a, b| a.0.total_cmp(&b.0));
+    stretches.iter().take(stretches.len().div_ceil(10)).map(|(_, mean)| *mean).collect()
 }
 
 /// What the median of a quantity says of its unit; nothing, if it is as in SI.
@@ -134,6 +152,17 @@ mod tests {
             Some("the magnetic field has a median of 0.000, and 0.00001 to 0.00015 T are usual")
         );
         assert_eq!(guess("x", Vec::new(), FIELD, &FIELDS, "T"), None);
+    }
+
+    /// Half a minute of it, and four seconds of rest.
+    #[test]
+    fn fast_motion_hides_no_gravity() {
+        let shaken = (0..3000).map(|index| 25.0 + 20.0 * (f64::from(index) * 0.1).sin());
+        let rest = std::iter::repeat_n(9.81, 400);
+        let norms: Vec<f64> = shaken.chain(rest).collect();
+        assert_eq!(guess("f", calm(&norms), FORCE, &FORCES, "m/s²"), None);
+        assert!(guess("f", norms, FORCE, &FORCES, "m/s²").is_some());
+        assert_eq!(calm(&[9.81; 3]), [9.81; 3]);
     }
 
     #[test]
