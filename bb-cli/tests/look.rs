@@ -248,9 +248,13 @@ fn fields_are_plotted_with_their_units() {
         assert!(svg.contains(text), "{text}");
     }
     assert!(!svg.contains("covariance"));
-    let output = bb(&["plot", name, "/imu.angular", "--out", out]);
+    let output = bb(&["plot", name, "/imu.angular_velocty", "--out", out]);
     assert_eq!(output.code, Some(1));
-    assert!(output.err.ends_with("/imu: no field `angular`; did you mean `angular_velocity`?\n"), "{}", output.err);
+    assert!(
+        output.err.ends_with("/imu: no field `angular_velocty`; did you mean `angular_velocity`?\n"),
+        "{}",
+        output.err
+    );
     let output = bb(&["plot", name, "/imu", "--out", "x.jpg"]);
     assert_eq!(output.code, Some(2));
     assert!(output.err.contains("--out writes an SVG or a PNG: call the file x.svg or .png"), "{}", output.err);
