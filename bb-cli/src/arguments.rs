@@ -6,7 +6,7 @@ use crate::navigation::{self, NAVIGATION_FILTERS, NavigationFilter, NavigationSe
 use crate::plot::Picture;
 use crate::recording::{MovingTopic, Topics};
 use crate::variants::{Field, Offset, Starts, Variants};
-use crate::{files, filters};
+use crate::{commands, files, filters};
 use bb_estimators::attitude::FilterParams;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -23,6 +23,8 @@ struct Bb {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    #[command(flatten)]
+    Other(commands::Command),
     /// Scores algorithms on recordings.
     Eval {
         #[command(subcommand)]
@@ -45,7 +47,7 @@ const EXAMPLES: &str =
 
 Examples:
   bb eval attitude walk.mcap
-  bb eval attitude recordings/ --filter mekf,madgwick --axes six --plot errors.svg
+  bb eval attitude recordings/ --filter mekf,madgwick --axes 6 --plot errors.svg
   bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json
   bb eval attitude walk.mcap --filter mekf,vqf --start random:8 --offset 30uT:4";
 
@@ -142,6 +144,7 @@ pub(crate) enum Job {
     Navigation(Navigation),
     /// Prints this.
     Print(String),
+    Other(commands::Command),
 }
 
 /// `bb eval navigation`.
@@ -164,7 +167,10 @@ pub(crate) struct Attitude {
 
 /// Reads the command line. An error is what to print, and has the exit code: help, which was asked for, has 0.
 pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job, clap::Error> {
-    let Bb { command: Command::Eval { what } } = Bb::try_parse_from(arguments)?;
+    let what = match Bb::try_parse_from(arguments)?.command {
+        Command::Eval { what } => what,
+        Command::Other(command) => return Ok(Job::Other(command)),
+    };
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,
         Eval::Navigation(NavigationArguments { list: true, .. }) => {

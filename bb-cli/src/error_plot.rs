@@ -2,21 +2,9 @@
 
 use crate::evaluate::Evaluation;
 use crate::filters::Axes;
-use crate::plot::{Line, Panel, Picture};
+use crate::plot::{Line, PALETTE, Panel, Picture};
 use crate::report::name;
 use std::path::Path;
-
-/// Told apart by those who see few colours, too.
-const COLOURS: [(u8, u8, u8); 8] = [
-    (0, 80, 170),
-    (210, 50, 30),
-    (230, 150, 30),
-    (0, 140, 110),
-    (140, 70, 150),
-    (90, 170, 220),
-    (110, 110, 110),
-    (130, 90, 30),
-];
 
 /// A picture of more is larger than most viewers open.
 const MOST_PANELS: usize = 40;
@@ -26,7 +14,9 @@ pub(crate) fn draw(file: &Path, evaluations: &[Evaluation], axes: Axes) -> Resul
         Axes::Six => "inclination error",
         Axes::Nine => "total error",
     };
-    let panels: Vec<_> = evaluations.iter().filter_map(|evaluation| panel(evaluation, evaluations)).collect();
+    let axis = format!("{angle} (deg)");
+    let panels: Vec<_> =
+        evaluations.iter().filter_map(|evaluation| panel(evaluation, evaluations, &axis)).collect();
     if panels.is_empty() {
         return Err(format!("{}: not plotted, for no recording has errors", file.display()));
     }
@@ -34,17 +24,17 @@ pub(crate) fn draw(file: &Path, evaluations: &[Evaluation], axes: Axes) -> Resul
         let count = panels.len();
         return Err(format!("--plot draws at most {MOST_PANELS} recordings, and {count} have errors; name fewer"));
     }
-    let title = format!("{angle}, {} axes, deg over s", axes.name());
+    let title = format!("{angle}, {} axes", axes.name());
     Picture { title, panels, panel_size: (1400, 260) }.write(file)
 }
 
-fn panel(evaluation: &Evaluation, all: &[Evaluation]) -> Option<Panel> {
+fn panel(evaluation: &Evaluation, all: &[Evaluation], axis: &str) -> Option<Panel> {
     let runs = evaluation.runs.as_ref().ok()?;
     let has_errors = runs.iter().any(|run| run.errors.iter().any(|(_, error)| error.is_some()));
     let line = |(index, run): (usize, &crate::Run)| {
-        let colour = COLOURS[index % COLOURS.len()];
+        let colour = PALETTE[index % PALETTE.len()];
         Line::peaks(run.filter, colour, 1, &run.errors)
     };
     let lines = runs.iter().enumerate().map(line).collect();
-    has_errors.then(|| Panel { name: name(evaluation, all), lines })
+    has_errors.then(|| Panel { title: name(evaluation, all), axis: axis.to_owned(), lines })
 }

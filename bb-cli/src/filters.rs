@@ -19,15 +19,15 @@ const MAGNETOMETER: &str = "magnetometer";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Axes {
     /// Gyroscope and accelerometer: heading starts anywhere and is no result.
-    #[value(alias = "6")]
+    #[value(name = "6", alias = "six")]
     Six,
     /// The magnetometer as well.
-    #[value(alias = "9")]
+    #[value(name = "9", alias = "nine")]
     Nine,
 }
 
 impl Axes {
-    /// As on the command line.
+    /// In words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Six => "six",

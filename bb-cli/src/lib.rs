@@ -1,4 +1,5 @@
-//! The command `bb`: attitude and navigation filters, scored on recordings.
+//! The command `bb`: recordings looked at, plotted and converted, filters scored on them, projects begun. The guide is
+//! `docs/command.md`.
 //!
 //! `bb eval attitude FILES…` plays each bag through the filters and prints their errors against the truth; the guide is
 //! `docs/evaluate.md`. What it is made of is a library, for others that score: [`Score`] and [`Averages`] are the one
@@ -13,16 +14,21 @@
 
 mod arguments;
 mod averages;
+mod commands;
 mod error_plot;
 mod evaluate;
 mod files;
 mod filters;
 mod navigation;
+mod periods;
 mod plot;
 mod progress;
 mod recording;
 mod report;
 mod score;
+mod table;
+mod topics;
+mod values;
 mod variants;
 
 pub use averages::Averages;
@@ -31,7 +37,7 @@ pub use filters::{Axes, Chosen, Refused, Running, Setting};
 pub use navigation::{
     DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
 };
-pub use plot::{Line, Panel, Picture};
+pub use plot::{Colour, Line, PALETTE, Panel, Picture, Point};
 pub use progress::Progress;
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
@@ -56,7 +62,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let done = match &job {
         Job::Attitude(attitude) => eval_attitude(attitude),
         Job::Navigation(navigation) => eval_navigation(navigation),
-        Job::Print(text) => say(text).map(|()| true),
+        Job::Print(text) => say(text),
+        Job::Other(command) => command.run(),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,
@@ -115,10 +122,11 @@ fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     Ok(is_whole)
 }
 
-/// Prints; a reader that has read enough (`| head`) is no error.
-fn say(text: &str) -> Result<(), String> {
+/// Prints; whether anybody still reads: one who has read enough (`| head`) is no error.
+fn say(text: &str) -> Result<bool, String> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(format!("cannot print: {error}")),
-        _ => Ok(()),
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(format!("cannot print: {error}")),
     }
 }

@@ -1,12 +1,17 @@
 //! Lines over time, as a picture.
 
+mod line;
+mod palette;
+mod panel;
+
+pub use line::{Line, Point};
+pub use palette::{Colour, PALETTE};
+pub use panel::Panel;
+
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 use std::path::Path;
-
-/// More points than pixels show nothing more.
-const MOST_POINTS: usize = 4000;
 
 /// Panels below one another, with a title.
 #[derive(Clone, Debug)]
@@ -17,68 +22,6 @@ pub struct Picture {
     pub panels: Vec<Panel>,
     /// Width, and height of a panel, in pixels.
     pub panel_size: (u32, u32),
-}
-
-/// Lines over one time axis.
-#[derive(Clone, Debug)]
-pub struct Panel {
-    /// What the values are, with their unit.
-    pub name: String,
-    /// Those without a point are left out.
-    pub lines: Vec<Line>,
-}
-
-/// Values over time.
-#[derive(Clone, Debug)]
-pub struct Line {
-    label: String,
-    colour: (u8, u8, u8),
-    width: u32,
-    /// Runs of points without a gap.
-    runs: Vec<Vec<(f64, f64)>>,
-}
-
-impl Line {
-    /// A line through the values, interrupted where there is none, and where an angle in degrees jumps from one end of
-    /// the circle to the other.
-    pub fn new(label: impl Into<String>, colour: (u8, u8, u8), width: u32, points: &[(f64, Option<f64>)]) -> Self {
-        Self::thinned(label.into(), colour, width, points, |points| points.first().copied())
-    }
-
-    /// The same, but of points too many to show the largest ones stay.
-    pub fn peaks(
-        label: impl Into<String>,
-        colour: (u8, u8, u8),
-        width: u32,
-        points: &[(f64, Option<f64>)],
-    ) -> Self {
-        Self::thinned(label.into(), colour, width, points, |points| {
-            points.iter().copied().max_by(|a, b| a.1.partial_cmp(&b.1).unwrap_or(std::cmp::Ordering::Equal))
-        })
-    }
-
-    fn thinned(
-        label: String,
-        colour: (u8, u8, u8),
-        width: u32,
-        points: &[(f64, Option<f64>)],
-        one_of: impl Fn(&[(f64, Option<f64>)]) -> Option<(f64, Option<f64>)>,
-    ) -> Self {
-        let every = points.len().div_ceil(MOST_POINTS).max(1);
-        let mut runs: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-        for (time, value) in points.chunks(every).filter_map(one_of) {
-            let Some(run) = runs.last_mut() else { continue };
-            match value.filter(|value| value.is_finite()) {
-                Some(value) if run.last().is_none_or(|(_, last)| (value - last).abs() < 180.0) => {
-                    run.push((time, value));
-                }
-                Some(value) => runs.push(vec![(time, value)]),
-                None if !run.is_empty() => runs.push(Vec::new()),
-                None => {}
-            }
-        }
-        Self { label, colour, width, runs }
-    }
 }
 
 impl Picture {
@@ -122,8 +65,10 @@ impl Picture {
     fn draw<B: DrawingBackend>(&self, root: DrawingArea<B, Shift>) -> Drawn<B> {
         root.fill(&WHITE)?;
         let rest = root.titled(&self.title, ("sans-serif", 24))?;
+        // One for all panels, so that their time axes are as long.
+        let legend = self.panels.iter().map(|panel| panel.legend_width(&rest)).max().unwrap_or(0);
         for (area, panel) in rest.split_evenly((self.panels.len(), 1)).iter().zip(&self.panels) {
-            panel.draw(area)?;
+            panel.draw(area, legend)?;
         }
         root.present()
     }
@@ -147,52 +92,46 @@ fn format(file: &Path) -> Option<Format> {
     }
 }
 
-impl Panel {
-    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn<B> {
-        let points = || self.lines.iter().flat_map(|line| line.runs.iter().flatten());
-        let (mut start, mut end, mut low, mut high) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
-        for (time, value) in points() {
-            (start, end) = (start.min(*time), end.max(*time));
-            (low, high) = (low.min(*value), high.max(*value));
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers of an attribute of all elements of a kind.
+    fn numbers(svg: &str, element: &str, attribute: &str) -> Vec<Vec<f64>> {
+        let (element, attribute) = (format!("<{element} "), format!("{attribute}=\""));
+        let elements = svg.split(&element).skip(1).filter_map(|element| {
+            let value = element.split(&attribute).nth(1)?.split('"').next()?;
+            Some(value.split([' ', ',']).filter_map(|number| number.parse().ok()).collect())
+        });
+        elements.collect()
+    }
+
+    #[test]
+    fn axes_are_labelled_and_no_legend_covers_the_data() {
+        let points: Vec<_> = (0..500).map(|i| (f64::from(i) * 0.01, Some(f64::from(i % 100)))).collect();
+        let lines: Vec<_> = (0..)
+            .zip(["truth", "an estimate with a long name"])
+            .map(|(index, label)| Line::new(label, PALETTE[index], 1, &points))
+            .collect();
+        let panel = |axis: &str| Panel { title: String::new(), axis: axis.into(), lines: lines.clone() };
+        let panels = vec![panel("roll (deg)"), panel("pitch (deg)")];
+        let file = std::env::temp_dir().join(format!("bb-plot-{}.svg", std::process::id()));
+        Picture { title: "walk".into(), panels, panel_size: (900, 240) }.write(&file).expect("writes");
+        let svg = std::fs::read_to_string(&file).expect("reads");
+        std::fs::remove_file(&file).expect("removes");
+        for label in ["roll (deg)", "pitch (deg)", "time (s)"] {
+            assert!(svg.contains(label), "{label}");
         }
-        if start >= end {
-            (start, end, low, high) = (0.0, 1.0, 0.0, 1.0);
+        // Of the coordinates in pairs, those along.
+        let data = numbers(&svg, "polyline", "points").into_iter().filter(|points| points.len() > 100);
+        let right = data.flat_map(|points| points.into_iter().step_by(2)).fold(0.0, f64::max);
+        assert!(right > 500.0, "the data take most of the room: {right}");
+        let is_legend = |text: &&str| text.contains("truth") || text.contains("estimate");
+        let legends: Vec<_> = svg.split("<text ").filter(is_legend).collect();
+        assert_eq!(legends.len(), 4);
+        for legend in legends {
+            let left = numbers(&format!("<text {legend}"), "text", "x")[0][0];
+            assert!(left > right, "{left} {right}");
         }
-        let margin = ((high - low) * 0.05).max(0.1);
-        let mut chart = ChartBuilder::on(area)
-            .margin(6)
-            .x_label_area_size(28)
-            .y_label_area_size(60)
-            .build_cartesian_2d(start..end, low - margin..high + margin)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .y_desc(&self.name)
-            .label_style(("sans-serif", 14))
-            .draw()?;
-        for line in &self.lines {
-            let (red, green, blue) = line.colour;
-            let style = RGBColor(red, green, blue).stroke_width(line.width);
-            let mut labelled = false;
-            for run in line.runs.iter().filter(|run| !run.is_empty()) {
-                // Thick lines have spikes at sharp turns; dots do not.
-                let drawn = if line.width > 1 {
-                    chart.draw_series(run.iter().map(|point| Circle::new(*point, 2, style.filled())))?
-                } else {
-                    chart.draw_series(LineSeries::new(run.iter().copied(), style))?
-                };
-                if !labelled {
-                    let key = move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style);
-                    drawn.label(&line.label).legend(key);
-                    labelled = true;
-                }
-            }
-        }
-        chart
-            .configure_series_labels()
-            .background_style(WHITE.mix(0.8))
-            .label_font(("sans-serif", 14))
-            .position(SeriesLabelPosition::UpperRight)
-            .draw()
     }
 }

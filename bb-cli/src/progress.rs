@@ -1,6 +1,10 @@
 //! A progress bar on the terminal, redrawn a few times a second; where the errors do not go to one, there is none.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use std::time::Duration;
+
+/// How often a spinner moves; what is faster shows none.
+const TICK: Duration = Duration::from_millis(200);
 
 /// How far a run has come.
 #[derive(Debug)]
@@ -14,6 +18,13 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_message(what);
+        Self(bar)
+    }
+
+    /// Something that moves as long as nobody knows how far it is.
+    pub fn spinner(what: &'static str) -> Self {
+        let bar = ProgressBar::new_spinner().with_message(what);
+        bar.enable_steady_tick(TICK);
         Self(bar)
     }
 

@@ -58,7 +58,7 @@ impl Recording {
         let magnetic = match bag.magnetometer_of(&imu.name, topics.magnetometer.as_deref()) {
             _ if !magnetometer => None,
             Ok(topic) => Some(&*topic.name),
-            Err(error) => return Err(format!("{}; without one, choose --axes six", said(&error, "--mag-topic"))),
+            Err(error) => return Err(format!("{}; without one, choose --axes 6", said(&error, "--mag-topic"))),
         };
         let poses = poses(&bag, topics.truth.as_deref())?;
         let moving = moving(&bag, &topics.moving)?;

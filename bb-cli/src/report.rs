@@ -4,8 +4,8 @@ use crate::averages::Averages;
 use crate::evaluate::{Evaluation, Run};
 use crate::filters::Axes;
 use crate::score::Degrees;
+use crate::table::aligned;
 use serde::Serialize;
-use std::fmt::Write;
 use std::path::Path;
 
 /// One object of `--json`. What is unknown is null: every error without truth, and with six axes, of which only the
@@ -83,6 +83,10 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
         let all: Vec<_> = of_filter.clone().map(|(_, run)| run).collect();
         let share = percent(within(&all, axes));
         let Some(averages) = Averages::of(of_filter.filter_map(|(_, run)| run.score.rms())) else { continue };
+        // An average of one says nothing new.
+        if averages.count < 2 {
+            continue;
+        }
         for (what, score) in [("mean of", averages.mean), ("worst of", averages.worst)] {
             let [total, heading, inclination] = angles(Some(score), axes);
             let what = format!("{what} {}", averages.count);
@@ -93,7 +97,7 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
     let head = ["recording", "filter", "total", "heading", "inclination", "in 2σ", "samples", "ns/update"];
     lines.insert(0, head.map(String::from));
     let mut text = format!("Error against the truth, {} axes, RMS in degrees:\n\n", axes.name());
-    text += &aligned(&lines, rows + 1);
+    text += &aligned(&lines, 2, rows + 1);
     text
 }
 
@@ -156,27 +160,4 @@ fn angles(rms: Option<Degrees>, axes: Axes) -> [String; 3] {
         (Some(rms), Axes::Six) => [none(), none(), angle(rms.inclination)],
         (Some(rms), Axes::Nine) => [angle(rms.total), angle(rms.heading), angle(rms.inclination)],
     }
-}
-
-/// Columns: the first two are words, the others numbers. An empty line before line `gap`.
-fn aligned(lines: &[[String; 8]], gap: usize) -> String {
-    let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
-    let widths: [usize; 8] = std::array::from_fn(width);
-    let mut text = String::new();
-    for (index, line) in lines.iter().enumerate() {
-        if index == gap {
-            text.push('\n');
-        }
-        let mut row = String::new();
-        for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
-            // Writing to a string cannot fail.
-            let _ = match column {
-                0 | 1 => write!(row, "{cell:width$}  "),
-                _ => write!(row, "{cell:>width$}  "),
-            };
-        }
-        text += row.trim_end();
-        text.push('\n');
-    }
-    text
 }

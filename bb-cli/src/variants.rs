@@ -81,7 +81,7 @@ impl Variants {
         let field =
             self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some();
         if field && axes == crate::Axes::Six {
-            return Err("--axes six takes no magnetometer, so --offset, --magnet, --disturb and --drift change \
+            return Err("--axes 6 takes no magnetometer, so --offset, --magnet, --disturb and --drift change \
                         nothing; leave them out"
                 .into());
         }

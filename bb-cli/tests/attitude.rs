@@ -55,7 +55,8 @@ fn with_six_axes_only_the_inclination_counts() {
         );
         assert!(row["inclination_deg"].as_f64().expect("a number") < 0.01);
     }
-    let table = eval(&[&file], &["--axes", "six"]).out;
+    // Both spellings are one.
+    let table = eval(&[&file], &["--axes", "6"]).out;
     assert!(table.starts_with("Error against the truth, six axes, RMS in degrees:\n"), "{table}");
 }
 
@@ -234,7 +235,7 @@ fn a_wrong_use_has_exit_code_2_and_a_way_out() {
     for (arguments, fault) in [
         (&["--filter", "madgwik"][..], "no filter `madgwik`; did you mean `madgwick`?"),
         (&["--filter", "kalman"], "there is mekf, madgwick"),
-        (&["--axes", "seven"], "[possible values: six, nine]"),
+        (&["--axes", "seven"], "[possible values: 6, 9]"),
         (&["--set", "betta=1"], "has no parameter `betta`; did you mean `beta`?"),
         (&["--set", "beta"], "write NAME=VALUE"),
         (&["--set", "madgwick.beta=-1"], "choose a value from 0 to 1000 rad/s"),

@@ -36,7 +36,7 @@ fn what_is_not_there_is_named() {
             &[],
             "no topic of type sensor_msgs/msg/MagneticField; the bag has /imu (sensor_msgs/msg/Imu)",
         ),
-        (&no_magnetometer, &[], "; without one, choose --axes six"),
+        (&no_magnetometer, &[], "; without one, choose --axes 6"),
         (&no_magnetometer, &["--mag-topic", "/mag"], "no topic /mag; the bag has"),
         (
             &no_magnetometer,

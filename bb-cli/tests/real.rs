@@ -2,20 +2,85 @@
 
 mod common;
 
+use bb_core::Stamped;
+use bb_core::payload::{Imu, MagneticField};
+use bb_core::time::MonotonicTime;
+use bb_mcap::{Bag, BagWriter, RecorderOptions};
 use common::bb;
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-#[test]
-fn ten_trials() {
+/// The folder of the recordings; none, with a line that says so, without them.
+fn broad() -> Option<PathBuf> {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     if !data.exists() {
         // To the terminal itself: the test harness keeps what a passing test prints.
         use std::io::Write;
         let _ = writeln!(std::io::stderr(), "skipped: there is no ../shared/data beside the workspace");
-        return;
+        return None;
     }
-    let folder = data.join("broad");
+    Some(data.join("broad"))
+}
+
+/// 20 s around the first motion of a recording, in SI or as a chip gives them: deg/s, g and µT.
+fn cut(recording: &Path, in_si: bool, out: &Path) {
+    let (rate, force, field) = if in_si { (1.0, 1.0, 1.0) } else { (180.0 / std::f64::consts::PI, 9.80665, 1e6) };
+    let _ = std::fs::remove_file(out);
+    let mut writer = BagWriter::create(out, &RecorderOptions::default()).expect("creates");
+    let bag = Bag::open(recording).expect("opens");
+    let first = bb_mcap::Truth::read(&bag).expect("is whole").first_motion().expect("it moves");
+    for message in bag.messages(&["/imu", "/mag"]).expect("are there") {
+        let message = message.expect("is whole");
+        let since = message.log_time_ns as i64 - first;
+        if !(-5_000_000_000..15_000_000_000).contains(&since) {
+            continue;
+        }
+        let header = message.header().expect("has one");
+        if &*message.topic == "/imu" {
+            let (mut imu, _) = message.payload::<Imu>().expect("is one");
+            imu.angular_velocity *= rate;
+            imu.linear_acceleration /= force;
+            let mut stamped = Stamped::new(MonotonicTime::ZERO, imu);
+            stamped.wall_time = header.stamp.wall_time();
+            writer.payload("/imu", &stamped).expect("writes");
+        } else {
+            let (mut sample, _) = message.payload::<MagneticField>().expect("is one");
+            sample.magnetic_field *= field;
+            let mut stamped = Stamped::new(MonotonicTime::ZERO, sample);
+            stamped.wall_time = header.stamp.wall_time();
+            writer.payload("/mag", &stamped).expect("writes");
+        }
+    }
+    writer.finish().expect("finishes");
+}
+
+/// Slow and fast motion, with breaks, tapping and magnets: in SI nothing looks wrong, in a chip's units all does.
+#[test]
+fn units_are_told_on_real_recordings() {
+    let Some(folder) = broad() else { return };
+    let files = std::fs::read_dir(folder).expect("is there").map(|entry| entry.expect("is one").path());
+    let mut count = 0;
+    for file in files.filter(|file| file.extension().is_some_and(|end| end == "mcap")) {
+        let remarks = |file: &Path| {
+            let output = bb(&["info", "--json", file.to_str().expect("is text")]).out;
+            output.lines().filter(|line| line.contains("\"text\"")).map(str::to_owned).collect::<Vec<_>>()
+        };
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cut.mcap");
+        cut(&file, true, &out);
+        assert_eq!(remarks(&out), [""; 0], "{}", file.display());
+        cut(&file, false, &out);
+        let said = remarks(&out);
+        let units = ["in g;", "in deg/s", "in µT;"];
+        assert_eq!(said.len(), units.len(), "{}: {said:?}", file.display());
+        assert!(said.iter().zip(units).all(|(said, unit)| said.contains(unit)), "{}: {said:?}", file.display());
+        count += 1;
+    }
+    assert_eq!(count, 10);
+}
+
+#[test]
+fn ten_trials() {
+    let Some(folder) = broad() else { return };
     let folder = folder.to_str().expect("is text");
     let arguments = ["eval", "attitude", folder, "--filter", "madgwick,complementary", "--set", "beta=0.12"];
     let table = bb(&arguments);

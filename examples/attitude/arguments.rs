@@ -14,10 +14,10 @@ pub(crate) struct Arguments {
     pub(crate) data: Option<PathBuf>,
     /// The topic of the IMU, where the bag has several.
     #[arg(long, value_name = "TOPIC", requires = "data")]
-    pub(crate) imu: Option<String>,
+    pub(crate) imu_topic: Option<String>,
     /// The topic of the magnetometer, where the bag has several.
     #[arg(long, value_name = "TOPIC", requires = "data")]
-    pub(crate) mag: Option<String>,
+    pub(crate) mag_topic: Option<String>,
     /// The filter; `bb eval attitude --help` says which there are.
     #[arg(long, value_name = "NAME", default_value = "mekf")]
     filter: String,

@@ -1,12 +1,12 @@
 //! Truth and estimate over time, as a picture.
 
 use crate::outcome::{Outcome, Point};
-use bb_cli::{Line, Panel, Picture};
+use bb_cli::{Colour, Line, PALETTE, Panel, Picture};
 use bb_core::nalgebra::UnitQuaternion;
 
-const TRUTH: (u8, u8, u8) = (250, 170, 60);
-const ESTIMATE: (u8, u8, u8) = (0, 80, 170);
-const ERROR: (u8, u8, u8) = (210, 50, 30);
+const ESTIMATE: Colour = PALETTE[0];
+const HEADING: Colour = PALETTE[1];
+const TRUTH: Colour = PALETTE[3];
 
 /// Roll, pitch and yaw of the first series, then its errors.
 pub(crate) fn picture(outcome: &Outcome) -> Result<Picture, String> {
@@ -24,14 +24,16 @@ pub(crate) fn picture(outcome: &Outcome) -> Result<Picture, String> {
         };
         let truth = line(&|point| point.truth.as_ref().map(angle));
         let estimate = line(&|point| Some(angle(&point.estimate)));
-        let lines = vec![Line::new("truth", TRUTH, 4, &truth), Line::new("estimate", ESTIMATE, 1, &estimate)];
-        panels.push(Panel { name: format!("{name}, deg over s"), lines });
+        let lines =
+            vec![Line::degrees("truth", TRUTH, 4, &truth), Line::degrees("estimate", ESTIMATE, 1, &estimate)];
+        panels.push(Panel { title: String::new(), axis: format!("{name} (deg)"), lines });
     }
     let has_heading = outcome.has_heading;
     let heading = line(&|point| point.error.filter(|_| has_heading).map(|error| error.heading.to_degrees()));
     let inclination = line(&|point| point.error.map(|error| error.inclination.to_degrees()));
-    let lines = vec![Line::new("heading", ERROR, 1, &heading), Line::new("inclination", ESTIMATE, 1, &inclination)];
-    panels.push(Panel { name: "error, deg over s".into(), lines });
+    let lines =
+        vec![Line::peaks("heading", HEADING, 1, &heading), Line::peaks("inclination", ESTIMATE, 1, &inclination)];
+    panels.push(Panel { title: String::new(), axis: "error (deg)".into(), lines });
     let title = format!("{} ({})", series.name, outcome.filter);
     Ok(Picture { title, panels, panel_size: (1400, 240) })
 }

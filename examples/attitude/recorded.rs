@@ -24,17 +24,17 @@ robot! {
 pub(crate) fn run(file: &Path, arguments: &Arguments, params: AnyParams) -> Result<Outcome, Box<dyn Error>> {
     let bag = Bag::open(file)?;
     let magnetometer = arguments.axes == Axes::Nine;
-    if magnetometer && arguments.mag.is_none() {
-        let imu = bag.choose(IMU, arguments.imu.as_deref())?;
-        bag.magnetometer_of(&imu.name, None).map_err(|error| format!("{error} (or choose --axes six)"))?;
+    if magnetometer && arguments.mag_topic.is_none() {
+        let imu = bag.choose(IMU, arguments.imu_topic.as_deref())?;
+        bag.magnetometer_of(&imu.name, None).map_err(|error| format!("{error} (or choose --axes 6)"))?;
     }
     let truth = Truth::read(&bag)?;
 
     let mut builder = Recorded::builder();
     let imu = builder.options(recorded::sensor::body::imu);
     imu.file = file.to_owned();
-    imu.imu_topic = arguments.imu.clone().unwrap_or_default();
-    imu.magnetometer_topic = arguments.mag.clone().unwrap_or_default();
+    imu.imu_topic = arguments.imu_topic.clone().unwrap_or_default();
+    imu.magnetometer_topic = arguments.mag_topic.clone().unwrap_or_default();
     imu.magnetometer = magnetometer;
     *builder.options(recorded::sensor::body::imu::orientation) = params;
     let orientation = builder.subscribe(recorded::sensor::body::imu::orientation);

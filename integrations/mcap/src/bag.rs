@@ -13,6 +13,7 @@ pub use messages::{BagMessage, BagMessages};
 pub use samples::MargSamples;
 pub use truth::{Bool, MOVING, ODOMETRY, POSE, Truth};
 
+use crate::definition::MessageDefinition;
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Channels, Record, Records, full_name};
 use crate::layout::PATH;
@@ -32,13 +33,28 @@ pub struct Topic {
     /// The type in its full spelling, as `sensor_msgs/msg/Imu` even where the file says `sensor_msgs/Imu`; empty
     /// if the file gives none.
     pub schema: Arc<str>,
-    /// How the messages are encoded; `cdr` is what can be read.
-    pub encoding: String,
+    /// How the messages are encoded, `cdr` mostly.
+    pub encoding: Arc<str>,
+    /// The definition of the type in the file; empty if there is none.
+    pub definition: Arc<str>,
+    /// How the definition is written: `ros2msg`, say.
+    pub definition_encoding: Arc<str>,
     /// Whether a robot of this project published it, by a recording of ours. Its poses may be estimates, so they are not
     /// taken for the truth unasked.
     pub is_own: bool,
     /// How many messages there are, in a broken bag before the break; `None` if a summary leaves it out.
     pub messages: Option<u64>,
+}
+
+impl Topic {
+    /// What the messages consist of.
+    ///
+    /// # Errors
+    ///
+    /// If the file has no definition of the type that can be read, and it is none of those that are known; in words.
+    pub fn message_definition(&self) -> Result<MessageDefinition, String> {
+        MessageDefinition::of(&self.schema, &self.definition_encoding, &self.definition)
+    }
 }
 
 /// A recording of ROS 2 messages in an MCAP file, or with the feature `sqlite` in a `.db3` file.
@@ -138,6 +154,19 @@ impl Bag {
     ///
     /// If the bag has no topic of a name, or its messages are not CDR, or the file can no longer be opened.
     pub fn messages<S: AsRef<str>>(&self, topics: &[S]) -> Result<BagMessages, RecordingError> {
+        self.messages_of(topics, true)
+    }
+
+    /// The same, of topics in any encoding: only the bytes of messages that are not CDR can be had.
+    ///
+    /// # Errors
+    ///
+    /// If the bag has no topic of a name, or the file can no longer be opened.
+    pub fn messages_in_any_encoding<S: AsRef<str>>(&self, topics: &[S]) -> Result<BagMessages, RecordingError> {
+        self.messages_of(topics, false)
+    }
+
+    fn messages_of<S: AsRef<str>>(&self, topics: &[S], only_cdr: bool) -> Result<BagMessages, RecordingError> {
         let fail = |kind| RecordingError::new(&self.path, kind);
         let mut wanted: Vec<Wanted> = Vec::new();
         for name in topics.iter().map(AsRef::as_ref) {
@@ -151,12 +180,14 @@ impl Bag {
             };
             let mut new = Wanted { topic: first.name.clone(), expected: 0, count: 0 };
             for topic in same {
-                messages::check(&topic.name, &topic.encoding).map_err(fail)?;
+                if only_cdr {
+                    messages::check(&topic.name, &topic.encoding).map_err(fail)?;
+                }
                 new.expected = new.expected.saturating_add(topic.messages.unwrap_or(0));
             }
             wanted.push(new);
         }
-        BagMessages::open(&self.path, wanted)
+        BagMessages::open(&self.path, wanted, only_cdr)
     }
 
     /// The topics for an error message.
@@ -218,7 +249,9 @@ fn topics_of(channels: &Channels, counts: Option<&BTreeMap<u16, u64>>) -> Vec<To
             topics.push(Topic {
                 name: Arc::clone(&channel.topic),
                 schema: Arc::clone(&channel.schema),
-                encoding: channel.encoding.clone(),
+                encoding: Arc::clone(&channel.encoding),
+                definition: String::from_utf8_lossy(&channel.definition).into(),
+                definition_encoding: Arc::clone(&channel.definition_encoding),
                 is_own: channel.metadata.contains_key(PATH),
                 messages: count,
             });

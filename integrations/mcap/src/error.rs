@@ -66,11 +66,11 @@ pub enum RecordingErrorKind {
         /// What it seems to be, and what to do with it.
         found: &'static str,
     },
-    /// The file stops in the middle, as after a recorder that was killed.
+    /// The file stops in the middle, as after a recorder that was killed; see [`recover`](crate::recover()).
     #[error(
         "truncated after {messages} messages (byte {byte} of {size}): the recorder was stopped or the copy is \
-         incomplete; copy it again, or go on with the messages before the break, of which `bb_mcap::recover` makes a \
-         whole file"
+         incomplete; copy it again, or go on with the messages before the break, of which `bb recover` makes a whole \
+         file"
     )]
     Truncated {
         /// Messages of all topics before the break.
@@ -80,10 +80,10 @@ pub enum RecordingErrorKind {
         /// The size of the file in bytes.
         size: u64,
     },
-    /// A record contradicts the format or its checksum.
+    /// A record contradicts the format or its checksum; see [`recover`](crate::recover()).
     #[error(
         "corrupt at byte {byte}, after {messages} messages: {fault}; copy the file again, or make a whole file of what \
-         is before with `bb_mcap::recover`"
+         is before with `bb recover`"
     )]
     Corrupt {
         /// Messages of all topics before the place.

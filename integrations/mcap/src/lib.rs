@@ -6,6 +6,8 @@
 //! | read it back, bit for bit | [`Recording`] |
 //! | read the messages of ROS in any bag, those of a [`Recorder`] too | [`Bag`] |
 //! | play a recorded IMU as the sensor of a robot, or take its samples | [`BagImu`], [`MargSamples`] |
+//! | read messages of any type, by the definition in the file | [`MessageDefinition`], [`Value`] |
+//! | write payloads as the messages of ROS | [`BagWriter`] |
 //! | what a bag knows of the true orientation | [`Truth`] |
 //! | make a whole file of what is before a break | [`recover`] |
 //!
@@ -68,18 +70,22 @@
 
 mod bag;
 mod clock;
+mod definition;
 mod error;
 mod file;
 mod layout;
 mod recorder;
 mod recording;
 mod recover;
+mod writer;
 
 pub use bag::{
     Bag, BagImu, BagImuOptions, BagMessage, BagMessages, Bool, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY,
     POSE, Topic, Truth,
 };
+pub use definition::{MessageDefinition, Value};
 pub use error::{RecordingError, RecordingErrorKind};
 pub use recorder::{BackgroundRecorder, Compression, Recorder, RecorderOptions, RecorderReport};
 pub use recording::{AllMessages, Messages, RecordedChannel, RecordedMessage, Recording};
 pub use recover::{Recovered, recover};
+pub use writer::BagWriter;

@@ -30,7 +30,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
-use viewers::{describe, latched, nanos, view};
+use viewers::{describe, latched, view};
+pub(crate) use viewers::{nanos, view_as};
 
 /// Where a recording goes.
 pub(crate) trait Output: Write + Seek + Send {}
@@ -409,7 +410,7 @@ impl std::fmt::Debug for Recorder {
     }
 }
 
-type FileWriter = Writer<BufWriter<Box<dyn Output>>>;
+pub(crate) type FileWriter = Writer<BufWriter<Box<dyn Output>>>;
 
 /// Why nothing more is written.
 enum WriteFault {

@@ -21,8 +21,8 @@ impl DecodeError {
         Self(Box::new(Fault { path: Path::default(), at, expected: expected.into(), found: found.into() }))
     }
 
-    /// The same, in the field `name` of what is read.
-    pub fn within(mut self, name: &'static str) -> Self {
+    /// The same, in the field `name` of what is read; `[2]` is the third of a list.
+    pub fn within(mut self, name: impl Into<Cow<'static, str>>) -> Self {
         self.0.path.enter(name);
         self
     }

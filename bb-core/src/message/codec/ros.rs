@@ -202,3 +202,10 @@ impl<T: Payload + RosMessage> RosLayout<T> {
         Self::OF
     }
 }
+
+impl<T> RosLayout<T> {
+    /// What the bytes mean.
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+}

@@ -1,5 +1,6 @@
 //! The messages of chosen topics, one by one.
 
+use crate::definition::{MessageDefinition, Value};
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Channels, Record, Records, full_name, unpack};
 use bb_core::message::codec::ros::Header;
@@ -23,8 +24,10 @@ pub struct BagMessage {
     /// When the recorder received it, in nanoseconds of the recorder's clock, mostly since 1970. When its values
     /// held is in the header.
     pub log_time_ns: u64,
-    /// As the type says, in CDR; unpacked, if the message was packed by itself.
+    /// As the type and the encoding say; unpacked, if the message was packed by itself.
     pub data: Vec<u8>,
+    /// How they are encoded: `cdr`, which is the only one that is read here.
+    pub encoding: Arc<str>,
     path: Arc<Path>,
     /// Its number on its topic, from 1.
     number: u64,
@@ -35,15 +38,15 @@ pub struct BagMessage {
 impl BagMessage {
     pub(super) fn new(
         topic: &Arc<str>,
-        schema: &Arc<str>,
+        kind: &MessageKind,
         log_time_ns: u64,
         data: Vec<u8>,
         path: &Arc<Path>,
         number: u64,
         byte: u64,
     ) -> Self {
-        let (topic, schema, path) = (Arc::clone(topic), Arc::clone(schema), Arc::clone(path));
-        Self { topic, schema, log_time_ns, data, path, number, byte }
+        let MessageKind { schema, encoding } = kind.clone();
+        Self { topic: Arc::clone(topic), schema, log_time_ns, data, encoding, path: Arc::clone(path), number, byte }
     }
 
     /// The payload and the time in the header of a message that ROS has for payloads `T`; see the table in
@@ -73,9 +76,23 @@ impl BagMessage {
     /// # Errors
     /// Its bytes are no header.
     pub fn header(&self) -> Result<Header, RecordingError> {
+        self.check_encoding()?;
         Reader::of_message(&self.data)
             .and_then(|mut reader| Header::read(&mut reader))
             .map_err(|error| self.fault(error))
+    }
+
+    /// The fields of a message of any type.
+    ///
+    /// # Errors
+    /// Its bytes are damaged, or the definition is of another type.
+    pub fn value(&self, definition: &MessageDefinition) -> Result<Value, RecordingError> {
+        self.check_encoding()?;
+        definition.read(&self.data).map_err(|error| self.fault(error))
+    }
+
+    fn check_encoding(&self) -> Result<(), RecordingError> {
+        check(&self.topic, &self.encoding).map_err(|kind| RecordingError::new(&self.path, kind))
     }
 
     fn read<T>(
@@ -89,6 +106,7 @@ impl BagMessage {
                 RecordingErrorKind::OtherType { topic, schema: self.schema.to_string(), wanted: full_name(wanted) };
             return Err(RecordingError::new(&self.path, kind));
         }
+        self.check_encoding()?;
         read(&self.data).map_err(|error| self.fault(error))
     }
 
@@ -124,6 +142,7 @@ pub struct BagMessages {
     records: Option<Records>,
     channels: Channels,
     wanted: Vec<Wanted>,
+    only_cdr: bool,
     /// What is read instead of records, in a bag that is a database.
     #[cfg(feature = "sqlite")]
     rows: Option<super::sqlite::Rows>,
@@ -145,27 +164,38 @@ pub(crate) struct Wanted {
 struct Route {
     /// Index into the wanted topics.
     topic: usize,
-    schema: Arc<str>,
+    kind: MessageKind,
+}
+
+/// What the messages of a channel have in common.
+#[derive(Clone, Debug)]
+pub(super) struct MessageKind {
+    pub(super) schema: Arc<str>,
+    pub(super) encoding: Arc<str>,
 }
 
 impl BagMessages {
-    pub(crate) fn open(path: &Path, wanted: Vec<Wanted>) -> Result<Self, RecordingError> {
+    pub(crate) fn open(path: &Path, wanted: Vec<Wanted>, only_cdr: bool) -> Result<Self, RecordingError> {
         #[cfg(feature = "sqlite")]
         if super::sqlite::is_database(path) {
             let rows = super::sqlite::Rows::open(path, &wanted).map_err(|kind| RecordingError::new(path, kind))?;
-            return Ok(Self { rows: Some(rows).filter(|_| !wanted.is_empty()), ..Self::of(path, None, wanted) });
+            return Ok(Self {
+                rows: Some(rows).filter(|_| !wanted.is_empty()),
+                ..Self::of(path, None, wanted, only_cdr)
+            });
         }
         let records = Records::open(path).map_err(|kind| RecordingError::new(path, kind))?;
         let records = Some(records).filter(|_| !wanted.is_empty());
-        Ok(Self::of(path, records, wanted))
+        Ok(Self::of(path, records, wanted, only_cdr))
     }
 
-    fn of(path: &Path, records: Option<Records>, wanted: Vec<Wanted>) -> Self {
+    fn of(path: &Path, records: Option<Records>, wanted: Vec<Wanted>, only_cdr: bool) -> Self {
         Self {
             path: path.into(),
             records,
             channels: Channels::default(),
             wanted,
+            only_cdr,
             #[cfg(feature = "sqlite")]
             rows: None,
             routes: HashMap::new(),
@@ -196,8 +226,11 @@ impl BagMessages {
                         Some(c) => match self.wanted.iter().position(|wanted| wanted.topic == c.topic) {
                             None => None,
                             Some(topic) => {
-                                check(&c.topic, &c.encoding)?;
-                                Some(Route { topic, schema: Arc::clone(&c.schema) })
+                                if self.only_cdr {
+                                    check(&c.topic, &c.encoding)?;
+                                }
+                                let (schema, encoding) = (Arc::clone(&c.schema), Arc::clone(&c.encoding));
+                                Some(Route { topic, kind: MessageKind { schema, encoding } })
                             }
                         },
                     };
@@ -209,7 +242,7 @@ impl BagMessages {
             *count += 1;
             let data = unpack(data).map_err(|fault| RecordingErrorKind::Payload {
                 topic: topic.to_string(),
-                schema: route.schema.to_string(),
+                schema: route.kind.schema.to_string(),
                 message: *count,
                 log_time_ns: log_time,
                 byte: records.byte(),
@@ -217,7 +250,7 @@ impl BagMessages {
             })?;
             let data = data.into_owned();
             let byte = records.byte();
-            return Ok(Some(BagMessage::new(topic, &route.schema, log_time, data, &self.path, *count, byte)));
+            return Ok(Some(BagMessage::new(topic, &route.kind, log_time, data, &self.path, *count, byte)));
         }
         // The length of a chunk and that it is one are covered by no checksum. Damage there can hide the chunk, and
         // only the summary knows.

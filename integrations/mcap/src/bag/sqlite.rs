@@ -1,7 +1,7 @@
 //! Bags in SQLite, which `ros2 bag record` wrote by default until Iron: files that end in `.db3`.
 
 use super::Topic;
-use super::messages::{BagMessage, Wanted};
+use super::messages::{BagMessage, MessageKind, Wanted};
 use crate::error::RecordingErrorKind;
 use crate::file::{LIMIT, full_name, unpack};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, params};
@@ -38,19 +38,35 @@ fn open(path: &Path) -> rusqlite::Result<Connection> {
 fn read_topics(connection: &Connection) -> rusqlite::Result<Vec<(i64, Topic)>> {
     let mut statement =
         connection.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")?;
+    let definitions = definitions(connection)?;
     let topics = statement.query_map([], |row| {
         let name: String = row.get(1)?;
         let schema: String = row.get(2)?;
+        let encoding: String = row.get(3)?;
+        let (definition_encoding, definition) = definitions.get(&schema).cloned().unwrap_or_default();
         let topic = Topic {
             name: name.into(),
             schema: full_name(&schema).into(),
-            encoding: row.get(3)?,
+            encoding: encoding.into(),
+            definition: definition.into(),
+            definition_encoding: definition_encoding.into(),
             is_own: false,
             messages: None,
         };
         Ok((row.get(0)?, topic))
     })?;
     topics.collect()
+}
+
+/// The definitions of types and how they are written, by their names; bags before Iron have none.
+fn definitions(connection: &Connection) -> rusqlite::Result<HashMap<String, (String, String)>> {
+    if !connection.table_exists(None, "message_definitions")? {
+        return Ok(HashMap::new());
+    }
+    let mut statement =
+        connection.prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")?;
+    let definitions = statement.query_map([], |row| Ok((row.get(0)?, (row.get(1)?, row.get(2)?))))?;
+    definitions.collect()
 }
 
 fn fault(messages: u64) -> impl Fn(rusqlite::Error) -> RecordingErrorKind {
@@ -61,7 +77,7 @@ fn fault(messages: u64) -> impl Fn(rusqlite::Error) -> RecordingErrorKind {
 pub(super) struct Rows {
     connection: Connection,
     /// The chosen topics: the place among those wanted, and the type, by their numbers in the database.
-    chosen: HashMap<i64, (usize, Arc<str>)>,
+    chosen: HashMap<i64, (usize, MessageKind)>,
     page: VecDeque<Row>,
     /// Where the next page begins: after this time and number.
     last: (i64, i64),
@@ -82,7 +98,7 @@ impl Rows {
         let topics = read_topics(&connection).map_err(fault(0))?;
         let chosen = topics.into_iter().filter_map(|(id, topic)| {
             let place = wanted.iter().position(|wanted| wanted.topic == topic.name)?;
-            Some((id, (place, topic.schema)))
+            Some((id, (place, MessageKind { schema: topic.schema, encoding: topic.encoding })))
         });
         let chosen = chosen.collect();
         Ok(Self { connection, chosen, page: VecDeque::new(), last: (i64::MIN, i64::MIN), messages: 0 })
@@ -103,7 +119,7 @@ impl Rows {
             };
             let messages = self.messages;
             self.messages += 1;
-            let Some((place, schema)) = self.chosen.get(&topic) else { continue };
+            let Some((place, kind)) = self.chosen.get(&topic) else { continue };
             // No message has a negative length.
             let length = u64::try_from(length).unwrap_or(u64::MAX);
             if length > LIMIT {
@@ -115,14 +131,14 @@ impl Rows {
             let log_time_ns = u64::try_from(time_ns).unwrap_or(0);
             let data = unpack(&data).map_err(|fault| RecordingErrorKind::Payload {
                 topic: topic.to_string(),
-                schema: schema.to_string(),
+                schema: kind.schema.to_string(),
                 message: *count,
                 log_time_ns,
                 byte: 0,
                 fault,
             })?;
             let data = data.into_owned();
-            return Ok(Some(BagMessage::new(topic, schema, log_time_ns, data, path, *count, 0)));
+            return Ok(Some(BagMessage::new(topic, kind, log_time_ns, data, path, *count, 0)));
         }
     }
 

@@ -11,14 +11,24 @@ pub(crate) struct Channel {
     /// The full name of the type; empty if the file gives none.
     pub(crate) schema: Arc<str>,
     pub(crate) definition: Arc<[u8]>,
-    pub(crate) encoding: String,
+    /// How the definition is written, `ros2msg` say.
+    pub(crate) definition_encoding: Arc<str>,
+    pub(crate) encoding: Arc<str>,
     pub(crate) metadata: BTreeMap<String, String>,
+}
+
+/// The type of the messages of channels.
+#[derive(Clone, Debug, Default)]
+struct Schema {
+    name: Arc<str>,
+    definition: Arc<[u8]>,
+    encoding: Arc<str>,
 }
 
 /// All channels met so far.
 #[derive(Debug, Default)]
 pub(crate) struct Channels {
-    schemas: HashMap<u16, (Arc<str>, Arc<[u8]>)>,
+    schemas: HashMap<u16, Schema>,
     channels: BTreeMap<u16, Channel>,
 }
 
@@ -27,20 +37,28 @@ impl Channels {
     /// wrong.
     pub(crate) fn define(&mut self, record: Record<'_>) -> Result<Option<(u16, &Channel)>, String> {
         match record {
-            Record::Schema { id, name, data, .. } => {
+            Record::Schema { id, name, encoding, data } => {
                 let name: Arc<str> = full_name(name).into();
-                match self.schemas.insert(id, (Arc::clone(&name), data.into())) {
-                    Some((old, _)) if old != name => Err(format!("schema {id} is both {old} and {name}")),
+                let new = Schema { name: Arc::clone(&name), definition: data.into(), encoding: encoding.into() };
+                match self.schemas.insert(id, new) {
+                    Some(old) if old.name != name => Err(format!("schema {id} is both {} and {name}", old.name)),
                     _ => Ok(None),
                 }
             }
             Record::Channel { id, schema, topic, encoding, metadata } => {
-                let (schema, definition) = match self.schemas.get(&schema) {
-                    Some((name, definition)) => (Arc::clone(name), Arc::clone(definition)),
-                    None if schema == 0 => ("".into(), [].into()),
+                let schema = match self.schemas.get(&schema) {
+                    Some(schema) => schema.clone(),
+                    None if schema == 0 => Schema::default(),
                     None => return Err(format!("{topic} has the unknown schema {schema}")),
                 };
-                let new = Channel { topic: topic.into(), schema, definition, encoding: encoding.into(), metadata };
+                let new = Channel {
+                    topic: topic.into(),
+                    schema: schema.name,
+                    definition: schema.definition,
+                    definition_encoding: schema.encoding,
+                    encoding: encoding.into(),
+                    metadata,
+                };
                 match self.channels.get(&id) {
                     Some(old) if *old != new => {
                         Err(format!("channel {id} is defined twice, for {} and {topic}", old.topic))

@@ -29,7 +29,18 @@ pub(super) fn view<T: Field>(writer: &mut FileWriter, topic: &str, qos: &str) ->
         Shape::Struct(shape) => shape.name,
         _ => "",
     };
-    let schema = Schema::new(name, T::SHAPE);
+    view_as(writer, topic, name, T::SHAPE, qos)
+}
+
+/// A channel of a type of this name and shape.
+pub(crate) fn view_as(
+    writer: &mut FileWriter,
+    topic: &str,
+    name: &str,
+    shape: Shape,
+    qos: &str,
+) -> McapResult<u16> {
+    let schema = Schema::new(name, shape);
     // ROS's player wants it to be there.
     let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos.to_owned())]);
     let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
@@ -70,6 +81,6 @@ const LATCHED: &str = "- history: 1
 ";
 
 /// MCAP has no time before 1970.
-pub(super) fn nanos(time: WallTime) -> u64 {
+pub(crate) fn nanos(time: WallTime) -> u64 {
     u64::try_from(time.as_unix_nanos()).unwrap_or(0)
 }

@@ -3,6 +3,7 @@
 mod bad;
 mod common;
 mod compressed;
+mod definitions;
 mod good;
 mod real;
 mod samples;

@@ -102,3 +102,28 @@ fn a_database_of_something_else_says_what_is_missing() {
         "{said}"
     );
 }
+
+/// Bags since Iron have definitions; of older ones, known types are read.
+#[test]
+fn types_are_read_by_the_definition_in_the_bag_or_by_name() {
+    let path = bag("defined.db3", 3);
+    let fault = |bag: &Bag| bag.topics()[1].message_definition().expect_err("nobody knows it");
+    let old = Bag::open(&path).expect("opens");
+    assert_eq!(fault(&old), "the file has no definition of x/msg/Y, and it is not a known type");
+    let imu = old.topics()[0].message_definition().expect("it is known");
+    let first = old.messages(&["/imu"]).expect("is there").next().expect("is one").expect("is whole");
+    assert!(first.value(&imu).expect("is one").field("angular_velocity").is_some());
+
+    let database = Connection::open(&path).expect("opens");
+    database
+        .execute_batch(
+            "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,
+                 encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);
+             INSERT INTO message_definitions VALUES (1, 'x/msg/Y', 'ros2msg', 'uint8[] data', '');",
+        )
+        .expect("is made");
+    drop(database);
+    let new = Bag::open(&path).expect("opens");
+    assert_eq!((&*new.topics()[1].definition, &*new.topics()[1].definition_encoding), ("uint8[] data", "ros2msg"));
+    assert!(new.topics()[1].message_definition().is_ok());
+}

@@ -1,0 +1,310 @@
+//! The rows of a CSV as quantities in SI.
+
+use super::columns::{Column, Columns, Quantity, What};
+use crate::filters::near;
+use csv::{ReaderBuilder, StringRecord};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Lines before the first one of numbers.
+const LONGEST_HEAD: usize = 100;
+
+/// Where the times of rows come from.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Times {
+    Column,
+    /// Hz; the first row is at zero.
+    Rate(f64),
+}
+
+/// What a row holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Row {
+    pub(super) time_ns: i64,
+    /// rad/s
+    pub(super) angular_velocity: Option<[f64; 3]>,
+    /// m/s²
+    pub(super) specific_force: Option<[f64; 3]>,
+    /// T
+    pub(super) magnetic_field: Option<[f64; 3]>,
+    /// w, x, y, z; NaN where it is not known.
+    pub(super) orientation: Option<[f64; 4]>,
+    /// m; NaN where it is not known.
+    pub(super) position: Option<[f64; 3]>,
+    pub(super) moving: Option<bool>,
+}
+
+/// A CSV that is being read.
+pub(super) struct Table {
+    file: PathBuf,
+    reader: csv::Reader<File>,
+    bytes: u64,
+    times: Times,
+    quantities: Vec<(Quantity, Vec<usize>)>,
+    /// Lines before the first row, and that row.
+    head: usize,
+    first: Option<StringRecord>,
+    /// Rows given.
+    rows: u64,
+}
+
+impl Table {
+    /// Reads the head, and finds the columns.
+    pub(super) fn open(file: &Path, columns: &Columns, times: Times) -> Result<Self, String> {
+        let opened = File::open(file).map_err(|error| format!("cannot be read: {error}"))?;
+        let bytes = opened.metadata().map_or(0, |about| about.len());
+        let mut reader = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .delimiter(delimiter(file)?)
+            .from_reader(opened);
+        let mut head: Vec<StringRecord> = Vec::new();
+        let mut record = StringRecord::new();
+        let first = loop {
+            if !reader.read_record(&mut record).map_err(said)? {
+                return Err(match head.is_empty() {
+                    true => "it is empty".into(),
+                    false => "it has no line that begins with a number".to_owned(),
+                });
+            }
+            if record.get(0).is_some_and(|cell| cell.parse::<f64>().is_ok()) {
+                break record;
+            }
+            if head.len() == LONGEST_HEAD {
+                return Err(format!("none of the first {LONGEST_HEAD} lines begins with a number"));
+            }
+            head.push(std::mem::take(&mut record));
+        };
+        let find = |column: &Column| find(column, &head);
+        let quantities = columns.quantities.iter().map(|quantity| {
+            let indices = quantity.columns.iter().map(find).collect::<Result<Vec<_>, _>>()?;
+            Ok((quantity.clone(), indices))
+        });
+        let quantities = quantities.collect::<Result<_, String>>()?;
+        Ok(Self {
+            file: file.to_owned(),
+            reader,
+            bytes,
+            times,
+            quantities,
+            head: head.len(),
+            first: Some(first),
+            rows: 0,
+        })
+    }
+
+    /// The length of the file.
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// How far it is read.
+    pub(super) fn byte(&self) -> u64 {
+        self.reader.position().byte()
+    }
+
+    /// How many lines are before the first row.
+    pub(super) fn head(&self) -> usize {
+        self.head
+    }
+
+    /// The next row; an error names its line and column.
+    pub(super) fn next(&mut self) -> Result<Option<Row>, String> {
+        let record = match self.first.take() {
+            Some(first) => first,
+            None => {
+                let mut record = StringRecord::new();
+                if !self.reader.read_record(&mut record).map_err(said)? {
+                    return Ok(None);
+                }
+                record
+            }
+        };
+        let mut row = Row::default();
+        if let Times::Rate(rate) = self.times {
+            row.time_ns = (self.rows as f64 / rate * 1e9).round() as i64;
+        }
+        for (quantity, indices) in &self.quantities {
+            take(&record, quantity, indices, &mut row)
+                .map_err(|fault| format!("line {}, {fault}", self.line_of(&record)))?;
+        }
+        self.rows += 1;
+        Ok(Some(row))
+    }
+}
+
+impl Table {
+    /// The line of a record. Its position is that before empty lines.
+    fn line_of(&self, record: &StringRecord) -> u64 {
+        let Some(position) = record.position() else { return 0 };
+        let empty = File::open(&self.file).and_then(|mut file| {
+            file.seek(SeekFrom::Start(position.byte()))?;
+            let bytes = BufReader::new(file).bytes().map_while(Result::ok);
+            Ok(bytes.take_while(|byte| b"\r\n".contains(byte)).filter(|byte| *byte == b'\n').count())
+        });
+        position.line() + empty.unwrap_or(0) as u64
+    }
+}
+
+fn said(error: csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::Utf8 { pos: Some(place), .. } => format!("line {} is not UTF-8", place.line()),
+        csv::ErrorKind::Io(cause) => format!("cannot be read: {cause}"),
+        _ => error.to_string(),
+    }
+}
+
+/// Of commas, semicolons and tabs the one that the first line has most of.
+fn delimiter(file: &Path) -> Result<u8, String> {
+    let mut line = Vec::new();
+    let opened = File::open(file).map_err(|error| format!("cannot be read: {error}"))?;
+    BufReader::new(opened).read_until(b'\n', &mut line).map_err(|error| format!("cannot be read: {error}"))?;
+    let count = |delimiter: u8| line.iter().filter(|byte| **byte == delimiter).count();
+    // Of those that are as many, the first.
+    Ok([b'\t', b';', b','].into_iter().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b','))
+}
+
+/// A column's index; by its name in any line of the head, which may have a unit in brackets at its end.
+fn find(column: &Column, head: &[StringRecord]) -> Result<usize, String> {
+    let name = match column {
+        Column::Number(index) => return Ok(*index),
+        Column::Name(name) => name,
+    };
+    let bare = |cell: &str| cell.split(['[', '(']).next().unwrap_or("").trim().trim_start_matches('#').to_owned();
+    let is_same = |cell: &str| cell.eq_ignore_ascii_case(name) || bare(cell).eq_ignore_ascii_case(name);
+    for line in head {
+        let mut found = line.iter().enumerate().filter(|(_, cell)| is_same(cell)).map(|(index, _)| index);
+        match (found.next(), found.next()) {
+            (Some(index), None) => return Ok(index),
+            (Some(_), Some(_)) => return Err(format!("several columns are called `{name}`; use numbers, from 1")),
+            (None, _) => {}
+        }
+    }
+    let names: Vec<String> = head.iter().flat_map(StringRecord::iter).map(bare).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
+    match names.is_empty() {
+        true => Err(format!("no column `{name}`, since the CSV has no head; use numbers, from 1")),
+        false => Err(format!("no column `{name}`; {}", near(name, &names))),
+    }
+}
+
+fn take(record: &StringRecord, quantity: &Quantity, indices: &[usize], row: &mut Row) -> Result<(), String> {
+    let cells = Cells { record, quantity, indices };
+    match quantity.what {
+        What::Time => row.time_ns = cells.time_ns()?,
+        What::AngularVelocity => row.angular_velocity = Some(cells.measured()?),
+        What::SpecificForce => row.specific_force = Some(cells.measured()?),
+        What::MagneticField => {
+            // Slower than the IMU, it has no value in many rows.
+            let field = cells.known_or_nan()?;
+            row.magnetic_field = field.iter().all(|value: &f64| value.is_finite()).then_some(field);
+        }
+        What::Orientation => row.orientation = Some(cells.known_or_nan()?),
+        What::Position => row.position = Some(cells.known_or_nan()?),
+        What::Moving => row.moving = Some(cells.number(0)? != 0.0),
+    }
+    Ok(())
+}
+
+/// The cells of one quantity.
+struct Cells<'a> {
+    record: &'a StringRecord,
+    quantity: &'a Quantity,
+    indices: &'a [usize],
+}
+
+impl Cells<'_> {
+    fn cell(&self, component: usize) -> Result<&str, String> {
+        let index = self.indices[component];
+        self.record.get(index).ok_or_else(|| {
+            let columns = self.record.len();
+            self.fault(component, format!("is missing, since the line has {columns} columns"))
+        })
+    }
+
+    fn fault(&self, component: usize, fault: impl std::fmt::Display) -> String {
+        let column = match &self.quantity.columns[component] {
+            Column::Number(_) => self.quantity.what.to_string(),
+            Column::Name(name) => name.clone(),
+        };
+        format!("column {} ({column}): {fault}", self.indices[component] + 1)
+    }
+
+    fn number(&self, component: usize) -> Result<f64, String> {
+        let cell = self.cell(component)?;
+        cell.parse().map_err(|_| self.fault(component, format!("`{cell}` is not a number")))
+    }
+
+    /// Numbers in SI that must be there.
+    fn measured<const N: usize>(&self) -> Result<[f64; N], String> {
+        let mut values = [0.0; N];
+        for (component, value) in values.iter_mut().enumerate() {
+            *value = self.number(component)? * self.quantity.factor;
+        }
+        Ok(values)
+    }
+
+    /// Numbers in SI; NaN for cells that are empty.
+    fn known_or_nan<const N: usize>(&self) -> Result<[f64; N], String> {
+        let mut values = [f64::NAN; N];
+        for (component, value) in values.iter_mut().enumerate() {
+            if !self.cell(component)?.is_empty() {
+                *value = self.number(component)? * self.quantity.factor;
+            }
+        }
+        Ok(values)
+    }
+
+    fn time_ns(&self) -> Result<i64, String> {
+        let cell = self.cell(0)?;
+        // A float of nanoseconds since 1970 has no nanoseconds.
+        if let Some(time_ns) = exact_ns(cell, self.quantity.factor) {
+            return Ok(time_ns);
+        }
+        let time_ns = (self.number(0)? * self.quantity.factor * 1e9).round();
+        match time_ns.abs() < 9e18 {
+            true => Ok(time_ns as i64),
+            false => Err(self.fault(0, format!("`{cell}` is no time"))),
+        }
+    }
+}
+
+/// A decimal number of a unit as nanoseconds, rounded down, without the detour by a float; none if the number or the unit
+/// is not decimal.
+fn exact_ns(cell: &str, factor: f64) -> Option<i64> {
+    let units = [(1.0, 9), (1e-3, 6), (1e-6, 3), (1e-9, 0)];
+    let (_, digits) = units.into_iter().find(|(unit, _)| *unit == factor)?;
+    let (whole, part) = cell.split_once('.').unwrap_or((cell, ""));
+    let is_negative = whole.starts_with('-');
+    let whole: i64 = whole.parse().ok()?;
+    if !part.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    let kept = &part[..part.len().min(digits)];
+    let scale = |digits: usize| 10_i64.checked_pow(u32::try_from(digits).ok()?);
+    let part =
+        if kept.is_empty() { 0 } else { kept.parse::<i64>().ok()?.checked_mul(scale(digits - kept.len())?)? };
+    whole.checked_mul(scale(digits)?)?.checked_add(if is_negative { -part } else { part })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_keep_their_nanoseconds() {
+        assert_eq!(exact_ns("1403636579758555392", 1e-9), Some(1_403_636_579_758_555_392));
+        assert_eq!(exact_ns("1403636579.758555392", 1.0), Some(1_403_636_579_758_555_392));
+        assert_eq!(exact_ns("1403636579758555.392", 1e-6), Some(1_403_636_579_758_555_392));
+        assert_eq!(exact_ns("12", 1e-3), Some(12_000_000));
+        assert_eq!(exact_ns("-0.25", 1.0), Some(-250_000_000));
+        assert_eq!(exact_ns("0.01", 1.0), Some(10_000_000));
+        // Digits beyond the nanosecond.
+        assert_eq!(exact_ns("1.0000000019", 1.0), Some(1_000_000_001));
+        assert_eq!(exact_ns("1e-3", 1.0), None);
+        assert_eq!(exact_ns("1.-3", 1.0), None);
+        assert_eq!(exact_ns("99999999999999999999", 1.0), None);
+    }
+}

@@ -1,0 +1,117 @@
+//! `bb hz`: how often the messages of topics come.
+
+use crate::periods::Periods;
+use crate::table::aligned;
+use crate::topics::{TopicReader, find, log_ns, open};
+use clap::Args;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+/// Prints how often messages come: by the stamps in their headers, or by the log where they have none.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// A recording or a ROS 2 bag.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// The topics; all without one.
+    #[arg(value_name = "TOPIC")]
+    topics: Vec<String>,
+    /// Prints an array of objects instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// An object of `--json`.
+#[derive(Serialize)]
+struct Row<'a> {
+    topic: &'a str,
+    messages: usize,
+    rate_hz: Option<f64>,
+    period: Option<&'a Periods>,
+    gaps: usize,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
+    let bag = open(&arguments.file)?;
+    let mut topics = Vec::new();
+    for name in &arguments.topics {
+        let topic = find(&bag, name)?;
+        if !topics.contains(&topic) {
+            topics.push(topic);
+        }
+    }
+    if topics.is_empty() {
+        topics = bag.topics().iter().collect();
+    }
+    let names: Vec<_> = topics.iter().map(|topic| &topic.name).collect();
+    let readers: HashMap<_, _> =
+        topics.iter().filter_map(|topic| Some((topic.name.clone(), TopicReader::new(topic).ok()?))).collect();
+
+    let expected = topics.iter().filter_map(|topic| topic.messages).sum();
+    let progress = crate::Progress::new("reading", expected);
+    let mut times: HashMap<_, Vec<i64>> = HashMap::new();
+    let mut broken = None;
+    for message in bag.messages_in_any_encoding(&names).map_err(|error| error.to_string())? {
+        let message = match message {
+            Ok(message) => message,
+            Err(error) => {
+                broken = Some(error.to_string());
+                break;
+            }
+        };
+        let stamp = readers.get(&message.topic).and_then(|reader| reader.stamp_ns(&message));
+        times.entry(message.topic.clone()).or_default().push(stamp.unwrap_or_else(|| log_ns(&message)));
+        progress.add(1);
+    }
+    progress.finish();
+
+    let periods: Vec<_> = names
+        .iter()
+        .map(|name| {
+            let times = times.get(*name).map_or(&[][..], |times| times);
+            (&***name, times.len(), Periods::of(times))
+        })
+        .collect();
+    crate::say(&if arguments.json { json(&periods)? } else { table(&periods) })?;
+    match broken {
+        Some(fault) => Err(fault),
+        None => Ok(true),
+    }
+}
+
+fn json(topics: &[(&str, usize, Option<Periods>)]) -> Result<String, String> {
+    let rows: Vec<_> = topics
+        .iter()
+        .map(|(topic, messages, periods)| Row {
+            topic,
+            messages: *messages,
+            rate_hz: periods.as_ref().and_then(Periods::rate_hz),
+            period: periods.as_ref(),
+            gaps: periods.as_ref().map_or(0, |periods| periods.gaps.len()),
+        })
+        .collect();
+    Ok(serde_json::to_string_pretty(&rows).map_err(|error| error.to_string())? + "\n")
+}
+
+fn table(topics: &[(&str, usize, Option<Periods>)]) -> String {
+    let head = ["topic", "messages", "rate", "mean", "min", "max", "std", "gaps"];
+    let mut rows = vec![head.map(String::from)];
+    for (topic, messages, periods) in topics {
+        let ms = |value: fn(&Periods) -> f64| {
+            periods.as_ref().map_or_else(|| "-".to_owned(), |periods| format!("{:.3} ms", value(periods) * 1e3))
+        };
+        let rate = periods.as_ref().and_then(Periods::rate_hz);
+        rows.push([
+            (*topic).to_owned(),
+            messages.to_string(),
+            rate.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2} Hz")),
+            ms(|periods| periods.mean_s),
+            ms(|periods| periods.min_s),
+            ms(|periods| periods.max_s),
+            ms(|periods| periods.std_s),
+            periods.as_ref().map_or_else(|| "-".to_owned(), |periods| periods.gaps.len().to_string()),
+        ]);
+    }
+    aligned(&rows, 1, usize::MAX)
+}

@@ -1,0 +1,43 @@
+//! `bb info`: what is in recordings, and what looks wrong with them.
+
+mod date;
+mod remark;
+mod report;
+mod scan;
+mod times;
+mod units;
+
+use crate::files;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Prints what is in recordings: topics, types, rates, and what looks wrong: gaps, clocks, units, damage.
+#[derive(Debug, Args)]
+#[command(after_help = "Exit code: 0; 1 if a file is damaged or could not be read; 2 for a wrong use.")]
+pub(crate) struct Arguments {
+    /// Recordings or ROS 2 bags, or folders of them.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Prints an array of objects instead of the tables.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
+    let mut is_whole = true;
+    let mut contents = Vec::new();
+    for (file, found) in files::recordings(&arguments.files) {
+        match found.and_then(|()| scan::scan(&file)) {
+            Ok(content) => {
+                is_whole &= content.damage.is_none();
+                contents.push(content);
+            }
+            Err(fault) => {
+                is_whole = false;
+                eprintln!("error: {}: {fault}", file.display());
+            }
+        }
+    }
+    crate::say(&if arguments.json { report::json(&contents)? } else { report::text(&contents) })?;
+    Ok(is_whole)
+}

@@ -1,0 +1,27 @@
+//! What looks wrong with a topic.
+
+use serde::Serialize;
+
+/// What a remark is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Subject {
+    Gap,
+    Clock,
+    Unit,
+    Values,
+    Messages,
+}
+
+/// What looks wrong with a topic.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Remark {
+    pub(crate) subject: Subject,
+    pub(crate) text: String,
+}
+
+impl Remark {
+    pub(super) fn new(subject: Subject, text: impl Into<String>) -> Self {
+        Self { subject, text: text.into() }
+    }
+}

@@ -1,0 +1,107 @@
+//! Reads a file through once.
+
+use super::remark::{Remark, Subject};
+use super::times::Times;
+use super::units::Units;
+use crate::periods::Periods;
+use crate::topics::{TopicReader, log_ns};
+use bb_mcap::Bag;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// What is in a file.
+pub(super) struct Content {
+    pub(super) file: PathBuf,
+    pub(super) bytes: u64,
+    /// The first and the last time of the log, nanoseconds.
+    pub(super) span_ns: Option<(i64, i64)>,
+    pub(super) messages: usize,
+    /// In the order of the file.
+    pub(super) topics: Vec<TopicContent>,
+    /// Where and why the file cannot be read on.
+    pub(super) damage: Option<String>,
+}
+
+/// What is on a topic.
+pub(super) struct TopicContent {
+    pub(super) name: String,
+    pub(super) schema: String,
+    pub(super) encoding: String,
+    pub(super) messages: usize,
+    pub(super) periods: Option<Periods>,
+    pub(super) remarks: Vec<Remark>,
+}
+
+/// A topic while it is read.
+#[derive(Default)]
+struct Open {
+    reader: Option<TopicReader>,
+    times: Times,
+    units: Units,
+    /// The first message that cannot be read.
+    fault: Option<String>,
+}
+
+/// Reads a file through; the error says why not even its beginning can be read.
+pub(super) fn scan(file: &Path) -> Result<Content, String> {
+    let opening = crate::Progress::spinner("opening");
+    let bag = Bag::open(file);
+    opening.finish();
+    let bag = bag.map_err(|error| error.kind().to_string())?;
+    let names: Vec<_> = bag.topics().iter().map(|topic| topic.name.clone()).collect();
+    let expected = bag.topics().iter().filter_map(|topic| topic.messages).sum();
+
+    let mut topics: HashMap<_, Open> = HashMap::new();
+    for topic in bag.topics() {
+        let reader = TopicReader::new(topic).ok();
+        topics.insert((topic.name.clone(), topic.schema.clone()), Open { reader, ..Open::default() });
+    }
+    let mut span_ns: Option<(i64, i64)> = None;
+    let mut messages = 0;
+    let mut damage = None;
+    let progress = crate::Progress::new("reading", expected);
+    for message in bag.messages_in_any_encoding(&names).map_err(|error| error.kind().to_string())? {
+        let message = match message {
+            Ok(message) => message,
+            Err(error) => {
+                damage = Some(error.kind().to_string());
+                break;
+            }
+        };
+        messages += 1;
+        progress.add(1);
+        let log = log_ns(&message);
+        span_ns = Some(span_ns.map_or((log, log), |(start, end)| (start.min(log), end.max(log))));
+        let topic = topics.entry((message.topic.clone(), message.schema.clone())).or_default();
+        topic.times.push(log, topic.reader.as_ref().and_then(|reader| reader.stamp_ns(&message)));
+        let read = topic.units.take(&message).map_err(|error| error.to_string());
+        let read = read.and_then(|()| match &topic.reader {
+            // Once is enough for those that tell nothing of units.
+            Some(reader) if topic.times.count() == 1 => reader.read(&message).map(drop),
+            _ => Ok(()),
+        });
+        if let (None, Err(fault)) = (&topic.fault, read) {
+            topic.fault = Some(fault);
+        }
+    }
+    progress.finish();
+
+    let start_ns = span_ns.map_or(0, |(start, _)| start);
+    let content = bag.topics().iter().map(|topic| {
+        let open = topics.remove(&(topic.name.clone(), topic.schema.clone())).unwrap_or_default();
+        let mut remarks = open.times.remarks(start_ns);
+        remarks.extend(open.units.remarks());
+        remarks.extend(open.fault.map(|fault| Remark::new(Subject::Messages, fault)));
+        TopicContent {
+            name: topic.name.to_string(),
+            schema: topic.schema.to_string(),
+            encoding: topic.encoding.to_string(),
+            messages: open.times.count(),
+            periods: open.times.periods(),
+            remarks,
+        }
+    });
+    let topics = content.collect();
+    let bytes = std::fs::metadata(file).map_or(0, |about| about.len());
+    Ok(Content { file: file.to_owned(), bytes, span_ns, messages, topics, damage })
+}

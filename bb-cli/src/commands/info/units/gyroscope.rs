@@ -1,0 +1,126 @@
+//! Whether the gyroscope is in rad/s: over a second the direction of gravity must turn as the gyroscope says.
+
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
+
+/// The time over which turns are compared.
+const SPAN_S: f64 = 1.0;
+/// Directions of gravity are means over so many samples at both ends.
+const MEAN: usize = 5;
+/// Between samples farther apart nothing is known of the turn.
+const LONGEST_S: f64 = 0.1;
+/// A verdict needs so many spans in motion,
+const FEWEST: usize = 3;
+/// which the unit at hand misses by this median, rad,
+const WRONG: f64 = 0.1;
+/// and the other unit by so many times less.
+const CLEARER: f64 = 3.0;
+/// No gyroscope of a robot measures more, rad/s: 2,000 deg/s.
+const FASTEST: f64 = 35.0;
+
+type Sample = (f64, Vector3<f64>, Vector3<f64>);
+
+/// What is wrong with the unit; nothing, if nothing is, or the recording does not tell.
+pub(super) fn verdict(samples: &[Sample]) -> Option<String> {
+    let mut errors: Vec<(f64, f64)> = spans(samples)
+        .map(|span| (error(span, 1.0), error(span, std::f64::consts::PI / 180.0)))
+        // Spans at rest tell nothing: both units give no turn.
+        .filter(|(as_radians, as_degrees)| as_radians.max(*as_degrees) > WRONG)
+        .collect();
+    if errors.len() >= FEWEST {
+        let mut median = |of: fn(&(f64, f64)) -> f64| {
+            errors.sort_by(|a, b| of(a).total_cmp(&of(b)));
+            of(&errors[errors.len() / 2])
+        };
+        let (as_radians, as_degrees) = (median(|error| error.0), median(|error| error.1));
+        if as_radians > WRONG && as_radians > CLEARER * as_degrees {
+            return Some(format!(
+                "the angular velocity looks to be in deg/s: over a second gravity turns as it says within {:.1} deg, and \
+                 read as rad/s within {:.1} deg; ROS has rad/s",
+                as_degrees.to_degrees(),
+                as_radians.to_degrees()
+            ));
+        }
+        if as_degrees > CLEARER * as_radians {
+            return None;
+        }
+    }
+    let mut rates: Vec<f64> = samples.iter().map(|(_, rate, _)| rate.norm()).collect();
+    rates.sort_by(f64::total_cmp);
+    let fast = *rates.get(rates.len() * 99 / 100)?;
+    (fast > FASTEST).then(|| {
+        format!("the angular velocity reaches {fast:.0} rad/s, more than gyroscopes measure: it looks to be in deg/s; ROS has rad/s")
+    })
+}
+
+/// The samples of each span, one after the other, without those that have a gap.
+fn spans(samples: &[Sample]) -> impl Iterator<Item = &[Sample]> {
+    let mut rest = samples;
+    std::iter::from_fn(move || {
+        loop {
+            let start = rest.first()?.0;
+            let end = rest.iter().position(|(time, ..)| time - start >= SPAN_S)?;
+            let span;
+            (span, rest) = rest.split_at(end);
+            let is_even = span.windows(2).all(|pair| (0.0..LONGEST_S).contains(&(pair[1].0 - pair[0].0)));
+            if is_even && span.len() > 3 * MEAN {
+                return Some(span);
+            }
+        }
+    })
+}
+
+/// The angle between gravity at the end of a span as it is measured and as the gyroscope, times `scale`, says.
+fn error(span: &[Sample], scale: f64) -> f64 {
+    let mean = |samples: &[Sample]| samples.iter().map(|(.., force)| force).sum::<Vector3<f64>>();
+    let (start, end) = (mean(&span[..MEAN]), mean(&span[span.len() - MEAN..]));
+    // From the middle of the first mean to that of the last.
+    let between = &span[MEAN / 2..span.len() - MEAN / 2];
+    let start_from_end = between.windows(2).fold(UnitQuaternion::identity(), |turned, pair| {
+        let rate = 0.5 * (pair[0].1 + pair[1].1) * scale;
+        turned * UnitQuaternion::from_scaled_axis(rate * (pair[1].0 - pair[0].0))
+    });
+    (start_from_end * end).angle(&start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 20 s at 100 Hz: rest, then turns about x by 1 rad/s for the rest of the time, with the gyroscope in a unit.
+    fn walk(unit: f64, motion: f64) -> Vec<Sample> {
+        let mut angle = 0.0_f64;
+        (0..2000)
+            .map(|index| {
+                let time = f64::from(index) * 0.01;
+                let rate = if time > 10.0 { motion * (time * 0.7).sin() } else { 0.0 };
+                angle += rate * 0.01;
+                let force =
+                    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -angle) * Vector3::new(0.0, 0.0, 9.81);
+                (time, Vector3::new((rate + 0.002) * unit, 0.001, 0.0), force)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn degrees_are_told_from_radians() {
+        assert_eq!(verdict(&walk(1.0, 1.0)), None);
+        let said = verdict(&walk(57.3, 1.0)).expect("it is wrong");
+        assert!(said.contains("in deg/s"), "{said}");
+        // Slowly too: 6 deg/s.
+        assert!(verdict(&walk(57.3, 0.1)).expect("it is wrong").contains("in deg/s"));
+        assert_eq!(verdict(&walk(1.0, 0.1)), None);
+    }
+
+    #[test]
+    fn at_rest_there_is_no_verdict() {
+        assert_eq!(verdict(&walk(1.0, 0.0)), None);
+        assert_eq!(verdict(&[]), None);
+    }
+
+    #[test]
+    fn without_gravity_the_range_tells() {
+        let samples: Vec<Sample> =
+            walk(57.3, 1.5).into_iter().map(|(time, rate, _)| (time, rate, Vector3::zeros())).collect();
+        assert!(verdict(&samples).expect("it is wrong").contains("more than gyroscopes measure"));
+    }
+}

@@ -1,0 +1,103 @@
+//! The times between messages.
+
+use serde::Serialize;
+
+/// What the times between messages have in common.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct Periods {
+    pub(crate) mean_s: f64,
+    pub(crate) min_s: f64,
+    pub(crate) max_s: f64,
+    /// The standard deviation.
+    pub(crate) std_s: f64,
+    pub(crate) median_s: f64,
+    /// Where messages are missing. Only of messages that come regularly it can be told.
+    #[serde(skip)]
+    pub(crate) gaps: Vec<Gap>,
+    /// Where the time goes back: indices of the messages after it.
+    #[serde(skip)]
+    pub(crate) backward: Vec<usize>,
+    /// How many messages have the time of the one before.
+    #[serde(skip)]
+    pub(crate) repeated: usize,
+}
+
+/// A time without messages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gap {
+    /// The index of the message before it.
+    pub(crate) after: usize,
+    pub(crate) length_s: f64,
+}
+
+/// A period longer than so many medians is a gap.
+const GAP: f64 = 3.0;
+/// Messages are regular if nine of ten periods are within this many medians, of at least so many.
+const REGULAR: f64 = 2.0;
+const FEWEST: usize = 8;
+
+impl Periods {
+    /// Of the times of messages in their order, nanoseconds; none of fewer than two. Times that go back count as no
+    /// period.
+    pub(crate) fn of(times_ns: &[i64]) -> Option<Self> {
+        let seconds = |ns: i64| ns as f64 * 1e-9;
+        let steps = || times_ns.windows(2).map(|pair| seconds(pair[1].saturating_sub(pair[0])));
+        let mut sorted: Vec<f64> = steps().filter(|step| *step >= 0.0).collect();
+        sorted.sort_by(f64::total_cmp);
+        let (first, last) = (*sorted.first()?, *sorted.last()?);
+        let count = sorted.len() as f64;
+        let mean_s = sorted.iter().sum::<f64>() / count;
+        let variance = sorted.iter().map(|step| (step - mean_s).powi(2)).sum::<f64>() / count;
+        let median_s = sorted[sorted.len() / 2];
+        let is_regular = sorted.len() >= FEWEST && sorted[sorted.len() * 9 / 10] <= REGULAR * median_s;
+        let gaps = steps().enumerate().filter(|(_, step)| is_regular && *step > GAP * median_s);
+        Some(Self {
+            mean_s,
+            min_s: first,
+            max_s: last,
+            std_s: variance.sqrt(),
+            median_s,
+            gaps: gaps.map(|(after, length_s)| Gap { after, length_s }).collect(),
+            backward: steps().enumerate().filter(|(_, step)| *step < 0.0).map(|(index, _)| index + 1).collect(),
+            repeated: steps().filter(|step| *step == 0.0).count(),
+        })
+    }
+
+    /// Messages a second.
+    pub(crate) fn rate_hz(&self) -> Option<f64> {
+        (self.mean_s > 0.0).then(|| 1.0 / self.mean_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+
+    #[test]
+    fn regular_messages_have_gaps() {
+        let mut times: Vec<i64> = (0..100).map(|index| index * 10 * MS).collect();
+        times.iter_mut().skip(50).for_each(|time| *time += 500 * MS);
+        let periods = Periods::of(&times).expect("there are some");
+        assert_eq!(periods.gaps, [Gap { after: 49, length_s: 0.51 }]);
+        assert!((periods.median_s - 0.01).abs() < 1e-12 && (periods.max_s - 0.51).abs() < 1e-12);
+        assert!((periods.mean_s - (0.98 + 0.51) / 99.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn messages_that_come_as_they_like_have_none() {
+        let times: Vec<i64> = (0..30_i64).map(|index| index * index * index * MS).collect();
+        assert_eq!(Periods::of(&times).expect("there are some").gaps, []);
+        assert_eq!(Periods::of(&[0, 5 * MS, 900 * MS]).expect("there are some").gaps, []);
+        assert_eq!(Periods::of(&[7]), None);
+        assert_eq!(Periods::of(&[]), None);
+    }
+
+    #[test]
+    fn times_that_go_back_or_stand_still_are_counted() {
+        let periods = Periods::of(&[0, 10, 20, 20, 5, 15]).expect("there are some");
+        assert_eq!((periods.backward, periods.repeated), (vec![4], 1));
+        assert_eq!(Periods::of(&[20, 10, 0]), None);
+    }
+}

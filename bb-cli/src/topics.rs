@@ -1,0 +1,78 @@
+//! Topics of a bag by the names on the command line, and their messages, whatever they are.
+
+use crate::filters::near;
+use crate::values::FromJson;
+use bb_mcap::{Bag, BagMessage, MessageDefinition, Topic, Value};
+use std::path::Path;
+
+/// How messages in JSON are encoded.
+const JSON: &str = "json";
+
+const SECOND_NS: u64 = 1_000_000_000;
+
+/// Opens a bag; the error names the file.
+pub(crate) fn open(file: &Path) -> Result<Bag, String> {
+    Bag::open(file).map_err(|error| error.to_string())
+}
+
+/// The topic of this name, with or without the slash at its beginning.
+pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
+    let full = format!("/{}", name.trim_start_matches('/'));
+    let found = bag.topics().iter().find(|topic| *topic.name == *name || *topic.name == *full);
+    found.ok_or_else(|| {
+        let names: Vec<&str> = bag.topics().iter().map(|topic| &*topic.name).collect();
+        let file = bag.path().display();
+        match names.is_empty() {
+            true => format!("{file}: no topic {full}; the bag has no topics"),
+            false => format!("{file}: no topic {full}; {}", near(&full, &names)),
+        }
+    })
+}
+
+/// Reads the messages of a topic.
+#[derive(Debug)]
+pub(crate) enum TopicReader {
+    Cdr(MessageDefinition),
+    Json,
+}
+
+impl TopicReader {
+    /// For a topic; the error says why its messages cannot be read.
+    pub(crate) fn new(topic: &Topic) -> Result<Self, String> {
+        match &*topic.encoding {
+            "cdr" => topic.message_definition().map(Self::Cdr).map_err(|fault| format!("{}: {fault}", topic.name)),
+            JSON => Ok(Self::Json),
+            other => Err(format!(
+                "the messages of {} are encoded as `{other}`, and only `cdr` and `{JSON}` are read; convert the bag",
+                topic.name
+            )),
+        }
+    }
+
+    /// The fields of a message.
+    pub(crate) fn read(&self, message: &BagMessage) -> Result<Value, String> {
+        match self {
+            Self::Cdr(definition) => message.value(definition).map_err(|error| error.to_string()),
+            Self::Json => serde_json::from_slice(&message.data)
+                .map(|FromJson(value)| value)
+                .map_err(|error| format!("a message of {} is no JSON: {error}", message.topic)),
+        }
+    }
+
+    /// The time in the header of a message, nanoseconds; none if it has no header, or the header has no time.
+    pub(crate) fn stamp_ns(&self, message: &BagMessage) -> Option<i64> {
+        match self {
+            Self::Cdr(definition) if definition.has_header() => {
+                let stamp_ns = message.header().ok()?.stamp.wall_time().as_unix_nanos();
+                // Zero is what nobody has set, but for a clock that begins with the recording.
+                (stamp_ns != 0 || message.log_time_ns < SECOND_NS).then_some(stamp_ns)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// When a message was logged, nanoseconds.
+pub(crate) fn log_ns(message: &BagMessage) -> i64 {
+    i64::try_from(message.log_time_ns).unwrap_or(i64::MAX)
+}

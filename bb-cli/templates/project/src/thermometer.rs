@@ -1,0 +1,43 @@
+//! The sensor: a thermometer.
+
+use bb_core::prelude::*;
+
+/// What the thermometer publishes: plain data in SI units.
+#[derive(Clone, Debug, Payload)]
+pub struct Temperature {
+    /// K
+    pub temperature_k: f64,
+}
+
+/// Options are given in the parentheses in `robot!`, and checked there.
+#[derive(Clone, Debug, Options)]
+pub struct ThermometerOptions {
+    /// What is added to each reading, at most. Unit: K.
+    #[option(default = 0.1, range = 0.0..=10.0, unit = "K")]
+    pub noise: f64,
+}
+
+/// A thermometer that is made up. A real one holds its device.
+#[derive(Debug)]
+pub struct Thermometer {
+    noise_k: f64,
+    readings: u32,
+}
+
+impl Sensor for Thermometer {
+    type Options = ThermometerOptions;
+    type Output = Temperature;
+
+    /// Opens the device. Any error becomes a `Fault` with `?`; the sensor is then tried again after a while.
+    fn init(options: ThermometerOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self { noise_k: options.noise, readings: 0 })
+    }
+
+    /// Reads the device, at the rate that the robot declares. An error, as of a device that is unplugged, is reported,
+    /// and the sensor is made again.
+    fn read(&mut self, _now: MonotonicTime) -> Result<Reading<Temperature>, Fault> {
+        self.readings = self.readings.wrapping_add(1);
+        let noise = (f64::from(self.readings) * 12.9898).sin();
+        Ok(Reading::now(Temperature { temperature_k: 293.15 + self.noise_k * noise }))
+    }
+}

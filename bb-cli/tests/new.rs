@@ -1,0 +1,71 @@
+//! `bb new`: the project compiles, its tests pass, and it records.
+
+mod common;
+
+use common::bb;
+use std::path::Path;
+use std::process::Command;
+
+const WORKSPACE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+/// `bb new` in a folder of the tests.
+fn new(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_bb"))
+        .current_dir(env!("CARGO_TARGET_TMPDIR"))
+        .arg("new")
+        .args(arguments)
+        .output()
+        .expect("runs");
+    let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("is text")).concat();
+    (output.status.code(), said)
+}
+
+#[test]
+fn the_project_compiles_passes_its_tests_and_records() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fresh-oven");
+    let _ = std::fs::remove_dir_all(&folder);
+    let (code, said) = new(&["fresh-oven", "--path", WORKSPACE]);
+    assert_eq!((code, &*said), (Some(0), "made fresh-oven; next: cd fresh-oven && cargo run\n"));
+
+    // The versions that the workspace has, so that nothing is fetched, and what it has built.
+    std::fs::copy(Path::new(WORKSPACE).join("Cargo.lock"), folder.join("Cargo.lock")).expect("copies");
+    let target = Path::new(env!("CARGO_BIN_EXE_bb")).ancestors().nth(2).expect("target/debug/bb");
+    let cargo = |command: &str| {
+        let output = Command::new(env!("CARGO"))
+            .current_dir(&folder)
+            .args([command, "--offline", "--quiet"])
+            .args(["--config", "profile.dev.package.nalgebra.opt-level=2"])
+            .env("CARGO_TARGET_DIR", target)
+            .output()
+            .expect("runs");
+        let text = |bytes| String::from_utf8(bytes).expect("is text");
+        let (out, err) = (text(output.stdout), text(output.stderr));
+        assert!(output.status.success() && !err.contains("warning"), "cargo {command}\n{out}\n{err}");
+        out
+    };
+    let tests = cargo("test");
+    assert!(tests.contains("2 passed"), "{tests}");
+    let run = cargo("run");
+    let recording = run.lines().find(|line| line.contains("look at it with")).expect("it is recorded");
+    let recording = folder.join(recording.split(':').next().expect("is named"));
+    let info = bb(&["info", recording.to_str().expect("is text")]);
+    assert_eq!(info.code, Some(0), "{}", info.err);
+    assert!(info.out.contains("/sensor/body/thermometer/smooth  "), "{}", info.out);
+    let echo = bb(&["echo", recording.to_str().expect("is text"), "sensor/body/thermometer", "--limit", "1"]);
+    assert!(echo.out.contains("temperature_k: 29"), "{}", echo.out);
+}
+
+#[test]
+fn what_is_there_is_not_touched() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("taken");
+    std::fs::create_dir_all(&folder).expect("makes");
+    let (code, said) = new(&["taken"]);
+    assert_eq!((code, &*said), (Some(1), "error: taken exists already; choose another name, or remove it\n"));
+    assert_eq!(std::fs::read_dir(&folder).expect("is there").count(), 0);
+    let (code, said) = new(&["2wheels"]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("a package's name begins with a letter"), "{said}");
+    let (code, said) = new(&["elsewhere", "--path", "taken"]);
+    assert_eq!((code, &*said), (Some(1), "error: taken is no checkout of bb: it has no bb-core/Cargo.toml\n"));
+    assert!(!folder.with_file_name("elsewhere").exists());
+}

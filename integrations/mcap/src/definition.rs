@@ -1,0 +1,112 @@
+//! Messages of types that are known only from the definition in the file.
+//!
+//! Why not `re_ros_msg`, which reads the same: it panics on some malformed definitions, allocates what a length in a file
+//! asks for, sorts the fields by name and does not say which field is wrong.
+
+mod known;
+mod parse;
+mod read;
+mod value;
+
+pub use value::Value;
+
+use bb_core::message::{DecodeError, Schema};
+use std::sync::Arc;
+
+/// The fields of a type of messages, to read any message of it, by [`Topic::message_definition`](crate::Topic::message_definition):
+/// from the definition in the file (`ros2msg`), or else, as
+/// bags in SQLite have none, of the types that [`bb_core::message::codec::ros`] has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MessageDefinition {
+    /// The type itself, then those that it is made of.
+    messages: Vec<Message>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Message {
+    /// `sensor_msgs/Imu`
+    name: String,
+    fields: Vec<Field>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Field {
+    name: Arc<str>,
+    kind: Kind,
+    count: Count,
+}
+
+/// The type of a field, or of the elements of a list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Bool,
+    I8,
+    I16,
+    I32,
+    I64,
+    U8,
+    U16,
+    U32,
+    U64,
+    F32,
+    F64,
+    Text,
+    /// By index.
+    Message(usize),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Count {
+    One,
+    Exactly(usize),
+    /// A length comes first.
+    Any,
+}
+
+/// The messages in a message in a message, and so on: more is no type that anybody wrote.
+const DEEPEST: usize = 32;
+
+impl MessageDefinition {
+    /// Of a type in the full spelling, by what the file has of it: a text, and how that is written. Both may be empty.
+    ///
+    /// # Errors
+    /// The text cannot be read, and the type is none of those that are known; in words.
+    pub(crate) fn of(name: &str, encoding: &str, text: &str) -> Result<Self, String> {
+        if encoding == Schema::ENCODING && !text.trim().is_empty() {
+            return Self::parse(name, text);
+        }
+        match known::definition(name) {
+            Some(text) => Self::parse(name, &text),
+            None if name.is_empty() => Err("the file does not name the type of its messages".into()),
+            None if text.is_empty() => {
+                Err(format!("the file has no definition of {name}, and it is not a known type"))
+            }
+            None => Err(format!("{name} is defined in `{encoding}`, and only `{}` is read", Schema::ENCODING)),
+        }
+    }
+
+    /// From the text of a definition and those of all types that it names, as ROS 2 writes it into bags (`ros2msg`).
+    ///
+    /// # Errors
+    /// The line that is wrong; or a type that is not defined, or contains itself.
+    pub fn parse(name: &str, text: &str) -> Result<Self, String> {
+        parse::definition(name, text).map_err(|fault| format!("the definition of {name} is malformed: {fault}"))
+    }
+
+    /// Whether a message begins with a `std_msgs/Header`, which has the time of its values.
+    pub fn has_header(&self) -> bool {
+        let first = self.messages.first().and_then(|message| message.fields.first());
+        first.is_some_and(|field| match (field.kind, field.count) {
+            (Kind::Message(index), Count::One) => self.messages[index].name == "std_msgs/Header",
+            _ => false,
+        })
+    }
+
+    /// Reads a message in CDR.
+    ///
+    /// # Errors
+    /// The field that is wrong, and what was expected there.
+    pub fn read(&self, data: &[u8]) -> Result<Value, DecodeError> {
+        read::message(self, data)
+    }
+}

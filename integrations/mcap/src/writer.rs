@@ -1,0 +1,129 @@
+//! Bags made of payloads, of what other programs have measured.
+
+use crate::error::{RecordingError, create_error, write_error};
+use crate::recorder::{FileWriter, nanos, view_as};
+use crate::{RecorderOptions, RecordingErrorKind};
+use bb_core::message::codec::{Field, Shape, encode, encode_as_ros};
+use bb_core::{Payload, Stamped, WallTime};
+use mcap::records::MessageHeader;
+use std::collections::HashMap;
+use std::fmt;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes payloads as the messages that ROS has for them into a new bag, which ROS 2 and this crate read. What a robot
+/// publishes is written by a [`Recorder`](crate::Recorder).
+///
+/// A bag that is dropped without [`finish`](Self::finish) is whole, but nobody is told if its end could not be written.
+pub struct BagWriter {
+    path: PathBuf,
+    writer: Box<FileWriter>,
+    channels: HashMap<String, Channel>,
+    messages: u64,
+    bytes: Vec<u8>,
+}
+
+struct Channel {
+    id: u16,
+    /// ROS's name of the type.
+    name: &'static str,
+    sequence: u32,
+}
+
+impl BagWriter {
+    /// Creates the file, of the chunks that the options say.
+    ///
+    /// # Errors
+    /// The file exists already, or cannot be created.
+    pub fn create(path: impl AsRef<Path>, options: &RecorderOptions) -> Result<Self, RecordingError> {
+        let path = path.as_ref();
+        let file = File::create_new(path).map_err(|cause| RecordingError::new(path, create_error(cause)))?;
+        let writer = options.mcap().create(BufWriter::new(Box::new(file) as _));
+        let writer = writer.map_err(|error| RecordingError::new(path, write_error(0, error)))?;
+        let (channels, bytes) = (HashMap::new(), Vec::new());
+        Ok(Self { path: path.to_owned(), writer: Box::new(writer), channels, messages: 0, bytes })
+    }
+
+    /// Writes a payload as ROS's message, logged at its wall time.
+    ///
+    /// # Errors
+    /// ROS has no message for it, the topic has another type, or the file cannot be written on.
+    pub fn payload<T: Payload>(&mut self, topic: &str, message: &Stamped<T>) -> Result<(), RecordingError> {
+        self.bytes.clear();
+        let shape = T::ROS.map_or(T::SHAPE, |layout| layout.shape());
+        if !encode_as_ros(message, &mut self.bytes) {
+            return Err(self.other_type(topic, T::NAME, "a payload that ROS has a message for"));
+        }
+        self.write(topic, shape, message.wall_time)
+    }
+
+    /// Writes a type that has ROS's fields and, by `#[payload(name = "package/Name")]`, ROS's name.
+    ///
+    /// # Errors
+    /// The topic has another type, or the file cannot be written on.
+    pub fn message<M: Field>(
+        &mut self,
+        topic: &str,
+        log_time: WallTime,
+        message: &M,
+    ) -> Result<(), RecordingError> {
+        self.bytes.clear();
+        encode(message, &mut self.bytes);
+        self.write(topic, M::SHAPE, log_time)
+    }
+
+    /// Writes the end of the file; how many messages it has.
+    ///
+    /// # Errors
+    /// The file cannot be written on.
+    pub fn finish(mut self) -> Result<u64, RecordingError> {
+        let (path, messages) = (self.path, self.messages);
+        let fail = |error| RecordingError::new(&path, write_error(messages, error));
+        self.writer.finish().map_err(fail)?;
+        self.writer.into_inner().flush().map_err(|cause| fail(cause.into()))?;
+        Ok(messages)
+    }
+
+    /// Writes the bytes.
+    fn write(&mut self, topic: &str, shape: Shape, time: WallTime) -> Result<(), RecordingError> {
+        let name = match shape {
+            Shape::Struct(shape) => shape.name,
+            _ => "",
+        };
+        if !self.channels.contains_key(topic) {
+            let id = view_as(&mut self.writer, topic, name, shape, "").map_err(|error| self.fail(error))?;
+            self.channels.insert(topic.to_owned(), Channel { id, name, sequence: 0 });
+        }
+        let Some(channel) = self.channels.get_mut(topic) else { return Ok(()) };
+        if channel.name != name {
+            let known = channel.name;
+            return Err(self.other_type(topic, name, known));
+        }
+        let (log_time, sequence) = (nanos(time), channel.sequence);
+        channel.sequence = channel.sequence.wrapping_add(1);
+        let header = MessageHeader { channel_id: channel.id, sequence, log_time, publish_time: log_time };
+        let written = self.writer.write_to_known_channel(&header, &self.bytes);
+        written.map_err(|error| self.fail(error))?;
+        self.messages += 1;
+        Ok(())
+    }
+
+    fn fail(&self, error: mcap::McapError) -> RecordingError {
+        RecordingError::new(&self.path, write_error(self.messages, error))
+    }
+
+    fn other_type(&self, topic: &str, schema: &str, wanted: &str) -> RecordingError {
+        let (topic, schema, wanted) = (topic.to_owned(), schema.to_owned(), wanted.to_owned());
+        RecordingError::new(&self.path, RecordingErrorKind::OtherType { topic, schema, wanted })
+    }
+}
+
+impl fmt::Debug for BagWriter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BagWriter")
+            .field("path", &self.path)
+            .field("messages", &self.messages)
+            .finish_non_exhaustive()
+    }
+}
