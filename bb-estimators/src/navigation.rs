@@ -27,6 +27,7 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
+pub mod smoother;
 mod stream;
 
 pub use alignment::{Alignment, AlignmentParams};
@@ -49,4 +50,5 @@ pub use measurement::{
     ZeroVelocity,
 };
 pub use navigator::{Aiding, NAVIGATED, Navigated, Navigator};
+pub use smoother::{ImuDensities, Preintegration};
 pub use stream::{Counts, Fused, Stream, StreamParams};
