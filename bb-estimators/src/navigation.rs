@@ -27,6 +27,7 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
+#[cfg(feature = "smoother")]
 pub mod smoother;
 mod stream;
 
@@ -34,7 +35,7 @@ pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
 pub use consistency::{Consistency, nees};
 pub use eskf::{
-    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuMean, Keyframe, NAVIGATION,
+    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuDensities, ImuMean, Keyframe, NAVIGATION,
     Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
 };
 #[cfg(feature = "runtime")]
@@ -50,5 +51,8 @@ pub use measurement::{
     ZeroVelocity,
 };
 pub use navigator::{Aiding, NAVIGATED, Navigated, Navigator};
-pub use smoother::{ImuDensities, Preintegration};
+#[cfg(feature = "smoother")]
+pub use smoother::{
+    Factor, FixedLagSmoother, Kernel, NavigationFactor, Preintegration, Rows, SmootherParams, Updated,
+};
 pub use stream::{Counts, Fused, Stream, StreamParams};

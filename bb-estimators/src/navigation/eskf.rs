@@ -29,7 +29,13 @@ mod tests;
 
 pub use estimate::{Estimate, Keyframe};
 pub use filter::{Eskf, ImuMean, Start};
-pub use params::{EskfParams, GaussMarkov};
+#[cfg(feature = "smoother")]
+pub(super) use filter::{LONGEST_GAP_S, seconds_between};
+pub use params::{EskfParams, GaussMarkov, ImuDensities};
+#[cfg(feature = "smoother")]
+pub(super) use propagation::{Transition, rows};
+#[cfg(feature = "smoother")]
+pub(super) use states::distinct;
 pub use refusal::Refusal;
 pub use states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,

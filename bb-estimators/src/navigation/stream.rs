@@ -56,7 +56,7 @@ pub struct Counts {
     pub gate: u64,
     /// [`Refusal::NonFinite`], [`Refusal::OutOfRange`] and [`Refusal::Noise`].
     pub invalid: u64,
-    /// [`Refusal::NoKeyframe`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
+    /// [`Refusal::NoKeyframe`], [`Refusal::Full`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
     pub not_applicable: u64,
     /// [`Refusal::TooOld`], [`Refusal::TimeNotIncreasing`] and [`Refusal::Gap`].
     pub late: u64,
@@ -208,7 +208,9 @@ impl Stream {
                 self.counts.gate_in_a_row += 1;
             }
             Err(Refusal::NonFinite | Refusal::OutOfRange | Refusal::Noise) => self.counts.invalid += 1,
-            Err(Refusal::NoKeyframe { .. } | Refusal::NotObservable | Refusal::NotStarted) => {
+            Err(
+                Refusal::NoKeyframe { .. } | Refusal::Full { .. } | Refusal::NotObservable | Refusal::NotStarted,
+            ) => {
                 self.counts.not_applicable += 1;
             }
             Err(Refusal::TooOld { .. } | Refusal::TimeNotIncreasing { .. } | Refusal::Gap { .. }) => {

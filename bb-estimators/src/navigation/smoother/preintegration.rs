@@ -16,21 +16,10 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::navigation::eskf::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY};
+use crate::navigation::eskf::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, ImuDensities, NAVIGATION, POSITION, ROTATION, VELOCITY,
+};
 use crate::navigation::math::{Integrals, renormalised, rotation, skew};
-
-/// White noise of the IMU and of its biases, as densities squared.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImuDensities {
-    /// Of the accelerometer, m²/s³.
-    pub accelerometer: f64,
-    /// Of the gyroscope, rad²/s.
-    pub gyroscope: f64,
-    /// Of the random walk of the accelerometer's bias, m²/s⁵.
-    pub accelerometer_bias: f64,
-    /// Of the random walk of the gyroscope's bias, rad²/s³.
-    pub gyroscope_bias: f64,
-}
 
 /// What position, velocity and rotation have in common: a 3 × 3 matrix for each.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::super::preintegration::{ImuDensities, Preintegration};
+use super::super::preintegration::Preintegration;
 use crate::navigation::math::rotation_vector;
-use crate::navigation::{Eskf, EskfParams, ImuMean, NAVIGATION, Start};
+use crate::navigation::{Eskf, EskfParams, ImuDensities, ImuMean, NAVIGATION, Start};
 
 const DT: f64 = 0.005;
 
@@ -44,13 +44,7 @@ fn params() -> EskfParams {
 }
 
 fn densities() -> ImuDensities {
-    let params = params();
-    ImuDensities {
-        accelerometer: params.accelerometer_noise.powi(2),
-        gyroscope: params.gyroscope_noise.powi(2),
-        accelerometer_bias: params.accelerometer_bias_walk.powi(2),
-        gyroscope_bias: params.gyroscope_bias_walk.powi(2),
-    }
+    params().densities()
 }
 
 proptest! {
