@@ -30,7 +30,7 @@ fn errors_are_no_greater_than_known() -> Result<(), Box<dyn Error>> {
     let Some(folder) = navigation()? else { return Ok(()) };
     let filter = &NAVIGATION_FILTERS[0];
     for Known { name, position, orientation, nees: (least, most) } in KNOWN {
-        let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, filter, &[], || {})?;
+        let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, filter, &[], 20, || {})?;
         println!(
             "{name}: {:.3} m, {:.3?}°, {:.3?} m/s, NEES {:.2}, {} keyframes",
             score.position_rmse_m, score.orientation_rmse_deg, score.velocity_rmse_mps, score.nees, score.keyframes
@@ -62,7 +62,7 @@ fn one_tuned_filter_agrees_with_a_smoother() -> Result<(), Box<dyn Error>> {
         ("euroc_mh01", &known, 0.556, 7.97),
     ] {
         let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
-        let score = evaluate_navigation(&DataSet::read(&folder.join(Path::new(name)))?, single, &settings, || {})?;
+        let score = evaluate_navigation(&DataSet::read(&folder.join(Path::new(name)))?, single, &settings, 20, || {})?;
         let (distance, consistency) = (score.position_rmse_m / position, score.nees / nees);
         assert!((distance - 1.0).abs() < 0.02, "{name}: {} m, not {position}", score.position_rmse_m);
         assert!((consistency - 1.0).abs() < 0.03, "{name}: NEES {}, not {nees}", score.nees);

@@ -141,6 +141,13 @@ impl Stream {
         &self.params
     }
 
+    /// Changes [`StreamParams::variance_factor`], for those who have learnt it elsewhere.
+    pub fn set_variance_factor(&mut self, factor: f64) {
+        if factor > 0.0 && factor.is_finite() {
+            self.params.variance_factor = factor;
+        }
+    }
+
     /// What became of its measurements.
     pub fn counts(&self) -> &Counts {
         &self.counts
