@@ -50,7 +50,7 @@ pub use measurement::{
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
     ZeroVelocity,
 };
-pub use navigator::{Aiding, NAVIGATED, Navigated, Navigator};
+pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
 #[cfg(feature = "smoother")]
 pub use smoother::{
     Factor, FixedLagSmoother, Kernel, NavigationFactor, Preintegration, Rows, SmootherParams, Updated,

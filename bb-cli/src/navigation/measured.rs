@@ -3,10 +3,12 @@
 use super::data::{DataSet, Keyframe};
 use bb_estimators::navigation::{AbsolutePose, GnssPosition, Navigator, RelativePose, Start};
 
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Measured {
     pub(crate) relative: Option<RelativePose>,
     pub(crate) anchor: Option<AbsolutePose>,
-    /// Only where there are no relative poses at all.
+    /// Whether there are relative poses at all.
+    has_relative: bool,
     pub(crate) fix: Option<GnssPosition>,
 }
 
@@ -14,16 +16,24 @@ impl Measured {
     pub(crate) fn at(data: &DataSet, keyframe: u64) -> Self {
         let relative = data.relative.get(&keyframe);
         let anchor = data.anchors.get(&keyframe);
-        let fix = data.fixes.get(&keyframe).filter(|_| data.relative.is_empty());
+        let fix = data.fixes.get(&keyframe);
         Self {
             relative: relative.map(|of| RelativePose::new(of.from, of.translation, of.rotation)),
             anchor: anchor.map(|of| AbsolutePose::new(of.position, of.world_from_body)),
+            has_relative: !data.relative.is_empty(),
             fix: fix.map(|of| GnssPosition::new(of.position, of.horizontal, of.vertical)),
         }
     }
 
-    /// Gives it to a filter; how much of it was refused.
+    /// Gives it to a filter, positions from satellites only where there are no relative poses at all; how much of it was
+    /// refused.
     pub(crate) fn filter(&self, navigator: &mut Navigator) -> u64 {
+        let fix = self.fix.filter(|_| !self.has_relative);
+        Self { fix, ..*self }.all(navigator)
+    }
+
+    /// Gives all of it to a filter; how much of it was refused.
+    pub(crate) fn all(&self, navigator: &mut Navigator) -> u64 {
         let mut refused = 0;
         if let Some(relative) = &self.relative {
             refused += u64::from(navigator.relative_pose(relative).is_err());

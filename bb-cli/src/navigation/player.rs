@@ -5,7 +5,7 @@ use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
 use super::measured::{Measured, nanoseconds};
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{
-    Estimate, FixedLagSmoother, ImuMean, Kernel, NAVIGATION, Navigator, Optional, POSITION, ROTATION, Refusal,
+    Estimate, FixedLagSmoother, ImuMean, Kernel, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION, ROTATION, Refusal,
     SmootherParams, Start, States, Stream, StreamParams,
 };
 use std::time::Instant;
@@ -30,6 +30,7 @@ pub(crate) enum Player {
 pub(crate) struct Smoothed {
     smoother: Smoother,
     twin: Option<Navigator>,
+    learnt: Option<Learnt>,
     gnss: Stream,
     poses: Stream,
     relative: Stream,
@@ -83,7 +84,7 @@ impl Player {
             // As in a bank: fixes are not gated.
             let gnss = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
             let (poses, relative) = (Stream::default(), Stream::default());
-            Ok(Self::Smoother(Box::new(Smoothed { smoother, twin, gnss, poses, relative })))
+            Ok(Self::Smoother(Box::new(Smoothed { smoother, twin, learnt: None, gnss, poses, relative })))
         };
         match filter.kind {
             Kind::Bank => navigator(true).map(|navigator| Self::Filter(Box::new(navigator))),
@@ -103,7 +104,7 @@ impl Player {
                 if let Some(twin) = &mut smoothed.twin {
                     twin.start(start)?;
                     twin.set_keyframe(0);
-                    smoothed.learn();
+                    smoothed.learn(None);
                 }
                 smoothed.smoother.start(0, start)?;
             }
@@ -187,7 +188,7 @@ impl Smoothed {
                 // It refuses what the smoother refuses.
                 let _ = twin.propagate(&ImuMean { time_ns: nanoseconds(time_s), angular_velocity, specific_force });
             }
-            measured.filter(twin);
+            measured.all(twin);
             twin.set_keyframe(k);
         }
         let began = Instant::now();
@@ -196,7 +197,7 @@ impl Smoothed {
         step.keyframe_s = began.elapsed().as_secs_f64();
         step.allocations = counted.count_total;
         step.refused += result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?;
-        self.learn();
+        self.learn(Some(k));
         Ok(())
     }
 
@@ -219,16 +220,28 @@ impl Smoothed {
         Ok(refused)
     }
 
-    /// Takes the noise that the filters have found.
-    fn learn(&mut self) {
+    /// Takes the noise that the filters have found, if what it has is implausible beside that. Then it takes their estimate as
+    /// well: what was smoothed with the wrong noise is wrong.
+    fn learn(&mut self, keyframe: Option<u64>) {
         let Some(twin) = &self.twin else { return };
-        let (sensors, _) = twin.learnt();
+        let (learnt, plausibility) = twin.learnt();
+        if self.learnt.is_some_and(|learnt| twin.plausibility(&learnt) * IMPLAUSIBLE > plausibility) {
+            return;
+        }
+        self.learnt = Some(learnt);
         // They were made with it, so it is accepted.
-        let _ = self.smoother.set_sensors(sensors);
-        let [gnss, ..] = twin.streams();
-        self.gnss.set_variance_factor(gnss.params().variance_factor);
+        let _ = self.smoother.set_sensors(learnt.sensors);
+        self.gnss.set_variance_factor(learnt.gnss_variance_factor);
+        if let (Some(k), Some((estimate, covariance))) = (keyframe, twin.estimate()) {
+            // What cannot be adopted leaves the smoother as it is.
+            let _ = self.smoother.adopt::<Navigated, NAVIGATED>(k, &estimate, &covariance);
+        }
     }
 }
+
+/// Odds against the noise that a smoother has at which it takes another: strong evidence, in the words of R. E. Kass,
+/// A. E. Raftery, "Bayes factors", Journal of the American Statistical Association 90(430), 1995.
+const IMPLAUSIBLE: f64 = 10.0;
 
 /// Anchors that pass the gate and are off all the same count less.
 const ANCHORS: Kernel = Kernel::Squares;

@@ -159,10 +159,31 @@ impl Navigator {
     }
 
     /// The parameters of the most plausible filter, which are what the bank has learnt, and how plausible it is.
-    pub fn learnt(&self) -> (EskfParams, f64) {
+    pub fn learnt(&self) -> (Learnt, f64) {
         let best = self.bank.best();
-        (*self.bank.filters()[best].params(), self.bank.weights()[best])
+        (self.hypothesis(best), self.bank.weights()[best])
     }
+
+    /// How plausible the filter with these parameters is; 0 if there is none, or it was dropped.
+    pub fn plausibility(&self, learnt: &Learnt) -> f64 {
+        let weights = self.bank.weights();
+        let found = (0..FILTERS).filter(|i| weights[*i] > 0.0).find(|i| self.hypothesis(*i) == *learnt);
+        found.map_or(0.0, |i| weights[i])
+    }
+
+    fn hypothesis(&self, i: usize) -> Learnt {
+        let sensors = *self.bank.filters()[i].params();
+        Learnt { sensors, gnss_variance_factor: self.gnss[i].params().variance_factor }
+    }
+}
+
+/// What a bank has found, for another estimator of the same robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learnt {
+    /// The parameters of the most plausible filter.
+    pub sensors: EskfParams,
+    /// What it multiplies the variance of positions from satellites by.
+    pub gnss_variance_factor: f64,
 }
 
 impl Hypothesis {

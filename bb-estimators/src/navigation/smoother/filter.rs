@@ -5,7 +5,7 @@ use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-use nalgebra::{Matrix6, SMatrix, Vector3};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
 
 use super::elimination::{Judged, Known, judge, judge_pair};
 use super::factor::{Factor, NavigationFactor, Rows};
@@ -18,7 +18,7 @@ use super::preintegration::Preintegration;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{
     EskfParams, Estimate, ImuMean, LONGEST_GAP_S, NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal,
-    Start, States, distinct, seconds_between,
+    Start, States, distinct, offset, seconds_between,
 };
 use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
 
@@ -151,6 +151,57 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(())
     }
 
+    /// Starts afresh from what a filter of the same robot estimates, with all correlations: a warm start, or another noise.
+    /// Optional states that only one of them has are dropped, or zero with the deviations of the parameters.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NonFinite`] and [`Refusal::Noise`] as [`start`](Self::start).
+    pub fn adopt<T: States, const M: usize>(
+        &mut self,
+        id: u64,
+        estimate: &Estimate<M>,
+        covariance: &SMatrix<f64, M, M>,
+    ) -> Result<(), Refusal> {
+        let mut adopted = Estimate { optional: SVector::zeros(), ..Estimate::unknown() };
+        adopted.time_ns = estimate.time_ns;
+        adopted.position = estimate.position;
+        adopted.velocity = estimate.velocity;
+        adopted.world_from_body = estimate.world_from_body;
+        adopted.accelerometer_bias = estimate.accelerometer_bias;
+        adopted.gyroscope_bias = estimate.gyroscope_bias;
+        adopted.angular_velocity = estimate.angular_velocity;
+        adopted.specific_force = estimate.specific_force;
+        // Where each error is in the filter's; none if it has it not.
+        let mut places: [Option<usize>; N] = core::array::from_fn(|i| (i < NAVIGATION).then_some(i));
+        let mut variances = [0.0; N];
+        for state in S::OPTIONAL {
+            let Some(first) = offset::<S>(*state) else { continue };
+            let process = self.params.sensors.process(*state);
+            for i in 0..state.dimension() {
+                places[first + i] = offset::<T>(*state).map(|index| index + i);
+                adopted.optional[first + i] = places[first + i].map_or(0.0, |index| estimate.optional[index]);
+                variances[first + i] = process.map_or(1.0, |process| process.deviation * process.deviation);
+            }
+        }
+        let covariance = SMatrix::<f64, N, N>::from_fn(|i, j| match (places[i], places[j]) {
+            (Some(row), Some(column)) => covariance[(row, column)],
+            (None, _) if i == j => variances[i].max(1e-24),
+            _ => 0.0,
+        });
+        if !adopted.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
+            return Err(Refusal::NonFinite);
+        }
+        let information = nalgebra::linalg::Cholesky::new(covariance).ok_or(Refusal::Noise)?.inverse();
+        let information = Information { matrix: information.data.0, vector: [0.0; N] };
+        self.spare.extend(self.window.drain(..));
+        let (angular_velocity, specific_force) =
+            (estimate.angular_velocity + estimate.gyroscope_bias, estimate.specific_force + estimate.accelerometer_bias);
+        self.last = ImuMean { time_ns: estimate.time_ns, angular_velocity, specific_force };
+        self.begin(id, adopted, Prior { information, mean: Some(adopted) });
+        Ok(())
+    }
+
     /// Begins a window with one keyframe.
     fn begin(&mut self, id: u64, point: Estimate<N>, prior: Prior<N>) {
         let Some(mut keyframe) = self.spare.pop() else { return };
@@ -162,6 +213,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.motion = motion;
         self.time_ns = point.time_ns;
         (self.dirty, self.exact_from) = (0, 0);
+        self.eliminate(1);
     }
 
     /// Integrates one sample of the IMU.
