@@ -5,7 +5,7 @@ use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
 use super::measured::{Measured, nanoseconds};
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{
-    Estimate, FixedLagSmoother, ImuMean, Kernel, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION, ROTATION, Refusal,
+    Estimate, FixedLagSmoother, ImuMean, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION, ROTATION, Refusal,
     SmootherParams, Start, States, Stream, StreamParams,
 };
 use std::time::Instant;
@@ -209,8 +209,7 @@ impl Smoothed {
             refused += u64::from(self.smoother.add(&mut self.relative, k, relative).is_err());
         }
         if let Some(anchor) = measured.anchor {
-            let added = self.smoother.add_robust(&mut self.poses, k, anchor, ANCHORS);
-            refused += u64::from(added.is_err());
+            refused += u64::from(self.smoother.add(&mut self.poses, k, anchor).is_err());
         }
         if let Some(fix) = measured.fix {
             refused += u64::from(self.smoother.add(&mut self.gnss, k, fix).is_err());
@@ -242,8 +241,5 @@ impl Smoothed {
 /// Odds against the noise that a smoother has at which it takes another: strong evidence, in the words of R. E. Kass,
 /// A. E. Raftery, "Bayes factors", Journal of the American Statistical Association 90(430), 1995.
 const IMPLAUSIBLE: f64 = 10.0;
-
-/// Anchors that pass the gate and are off all the same count less.
-const ANCHORS: Kernel = Kernel::Squares;
 
 const _: () = assert!(Scaled::DIMENSION == NAVIGATION + 1);

@@ -564,6 +564,14 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         moved
     }
 
+    /// Eliminates all of the window.
+    #[cfg(test)]
+    pub(super) fn eliminate_all(&mut self) {
+        self.dirty = 0;
+        self.eliminate(self.window.len());
+        self.solve(0);
+    }
+
     /// What is estimated of the newest keyframe; none before the start.
     pub fn estimate(&self) -> Option<Estimate<N>> {
         self.window.back().map(|keyframe| keyframe.estimate::<S>())

@@ -127,6 +127,11 @@ impl<const N: usize> Link<N> {
     }
 
     /// What the motion says, about these estimates; its noise is multiplied by `raised`.
+    ///
+    /// What a rotation does to position and velocity is taken from the estimates, not from what was measured: then turning
+    /// and moving all of the world, which no IMU sees, changes nothing here either, and no information about heading comes of
+    /// noise. G. Huang, A. Mourikis, S. Roumeliotis, "Observability-based rules for designing consistent EKF SLAM
+    /// estimators", The International Journal of Robotics Research 29(5), 2010.
     pub(super) fn of_motion<S: States>(
         from: &Estimate<N>,
         to: &Estimate<N>,
@@ -139,7 +144,11 @@ impl<const N: usize> Link<N> {
         let predicted = predicted::<S, N>(from, motion, params);
 
         // In the axes of the body at `from`: the inverse of what `preintegration.rs` has.
-        let (velocity, position) = (skew(&corrected.velocity), skew(&corrected.position));
+        let to_world = from.rotation();
+        let fall = Vector3::new(0.0, 0.0, -params.gravity * seconds);
+        let gained = to.velocity - from.velocity - fall;
+        let moved = to.position - from.position - from.velocity * seconds - fall * (0.5 * seconds);
+        let (velocity, position) = (skew(&to_world.tr_mul(&gained)), skew(&to_world.tr_mul(&moved)));
         let turned = corrected.rotation_by_gyroscope;
         let (by_accelerometer, by_gyroscope) = (&motion.by_accelerometer, &motion.by_gyroscope);
         let position_by_rotation = position - velocity * seconds;
@@ -158,13 +167,10 @@ impl<const N: usize> Link<N> {
         const NONE: ImuDensities =
             ImuDensities { accelerometer: 0.0, gyroscope: 0.0, accelerometer_bias: 0.0, gyroscope_bias: 0.0 };
         inverse.apply(&mut noise, &NONE);
-        let to_world = from.rotation();
         rotate(&mut noise, &to_world);
 
-        // The same in the world's axes, and about a rotation that is off by c: the left Jacobian of SO(3).
+        // The same in the world's axes.
         let error = to.error_to::<S>(&predicted);
-        let turn = error.fixed_rows::<3>(ROTATION).into_owned();
-        let left = Integrals::new(&turn).first_matrix(&turn);
         let in_world = |block: &Matrix3<f64>| to_world * block * to_world.transpose();
         let mut back = zeros();
         for i in 0..N {
@@ -180,9 +186,8 @@ impl<const N: usize> Link<N> {
                 }
             }
         };
-        set(ROTATION, ROTATION, &left);
-        set(POSITION, ROTATION, &(in_world(&position_by_rotation) * left));
-        set(VELOCITY, ROTATION, &(in_world(&velocity) * left));
+        set(POSITION, ROTATION, &in_world(&position_by_rotation));
+        set(VELOCITY, ROTATION, &in_world(&velocity));
         set(POSITION, ACCELEROMETER_BIAS, &(to_world * position_by_accelerometer));
         set(VELOCITY, ACCELEROMETER_BIAS, &-(to_world * by_accelerometer.velocity));
         set(POSITION, GYROSCOPE_BIAS, &(to_world * position_by_gyroscope));

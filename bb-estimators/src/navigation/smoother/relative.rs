@@ -4,13 +4,14 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::factor::Rows;
 use crate::navigation::eskf::{Estimate, Optional, POSITION, ROTATION, Refusal, States, offset};
-use crate::navigation::math::{Integrals, rotation_vector, skew};
+use crate::navigation::math::{rotation_vector, skew};
 use crate::navigation::measurement::RelativePose;
 
 /// Compares with the poses of both keyframes: `R_k t - (1 + s) (p - p_k)` and `log(R_k Q Rᵀ)`, in the world's axes.
 ///
-/// The derivatives of the logarithm are inverse Jacobians of SO(3): J. Solà, J. Deray, D. Atchuthan, "A micro Lie theory
-/// for state estimation in robotics", arXiv 1812.01537, 2018, equations 143 to 146.
+/// As in [`Link::of_motion`](super::link::Link::of_motion), what a rotation does to the translation is taken from the
+/// estimates, and that of the logarithm is the identity: turning all of the world changes nothing. The gradient of the cost
+/// is exact all the same where noise is alike along all axes, since what is left out is normal to the residual.
 pub(super) fn compare<S: States, const N: usize>(
     measured: &RelativePose,
     previous: &Estimate<N>,
@@ -22,7 +23,6 @@ pub(super) fn compare<S: States, const N: usize>(
     let expected = previous.world_from_body * measured.translation;
     let turned = previous.world_from_body * measured.keyframe_from_body * at.world_from_body.inverse();
     let turn = rotation_vector(&turned);
-    let left = Integrals::new(&turn).first_matrix(&turn).try_inverse().ok_or(Refusal::NotObservable)?;
 
     let mut residual = [0.0; 6];
     let translation = expected - way * scale;
@@ -34,12 +34,12 @@ pub(super) fn compare<S: States, const N: usize>(
     let mut of_this = [[0.0; N]; 6];
     set(&mut of_this, 0, POSITION, &Matrix3::from_diagonal_element(scale));
     set(&mut of_previous, 0, POSITION, &Matrix3::from_diagonal_element(-scale));
-    set(&mut of_previous, 0, ROTATION, &skew(&expected));
+    set(&mut of_previous, 0, ROTATION, &(skew(&way) * scale));
     if let Some(index) = offset::<S>(Optional::RelativeScale) {
         set_column(&mut of_this, index, &way);
     }
-    set(&mut of_this, 3, ROTATION, &left.transpose());
-    set(&mut of_previous, 3, ROTATION, &-left);
+    set(&mut of_this, 3, ROTATION, &Matrix3::identity());
+    set(&mut of_previous, 3, ROTATION, &-Matrix3::identity());
 
     let to_world = at.rotation();
     let mut noise = SMatrix::<f64, 6, 6>::zeros();
