@@ -35,8 +35,8 @@ pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
 pub use consistency::{Consistency, nees};
 pub use eskf::{
-    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuDensities, ImuMean, Keyframe, NAVIGATION,
-    Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
+    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuDensities, ImuMean, Keyframe,
+    NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
 };
 #[cfg(feature = "runtime")]
 pub use estimator::{

@@ -62,7 +62,8 @@ fn one_tuned_filter_agrees_with_a_smoother() -> Result<(), Box<dyn Error>> {
         ("euroc_mh01", &known, 0.556, 7.97),
     ] {
         let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
-        let score = evaluate_navigation(&DataSet::read(&folder.join(Path::new(name)))?, single, &settings, 20, || {})?;
+        let score =
+            evaluate_navigation(&DataSet::read(&folder.join(Path::new(name)))?, single, &settings, 20, || {})?;
         let (distance, consistency) = (score.position_rmse_m / position, score.nees / nees);
         assert!((distance - 1.0).abs() < 0.02, "{name}: {} m, not {position}", score.position_rmse_m);
         assert!((consistency - 1.0).abs() < 0.03, "{name}: NEES {}, not {nees}", score.nees);

@@ -5,8 +5,8 @@ use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
 use super::measured::{Measured, nanoseconds};
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{
-    Estimate, FixedLagSmoother, ImuMean, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION, ROTATION, Refusal,
-    SmootherParams, Start, States, Stream, StreamParams,
+    Estimate, FixedLagSmoother, ImuMean, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION,
+    ROTATION, Refusal, SmootherParams, Start, States, Stream, StreamParams,
 };
 use std::time::Instant;
 
@@ -73,8 +73,7 @@ impl Player {
     ) -> Result<Self, String> {
         let sensors = params(data, settings);
         let navigator = |is_bank: bool| {
-            let made =
-                if is_bank { Navigator::new(sensors, aiding(data)) } else { Navigator::single(sensors) };
+            let made = if is_bank { Navigator::new(sensors, aiding(data)) } else { Navigator::single(sensors) };
             made.map_err(|error| error.to_string())
         };
         let smoothed = |is_bank: bool| {
@@ -113,7 +112,13 @@ impl Player {
     }
 
     /// From the keyframe before to keyframe `k`.
-    pub(crate) fn play(&mut self, data: &DataSet, k: usize, from: &Keyframe, to: &Keyframe) -> Result<Step, String> {
+    pub(crate) fn play(
+        &mut self,
+        data: &DataSet,
+        k: usize,
+        from: &Keyframe,
+        to: &Keyframe,
+    ) -> Result<Step, String> {
         let mut step = Step::default();
         let began = Instant::now();
         // Time is that of the keyframe and the lengths of the samples since, as the samples' own stamps may jitter.
@@ -177,7 +182,13 @@ impl Player {
 }
 
 impl Smoothed {
-    fn play(&mut self, data: &DataSet, k: u64, ends: (&Keyframe, &Keyframe), step: &mut Step) -> Result<(), String> {
+    fn play(
+        &mut self,
+        data: &DataSet,
+        k: u64,
+        ends: (&Keyframe, &Keyframe),
+        step: &mut Step,
+    ) -> Result<(), String> {
         let measured = Measured::at(data, k);
         if let Some(twin) = &mut self.twin {
             let (from, to) = ends;

@@ -57,7 +57,8 @@ pub(crate) fn table(scores: &[Scored]) -> String {
     let name = |file: &PathBuf| file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
     let width = scores.iter().map(|(file, ..)| name(file).chars().count()).max().unwrap_or(0).max(4);
     let mut text = String::from("Root mean square errors at the keyframes:\n\n");
-    let head = ["position m", "orient. deg", "velocity m/s", "NEES", "keyframes", "us/sample", "ms/keyframe", "99 %"];
+    let head =
+        ["position m", "orient. deg", "velocity m/s", "NEES", "keyframes", "us/sample", "ms/keyframe", "99 %"];
     let _ = write!(text, "{:width$}  {:15}", "data", "filter");
     for cell in head {
         let _ = write!(text, "  {cell:>12}");

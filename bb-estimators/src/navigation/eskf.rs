@@ -34,9 +34,9 @@ pub(super) use filter::{LONGEST_GAP_S, seconds_between};
 pub use params::{EskfParams, GaussMarkov, ImuDensities};
 #[cfg(feature = "smoother")]
 pub(super) use propagation::{Transition, rows};
+pub use refusal::Refusal;
 #[cfg(feature = "smoother")]
 pub(super) use states::distinct;
-pub use refusal::Refusal;
 pub use states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
     offset,

@@ -42,7 +42,8 @@ impl ImuMean {
     pub(in crate::navigation) fn check(&self) -> Result<(), Refusal> {
         // Within its limit is no NaN.
         let within = |vector: &Vector3<f64>, limit: f64| vector.iter().all(|x| (-limit..=limit).contains(x));
-        if within(&self.angular_velocity, MAX_ANGULAR_VELOCITY) && within(&self.specific_force, MAX_SPECIFIC_FORCE) {
+        if within(&self.angular_velocity, MAX_ANGULAR_VELOCITY) && within(&self.specific_force, MAX_SPECIFIC_FORCE)
+        {
             return Ok(());
         }
         let mut components = self.angular_velocity.iter().chain(self.specific_force.iter());
@@ -104,7 +105,10 @@ impl Start {
     }
 
     /// The state and the covariance that it says.
-    fn state<S: States, const N: usize>(&self, params: &EskfParams) -> Result<(Estimate<N>, Covariance<N>), Refusal> {
+    fn state<S: States, const N: usize>(
+        &self,
+        params: &EskfParams,
+    ) -> Result<(Estimate<N>, Covariance<N>), Refusal> {
         let mut covariance = Covariance::new();
         covariance.set(POSITION, &self.position_covariance);
         covariance.set(VELOCITY, &self.velocity_covariance);

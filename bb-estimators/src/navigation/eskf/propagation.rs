@@ -44,7 +44,6 @@ pub(in crate::navigation) struct Transition {
     pub(in crate::navigation) rotation: [[f64; 3]; 3],
 }
 
-
 impl Transition {
     /// Moves the estimate over `dt` seconds; angular velocity and specific force are those it holds.
     #[inline]
@@ -190,7 +189,11 @@ impl Transition {
 }
 
 #[inline]
-pub(in crate::navigation) fn rows(rotation: &Matrix3<f64>, force: &Matrix3<f64>, turn: &Matrix3<f64>) -> [[f64; SOURCES]; 3] {
+pub(in crate::navigation) fn rows(
+    rotation: &Matrix3<f64>,
+    force: &Matrix3<f64>,
+    turn: &Matrix3<f64>,
+) -> [[f64; SOURCES]; 3] {
     core::array::from_fn(|i| {
         core::array::from_fn(|k| match k {
             0..=2 => rotation[(i, k)],

@@ -185,7 +185,11 @@ pub(super) struct Judged {
 }
 
 /// Compares a factor at one keyframe with what is known of that.
-pub(super) fn judge<const N: usize>(factor: &Rows<N>, correction: &[f64; N], known: &Known<'_, N>) -> Option<Judged> {
+pub(super) fn judge<const N: usize>(
+    factor: &Rows<N>,
+    correction: &[f64; N],
+    known: &Known<'_, N>,
+) -> Option<Judged> {
     let mut covariance = [[0.0; MOST_ROWS]; MOST_ROWS];
     let mut residual = factor.residual;
     for i in 0..factor.count {

@@ -89,7 +89,10 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// The first parameter outside its accepted range, by name.
     pub fn new(params: SmootherParams) -> Result<Self, ParamsError> {
         const {
-            assert!(N == S::DIMENSION, "the second parameter of `FixedLagSmoother` must be `DIMENSION` of the first");
+            assert!(
+                N == S::DIMENSION,
+                "the second parameter of `FixedLagSmoother` must be `DIMENSION` of the first"
+            );
             assert!(distinct(S::OPTIONAL), "an optional state is listed twice");
             let mut i = 0;
             while i < S::OPTIONAL.len() {
@@ -195,8 +198,10 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let information = nalgebra::linalg::Cholesky::new(covariance).ok_or(Refusal::Noise)?.inverse();
         let information = Information { matrix: information.data.0, vector: [0.0; N] };
         self.spare.extend(self.window.drain(..));
-        let (angular_velocity, specific_force) =
-            (estimate.angular_velocity + estimate.gyroscope_bias, estimate.specific_force + estimate.accelerometer_bias);
+        let (angular_velocity, specific_force) = (
+            estimate.angular_velocity + estimate.gyroscope_bias,
+            estimate.specific_force + estimate.accelerometer_bias,
+        );
         self.last = ImuMean { time_ns: estimate.time_ns, angular_velocity, specific_force };
         self.begin(id, adopted, Prior { information, mean: Some(adopted) });
         Ok(())
@@ -376,15 +381,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
         }
         self.dirty = self.dirty.min(index);
-        Ok(Fused {
-            nis: judged.nis,
-            dimension,
-            weight,
-            raised,
-            limit,
-            log_likelihood,
-            whitened: judged.whitened,
-        })
+        Ok(Fused { nis: judged.nis, dimension, weight, raised, limit, log_likelihood, whitened: judged.whitened })
     }
 
     /// Compares a factor with what is known so far. Corrections stay as they were at the last update, all but the newest.

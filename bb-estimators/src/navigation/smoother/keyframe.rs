@@ -11,7 +11,7 @@ use super::link::{Information, Link, predicted};
 use super::matrix::dot;
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
-use crate::navigation::eskf::{Estimate, POSITION, Refusal, ROTATION, States};
+use crate::navigation::eskf::{Estimate, POSITION, ROTATION, Refusal, States};
 
 /// A weight that differs by less from what the kernel says stays.
 const REWEIGHED: f64 = 0.02;

@@ -13,8 +13,8 @@ use super::factor::{MOST_ROWS, Rows};
 use super::matrix::{Square, add_gram, axpy, dot, times, zeros};
 use super::preintegration::Preintegration;
 use crate::navigation::eskf::{
-    ACCELEROMETER_BIAS, EskfParams, Estimate, GYROSCOPE_BIAS, ImuDensities, POSITION, ROTATION, States,
-    Transition, VELOCITY, offset, rows,
+    ACCELEROMETER_BIAS, EskfParams, Estimate, GYROSCOPE_BIAS, ImuDensities, POSITION, ROTATION, States, Transition,
+    VELOCITY, offset, rows,
 };
 use crate::navigation::math::{Integrals, exp, renormalised, rotation, skew, sqrt};
 
@@ -100,8 +100,12 @@ impl Corrected {
         let (by_accelerometer, by_gyroscope) = (&motion.by_accelerometer, &motion.by_gyroscope);
         let turn = by_gyroscope.rotation * gyroscope;
         Self {
-            position: motion.position() + by_accelerometer.position * accelerometer + by_gyroscope.position * gyroscope,
-            velocity: motion.velocity() + by_accelerometer.velocity * accelerometer + by_gyroscope.velocity * gyroscope,
+            position: motion.position()
+                + by_accelerometer.position * accelerometer
+                + by_gyroscope.position * gyroscope,
+            velocity: motion.velocity()
+                + by_accelerometer.velocity * accelerometer
+                + by_gyroscope.velocity * gyroscope,
             rotation: rotation(&turn) * motion.rotation(),
             rotation_by_gyroscope: Integrals::new(&turn).first_matrix(&turn) * by_gyroscope.rotation,
         }
@@ -153,8 +157,8 @@ impl<const N: usize> Link<N> {
         let (by_accelerometer, by_gyroscope) = (&motion.by_accelerometer, &motion.by_gyroscope);
         let position_by_rotation = position - velocity * seconds;
         let velocity_by_gyroscope = -by_gyroscope.velocity - velocity * turned;
-        let position_by_gyroscope = -by_gyroscope.position + by_gyroscope.velocity * seconds
-            - position_by_rotation * turned;
+        let position_by_gyroscope =
+            -by_gyroscope.position + by_gyroscope.velocity * seconds - position_by_rotation * turned;
         let position_by_accelerometer = by_accelerometer.velocity * seconds - by_accelerometer.position;
         let inverse = Transition {
             dt: -seconds,
@@ -290,9 +294,8 @@ pub(super) struct Innovation<const N: usize> {
 /// states yet.
 fn rotate<const N: usize>(matrix: &mut Square<N>, rotation: &Matrix3<f64>) {
     const TURNED: [usize; 3] = [POSITION, VELOCITY, ROTATION];
-    let block = |matrix: &Square<N>, row: usize, column: usize| {
-        Matrix3::from_fn(|i, j| matrix[row + i][column + j])
-    };
+    let block =
+        |matrix: &Square<N>, row: usize, column: usize| Matrix3::from_fn(|i, j| matrix[row + i][column + j]);
     let set = |matrix: &mut Square<N>, row: usize, column: usize, block: &Matrix3<f64>| {
         for i in 0..3 {
             for j in 0..3 {

@@ -57,14 +57,14 @@ pub struct Preintegration {
     pub(super) by_accelerometer: Columns,
     /// Derivatives by the gyroscope's bias.
     pub(super) by_gyroscope: Columns,
-    /// Covariance with the accelerometer's bias.
+    /// Covariance of y with the accelerometer's bias; see [`add_covariance`](Self::add_covariance).
     with_accelerometer: Columns,
-    /// Covariance with the gyroscope's bias.
+    /// Covariance of y with the gyroscope's bias.
     with_gyroscope: Columns,
     /// Variance of each component of a bias, from its random walk.
     accelerometer_walk: f64,
     gyroscope_walk: f64,
-    /// Covariance of position, velocity and rotation, blocks on and above the diagonal.
+    /// Covariance of y, blocks of position, velocity and rotation on and above the diagonal.
     pp: Matrix3<f64>,
     pv: Matrix3<f64>,
     pr: Matrix3<f64>,
@@ -89,6 +89,12 @@ impl Columns {
         }
     }
 
+    /// The same where the rotation has no part in them.
+    #[inline]
+    fn carried_straight(&self, dt: f64) -> Self {
+        Self { position: self.position + self.velocity * dt, ..*self }
+    }
+
     #[inline]
     fn plus(&self, other: &Self, factor: f64) -> Self {
         Self {
@@ -98,6 +104,9 @@ impl Columns {
         }
     }
 }
+
+/// One of the three.
+type Part = fn(&Columns) -> &Matrix3<f64>;
 
 /// What a sample adds to velocity and position.
 #[derive(Clone, Copy, Debug)]
@@ -159,24 +168,18 @@ impl Preintegration {
             rotation: -first,
         };
 
-        self.add_covariance(dt, &change, &by_accelerometer, &by_gyroscope, densities);
-        self.by_accelerometer = self.by_accelerometer.carried(dt, &change).plus(&by_accelerometer, 1.0);
+        self.by_accelerometer = self.by_accelerometer.carried_straight(dt).plus(&by_accelerometer, 1.0);
         self.by_gyroscope = self.by_gyroscope.carried(dt, &change).plus(&by_gyroscope, 1.0);
+        self.add_covariance(dt, &change, densities);
         self.position += self.velocity * dt + change.position;
         self.velocity += change.velocity;
         self.rotation = renormalised(&(self.rotation * rotation(&turn)));
         self.seconds += dt;
     }
 
+    /// Of the errors less what the biases now make of them, `y = x - J b`: that has no transition by a bias.
     #[inline]
-    fn add_covariance(
-        &mut self,
-        dt: f64,
-        change: &Increments,
-        by_accelerometer: &Columns,
-        by_gyroscope: &Columns,
-        densities: &ImuDensities,
-    ) {
+    fn add_covariance(&mut self, dt: f64, change: &Increments, densities: &ImuDensities) {
         // Φ P, then (Φ P) Φᵀ; the rotation error has no transition.
         let rotation_velocity = self.vr.transpose();
         let vr = self.vr - crossed(&change.velocity, &self.rr);
@@ -190,28 +193,27 @@ impl Preintegration {
         self.vv = vv - crossed_right(&vr, &change.velocity);
         self.vr = vr;
 
-        // What the biases add, with b the variance of each: Φ M Bᵀ + B (Φ M)ᵀ + b B Bᵀ, halves of which are transposes.
-        let (of_accelerometer, of_gyroscope) = (by_accelerometer, by_gyroscope);
-        let carried = self.with_accelerometer.carried(dt, change);
-        let half = carried.plus(of_accelerometer, 0.5 * self.accelerometer_walk);
-        self.pp += twice_symmetric(&(half.position * of_accelerometer.position.transpose()));
-        self.pv += half.position * of_accelerometer.velocity.transpose()
-            + of_accelerometer.position * half.velocity.transpose();
-        self.vv += twice_symmetric(&(half.velocity * of_accelerometer.velocity.transpose()));
-        self.with_accelerometer = carried.plus(of_accelerometer, self.accelerometer_walk);
+        // A step n of a bias is -J n in them, J the derivatives by the bias so far.
+        let accelerometer = densities.accelerometer_bias * dt;
+        let by = &self.by_accelerometer;
+        let (position, velocity) =
+            (by.position.transpose() * accelerometer, by.velocity.transpose() * accelerometer);
+        self.pp += by.position * position;
+        self.pv += by.position * velocity;
+        self.vv += by.velocity * velocity;
+        self.with_accelerometer = self.with_accelerometer.carried_straight(dt).plus(by, -accelerometer);
 
-        let carried = self.with_gyroscope.carried(dt, change);
-        let half = carried.plus(of_gyroscope, 0.5 * self.gyroscope_walk);
-        self.pp += twice_symmetric(&(half.position * of_gyroscope.position.transpose()));
-        self.pv +=
-            half.position * of_gyroscope.velocity.transpose() + of_gyroscope.position * half.velocity.transpose();
-        self.pr +=
-            half.position * of_gyroscope.rotation.transpose() + of_gyroscope.position * half.rotation.transpose();
-        self.vv += twice_symmetric(&(half.velocity * of_gyroscope.velocity.transpose()));
-        self.vr +=
-            half.velocity * of_gyroscope.rotation.transpose() + of_gyroscope.velocity * half.rotation.transpose();
-        self.rr += twice_symmetric(&(half.rotation * of_gyroscope.rotation.transpose()));
-        self.with_gyroscope = carried.plus(of_gyroscope, self.gyroscope_walk);
+        let gyroscope = densities.gyroscope_bias * dt;
+        let by = &self.by_gyroscope;
+        let (position, velocity) = (by.position.transpose() * gyroscope, by.velocity.transpose() * gyroscope);
+        let rotation = by.rotation.transpose() * gyroscope;
+        self.pp += by.position * position;
+        self.pv += by.position * velocity;
+        self.pr += by.position * rotation;
+        self.vv += by.velocity * velocity;
+        self.vr += by.velocity * rotation;
+        self.rr += by.rotation * rotation;
+        self.with_gyroscope = self.with_gyroscope.carried(dt, change).plus(by, -gyroscope);
 
         // White noise of density q on a derivative: q [dt³/3, dt²/2; dt²/2, dt] on position and velocity.
         let velocity = densities.accelerometer * dt;
@@ -221,8 +223,8 @@ impl Preintegration {
             self.vv[(i, i)] += velocity;
             self.rr[(i, i)] += densities.gyroscope * dt;
         }
-        self.accelerometer_walk += densities.accelerometer_bias * dt;
-        self.gyroscope_walk += densities.gyroscope_bias * dt;
+        self.accelerometer_walk += accelerometer;
+        self.gyroscope_walk += gyroscope;
     }
 
     /// How long the samples are together, s.
@@ -274,15 +276,28 @@ impl Preintegration {
                 }
             }
         };
-        set(POSITION, POSITION, &self.pp);
-        set(POSITION, VELOCITY, &self.pv);
-        set(POSITION, ROTATION, &self.pr);
-        set(VELOCITY, VELOCITY, &self.vv);
-        set(VELOCITY, ROTATION, &self.vr);
-        set(ROTATION, ROTATION, &self.rr);
+        // x = y + J b: `P + J M ᵀ + (J Mᵀ)ᵀ + b J Jᵀ` with the covariance M of y and b.
+        let (accelerometer, gyroscope) = (&self.by_accelerometer, &self.by_gyroscope);
+        let half_accelerometer = self.with_accelerometer.plus(accelerometer, 0.5 * self.accelerometer_walk);
+        let half_gyroscope = self.with_gyroscope.plus(gyroscope, 0.5 * self.gyroscope_walk);
+        let whole = |block: &Matrix3<f64>, row: Part, column: Part| {
+            let of = |by: &Columns, half: &Columns| {
+                row(by) * column(half).transpose() + row(half) * column(by).transpose()
+            };
+            block + of(accelerometer, &half_accelerometer) + of(gyroscope, &half_gyroscope)
+        };
+        let position: Part = |columns| &columns.position;
+        let velocity: Part = |columns| &columns.velocity;
+        let rotation: Part = |columns| &columns.rotation;
+        set(POSITION, POSITION, &whole(&self.pp, position, position));
+        set(POSITION, VELOCITY, &whole(&self.pv, position, velocity));
+        set(POSITION, ROTATION, &whole(&self.pr, position, rotation));
+        set(VELOCITY, VELOCITY, &whole(&self.vv, velocity, velocity));
+        set(VELOCITY, ROTATION, &whole(&self.vr, velocity, rotation));
+        set(ROTATION, ROTATION, &whole(&self.rr, rotation, rotation));
         for (bias, columns) in [
-            (ACCELEROMETER_BIAS, &self.with_accelerometer),
-            (GYROSCOPE_BIAS, &self.with_gyroscope),
+            (ACCELEROMETER_BIAS, self.with_accelerometer.plus(accelerometer, self.accelerometer_walk)),
+            (GYROSCOPE_BIAS, self.with_gyroscope.plus(gyroscope, self.gyroscope_walk)),
         ] {
             set(POSITION, bias, &columns.position);
             set(VELOCITY, bias, &columns.velocity);
@@ -313,10 +328,4 @@ fn crossed_right(matrix: &Matrix3<f64>, v: &Vector3<f64>) -> Matrix3<f64> {
         1 => v.z * m(i, 0) - v.x * m(i, 2),
         _ => v.x * m(i, 1) - v.y * m(i, 0),
     })
-}
-
-/// `M + Mᵀ`.
-#[inline]
-fn twice_symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    matrix + matrix.transpose()
 }

@@ -46,9 +46,9 @@ impl Problem {
         for k in 0..keyframes {
             // What is known of one alone may have any rank; the first is known.
             let root = random(&mut noise);
-            let of_rank = SMatrix::<f64, N, N>::from_fn(|i, j| if k == 0 || i < k % 3 { root[(i, j)] } else { 0.0 });
-            let known = of_rank.transpose() * of_rank
-                + SMatrix::identity() * if k == 0 { 0.5 } else { 0.0 };
+            let of_rank =
+                SMatrix::<f64, N, N>::from_fn(|i, j| if k == 0 || i < k % 3 { root[(i, j)] } else { 0.0 });
+            let known = of_rank.transpose() * of_rank + SMatrix::identity() * if k == 0 { 0.5 } else { 0.0 };
             let mean = numbers(&mut noise);
             let vector = known * mean;
             all.own.push(Information { matrix: square(&known), vector: vector.into() });
@@ -86,8 +86,9 @@ impl Problem {
         for _ in 0..2 {
             let mut factor = Rows::new();
             let jacobians: [SMatrix<f64, D, N>; 2] = [(); 2].map(|()| SMatrix::from_fn(|_, _| noise.next()));
-            let [previous, this] = jacobians
-                .map(|matrix| -> [[f64; N]; D] { core::array::from_fn(|i| core::array::from_fn(|j| matrix[(i, j)])) });
+            let [previous, this] = jacobians.map(|matrix| -> [[f64; N]; D] {
+                core::array::from_fn(|i| core::array::from_fn(|j| matrix[(i, j)]))
+            });
             let residual = SVector::<f64, D>::from_fn(|_, _| noise.next());
             let root = SMatrix::<f64, D, D>::from_fn(|_, _| noise.next());
             let covariance = root * root.transpose() + SMatrix::identity() * 0.2;

@@ -210,7 +210,9 @@ fn with_an_outlier(kernel: Kernel, at: u64) -> f64 {
 fn a_robust_kernel_takes_an_outlier_for_one() {
     let plain = with_an_outlier(Kernel::Squares, 6);
     assert!(plain > 2.0, "{plain}");
-    for (kernel, part) in [(Kernel::Huber(1.345), 0.1), (Kernel::Cauchy(2.385), 0.02), (Kernel::GemanMcClure(3.0), 1e-3)] {
+    for (kernel, part) in
+        [(Kernel::Huber(1.345), 0.1), (Kernel::Cauchy(2.385), 0.02), (Kernel::GemanMcClure(3.0), 1e-3)]
+    {
         let robust = with_an_outlier(kernel, 6);
         assert!(robust < part * plain, "{kernel:?}: {robust}, without {plain}");
     }

@@ -7,8 +7,7 @@ use super::super::factor::{Factor, Rows};
 use super::super::link::{Link, predicted};
 use super::flight::{Drone, N, sensors};
 use crate::navigation::{
-    Estimate, NAVIGATION, NavigationFactor, POSITION, Preintegration, ROTATION, RelativePose,
-    VELOCITY,
+    Estimate, NAVIGATION, NavigationFactor, POSITION, Preintegration, ROTATION, RelativePose, VELOCITY,
 };
 
 type Error = SVector<f64, N>;

@@ -45,12 +45,7 @@ pub(super) fn linear(window: usize) -> SmootherParams {
 
 /// To convergence.
 pub(super) fn converged(window: usize) -> SmootherParams {
-    SmootherParams {
-        relinearise_rotation: 0.0,
-        relinearise_position: 0.0,
-        iterations: 20,
-        ..linear(window)
-    }
+    SmootherParams { relinearise_rotation: 0.0, relinearise_position: 0.0, iterations: 20, ..linear(window) }
 }
 
 /// What happened, and what was measured of it.

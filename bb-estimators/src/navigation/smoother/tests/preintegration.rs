@@ -18,12 +18,7 @@ fn motion(seed: f64) -> impl Fn(usize) -> (Vector3<f64>, Vector3<f64>) {
     }
 }
 
-fn integrated(
-    seed: f64,
-    samples: usize,
-    biases: &SVector<f64, 6>,
-    densities: &ImuDensities,
-) -> Preintegration {
+fn integrated(seed: f64, samples: usize, biases: &SVector<f64, 6>, densities: &ImuDensities) -> Preintegration {
     let mut all = Preintegration::new(biases.fixed_rows::<3>(0).into(), biases.fixed_rows::<3>(3).into());
     let sample = motion(seed);
     for i in 0..samples {
