@@ -22,8 +22,9 @@ use crate::navigation::eskf::{
 };
 use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
 
-/// A change of a correction below this part of what is linearised again changes nothing that is.
-const SETTLED: f64 = 1e-3;
+/// Where a correction changes by less than this part of what is linearised again, earlier ones are left as they are until
+/// they are asked for.
+const SETTLED: f64 = 0.01;
 
 /// Position, velocity, attitude and biases at the last keyframes, with the optional states `S`, `N` errors in all, and
 /// factors of type `F`; see the [module](super).
@@ -471,37 +472,35 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
     }
 
-    /// The correction of a keyframe, from that of the next; the largest change of it, as a part of what is linearised again.
-    fn solve_one(&mut self, index: usize) -> f64 {
+    /// The correction of a keyframe, from that of the next.
+    fn solve_one(&mut self, index: usize) {
         let window = self.window.make_contiguous();
         let (these, after) = window.split_at_mut(index + 1);
-        let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) else { return 0.0 };
-        let correction = keyframe.pivot.back(&next.link, &next.correction);
-        let mut largest = 0.0_f64;
-        for i in 0..N {
-            // A centimetre of position is a centiradian of rotation; biases follow them.
-            let limit = if (ROTATION..ROTATION + 3).contains(&i) { self.params.relinearise_rotation } else { 1.0 };
-            let change = (correction[i] - keyframe.correction[i]).abs();
-            largest = largest.max(change / limit.max(f64::MIN_POSITIVE));
+        if let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) {
+            keyframe.correction = keyframe.pivot.back(&next.link, &next.correction);
         }
-        keyframe.correction = correction;
-        largest
     }
 
-    /// Corrections of all keyframes that may have changed by more than matters; the first of them.
+    /// Corrections of all keyframes that have changed by more than matters, at least of those from `least` on; the first of
+    /// them.
     fn solve(&mut self, least: usize) -> usize {
         let Some(newest) = self.window.back_mut() else { return 0 };
         newest.correction = newest.pivot.newest();
-        let mut index = self.window.len() - 1;
-        while index > 0 {
-            index -= 1;
-            let change = self.solve_one(index);
-            if change < SETTLED && index <= least {
+        let mut first = self.window.len() - 1;
+        while first > 0 {
+            let window = self.window.make_contiguous();
+            let (these, after) = window.split_at_mut(first);
+            let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) else { break };
+            let correction = keyframe.pivot.back(&next.link, &next.correction);
+            // What is below adds up, since it is not stored.
+            if first <= least && is_settled(&correction, &keyframe.correction, &self.params) {
                 break;
             }
+            keyframe.correction = correction;
+            first -= 1;
         }
-        self.exact_from = index;
-        index
+        self.exact_from = first;
+        first
     }
 
     /// Estimates the window from all that was added.
@@ -521,7 +520,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             let least = self.dirty;
             updated.eliminated += self.eliminate(self.window.len());
             let first = self.solve(least);
-            if !self.window.iter().all(|keyframe| keyframe.correction.iter().all(|x| x.is_finite())) {
+            if !self.window.range(first..).all(|keyframe| keyframe.correction.iter().all(|x| x.is_finite())) {
                 return Err(Refusal::NonFinite);
             }
             if iteration == self.params.iterations {
@@ -653,4 +652,11 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     pub fn marginalised(&self) -> u64 {
         self.marginalised
     }
+}
+
+/// Whether two corrections are alike: a centimetre of position, or a hundredth of what is linearised again of rotation.
+fn is_settled<const N: usize>(a: &[f64; N], b: &[f64; N], params: &SmootherParams) -> bool {
+    let is_rotation = |i: usize| (ROTATION..ROTATION + 3).contains(&i);
+    let limit = |i: usize| SETTLED * if is_rotation(i) { params.relinearise_rotation } else { 1.0 };
+    a.iter().zip(b).enumerate().all(|(i, (a, b))| (a - b).abs() < limit(i))
 }

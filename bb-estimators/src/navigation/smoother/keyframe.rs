@@ -8,7 +8,7 @@ use super::elimination::Pivot;
 use super::factor::{Factor, Rows};
 use super::kernel::Kernel;
 use super::link::{Information, Link, predicted};
-use super::matrix::dot;
+use super::matrix::{axpy, dot, mirror, times};
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use crate::navigation::eskf::{Estimate, POSITION, ROTATION, Refusal, States};
@@ -133,10 +133,9 @@ impl<F, const N: usize> Keyframe<F, N> {
             if let Some(mean) = &prior.mean {
                 let error = self.point.error_to::<S>(mean);
                 let mut matrix = prior.information.matrix;
-                super::matrix::mirror(&mut matrix);
-                for i in 0..N {
-                    self.own.vector[i] += dot(&matrix[i], &error.data.0[0]);
-                }
+                mirror(&mut matrix);
+                let pull = times(&matrix, &error.into());
+                axpy(&mut self.own.vector, 1.0, &pull);
             }
         }
         if let Some(before) = before {

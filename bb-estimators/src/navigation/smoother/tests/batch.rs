@@ -1,5 +1,7 @@
 //! Elimination in the order of time against all at once, on random problems.
 
+#![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
 

@@ -1,5 +1,7 @@
 //! Every factor: its derivatives by both keyframes are those of numeric differentiation, where it fits and where it does not.
 
+#![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
