@@ -29,7 +29,7 @@ pub(crate) enum Player {
 /// A smoother and the filters whose noise it takes.
 pub(crate) struct Smoothed {
     smoother: Smoother,
-    twin: Option<Navigator>,
+    twin: Option<Box<Navigator>>,
     learnt: Option<Learnt>,
     gnss: Stream,
     poses: Stream,
@@ -74,7 +74,8 @@ impl Player {
         let sensors = params(data, settings);
         let navigator = |is_bank: bool| {
             let made = if is_bank { Navigator::new(sensors, aiding(data)) } else { Navigator::single(sensors) };
-            made.map_err(|error| error.to_string())
+            // It is large: the sooner it is on the heap, the better.
+            made.map(Box::new).map_err(|error| error.to_string())
         };
         let smoothed = |is_bank: bool| {
             let twin = if is_bank { Some(navigator(true)?) } else { None };
@@ -86,8 +87,8 @@ impl Player {
             Ok(Self::Smoother(Box::new(Smoothed { smoother, twin, learnt: None, gnss, poses, relative })))
         };
         match filter.kind {
-            Kind::Bank => navigator(true).map(|navigator| Self::Filter(Box::new(navigator))),
-            Kind::Single => navigator(false).map(|navigator| Self::Filter(Box::new(navigator))),
+            Kind::Bank => navigator(true).map(Self::Filter),
+            Kind::Single => navigator(false).map(Self::Filter),
             Kind::Smoother => smoothed(true),
             Kind::SmootherSingle => smoothed(false),
         }

@@ -429,6 +429,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         information.add(&keyframe.incoming);
         information.matrix.iter_mut().flatten().for_each(|x| *x /= factor);
         information.vector = [0.0; N];
+        self.marginalised = self.marginalised.wrapping_add(newest as u64);
         self.spare.extend(self.window.drain(..));
         let motion = self.motion;
         let time_ns = self.time_ns;
