@@ -23,8 +23,10 @@
 //! singular, and no system is refused as indeterminate.
 
 mod elimination;
+mod estimates;
 mod factor;
 mod filter;
+mod fusion;
 mod kernel;
 mod keyframe;
 mod link;
@@ -32,11 +34,13 @@ mod matrix;
 mod params;
 mod preintegration;
 mod relative;
+mod solution;
 #[cfg(test)]
 mod tests;
 
 pub use factor::{Factor, MOST_ROWS, NavigationFactor, Rows};
-pub use filter::{FixedLagSmoother, Updated};
+pub use filter::FixedLagSmoother;
 pub use kernel::Kernel;
 pub use params::SmootherParams;
 pub use preintegration::Preintegration;
+pub use solution::Updated;

@@ -5,26 +5,18 @@ use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::elimination::{Judged, Known, judge, judge_pair};
-use super::factor::{Factor, NavigationFactor, Rows};
-use super::kernel::Kernel;
-use super::keyframe::{Held, Keyframe, Prior, after};
-use super::link::{Information, predicted};
-use super::matrix::{Square, mirror};
+use super::factor::{Factor, NavigationFactor};
+use super::keyframe::{Keyframe, Prior, after};
+use super::link::Information;
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{
-    EskfParams, Estimate, ImuMean, LONGEST_GAP_S, NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal,
-    Start, States, distinct, offset, seconds_between,
+    EskfParams, Estimate, ImuMean, LONGEST_GAP_S, NAVIGATION, Navigation, Optional, Refusal, Start, States,
+    distinct, offset, seconds_between,
 };
-use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
-
-/// Where a correction changes by less than this part of what is linearised again, earlier ones are left as they are until
-/// they are asked for.
-const SETTLED: f64 = 0.01;
 
 /// Position, velocity, attitude and biases at the last keyframes, with the optional states `S`, `N` errors in all, and
 /// factors of type `F`; see the [module](super).
@@ -56,30 +48,21 @@ const SETTLED: f64 = 0.01;
 /// ```
 #[derive(Clone, Debug)]
 pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION, F = NavigationFactor> {
-    params: SmootherParams,
-    window: VecDeque<Box<Keyframe<F, N>>>,
+    pub(super) params: SmootherParams,
+    pub(super) window: VecDeque<Box<Keyframe<F, N>>>,
     /// Keyframes that are not in the window.
-    spare: Vec<Box<Keyframe<F, N>>>,
+    pub(super) spare: Vec<Box<Keyframe<F, N>>>,
     /// Since the newest keyframe.
-    motion: Preintegration,
-    time_ns: i64,
-    last: ImuMean,
+    pub(super) motion: Preintegration,
+    pub(super) time_ns: i64,
+    pub(super) last: ImuMean,
     /// The first keyframe that has to be eliminated again.
-    dirty: usize,
+    pub(super) dirty: usize,
     /// Keyframes before this one may have an older correction than could be had.
-    exact_from: usize,
-    gaps: u32,
-    marginalised: u64,
-    states: PhantomData<S>,
-}
-
-/// What an update did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Updated {
-    /// How many keyframes were eliminated, each time they were.
-    pub eliminated: usize,
-    /// How many keyframes were linearised again, each time they were.
-    pub relinearised: usize,
+    pub(super) exact_from: usize,
+    pub(super) gaps: u32,
+    pub(super) marginalised: u64,
+    pub(super) states: PhantomData<S>,
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
@@ -209,7 +192,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 
     /// Begins a window with one keyframe.
-    fn begin(&mut self, id: u64, point: Estimate<N>, prior: Prior<N>) {
+    pub(super) fn begin(&mut self, id: u64, point: Estimate<N>, prior: Prior<N>) {
         let Some(mut keyframe) = self.spare.pop() else { return };
         let motion = Preintegration::new(point.accelerometer_bias, point.gyroscope_bias);
         keyframe.renew(id, point, &motion);
@@ -305,345 +288,6 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.marginalised = self.marginalised.wrapping_add(1);
     }
 
-    /// Adds what was measured at a keyframe of the window, in any order.
-    ///
-    /// `stream` is that of the sensor: its gate decides, and its counts and statistics tell of it. After
-    /// [`patience`](crate::navigation::StreamParams::patience) refusals at the newest keyframe it is the window that is
-    /// taken to be wrong: it begins afresh there, with its covariance raised, or, if it was the way from the keyframe
-    /// before, with the noise of that raised.
-    ///
-    /// # Errors
-    ///
-    /// [`Refusal`], which the stream has counted; the smoother is then as it was. [`Refusal::NoKeyframe`] if the keyframe has
-    /// left the window, or a relative pose is not one to the keyframe before.
-    pub fn add(&mut self, stream: &mut Stream, id: u64, factor: impl Into<F>) -> Result<Fused, Refusal> {
-        self.add_robust(stream, id, factor, Kernel::Squares)
-    }
-
-    /// [`add`](Self::add) with a robust kernel: how much it weighs is decided anew as the window learns.
-    ///
-    /// # Errors
-    ///
-    /// As there.
-    pub fn add_robust(
-        &mut self,
-        stream: &mut Stream,
-        id: u64,
-        factor: impl Into<F>,
-        kernel: Kernel,
-    ) -> Result<Fused, Refusal> {
-        let result = self.fuse(stream, id, factor.into(), kernel);
-        stream.count(&result);
-        result
-    }
-
-    fn fuse(&mut self, stream: &Stream, id: u64, factor: F, kernel: Kernel) -> Result<Fused, Refusal> {
-        if self.window.is_empty() {
-            return Err(Refusal::NotStarted);
-        }
-        let missing = Refusal::NoKeyframe { id };
-        // Ids increase, but not always by one.
-        let index = self.window.iter().rposition(|keyframe| keyframe.id == id).ok_or(missing)?;
-        let trust = 1.0 / stream.noise_factor();
-        let mut rows = Rows::new();
-        let keyframe = self.window.get(index).ok_or(missing)?;
-        if keyframe.factors.len() >= self.params.factors {
-            return Err(Refusal::Full { id });
-        }
-        let before = index.checked_sub(1).and_then(|before| self.window.get(before));
-        keyframe.rows::<S>(&factor, before.map(|before| &**before), &mut rows)?;
-        rows.weigh(trust);
-        let (judged, dimension) = (self.judged(index, &rows, factor.previous().is_some()), rows.count);
-        let judged = judged.ok_or(Refusal::NonFinite)?;
-        let Verdict { weight, raised, limit, log_likelihood } =
-            stream.weigh(judged.nis, dimension, judged.log_density, Gate::Closed)?;
-        let mut index = index;
-        if raised > 1.0 {
-            if index + 1 != self.window.len() {
-                return Err(Refusal::Gate { nis: judged.nis, limit });
-            }
-            index = self.raise(raised, factor.previous().is_some());
-        }
-        let is_robust = kernel != Kernel::Squares;
-        let ties = factor.previous().is_some();
-        let held = Held { factor, kernel, trust: trust * weight, weight: 1.0 };
-        if let Some(keyframe) = self.window.get_mut(index) {
-            keyframe.factors.push(held);
-            keyframe.is_robust |= is_robust;
-            if is_robust || raised > 1.0 {
-                self.linearise(index);
-            } else {
-                rows.weigh(weight);
-                if ties {
-                    keyframe.link.add(&rows);
-                } else {
-                    keyframe.own.add_rows(&rows.at[..dimension], &rows.residual[..dimension]);
-                }
-            }
-        }
-        self.dirty = self.dirty.min(index);
-        Ok(Fused { nis: judged.nis, dimension, weight, raised, limit, log_likelihood, whitened: judged.whitened })
-    }
-
-    /// Compares a factor with what is known so far. Corrections stay as they were at the last update, all but the newest.
-    fn judged(&mut self, index: usize, rows: &Rows<N>, ties: bool) -> Option<Judged> {
-        self.eliminate(self.window.len());
-        let newest = self.window.back_mut()?;
-        newest.correction = newest.pivot.newest();
-        let is_newest = index + 1 == self.window.len();
-        let correction = self.correction_at(index)?;
-        let covariance = if is_newest { None } else { Some(self.covariance_at(index)?) };
-        let keyframe = self.window.get(index)?;
-        let known = covariance.as_ref().map_or(Known::Newest(&keyframe.pivot.root), Known::Other);
-        if !ties {
-            return judge(rows, &correction, &known);
-        }
-        let before = self.window.get(index.checked_sub(1)?)?;
-        let earlier = before.pivot.back(&keyframe.link, &correction);
-        judge_pair(rows, &before.pivot, &keyframe.link, (&earlier, &correction), &known)
-    }
-
-    /// The correction of a keyframe as it would be solved.
-    fn correction_at(&self, index: usize) -> Option<[f64; N]> {
-        let mut correction = self.window.back()?.correction;
-        for index in (index..self.window.len() - 1).rev() {
-            let (keyframe, next) = (self.window.get(index)?, self.window.get(index + 1)?);
-            correction = keyframe.pivot.back(&next.link, &correction);
-        }
-        Some(correction)
-    }
-
-    /// Trusts the newest keyframe less, or the way to it; where that is now.
-    #[cold]
-    fn raise(&mut self, factor: f64, way: bool) -> usize {
-        let newest = self.window.len() - 1;
-        if way {
-            if let Some(keyframe) = self.window.get_mut(newest) {
-                keyframe.raised *= factor;
-            }
-            return newest;
-        }
-        let Some(keyframe) = self.window.back() else { return newest };
-        let (id, point) = (keyframe.id, keyframe.estimate::<S>());
-        let mut information = keyframe.own;
-        information.add(&keyframe.incoming);
-        information.matrix.iter_mut().flatten().for_each(|x| *x /= factor);
-        information.vector = [0.0; N];
-        self.marginalised = self.marginalised.wrapping_add(newest as u64);
-        self.spare.extend(self.window.drain(..));
-        let motion = self.motion;
-        let time_ns = self.time_ns;
-        self.begin(id, point, Prior { information, mean: Some(point) });
-        (self.motion, self.time_ns) = (motion, time_ns);
-        0
-    }
-
-    /// Linearises all that concerns a keyframe and the one before.
-    fn linearise(&mut self, index: usize) {
-        let (before, after) = self.window.make_contiguous().split_at_mut(index);
-        if let Some(keyframe) = after.first_mut() {
-            keyframe.linearise::<S>(before.last().map(|before| &**before), &self.params);
-        }
-    }
-
-    /// Eliminates what has changed, and all that follows it, up to a keyframe.
-    fn eliminate(&mut self, end: usize) -> usize {
-        let end = end.min(self.window.len());
-        let first = self.dirty;
-        let window = self.window.make_contiguous();
-        for index in first..end {
-            let (before, after) = window.split_at_mut(index);
-            let Some(keyframe) = after.first_mut() else { break };
-            if let Some(before) = before.last_mut() {
-                keyframe.incoming = before.pivot.eliminate(&keyframe.link);
-            }
-            let mut known = keyframe.own;
-            known.add(&keyframe.incoming);
-            keyframe.pivot.take(&known);
-        }
-        self.dirty = self.dirty.max(end);
-        self.exact_from = self.exact_from.max(first.min(self.window.len()));
-        end.saturating_sub(first)
-    }
-
-    /// Corrections from the keyframe before `from`, which has its own, back to `to`.
-    fn solve_back(&mut self, from: usize, to: usize) {
-        for index in (to..from).rev() {
-            self.solve_one(index);
-        }
-    }
-
-    /// The correction of a keyframe, from that of the next.
-    fn solve_one(&mut self, index: usize) {
-        let window = self.window.make_contiguous();
-        let (these, after) = window.split_at_mut(index + 1);
-        if let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) {
-            keyframe.correction = keyframe.pivot.back(&next.link, &next.correction);
-        }
-    }
-
-    /// Corrections of all keyframes that have changed by more than matters, at least of those from `least` on; the first of
-    /// them.
-    fn solve(&mut self, least: usize) -> usize {
-        let Some(newest) = self.window.back_mut() else { return 0 };
-        newest.correction = newest.pivot.newest();
-        let mut first = self.window.len() - 1;
-        while first > 0 {
-            let window = self.window.make_contiguous();
-            let (these, after) = window.split_at_mut(first);
-            let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) else { break };
-            let correction = keyframe.pivot.back(&next.link, &next.correction);
-            // What is below adds up, since it is not stored.
-            if first <= least && is_settled(&correction, &keyframe.correction, &self.params) {
-                break;
-            }
-            keyframe.correction = correction;
-            first -= 1;
-        }
-        self.exact_from = first;
-        first
-    }
-
-    /// Estimates the window from all that was added.
-    ///
-    /// Keyframes that moved far are linearised again, and what they concern is eliminated again, as often as the
-    /// parameters allow. It is no error if that is not often enough: the next update goes on.
-    ///
-    /// # Errors
-    ///
-    /// [`Refusal::NotStarted`]; [`Refusal::NonFinite`] if the estimate is beyond all numbers: start afresh.
-    pub fn update(&mut self) -> Result<Updated, Refusal> {
-        if self.window.is_empty() {
-            return Err(Refusal::NotStarted);
-        }
-        let mut updated = Updated::default();
-        for iteration in 0..=self.params.iterations {
-            let least = self.dirty;
-            updated.eliminated += self.eliminate(self.window.len());
-            let first = self.solve(least);
-            if !self.window.range(first..).all(|keyframe| keyframe.correction.iter().all(|x| x.is_finite())) {
-                return Err(Refusal::NonFinite);
-            }
-            if iteration == self.params.iterations {
-                break;
-            }
-            let moved = self.relinearise(first);
-            updated.relinearised += moved;
-            if self.dirty >= self.window.len() {
-                break;
-            }
-        }
-        Ok(updated)
-    }
-
-    /// Linearises again what moved far or weighs otherwise, from a keyframe on; how many moved.
-    fn relinearise(&mut self, first: usize) -> usize {
-        let mut moved = 0;
-        let count = self.window.len();
-        // Where a keyframe moved, the next has to be linearised as well.
-        let mut is_next = false;
-        for index in first..count {
-            let params = &self.params;
-            let window = self.window.make_contiguous();
-            let (before, after) = window.split_at_mut(index);
-            let (before, Some(keyframe)) = (before.last(), after.first_mut()) else { continue };
-            let is_off = keyframe.is_free() && keyframe.is_off(params);
-            if is_off {
-                keyframe.relinearise::<S>();
-                moved += 1;
-            }
-            if is_off || is_next || keyframe.is_misweighed::<S>(before.map(|before| &**before)) {
-                keyframe.linearise::<S>(before.map(|before| &**before), params);
-                self.dirty = self.dirty.min(index);
-            }
-            is_next = is_off;
-        }
-        moved
-    }
-
-    /// Eliminates all of the window.
-    #[cfg(test)]
-    pub(super) fn eliminate_all(&mut self) {
-        self.dirty = 0;
-        self.eliminate(self.window.len());
-        self.solve(0);
-    }
-
-    /// What is estimated of the newest keyframe; none before the start.
-    pub fn estimate(&self) -> Option<Estimate<N>> {
-        self.window.back().map(|keyframe| keyframe.estimate::<S>())
-    }
-
-    /// The estimate at the last sample of the IMU, for an output between keyframes; none before the start.
-    pub fn predicted(&self) -> Option<Estimate<N>> {
-        let mut estimate = self.estimate()?;
-        if self.time_ns > estimate.time_ns {
-            estimate = predicted::<S, N>(&estimate, &self.motion, &self.params.sensors);
-            estimate.time_ns = self.time_ns;
-            estimate.angular_velocity = self.last.angular_velocity - estimate.gyroscope_bias;
-            estimate.specific_force = self.last.specific_force - estimate.accelerometer_bias;
-        }
-        Some(estimate)
-    }
-
-    /// Covariance of the newest keyframe, `N × N`, in the order of [`POSITION`] to
-    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states, as of the last update. None
-    /// before the first, and where something is not known at all.
-    pub fn covariance(&self) -> Option<SMatrix<f64, N, N>> {
-        self.newest_covariance().map(|covariance| SMatrix::from_fn(|i, j| covariance[i][j]))
-    }
-
-    fn newest_covariance(&self) -> Option<Square<N>> {
-        let root = &self.window.back()?.pivot.root;
-        let is_eliminated = self.dirty >= self.window.len() && root.is_regular();
-        is_eliminated.then(|| {
-            let mut inverse = root.inverse();
-            mirror(&mut inverse);
-            inverse
-        })
-    }
-
-    /// Covariance of the pose of the newest keyframe: position error in the world, m², then rotation error in the world,
-    /// rad². None as [`covariance`](Self::covariance).
-    pub fn pose_covariance(&self) -> Option<Matrix6<f64>> {
-        let covariance = self.newest_covariance()?;
-        let index = |i: usize| if i < 3 { POSITION + i } else { ROTATION + i - 3 };
-        Some(Matrix6::from_fn(|i, j| covariance[index(i)][index(j)]))
-    }
-
-    /// The keyframes of the window by their ids, the oldest first.
-    pub fn keyframes(&self) -> impl DoubleEndedIterator<Item = u64> + ExactSizeIterator {
-        self.window.iter().map(|keyframe| keyframe.id)
-    }
-
-    /// What is estimated of a keyframe of the window, from all that was measured before and after it, as of the last
-    /// update.
-    pub fn smoothed(&mut self, id: u64) -> Option<Estimate<N>> {
-        let index = self.window.iter().position(|keyframe| keyframe.id == id)?;
-        if index < self.exact_from && self.dirty >= self.window.len() {
-            self.solve_back(self.exact_from, index);
-            self.exact_from = index;
-        }
-        self.window.get(index).map(|keyframe| keyframe.estimate::<S>())
-    }
-
-    /// Covariance of a keyframe of the window, as [`covariance`](Self::covariance). It takes as many steps back as there are
-    /// keyframes after it.
-    pub fn smoothed_covariance(&self, id: u64) -> Option<SMatrix<f64, N, N>> {
-        let index = self.window.iter().position(|keyframe| keyframe.id == id)?;
-        let covariance = self.covariance_at(index)?;
-        Some(SMatrix::from_fn(|i, j| covariance[i][j]))
-    }
-
-    fn covariance_at(&self, index: usize) -> Option<Square<N>> {
-        let mut covariance = self.newest_covariance()?;
-        for index in (index..self.window.len() - 1).rev() {
-            let (keyframe, next) = (self.window.get(index)?, self.window.get(index + 1)?);
-            covariance = keyframe.pivot.covariance_back(&next.link, &covariance);
-        }
-        Some(covariance)
-    }
-
     /// How many gaps were bridged.
     pub fn gaps(&self) -> u32 {
         self.gaps
@@ -653,11 +297,4 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     pub fn marginalised(&self) -> u64 {
         self.marginalised
     }
-}
-
-/// Whether two corrections are alike: a centimetre of position, or a hundredth of what is linearised again of rotation.
-fn is_settled<const N: usize>(a: &[f64; N], b: &[f64; N], params: &SmootherParams) -> bool {
-    let is_rotation = |i: usize| (ROTATION..ROTATION + 3).contains(&i);
-    let limit = |i: usize| SETTLED * if is_rotation(i) { params.relinearise_rotation } else { 1.0 };
-    a.iter().zip(b).enumerate().all(|(i, (a, b))| (a - b).abs() < limit(i))
 }
