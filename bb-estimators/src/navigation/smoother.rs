@@ -34,13 +34,15 @@ mod matrix;
 mod params;
 mod preintegration;
 mod relative;
+mod rows;
 mod solution;
 #[cfg(test)]
 mod tests;
 
-pub use factor::{Factor, MOST_ROWS, NavigationFactor, Rows};
+pub use factor::{Factor, NavigationFactor};
 pub use filter::FixedLagSmoother;
 pub use kernel::Kernel;
 pub use params::SmootherParams;
 pub use preintegration::Preintegration;
+pub use rows::{MOST_ROWS, Rows};
 pub use solution::Updated;

@@ -10,9 +10,9 @@
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
-use super::factor::{MOST_ROWS, Rows};
 use super::link::{Information, Link};
 use super::matrix::{Root, Square, add_gram, axpy, dot, mirror, times, transpose_times, transposed, zeros};
+use super::rows::{MOST_ROWS, Rows};
 use crate::navigation::math::ln;
 
 /// A keyframe, eliminated.

@@ -1,10 +1,11 @@
 //! What was measured, at any keyframe of the window: judged by its gate, and added.
 
 use super::elimination::{Judged, Known, judge, judge_pair};
-use super::factor::{Factor, Rows};
+use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::kernel::Kernel;
 use super::keyframe::{Held, Prior};
+use super::rows::Rows;
 use crate::navigation::eskf::{Refusal, States};
 use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
 

@@ -5,12 +5,13 @@ use alloc::vec::Vec;
 use nalgebra::SVector;
 
 use super::elimination::Pivot;
-use super::factor::{Factor, Rows};
+use super::factor::Factor;
 use super::kernel::Kernel;
 use super::link::{Information, Link, predicted};
 use super::matrix::{axpy, dot, mirror, times};
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
+use super::rows::Rows;
 use crate::navigation::eskf::{Estimate, POSITION, ROTATION, Refusal, States};
 
 /// A weight that differs by less from what the kernel says stays.

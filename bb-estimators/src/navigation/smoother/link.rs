@@ -9,9 +9,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::factor::{MOST_ROWS, Rows};
 use super::matrix::{Square, add_gram, axpy, dot, times, zeros};
 use super::preintegration::Preintegration;
+use super::rows::{MOST_ROWS, Rows};
 use crate::navigation::eskf::{
     ACCELEROMETER_BIAS, EskfParams, Estimate, GYROSCOPE_BIAS, ImuDensities, POSITION, ROTATION, States, Transition,
     VELOCITY, offset, rows,

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::factor::Rows;
+use super::rows::Rows;
 use crate::navigation::eskf::{Estimate, Optional, POSITION, ROTATION, Refusal, States, offset};
 use crate::navigation::math::{rotation_vector, skew};
 use crate::navigation::measurement::RelativePose;

@@ -6,9 +6,9 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
 
 use super::super::elimination::Pivot;
-use super::super::factor::Rows;
 use super::super::link::{Information, Link};
 use super::super::matrix::{Root, Square, mirror};
+use super::super::rows::Rows;
 use crate::navigation::noise::Noise;
 
 const N: usize = 5;

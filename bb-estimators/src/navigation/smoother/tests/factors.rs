@@ -5,8 +5,9 @@
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::super::factor::{Factor, Rows};
+use super::super::factor::Factor;
 use super::super::link::{Link, predicted};
+use super::super::rows::Rows;
 use super::flight::{Drone, N, sensors};
 use crate::navigation::{
     Estimate, NAVIGATION, NavigationFactor, POSITION, Preintegration, ROTATION, RelativePose, VELOCITY,
