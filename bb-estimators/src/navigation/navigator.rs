@@ -216,3 +216,23 @@ impl Hypothesis {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_learnt_is_as_plausible_as_it_is_said_to_be() {
+        for aiding in [Aiding::Gnss, Aiding::RelativePoses] {
+            let navigator = Navigator::new(EskfParams::default(), aiding).unwrap();
+            let (learnt, plausibility) = navigator.learnt();
+            assert!(plausibility > 0.5, "nothing speaks against the data sheets yet: {plausibility}");
+            assert_eq!(navigator.plausibility(&learnt), plausibility);
+            let sensors = EskfParams { gyroscope_noise: 3.0 * learnt.sensors.gyroscope_noise, ..learnt.sensors };
+            let noisier = navigator.plausibility(&Learnt { sensors, ..learnt });
+            assert!((noisier / plausibility - DEPARTURE).abs() < 1e-12, "{noisier}");
+            let sensors = EskfParams { gravity: 3.0, ..learnt.sensors };
+            assert_eq!(navigator.plausibility(&Learnt { sensors, ..learnt }), 0.0, "no such filter");
+        }
+    }
+}
