@@ -90,7 +90,7 @@ pub fn evaluate_navigation(
         if let Some(known) = player.newest().filter(|_| pair[1].scored) {
             newest.add(&pair[1], &known)?;
         }
-        let scored = |k: usize| data.keyframes.get(k).filter(|keyframe| keyframe.scored);
+        let scored = |k: usize| data.keyframes.get(k).filter(|keyframe| keyframe.scored && k > left_out);
         if let Some((keyframe, known)) = player.oldest().and_then(|(k, known)| Some((scored(k)?, known))) {
             oldest.add(keyframe, &known)?;
         }

@@ -38,7 +38,7 @@ pub struct SmootherParams {
     ///
     /// Small: bounds the time of an update. Large: as exact as a batch, at its cost. From 0 to 100.
     ///
-    /// Unit: times. Default: 2. Source: Gauss and Newton's method converges within two, so close to the solution.
+    /// Unit: times. Default: 2. Source: the Gauss–Newton method converges within two so close to the solution.
     pub iterations: usize,
 }
 
