@@ -115,11 +115,13 @@ fn a_tuned_smoother_agrees_with_gtsam() -> Result<(), Box<dyn Error>> {
         let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, single, &settings, 20, || {})?;
         let smoothed = score.position_smoothed_rmse_m.ok_or("a window was never full")?;
-        let ratios = [score.position_rmse_m / position, score.nees / nees, smoothed / oldest];
-        println!("{name}: position, NEES and oldest beside GTSAM's: {ratios:.3?}");
-        for (ratio, bound) in ratios.into_iter().zip([0.03, 0.05, 0.06]) {
+        let ratios = [score.position_rmse_m / position, score.nees / nees];
+        println!("{name}: position, NEES and oldest beside GTSAM's: {ratios:.3?}, {:.3}", smoothed / oldest);
+        for (ratio, bound) in ratios.into_iter().zip([0.03, 0.05]) {
             assert!((ratio - 1.0).abs() < bound, "{name}: {ratios:?}");
         }
+        // GTSAM's varies by a tenth with the noise that it adds to every integration.
+        assert!(smoothed < 1.03 * oldest, "{name}: {smoothed} m, not {oldest}");
     }
     Ok(())
 }
