@@ -1,9 +1,14 @@
 //! From a sensor's publish to the outputs of all estimators downstream nothing is allocated. A binary of its own, since
 //! it replaces the allocator by one that counts.
 
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
 use bb_core::pubsub::Topic;
 use bb_estimators::attitude::ImuAndMagnetometer;
+use bb_estimators::navigation::{
+    AbsolutePose, EskfParams, FixedLagSmoother, GnssPosition, ImuMean, Kernel, Refusal, RelativePose,
+    SmootherParams, Start, Stream,
+};
 use bb_estimators::{Madgwick, OrientationAverage};
 use std::future::Future;
 use std::pin::pin;
@@ -77,4 +82,60 @@ fn nothing_is_allocated_for_subscribers_that_are_full_or_awaited() {
     let allocations = allocation_counter::measure(|| (0..1000).for_each(|_| publish()));
     assert_eq!(allocations.count_total, 0);
     assert_eq!((by_number.lagged(), by_bytes.lagged(), latest.lagged()), (997, 991, 1000));
+}
+
+/// Nor at a keyframe of the smoother, whatever happens there.
+#[test]
+fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>> {
+    let sensors = EskfParams { longest_sample: 0.05, ..EskfParams::default() };
+    let params =
+        SmootherParams { sensors, window: 12, factors: 4, relinearise_rotation: 1e-4, ..SmootherParams::default() };
+    let mut smoother: FixedLagSmoother = FixedLagSmoother::new(params)?;
+    let (rest, level) = (Vector3::zeros(), UnitQuaternion::identity());
+    let mut streams = [Stream::default(); 2];
+    let [poses, odometry] = &mut streams;
+    let mut moved = 0;
+    let mut keyframe = |smoother: &mut FixedLagSmoother, k: u64| -> Result<(), Refusal> {
+        let time_ns = |k: u64| i64::try_from(k).unwrap_or(i64::MAX) * 100_000_000;
+        let sway = 0.3 * (k as f64).sin();
+        // Now and then samples are missing.
+        let samples = if k.is_multiple_of(40) { 1 } else { 5 };
+        for i in 1..=samples {
+            let specific_force = Vector3::new(sway, 0.0, 9.80665);
+            let angular_velocity = Vector3::new(0.0, 0.1 * sway, sway);
+            let time_ns = time_ns(k - 1) + i * 100_000_000 / samples;
+            smoother.propagate(&ImuMean { time_ns, angular_velocity, specific_force })?;
+        }
+        smoother.add_keyframe(k)?;
+        // Some of it is refused: it jumps, and four are too many.
+        let jump = if k % 50 < 5 { 500.0 } else { 0.0 };
+        let pose = AbsolutePose::new((Vector3::new(jump, sway, 0.0), 1.0), (level, 0.05));
+        let _ = smoother.add_robust(poses, k, pose, Kernel::Cauchy(2.0));
+        let _ = smoother.add(odometry, k, RelativePose::new(k - 1, (rest, 0.1), (level, 0.01)));
+        for late in 0..4 {
+            let fix = GnssPosition::new(Vector3::new(0.0, f64::NAN * f64::from(late == 3), 0.0), 2.0, 4.0);
+            let _ = smoother.add(poses, k.saturating_sub(late * 5), fix);
+        }
+        moved += smoother.update()?.relinearised;
+        let _ = (smoother.estimate(), smoother.pose_covariance(), smoother.smoothed(k.saturating_sub(5)));
+        Ok(())
+    };
+    smoother.start(0, &Start::at(0, (rest, 1.0), (rest, 0.1), (level, 0.05)))?;
+    for k in 1..30 {
+        keyframe(&mut smoother, k)?;
+    }
+    let mut result = Ok(());
+    let allocations = allocation_counter::measure(|| {
+        result = (30..1000).try_for_each(|k| keyframe(&mut smoother, k));
+    });
+    result?;
+    assert_eq!(allocations.count_total, 0);
+    // It has seen all of it.
+    let counts = poses.counts();
+    assert!(
+        counts.gate > 20 && counts.recoveries > 0 && counts.invalid > 20 && counts.not_applicable > 20,
+        "{counts:?}"
+    );
+    assert!(moved > 100 && smoother.gaps() > 10 && smoother.marginalised() > 900, "{moved}");
+    Ok(())
 }

@@ -56,7 +56,8 @@ const NAVIGATION_EXAMPLES: &str = "Exit code: 0; 1 if a data set could not be ev
 Examples:
   bb eval navigation drives/kitti_s2
   bb eval navigation drives/kitti_s2 drives/kitti_s5 --filter eskf --json
-  bb eval navigation flights/one --filter eskf-single --set gyroscope_noise=1e-3";
+  bb eval navigation flights/one --filter eskf-single --set gyroscope_noise=1e-3
+  bb eval navigation flights/one --filter smoother,eskf --window 10 --json";
 
 #[derive(Debug, Args)]
 struct NavigationArguments {
@@ -67,6 +68,10 @@ struct NavigationArguments {
     #[arg(long = "filter", value_name = "NAME", value_delimiter = ',', default_value = NAVIGATION_FILTERS[0].name,
           value_parser = navigation_filter, long_help = navigation_filters_in_words())]
     filters: Vec<NavigationFilter>,
+    /// How many keyframes a smoother holds.
+    #[arg(long, value_name = "KEYFRAMES", default_value_t = 20,
+          value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..=1000))]
+    window: usize,
     /// Sets a parameter, in SI or with a unit, in place of what the data set says.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<NavigationSetting>,
@@ -153,6 +158,7 @@ pub(crate) struct Navigation {
     pub(crate) data: Vec<PathBuf>,
     pub(crate) filters: Vec<NavigationFilter>,
     pub(crate) settings: Vec<NavigationSetting>,
+    pub(crate) window: usize,
     pub(crate) json: bool,
 }
 
@@ -176,8 +182,8 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
         Eval::Navigation(NavigationArguments { list: true, .. }) => {
             return Ok(Job::Print(navigation::listed()));
         }
-        Eval::Navigation(NavigationArguments { data, filters, settings, json, .. }) => {
-            return Ok(Job::Navigation(Navigation { data, filters, settings, json }));
+        Eval::Navigation(NavigationArguments { data, filters, window, settings, json, .. }) => {
+            return Ok(Job::Navigation(Navigation { data, filters, settings, window, json }));
         }
     };
     arguments.check().map_err(|(kind, fault)| {

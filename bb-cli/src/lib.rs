@@ -77,7 +77,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 /// Whether every data set could be evaluated.
 fn eval_navigation(job: &Navigation) -> Result<bool, String> {
-    let Navigation { data, filters, settings, json } = job;
+    let Navigation { data, filters, settings, window, json } = job;
     let (mut scores, mut faults) = (Vec::new(), Vec::new());
     for prefix in data {
         let data = match DataSet::read(prefix) {
@@ -89,7 +89,7 @@ fn eval_navigation(job: &Navigation) -> Result<bool, String> {
         };
         let progress = Progress::new("evaluating", (data.keyframes.len() * filters.len()) as u64);
         for filter in filters {
-            match evaluate_navigation(&data, filter, settings, || progress.add(1)) {
+            match evaluate_navigation(&data, filter, settings, *window, || progress.add(1)) {
                 Ok(score) => scores.push((prefix.clone(), filter.name, score)),
                 Err(fault) => faults.push(format!("{}: {}: {fault}", prefix.display(), filter.name)),
             }

@@ -3,6 +3,8 @@
 mod data;
 mod evaluate;
 mod filters;
+mod measured;
+mod player;
 mod report;
 
 pub use data::DataSet;

@@ -55,6 +55,32 @@ fn a_drive_is_scored() {
 }
 
 #[test]
+fn a_smoother_tells_of_its_window() {
+    let drive = drive("smoothed");
+    let prefix = drive.to_str().expect("is text");
+    let filters = "smoother,smoother-single,eskf";
+    let output = bb(&["eval", "navigation", prefix, "--filter", filters, "--window", "10", "--json"]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+    assert_eq!(rows.len(), 3);
+    for row in &rows[..2] {
+        let number = |name: &str| row[name].as_f64().unwrap_or_else(|| panic!("{name} is no number: {row}"));
+        assert!(number("position_rmse_m") < 0.3 && number("nees") < 6.0, "{row}");
+        assert!(number("position_smoothed_rmse_m") < 0.3 && number("orientation_smoothed_rmse_deg") < 1.0, "{row}");
+        assert_eq!((&row["keyframes"], &row["refused"], &row["allocations"]), (&90.into(), &0.into(), &0.into()));
+    }
+    assert_eq!((&rows[2]["allocations"], &rows[2]["position_smoothed_rmse_m"]), (&Value::Null, &Value::Null));
+    for window in ["1", "1001", "ten"] {
+        let output = bb(&["eval", "navigation", prefix, "--filter", "smoother", "--window", window]);
+        assert!(output.code == Some(2) && output.err.contains("--window"), "{window}: {}", output.err);
+    }
+    // Of a window that is never full nothing is smoothed.
+    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother", "--window", "500", "--json"]);
+    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+    assert_eq!((output.code, &rows[0]["position_smoothed_rmse_m"]), (Some(0), &Value::Null));
+}
+
+#[test]
 fn mistakes_are_named() {
     let good = drive("good");
     let good = good.to_str().expect("is text");

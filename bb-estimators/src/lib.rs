@@ -19,6 +19,9 @@
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+#[cfg(feature = "smoother")]
+extern crate alloc;
+
 pub mod attitude;
 pub mod navigation;
 pub mod params;

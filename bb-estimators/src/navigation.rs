@@ -11,7 +11,8 @@
 //! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
 //! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
 //! counts and statistics. [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several
-//! filters and finds which fits; [`Navigator`] is one that is ready for use.
+//! filters and finds which fits; [`Navigator`] is one that is ready for use. `FixedLagSmoother`, with the feature `smoother`,
+//! holds the last keyframes and corrects them in hindsight.
 
 mod alignment;
 mod bank;
@@ -27,14 +28,16 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
+#[cfg(feature = "smoother")]
+pub mod smoother;
 mod stream;
 
 pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
 pub use consistency::{Consistency, nees};
 pub use eskf::{
-    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuMean, Keyframe, NAVIGATION,
-    Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
+    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuDensities, ImuMean, Keyframe,
+    NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
 };
 #[cfg(feature = "runtime")]
 pub use estimator::{
@@ -48,5 +51,9 @@ pub use measurement::{
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
     ZeroVelocity,
 };
-pub use navigator::{Aiding, NAVIGATED, Navigated, Navigator};
+pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
+#[cfg(feature = "smoother")]
+pub use smoother::{
+    Factor, FixedLagSmoother, Kernel, NavigationFactor, Preintegration, Rows, SmootherParams, Updated,
+};
 pub use stream::{Counts, Fused, Stream, StreamParams};

@@ -30,7 +30,7 @@ fn errors_are_no_greater_than_known() -> Result<(), Box<dyn Error>> {
     let Some(folder) = navigation()? else { return Ok(()) };
     let filter = &NAVIGATION_FILTERS[0];
     for Known { name, position, orientation, nees: (least, most) } in KNOWN {
-        let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, filter, &[], || {})?;
+        let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, filter, &[], 20, || {})?;
         println!(
             "{name}: {:.3} m, {:.3?}°, {:.3?} m/s, NEES {:.2}, {} keyframes",
             score.position_rmse_m, score.orientation_rmse_deg, score.velocity_rmse_mps, score.nees, score.keyframes
@@ -40,6 +40,88 @@ fn errors_are_no_greater_than_known() -> Result<(), Box<dyn Error>> {
         assert!(turned.is_none_or(|(measured, known)| measured <= 1.02 * known), "{name}: {turned:?}°");
         assert_eq!(score.orientation_rmse_deg.is_some(), orientation.is_some(), "{name}");
         assert!((least..most).contains(&score.nees), "{name}: NEES {}", score.nees);
+    }
+    Ok(())
+}
+
+/// A data set and what the smoother reaches on it.
+struct Smoothed {
+    name: &'static str,
+    /// Of the newest keyframe, m, and its largest NEES that is accepted, with the least.
+    position: f64,
+    nees: (f64, f64),
+    /// Of the newest, degrees.
+    orientation: Option<f64>,
+    /// Of the oldest in a window of 20, m.
+    oldest: f64,
+}
+
+const SMOOTHED: [Smoothed; SETS - 1] = [
+    Smoothed { name: "euroc_mh01", position: 0.556, nees: (5.0, 8.2), orientation: Some(0.618), oldest: 0.558 },
+    Smoothed { name: "kitti_s10", position: 7.822, nees: (2.0, 4.0), orientation: None, oldest: 0.639 },
+    Smoothed { name: "kitti_s2", position: 0.253, nees: (2.0, 4.0), orientation: None, oldest: 0.107 },
+    Smoothed { name: "kitti_s5", position: 1.504, nees: (2.0, 4.0), orientation: None, oldest: 0.181 },
+    Smoothed { name: "simflight", position: 0.812, nees: (5.0, 6.5), orientation: Some(0.272), oldest: 0.756 },
+    Smoothed {
+        name: "simflight_stress",
+        position: 1.084,
+        nees: (5.0, 8.0),
+        orientation: Some(0.305),
+        oldest: 0.978,
+    },
+];
+
+#[test]
+fn the_smoother_errs_no_more_than_known() -> Result<(), Box<dyn Error>> {
+    let Some(folder) = navigation()? else { return Ok(()) };
+    let smoother = NAVIGATION_FILTERS.iter().find(|filter| filter.name == "smoother").ok_or("no such filter")?;
+    for Smoothed { name, position, nees: (least, most), orientation, oldest } in SMOOTHED {
+        let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, smoother, &[], 20, || {})?;
+        let smoothed = score.position_smoothed_rmse_m.ok_or("a window was never full")?;
+        println!(
+            "{name}: {:.3} m, {:.3?}°, NEES {:.2}, oldest {smoothed:.3} m",
+            score.position_rmse_m, score.orientation_rmse_deg, score.nees
+        );
+        assert!(score.position_rmse_m <= 1.02 * position, "{name}: {} m was {position}", score.position_rmse_m);
+        let turned = score.orientation_rmse_deg.zip(orientation);
+        assert!(turned.is_none_or(|(measured, known)| measured <= 1.02 * known), "{name}: {turned:?}°");
+        assert_eq!(score.orientation_rmse_deg.is_some(), orientation.is_some(), "{name}");
+        assert!(smoothed <= 1.02 * oldest, "{name}: {smoothed} m was {oldest}");
+        assert!((least..most).contains(&score.nees), "{name}: NEES {}", score.nees);
+        assert_eq!(score.allocations, Some(0), "{name}");
+    }
+    Ok(())
+}
+
+/// With the noise that GTSAM was given, the smoother gives GTSAM's figures: they are the same problem.
+#[test]
+fn a_tuned_smoother_agrees_with_gtsam() -> Result<(), Box<dyn Error>> {
+    let Some(folder) = navigation()? else { return Ok(()) };
+    let single =
+        NAVIGATION_FILTERS.iter().find(|filter| filter.name == "smoother-single").ok_or("no such filter")?;
+    let tuned = ["gyroscope_noise=5e-3", "accelerometer_noise=5e-2"];
+    let known = ["relative_scale=0"];
+    // Position in m, NEES and position of the oldest in m, as in the README of the data.
+    for (name, settings, position, nees, oldest) in [
+        ("kitti_s2", &tuned[..], 0.380, 0.97, 0.18),
+        ("kitti_s5", &tuned, 1.503, 1.64, 0.25),
+        ("kitti_s10", &tuned, 7.84, 2.78, 0.74),
+        ("kitti_s2", &[], 1.83, 47.0, 0.79),
+        ("kitti_s5", &[], 3.89, 61.0, 1.04),
+        ("kitti_s10", &[], 12.8, 110.0, 1.38),
+        ("simflight", &known, 0.831, 5.74, 0.772),
+        ("euroc_mh01", &known, 0.556, 7.97, 0.557),
+    ] {
+        let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
+        let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, single, &settings, 20, || {})?;
+        let smoothed = score.position_smoothed_rmse_m.ok_or("a window was never full")?;
+        let ratios = [score.position_rmse_m / position, score.nees / nees];
+        println!("{name}: position, NEES and oldest beside GTSAM's: {ratios:.3?}, {:.3}", smoothed / oldest);
+        for (ratio, bound) in ratios.into_iter().zip([0.03, 0.05]) {
+            assert!((ratio - 1.0).abs() < bound, "{name}: {ratios:?}");
+        }
+        // GTSAM's varies by a tenth with the noise that it adds to every integration.
+        assert!(smoothed < 1.03 * oldest, "{name}: {smoothed} m, not {oldest}");
     }
     Ok(())
 }
@@ -62,7 +144,8 @@ fn one_tuned_filter_agrees_with_a_smoother() -> Result<(), Box<dyn Error>> {
         ("euroc_mh01", &known, 0.556, 7.97),
     ] {
         let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
-        let score = evaluate_navigation(&DataSet::read(&folder.join(Path::new(name)))?, single, &settings, || {})?;
+        let score =
+            evaluate_navigation(&DataSet::read(&folder.join(Path::new(name)))?, single, &settings, 20, || {})?;
         let (distance, consistency) = (score.position_rmse_m / position, score.nees / nees);
         assert!((distance - 1.0).abs() < 0.02, "{name}: {} m, not {position}", score.position_rmse_m);
         assert!((consistency - 1.0).abs() < 0.03, "{name}: NEES {}, not {nees}", score.nees);

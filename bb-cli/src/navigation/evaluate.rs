@@ -2,12 +2,10 @@
 
 use super::data::{DataSet, Keyframe};
 use super::filters::{NavigationFilter, NavigationSetting};
-use bb_core::nalgebra::{Matrix6, Vector6};
-use bb_estimators::navigation::{
-    AbsolutePose, GnssPosition, ImuMean, NAVIGATED, Navigator, POSITION, ROTATION, Refusal, RelativePose, Start,
-    nees,
-};
-use std::time::Instant;
+use super::measured::start;
+use super::player::{Known, Player};
+use bb_core::nalgebra::Vector6;
+use bb_estimators::navigation::nees;
 
 /// Keyframes at the start that are not scored: a tenth of all, but not more than these.
 const MOST_LEFT_OUT: usize = 50;
@@ -26,14 +24,23 @@ pub struct NavigationScore {
     pub nees: f64,
     /// How many keyframes were scored.
     pub keyframes: usize,
-    /// Time to propagate over one sample of the IMU, µs, on average.
+    /// Of the oldest keyframe in the window, m; none of a filter.
+    pub position_smoothed_rmse_m: Option<f64>,
+    /// Of the same, degrees.
+    pub orientation_smoothed_rmse_deg: Option<f64>,
+    /// Time to take in one sample of the IMU, µs, on average.
     pub us_per_imu_sample: f64,
-    /// Time from one keyframe to the next, with all samples, measurements and the estimate: median, ms.
+    /// Median time of a keyframe, ms: of a filter from one to the next, with all samples, measurements and the estimate; of a
+    /// smoother that of measurements, update, estimate and covariance of the pose.
     pub ms_per_keyframe_p50: f64,
     /// The same, 99th percentile.
     pub ms_per_keyframe_p99: f64,
     /// How many measurements were refused.
     pub refused: u64,
+    /// How often a smoother took memory at a scored keyframe; none of a filter.
+    pub allocations: Option<u64>,
+    /// Memory of the process afterwards, MB; none where the system does not tell.
+    pub rss_mb: Option<f64>,
 }
 
 #[derive(Default)]
@@ -47,7 +54,7 @@ struct Sums {
     velocities: usize,
 }
 
-/// Plays a data set through a filter. `progress` is told of each keyframe.
+/// Plays a data set through a filter; a smoother holds `window` keyframes. `progress` is told of each keyframe.
 ///
 /// Positions from satellites are used where there are no relative poses.
 ///
@@ -58,99 +65,70 @@ pub fn evaluate_navigation(
     data: &DataSet,
     filter: &NavigationFilter,
     settings: &[NavigationSetting],
+    window: usize,
     mut progress: impl FnMut(),
 ) -> Result<NavigationScore, String> {
-    let mut navigator = filter.make(data, settings)?;
+    let mut player = Player::new(filter, data, settings, window)?;
     let first = data.keyframes.first().ok_or("no keyframe")?;
-    navigator.start(&start(data, first)).map_err(|error| format!("cannot start: {error}"))?;
-    navigator.set_keyframe(0);
+    player.start(&start(data, first)).map_err(|error| format!("cannot start: {error}"))?;
     let left_out = MOST_LEFT_OUT.min((data.keyframes.len() - 1) / 10);
-    let (mut sums, mut refused) = (Sums::default(), 0);
+    let (mut newest, mut oldest) = (Sums::default(), Sums::default());
     let (mut propagation_s, mut samples) = (0.0, 0_usize);
+    let (mut refused, mut allocations) = (0, 0);
     let mut keyframe_ms = Vec::with_capacity(data.keyframes.len());
     for (k, pair) in data.keyframes.windows(2).enumerate().map(|(k, pair)| (k + 1, pair)) {
-        let began = Instant::now();
-        // Time is that of the keyframe and the lengths of the samples since, as the samples' own stamps may jitter.
-        let mut time_s = pair[0].time_s;
-        let between = data.samples.get(pair[0].sample..pair[1].sample).unwrap_or_default();
-        for sample in between {
-            time_s += sample.dt;
-            let (angular_velocity, specific_force) = (sample.angular_velocity, sample.specific_force);
-            match navigator.propagate(&ImuMean { time_ns: nanoseconds(time_s), angular_velocity, specific_force }) {
-                Ok(()) => {}
-                Err(error @ Refusal::Gap { .. }) => return Err(format!("at {time_s} s: {error}")),
-                Err(_) => refused += 1,
-            }
-        }
-        propagation_s += began.elapsed().as_secs_f64();
-        samples += between.len();
-        refused += measure(data, k as u64, &mut navigator);
-        navigator.set_keyframe(k as u64);
-        let estimate = navigator.estimate();
-        keyframe_ms.push(began.elapsed().as_secs_f64() * 1e3);
+        let step = player.play(data, k, &pair[0], &pair[1])?;
+        propagation_s += step.propagation_s;
+        samples += pair[1].sample - pair[0].sample;
+        refused += step.refused;
+        keyframe_ms.push(step.keyframe_s * 1e3);
         progress();
-        let Some((estimate, covariance)) = estimate else { continue };
-        if pair[1].scored && k > left_out {
-            let pose = |i: usize| if i < 3 { POSITION + i } else { ROTATION + i - 3 };
-            let pose_covariance = Matrix6::from_fn(|i, j| covariance[(pose(i), pose(j))]);
-            sums.add(&pair[1], &estimate, &pose_covariance)?;
+        if k <= left_out {
+            continue;
+        }
+        allocations += step.allocations;
+        if let Some(known) = player.newest().filter(|_| pair[1].scored) {
+            newest.add(&pair[1], &known)?;
+        }
+        let scored = |k: usize| data.keyframes.get(k).filter(|keyframe| keyframe.scored && k > left_out);
+        if let Some((keyframe, known)) = player.oldest().and_then(|(k, known)| Some((scored(k)?, known))) {
+            oldest.add(keyframe, &known)?;
         }
     }
-    if sums.keyframes == 0 {
+    if newest.keyframes == 0 {
         return Err("no keyframe is scored".into());
     }
     keyframe_ms.sort_by(f64::total_cmp);
     let percentile = |part: f64| keyframe_ms[((keyframe_ms.len() - 1) as f64 * part).round() as usize];
     let rms = |sum: f64, count: usize| (count > 0).then(|| (sum / count as f64).sqrt());
     Ok(NavigationScore {
-        position_rmse_m: rms(sums.position, sums.keyframes).unwrap_or(f64::NAN),
-        orientation_rmse_deg: rms(sums.orientation, sums.orientations).map(f64::to_degrees),
-        velocity_rmse_mps: rms(sums.velocity, sums.velocities),
-        nees: sums.nees / sums.keyframes as f64,
-        keyframes: sums.keyframes,
+        position_rmse_m: rms(newest.position, newest.keyframes).unwrap_or(f64::NAN),
+        orientation_rmse_deg: rms(newest.orientation, newest.orientations).map(f64::to_degrees),
+        velocity_rmse_mps: rms(newest.velocity, newest.velocities),
+        nees: newest.nees / newest.keyframes as f64,
+        keyframes: newest.keyframes,
+        position_smoothed_rmse_m: rms(oldest.position, oldest.keyframes),
+        orientation_smoothed_rmse_deg: rms(oldest.orientation, oldest.orientations).map(f64::to_degrees),
         us_per_imu_sample: propagation_s * 1e6 / samples.max(1) as f64,
         ms_per_keyframe_p50: percentile(0.5),
         ms_per_keyframe_p99: percentile(0.99),
         refused,
+        allocations: filter.is_smoother().then_some(allocations),
+        rss_mb: resident_mb(),
     })
 }
 
-/// Gives the filter what was measured at a keyframe; how much of it was refused.
-fn measure(data: &DataSet, keyframe: u64, navigator: &mut Navigator) -> u64 {
-    let mut refused = 0;
-    if let Some(relative) = data.relative.get(&keyframe) {
-        let measured = RelativePose::new(relative.from, relative.translation, relative.rotation);
-        refused += u64::from(navigator.relative_pose(&measured).is_err());
-    }
-    if let Some(anchor) = data.anchors.get(&keyframe) {
-        let measured = AbsolutePose::new(anchor.position, anchor.world_from_body);
-        refused += u64::from(navigator.absolute_pose(&measured).is_err());
-    }
-    if let (Some(fix), true) = (data.fixes.get(&keyframe), data.relative.is_empty()) {
-        let measured = GnssPosition::new(fix.position, fix.horizontal, fix.vertical);
-        refused += u64::from(navigator.gnss_position(&measured).is_err());
-    }
-    refused
-}
-
-fn start(data: &DataSet, first: &Keyframe) -> Start {
-    let known = &data.start;
-    Start {
-        gyroscope_bias: known.gyroscope_bias.0,
-        gyroscope_bias_deviation: known.gyroscope_bias.1,
-        accelerometer_bias: known.accelerometer_bias.0,
-        accelerometer_bias_deviation: known.accelerometer_bias.1,
-        ..Start::at(nanoseconds(first.time_s), known.position, known.velocity, known.world_from_body)
-    }
+/// Memory of this process that is in use, MB, where Linux tells.
+fn resident_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let kilobytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes / 1024.0)
 }
 
 impl Sums {
-    fn add(
-        &mut self,
-        truth: &Keyframe,
-        estimate: &bb_estimators::navigation::Estimate<NAVIGATED>,
-        covariance: &Matrix6<f64>,
-    ) -> Result<(), String> {
+    fn add(&mut self, truth: &Keyframe, estimate: &Known) -> Result<(), String> {
+        let covariance = &estimate.covariance;
         let position = truth.position - estimate.position;
         self.position += position.norm_squared();
         self.keyframes += 1;
@@ -172,9 +150,4 @@ impl Sums {
         }
         Ok(())
     }
-}
-
-fn nanoseconds(seconds: f64) -> i64 {
-    // A cast saturates.
-    (seconds * 1e9).round() as i64
 }

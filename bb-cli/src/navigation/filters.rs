@@ -2,7 +2,7 @@
 
 use super::data::DataSet;
 use crate::filters::parameters;
-use bb_estimators::navigation::{Aiding, EskfParams, Navigator};
+use bb_estimators::navigation::{Aiding, EskfParams};
 use bb_estimators::params::Params;
 use std::str::FromStr;
 
@@ -13,20 +13,39 @@ pub struct NavigationFilter {
     pub name: &'static str,
     /// What it is, in a line.
     pub about: &'static str,
-    is_bank: bool,
+    pub(crate) kind: Kind,
+}
+
+/// What a filter is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Bank,
+    Single,
+    Smoother,
+    SmootherSingle,
 }
 
 /// All there are; the first is the default.
-pub const NAVIGATION_FILTERS: [NavigationFilter; 2] = [
+pub const NAVIGATION_FILTERS: [NavigationFilter; 4] = [
     NavigationFilter {
         name: "eskf",
         about: "error-state Kalman filters over multiples of the data sheets' noise, weighed by their likelihood",
-        is_bank: true,
+        kind: Kind::Bank,
     },
     NavigationFilter {
         name: "eskf-single",
         about: "one error-state Kalman filter with the noise as it is given",
-        is_bank: false,
+        kind: Kind::Single,
+    },
+    NavigationFilter {
+        name: "smoother",
+        about: "a fixed-lag smoother with the noise that those filters have found",
+        kind: Kind::Smoother,
+    },
+    NavigationFilter {
+        name: "smoother-single",
+        about: "a fixed-lag smoother with the noise as it is given",
+        kind: Kind::SmootherSingle,
     },
 ];
 
@@ -62,25 +81,33 @@ pub(crate) fn listed() -> String {
 }
 
 impl NavigationFilter {
-    /// The filter for a data set: its noise is that of the set, but for what `settings` say.
-    ///
-    /// # Errors
-    ///
-    /// A parameter outside its range.
-    pub fn make(&self, data: &DataSet, settings: &[NavigationSetting]) -> Result<Box<Navigator>, String> {
-        let mut params = EskfParams {
-            gyroscope_noise: data.noise.gyroscope,
-            gyroscope_bias_walk: data.noise.gyroscope_bias,
-            accelerometer_noise: data.noise.accelerometer,
-            accelerometer_bias_walk: data.noise.accelerometer_bias,
-            gravity: data.noise.gravity,
-            ..EskfParams::default()
-        };
-        for setting in settings {
-            setting.apply(&mut params)?;
-        }
-        let aiding = if data.relative.is_empty() { Aiding::Gnss } else { Aiding::RelativePoses };
-        let made = if self.is_bank { Navigator::new(params, aiding) } else { Navigator::single(params) };
-        made.map(Box::new).map_err(|error| error.to_string())
+    /// Whether it holds a window of keyframes.
+    pub(crate) fn is_smoother(&self) -> bool {
+        matches!(self.kind, Kind::Smoother | Kind::SmootherSingle)
     }
+}
+
+/// The noise of a data set, but for what `settings` say.
+///
+/// # Errors
+///
+/// A parameter outside its range.
+pub(crate) fn params(data: &DataSet, settings: &[NavigationSetting]) -> Result<EskfParams, String> {
+    let mut params = EskfParams {
+        gyroscope_noise: data.noise.gyroscope,
+        gyroscope_bias_walk: data.noise.gyroscope_bias,
+        accelerometer_noise: data.noise.accelerometer,
+        accelerometer_bias_walk: data.noise.accelerometer_bias,
+        gravity: data.noise.gravity,
+        ..EskfParams::default()
+    };
+    for setting in settings {
+        setting.apply(&mut params)?;
+    }
+    Ok(params)
+}
+
+/// What a data set has besides the IMU.
+pub(crate) fn aiding(data: &DataSet) -> Aiding {
+    if data.relative.is_empty() { Aiding::Gnss } else { Aiding::RelativePoses }
 }

@@ -18,10 +18,14 @@ struct Object {
     velocity_rmse_mps: Option<f64>,
     nees: f64,
     keyframes: usize,
+    position_smoothed_rmse_m: Option<f64>,
+    orientation_smoothed_rmse_deg: Option<f64>,
     us_per_imu_sample: f64,
     ms_per_keyframe_p50: f64,
     ms_per_keyframe_p99: f64,
     refused: u64,
+    allocations: Option<u64>,
+    rss_mb: Option<f64>,
 }
 
 pub(crate) fn json(scores: &[Scored]) -> Result<String, String> {
@@ -33,10 +37,14 @@ pub(crate) fn json(scores: &[Scored]) -> Result<String, String> {
         velocity_rmse_mps: score.velocity_rmse_mps,
         nees: score.nees,
         keyframes: score.keyframes,
+        position_smoothed_rmse_m: score.position_smoothed_rmse_m,
+        orientation_smoothed_rmse_deg: score.orientation_smoothed_rmse_deg,
         us_per_imu_sample: score.us_per_imu_sample,
         ms_per_keyframe_p50: score.ms_per_keyframe_p50,
         ms_per_keyframe_p99: score.ms_per_keyframe_p99,
         refused: score.refused,
+        allocations: score.allocations,
+        rss_mb: score.rss_mb,
     };
     let objects: Vec<_> = scores.iter().map(object).collect();
     Ok(serde_json::to_string_pretty(&objects).map_err(|error| error.to_string())? + "\n")
@@ -49,8 +57,9 @@ pub(crate) fn table(scores: &[Scored]) -> String {
     let name = |file: &PathBuf| file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
     let width = scores.iter().map(|(file, ..)| name(file).chars().count()).max().unwrap_or(0).max(4);
     let mut text = String::from("Root mean square errors at the keyframes:\n\n");
-    let head = ["position m", "orient. deg", "velocity m/s", "NEES", "keyframes", "us/sample"];
-    let _ = write!(text, "{:width$}  {:11}", "data", "filter");
+    let head =
+        ["position m", "orient. deg", "velocity m/s", "NEES", "keyframes", "us/sample", "ms/keyframe", "99 %"];
+    let _ = write!(text, "{:width$}  {:15}", "data", "filter");
     for cell in head {
         let _ = write!(text, "  {cell:>12}");
     }
@@ -64,8 +73,10 @@ pub(crate) fn table(scores: &[Scored]) -> String {
             format!("{:.2}", score.nees),
             score.keyframes.to_string(),
             format!("{:.2}", score.us_per_imu_sample),
+            format!("{:.4}", score.ms_per_keyframe_p50),
+            format!("{:.4}", score.ms_per_keyframe_p99),
         ];
-        let _ = write!(text, "{:width$}  {filter:11}", name(file));
+        let _ = write!(text, "{:width$}  {filter:15}", name(file));
         for cell in cells {
             let _ = write!(text, "  {cell:>12}");
         }

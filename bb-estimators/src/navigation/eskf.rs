@@ -29,10 +29,16 @@ mod tests;
 
 pub use estimate::{Estimate, Keyframe};
 pub use filter::{Eskf, ImuMean, Start};
+#[cfg(feature = "smoother")]
+pub(super) use filter::{LONGEST_GAP_S, seconds_between};
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
-pub use params::{EskfParams, GaussMarkov};
+pub use params::{EskfParams, GaussMarkov, ImuDensities};
+#[cfg(feature = "smoother")]
+pub(super) use propagation::{Transition, rows};
 pub use refusal::Refusal;
+#[cfg(feature = "smoother")]
+pub(super) use states::distinct;
 pub use states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
     offset,

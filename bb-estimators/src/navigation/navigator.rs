@@ -159,10 +159,31 @@ impl Navigator {
     }
 
     /// The parameters of the most plausible filter, which are what the bank has learnt, and how plausible it is.
-    pub fn learnt(&self) -> (EskfParams, f64) {
+    pub fn learnt(&self) -> (Learnt, f64) {
         let best = self.bank.best();
-        (*self.bank.filters()[best].params(), self.bank.weights()[best])
+        (self.hypothesis(best), self.bank.weights()[best])
     }
+
+    /// How plausible the filter with these parameters is; 0 if there is none, or it was dropped.
+    pub fn plausibility(&self, learnt: &Learnt) -> f64 {
+        let weights = self.bank.weights();
+        let found = (0..FILTERS).filter(|i| weights[*i] > 0.0).find(|i| self.hypothesis(*i) == *learnt);
+        found.map_or(0.0, |i| weights[i])
+    }
+
+    fn hypothesis(&self, i: usize) -> Learnt {
+        let sensors = *self.bank.filters()[i].params();
+        Learnt { sensors, gnss_variance_factor: self.gnss[i].params().variance_factor }
+    }
+}
+
+/// What a bank has found, for another estimator of the same robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learnt {
+    /// The parameters of the most plausible filter.
+    pub sensors: EskfParams,
+    /// What it multiplies the variance of positions from satellites by.
+    pub gnss_variance_factor: f64,
 }
 
 impl Hypothesis {
@@ -192,6 +213,26 @@ impl Hypothesis {
             accelerometer_noise: (params.accelerometer_noise * self.accelerometer).min(100.0),
             relative_scale: if self.scale { params.relative_scale } else { known },
             ..*params
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_learnt_is_as_plausible_as_it_is_said_to_be() {
+        for aiding in [Aiding::Gnss, Aiding::RelativePoses] {
+            let navigator = Navigator::new(EskfParams::default(), aiding).unwrap();
+            let (learnt, plausibility) = navigator.learnt();
+            assert!(plausibility > 0.5, "nothing speaks against the data sheets yet: {plausibility}");
+            assert_eq!(navigator.plausibility(&learnt), plausibility);
+            let sensors = EskfParams { gyroscope_noise: 3.0 * learnt.sensors.gyroscope_noise, ..learnt.sensors };
+            let noisier = navigator.plausibility(&Learnt { sensors, ..learnt });
+            assert!((noisier / plausibility - DEPARTURE).abs() < 1e-12, "{noisier}");
+            let sensors = EskfParams { gravity: 3.0, ..learnt.sensors };
+            assert_eq!(navigator.plausibility(&Learnt { sensors, ..learnt }), 0.0, "no such filter");
         }
     }
 }

@@ -52,7 +52,7 @@ pub struct Counts {
     pub gate: u64,
     /// [`Refusal::NonFinite`], [`Refusal::OutOfRange`] and [`Refusal::Noise`].
     pub invalid: u64,
-    /// [`Refusal::NoKeyframe`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
+    /// [`Refusal::NoKeyframe`], [`Refusal::Full`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
     pub not_applicable: u64,
     /// [`Refusal::TooOld`], [`Refusal::TimeNotIncreasing`] and [`Refusal::Gap`].
     pub late: u64,
@@ -137,6 +137,13 @@ impl Stream {
         &self.params
     }
 
+    /// Changes [`StreamParams::variance_factor`], for those who have learnt it elsewhere.
+    pub fn set_variance_factor(&mut self, factor: f64) {
+        if factor > 0.0 && factor.is_finite() {
+            self.params.variance_factor = factor;
+        }
+    }
+
     /// What became of its measurements.
     pub fn counts(&self) -> &Counts {
         &self.counts
@@ -204,7 +211,9 @@ impl Stream {
                 self.counts.gate_in_a_row += 1;
             }
             Err(Refusal::NonFinite | Refusal::OutOfRange | Refusal::Noise) => self.counts.invalid += 1,
-            Err(Refusal::NoKeyframe { .. } | Refusal::NotObservable | Refusal::NotStarted) => {
+            Err(
+                Refusal::NoKeyframe { .. } | Refusal::Full { .. } | Refusal::NotObservable | Refusal::NotStarted,
+            ) => {
                 self.counts.not_applicable += 1;
             }
             Err(Refusal::TooOld { .. } | Refusal::TimeNotIncreasing { .. } | Refusal::Gap { .. }) => {

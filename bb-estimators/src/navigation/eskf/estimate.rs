@@ -42,7 +42,7 @@ pub struct Estimate<const N: usize> {
     /// The keyframe, if one was set and the filter keeps one.
     pub keyframe: Option<Keyframe>,
     /// Optional states at their places in the error vector.
-    pub(super) optional: SVector<f64, N>,
+    pub(in crate::navigation) optional: SVector<f64, N>,
 }
 
 impl<const N: usize> Estimate<N> {
@@ -108,8 +108,26 @@ impl<const N: usize> Estimate<N> {
         error
     }
 
+    /// At rest at the origin, for a place that is filled later.
+    #[cfg(feature = "smoother")]
+    pub(in crate::navigation) fn unknown() -> Self {
+        let zero = Vector3::zeros();
+        Self {
+            time_ns: 0,
+            position: zero,
+            velocity: zero,
+            world_from_body: UnitQuaternion::identity(),
+            accelerometer_bias: zero,
+            gyroscope_bias: zero,
+            angular_velocity: zero,
+            specific_force: zero,
+            keyframe: None,
+            optional: SVector::zeros(),
+        }
+    }
+
     /// Whether every component is a number.
-    pub(super) fn is_finite(&self) -> bool {
+    pub(in crate::navigation) fn is_finite(&self) -> bool {
         let vectors = [&self.position, &self.velocity, &self.accelerometer_bias, &self.gyroscope_bias];
         vectors.iter().all(|vector| vector.iter().all(|x| x.is_finite()))
             && self.world_from_body.coords.iter().all(|x| x.is_finite())

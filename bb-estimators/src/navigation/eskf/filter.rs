@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Ve
 
 use super::covariance::{Covariance, Innovation};
 use super::estimate::{Estimate, Keyframe};
-use super::params::EskfParams;
-use super::propagation::{Densities, Transition};
+use super::params::{EskfParams, ImuDensities};
+use super::propagation::Transition;
 use super::refusal::Refusal;
 use super::states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
@@ -25,7 +25,7 @@ const RESET: f64 = 1e-12;
 const COPY: f64 = 1e-11;
 
 /// The longest gap that is bridged at all, s: a body may be anywhere after it.
-const LONGEST_GAP_S: f64 = 60.0;
+pub(in crate::navigation) const LONGEST_GAP_S: f64 = 60.0;
 
 /// One sample of the IMU, body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +36,21 @@ pub struct ImuMean {
     pub angular_velocity: Vector3<f64>,
     /// Mean specific force over the interval, m/s²: at rest one g upwards.
     pub specific_force: Vector3<f64>,
+}
+
+impl ImuMean {
+    /// Whether it may have been measured.
+    pub(in crate::navigation) fn check(&self) -> Result<(), Refusal> {
+        // Within its limit is no NaN.
+        let within = |vector: &Vector3<f64>, limit: f64| vector.iter().all(|x| (-limit..=limit).contains(x));
+        if within(&self.angular_velocity, MAX_ANGULAR_VELOCITY) && within(&self.specific_force, MAX_SPECIFIC_FORCE)
+        {
+            return Ok(());
+        }
+        let mut components = self.angular_velocity.iter().chain(self.specific_force.iter());
+        let is_finite = components.all(|x| x.is_finite());
+        Err(if is_finite { Refusal::OutOfRange } else { Refusal::NonFinite })
+    }
 }
 
 /// What is known when a filter starts.
@@ -89,6 +104,61 @@ impl Start {
             gyroscope_bias_deviation: 0.02,
         }
     }
+
+    /// The state and the covariance that it says.
+    fn state<S: States, const N: usize>(
+        &self,
+        params: &EskfParams,
+    ) -> Result<(Estimate<N>, Covariance<N>), Refusal> {
+        let mut covariance = Covariance::new();
+        covariance.set(POSITION, &self.position_covariance);
+        covariance.set(VELOCITY, &self.velocity_covariance);
+        covariance.set(ROTATION, &self.rotation_covariance);
+        for i in 0..3 {
+            let square = |x: f64| x * x;
+            covariance.forget(ACCELEROMETER_BIAS + i, square(self.accelerometer_bias_deviation));
+            covariance.forget(GYROSCOPE_BIAS + i, square(self.gyroscope_bias_deviation));
+        }
+        for state in S::OPTIONAL {
+            let variance = params.process(*state).map_or(1.0, |process| process.deviation * process.deviation);
+            let Some(first) = offset::<S>(*state) else { continue };
+            for i in first..first + state.dimension() {
+                // 0 would make the matrix singular; the state is known all the same.
+                covariance.forget(i, variance.max(1e-24));
+            }
+        }
+        let norm = self.world_from_body.norm();
+        let estimate = Estimate {
+            time_ns: self.time_ns,
+            position: self.position,
+            velocity: self.velocity,
+            world_from_body: UnitQuaternion::new_normalize(self.world_from_body.into_inner()),
+            accelerometer_bias: self.accelerometer_bias,
+            gyroscope_bias: self.gyroscope_bias,
+            angular_velocity: Vector3::zeros(),
+            specific_force: Vector3::zeros(),
+            keyframe: None,
+            optional: SVector::zeros(),
+        };
+        if !estimate.is_finite() || !(0.5..2.0).contains(&norm) {
+            return Err(Refusal::NonFinite);
+        }
+        if !covariance.is_positive_definite() {
+            return Err(Refusal::Noise);
+        }
+        Ok((estimate, covariance))
+    }
+
+    /// The state and the information that it says: the inverse of the covariance.
+    #[cfg(feature = "smoother")]
+    pub(in crate::navigation) fn information<S: States, const N: usize>(
+        &self,
+        params: &EskfParams,
+    ) -> Result<(Estimate<N>, SMatrix<f64, N, N>), Refusal> {
+        let (estimate, covariance) = self.state::<S, N>(params)?;
+        let information = nalgebra::linalg::Cholesky::new(*covariance.matrix()).ok_or(Refusal::Noise)?;
+        Ok((estimate, information.inverse()))
+    }
 }
 
 /// An error-state Kalman filter with the optional states `S` and `N` errors in all; see the [module](super).
@@ -113,7 +183,7 @@ impl Start {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
     params: EskfParams,
-    densities: Densities,
+    densities: ImuDensities,
     estimate: Option<Estimate<N>>,
     covariance: Covariance<N>,
     resets: u32,
@@ -135,13 +205,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             assert!(distinct(S::OPTIONAL), "an optional state is listed twice");
         }
         params.check()?;
-        let square = |x: f64| x * x;
-        let densities = Densities {
-            accelerometer: square(params.accelerometer_noise),
-            gyroscope: square(params.gyroscope_noise),
-            accelerometer_bias: square(params.accelerometer_bias_walk),
-            gyroscope_bias: square(params.gyroscope_bias_walk),
-        };
+        let densities = params.densities();
         let covariance = Covariance::new();
         let states = core::marker::PhantomData;
         Ok(Self { params, densities, estimate: None, covariance, resets: 0, gaps: 0, fixed_ns: 0, states })
@@ -159,42 +223,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// [`Refusal::NonFinite`] if a value is not finite or the orientation no rotation, [`Refusal::Noise`] if a covariance is
     /// not positive definite. The filter is then as it was.
     pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
-        let mut covariance = Covariance::new();
-        covariance.set(POSITION, &start.position_covariance);
-        covariance.set(VELOCITY, &start.velocity_covariance);
-        covariance.set(ROTATION, &start.rotation_covariance);
-        for i in 0..3 {
-            let square = |x: f64| x * x;
-            covariance.forget(ACCELEROMETER_BIAS + i, square(start.accelerometer_bias_deviation));
-            covariance.forget(GYROSCOPE_BIAS + i, square(start.gyroscope_bias_deviation));
-        }
-        for state in S::OPTIONAL {
-            let variance = self.params.process(*state).map_or(1.0, |process| process.deviation * process.deviation);
-            let Some(first) = offset::<S>(*state) else { continue };
-            for i in first..first + state.dimension() {
-                // 0 would make the matrix singular; the state is known all the same.
-                covariance.forget(i, variance.max(1e-24));
-            }
-        }
-        let norm = start.world_from_body.norm();
-        let estimate = Estimate {
-            time_ns: start.time_ns,
-            position: start.position,
-            velocity: start.velocity,
-            world_from_body: UnitQuaternion::new_normalize(start.world_from_body.into_inner()),
-            accelerometer_bias: start.accelerometer_bias,
-            gyroscope_bias: start.gyroscope_bias,
-            angular_velocity: Vector3::zeros(),
-            specific_force: Vector3::zeros(),
-            keyframe: None,
-            optional: SVector::zeros(),
-        };
-        if !estimate.is_finite() || !(0.5..2.0).contains(&norm) {
-            return Err(Refusal::NonFinite);
-        }
-        if !covariance.is_positive_definite() {
-            return Err(Refusal::Noise);
-        }
+        let (estimate, covariance) = start.state::<S, N>(&self.params)?;
         self.resets = self.resets.wrapping_add(1);
         self.fixed_ns = start.time_ns;
         self.estimate = Some(estimate);
@@ -213,15 +242,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// back, or the gap is longer than a minute. The filter is then as it was.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
-        // Within its limit is no NaN.
-        let within = |vector: &Vector3<f64>, limit: f64| vector.iter().all(|x| (-limit..=limit).contains(x));
-        if !within(&sample.angular_velocity, MAX_ANGULAR_VELOCITY)
-            || !within(&sample.specific_force, MAX_SPECIFIC_FORCE)
-        {
-            let mut components = sample.angular_velocity.iter().chain(sample.specific_force.iter());
-            let is_finite = components.all(|x| x.is_finite());
-            return Err(if is_finite { Refusal::OutOfRange } else { Refusal::NonFinite });
-        }
+        sample.check()?;
         let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
         if dt > self.params.longest_sample {
             self.bridge(sample.time_ns, dt)?;
@@ -231,7 +252,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
         let transition = Transition::advance(estimate, dt, self.params.gravity);
-        transition.apply(&mut self.covariance, &self.densities);
+        transition.apply(self.covariance.rows_mut(), &self.densities);
         self.covariance.bound();
         self.decay(dt);
         Ok(())
@@ -267,14 +288,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.time_ns = time_ns;
         estimate.angular_velocity = Vector3::zeros();
         estimate.specific_force = estimate.world_from_body.inverse_transform_vector(&up);
-        let square = |x: f64| x * x;
-        let densities = Densities {
-            accelerometer: self.densities.accelerometer + square(self.params.gap_acceleration),
-            gyroscope: self.densities.gyroscope + square(self.params.gap_rotation),
-            ..self.densities
-        };
         let transition = Transition::advance(estimate, dt, self.params.gravity);
-        transition.apply(&mut self.covariance, &densities);
+        transition.apply(self.covariance.rows_mut(), &self.params.gap_densities());
         self.covariance.bound();
         self.gaps = self.gaps.wrapping_add(1);
         self.decay(dt);
@@ -537,7 +552,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
 }
 
 /// From one stamp to a later one, s.
-fn seconds_between(previous_ns: i64, time_ns: i64) -> Result<f64, Refusal> {
+pub(in crate::navigation) fn seconds_between(previous_ns: i64, time_ns: i64) -> Result<f64, Refusal> {
     if time_ns <= previous_ns {
         return Err(Refusal::TimeNotIncreasing { previous_ns, time_ns });
     }

@@ -110,6 +110,19 @@ imu_params! {
     }
 }
 
+/// White noise of the IMU and of its biases, as densities squared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuDensities {
+    /// Of the accelerometer, m²/s³.
+    pub accelerometer: f64,
+    /// Of the gyroscope, rad²/s.
+    pub gyroscope: f64,
+    /// Of the random walk of the accelerometer's bias, m²/s⁵.
+    pub accelerometer_bias: f64,
+    /// Of the random walk of the gyroscope's bias, rad²/s³.
+    pub gyroscope_bias: f64,
+}
+
 /// A first-order Gauss–Markov process: a state that wanders, but not away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussMarkov {
@@ -147,8 +160,30 @@ impl Field for GaussMarkov {
 }
 
 impl EskfParams {
+    /// The noise of the IMU.
+    pub fn densities(&self) -> ImuDensities {
+        let square = |x: f64| x * x;
+        ImuDensities {
+            accelerometer: square(self.accelerometer_noise),
+            gyroscope: square(self.gyroscope_noise),
+            accelerometer_bias: square(self.accelerometer_bias_walk),
+            gyroscope_bias: square(self.gyroscope_bias_walk),
+        }
+    }
+
+    /// The noise while nothing is measured.
+    pub(in crate::navigation) fn gap_densities(&self) -> ImuDensities {
+        let square = |x: f64| x * x;
+        let densities = self.densities();
+        ImuDensities {
+            accelerometer: densities.accelerometer + square(self.gap_acceleration),
+            gyroscope: densities.gyroscope + square(self.gap_rotation),
+            ..densities
+        }
+    }
+
     /// The process of an optional state; none for a keyframe, which is what it was.
-    pub(super) fn process(&self, state: Optional) -> Option<GaussMarkov> {
+    pub(in crate::navigation) fn process(&self, state: Optional) -> Option<GaussMarkov> {
         match state {
             Optional::Keyframe => None,
             Optional::RelativeScale => Some(self.relative_scale),

@@ -23,37 +23,25 @@
 use nalgebra::SMatrix;
 use nalgebra::{Matrix3, Vector3};
 
-use super::covariance::Covariance;
 use super::estimate::Estimate;
+use super::params::ImuDensities;
 use super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY};
 use crate::navigation::math::{Integrals, renormalised, rotation, skew};
 
 /// The errors from [`ROTATION`] on that position and velocity integrate: rotation and both biases.
-const SOURCES: usize = NAVIGATION - ROTATION;
+pub(in crate::navigation) const SOURCES: usize = NAVIGATION - ROTATION;
 
 /// What a sample does to the errors: the blocks of the transition that are neither zero nor the identity.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Transition {
-    dt: f64,
+pub(in crate::navigation) struct Transition {
+    /// Of the position error by the velocity error, s.
+    pub(in crate::navigation) dt: f64,
     /// Of the position error by rotation error and biases, row by row.
-    position: [[f64; SOURCES]; 3],
+    pub(in crate::navigation) position: [[f64; SOURCES]; 3],
     /// Of the velocity error by the same.
-    velocity: [[f64; SOURCES]; 3],
+    pub(in crate::navigation) velocity: [[f64; SOURCES]; 3],
     /// Of the rotation error by the gyroscope's bias.
-    rotation: [[f64; 3]; 3],
-}
-
-/// White noise of a sample, as densities squared.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Densities {
-    /// m²/s³.
-    pub(super) accelerometer: f64,
-    /// rad²/s.
-    pub(super) gyroscope: f64,
-    /// m²/s⁵.
-    pub(super) accelerometer_bias: f64,
-    /// rad²/s³.
-    pub(super) gyroscope_bias: f64,
+    pub(in crate::navigation) rotation: [[f64; 3]; 3],
 }
 
 impl Transition {
@@ -90,8 +78,7 @@ impl Transition {
 
     /// `P ← Φ P Φᵀ + Q`.
     #[inline]
-    pub(super) fn apply<const N: usize>(&self, covariance: &mut Covariance<N>, densities: &Densities) {
-        let p = covariance.rows_mut();
+    pub(in crate::navigation) fn apply<const N: usize>(&self, p: &mut [[f64; N]; N], densities: &ImuDensities) {
         // Φ P: what a row takes from are rows below it, which are not yet changed. Only columns that are read or kept.
         for i in 0..3 {
             let mut row = p[POSITION + i];
@@ -170,7 +157,7 @@ impl Transition {
 
     /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on position and velocity.
     #[inline]
-    fn add_noise<const N: usize>(&self, p: &mut [[f64; N]; N], densities: &Densities) {
+    fn add_noise<const N: usize>(&self, p: &mut [[f64; N]; N], densities: &ImuDensities) {
         let dt = self.dt;
         let velocity = densities.accelerometer * dt;
         for i in 0..3 {
@@ -202,7 +189,11 @@ impl Transition {
 }
 
 #[inline]
-fn rows(rotation: &Matrix3<f64>, force: &Matrix3<f64>, turn: &Matrix3<f64>) -> [[f64; SOURCES]; 3] {
+pub(in crate::navigation) fn rows(
+    rotation: &Matrix3<f64>,
+    force: &Matrix3<f64>,
+    turn: &Matrix3<f64>,
+) -> [[f64; SOURCES]; 3] {
     core::array::from_fn(|i| {
         core::array::from_fn(|k| match k {
             0..=2 => rotation[(i, k)],

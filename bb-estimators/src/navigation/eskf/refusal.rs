@@ -38,6 +38,11 @@ pub enum Refusal {
         /// The keyframe it names.
         id: u64,
     },
+    /// A keyframe has as many factors as it takes.
+    Full {
+        /// The keyframe.
+        id: u64,
+    },
     /// The measurement says nothing in this state: the heading of a body that points up, say.
     NotObservable,
     /// Older than the history reaches.
@@ -67,6 +72,7 @@ impl fmt::Display for Refusal {
                 write!(f, "normalised innovation squared is {nis:.1}, beyond the gate of {limit:.1}")
             }
             Self::NoKeyframe { id } => write!(f, "keyframe {id} is not held"),
+            Self::Full { id } => write!(f, "keyframe {id} has as many factors as it takes"),
             Self::NotObservable => f.write_str("the measurement says nothing in this state"),
             Self::TooOld { time_ns } => write!(f, "time stamp {time_ns} ns is older than the history"),
             Self::InTheFuture { time_ns } => write!(f, "time stamp {time_ns} ns is in the future"),

@@ -109,7 +109,7 @@ const fn dimension(states: &[Optional]) -> usize {
 }
 
 /// Whether no state is listed twice.
-pub(super) const fn distinct(states: &[Optional]) -> bool {
+pub(in crate::navigation) const fn distinct(states: &[Optional]) -> bool {
     let mut i = 0;
     while i < states.len() {
         let mut j = 0;

@@ -5,13 +5,14 @@ use proptest::prelude::*;
 
 use super::super::covariance::Covariance;
 use super::super::estimate::Estimate;
-use super::super::propagation::{Densities, Transition};
+use super::super::params::ImuDensities;
+use super::super::propagation::Transition;
 use super::super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 use super::{ALL, All, estimate};
 use crate::navigation::math::rotation_vector;
 
-const DENSITIES: Densities =
-    Densities { accelerometer: 1e-4, gyroscope: 2e-6, accelerometer_bias: 3e-5, gyroscope_bias: 4e-8 };
+const DENSITIES: ImuDensities =
+    ImuDensities { accelerometer: 1e-4, gyroscope: 2e-6, accelerometer_bias: 3e-5, gyroscope_bias: 4e-8 };
 
 /// The error that takes `from` to `to`, of the navigation states.
 fn error(from: &Estimate<ALL>, to: &Estimate<ALL>) -> SVector<f64, 15> {
@@ -72,7 +73,7 @@ proptest! {
         }
         let mut mean = start;
         let transition = Transition::advance(&mut mean, dt, 9.81);
-        transition.apply(&mut covariance, &DENSITIES);
+        transition.apply(covariance.rows_mut(), &DENSITIES);
         let matrix = transition.matrix::<ALL>();
         let mut expected = matrix * dense * matrix.transpose();
         for i in 0..3 {

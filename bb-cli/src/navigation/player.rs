@@ -1,0 +1,257 @@
+//! A filter while a data set is played: what all of them are asked for.
+
+use super::data::{DataSet, Keyframe};
+use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
+use super::measured::{Measured, nanoseconds};
+use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use bb_estimators::navigation::{
+    Estimate, FixedLagSmoother, ImuMean, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION,
+    ROTATION, Refusal, SmootherParams, Start, States, Stream, StreamParams,
+};
+use std::time::Instant;
+
+/// States of the smoother: the scale of relative poses besides those of navigation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Scaled;
+
+impl States for Scaled {
+    const OPTIONAL: &'static [Optional] = &[Optional::RelativeScale];
+}
+
+type Smoother = FixedLagSmoother<Scaled, { Scaled::DIMENSION }>;
+
+/// A filter that was made for a data set.
+pub(crate) enum Player {
+    Filter(Box<Navigator>),
+    Smoother(Box<Smoothed>),
+}
+
+/// A smoother and the filters whose noise it takes.
+pub(crate) struct Smoothed {
+    smoother: Smoother,
+    twin: Option<Box<Navigator>>,
+    learnt: Option<Learnt>,
+    gnss: Stream,
+    poses: Stream,
+    relative: Stream,
+}
+
+/// What a filter says of a keyframe.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known {
+    pub(crate) position: Vector3<f64>,
+    pub(crate) velocity: Vector3<f64>,
+    pub(crate) world_from_body: UnitQuaternion<f64>,
+    /// Position error, then rotation error, both in the world.
+    pub(crate) covariance: Matrix6<f64>,
+}
+
+impl Known {
+    fn of<const N: usize>(estimate: &Estimate<N>, covariance: Matrix6<f64>) -> Self {
+        let Estimate { position, velocity, world_from_body, .. } = *estimate;
+        Self { position, velocity, world_from_body, covariance }
+    }
+}
+
+/// How it went from one keyframe to the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Step {
+    pub(crate) refused: u64,
+    /// With the samples for a filter; without for a smoother, whose samples are integrated as they come.
+    pub(crate) keyframe_s: f64,
+    pub(crate) propagation_s: f64,
+    /// Of the heap, at the keyframe.
+    pub(crate) allocations: u64,
+}
+
+impl Player {
+    pub(crate) fn new(
+        filter: &NavigationFilter,
+        data: &DataSet,
+        settings: &[NavigationSetting],
+        window: usize,
+    ) -> Result<Self, String> {
+        let sensors = params(data, settings)?;
+        let navigator = |is_bank: bool| {
+            let made = if is_bank { Navigator::new(sensors, aiding(data)) } else { Navigator::single(sensors) };
+            // It is large: the sooner it is on the heap, the better.
+            made.map(Box::new).map_err(|error| error.to_string())
+        };
+        let smoothed = |is_bank: bool| {
+            let twin = if is_bank { Some(navigator(true)?) } else { None };
+            let params = SmootherParams { sensors, window, ..SmootherParams::default() };
+            let smoother = Smoother::new(params).map_err(|error| error.to_string())?;
+            // As in a bank: fixes are not gated.
+            let gnss = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+            let (poses, relative) = (Stream::default(), Stream::default());
+            Ok(Self::Smoother(Box::new(Smoothed { smoother, twin, learnt: None, gnss, poses, relative })))
+        };
+        match filter.kind {
+            Kind::Bank => navigator(true).map(Self::Filter),
+            Kind::Single => navigator(false).map(Self::Filter),
+            Kind::Smoother => smoothed(true),
+            Kind::SmootherSingle => smoothed(false),
+        }
+    }
+
+    pub(crate) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+        match self {
+            Self::Filter(navigator) => {
+                navigator.start(start)?;
+                navigator.set_keyframe(0);
+            }
+            Self::Smoother(smoothed) => {
+                if let Some(twin) = &mut smoothed.twin {
+                    twin.start(start)?;
+                    twin.set_keyframe(0);
+                    smoothed.learn(None);
+                }
+                smoothed.smoother.start(0, start)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// From the keyframe before to keyframe `k`.
+    pub(crate) fn play(
+        &mut self,
+        data: &DataSet,
+        k: usize,
+        from: &Keyframe,
+        to: &Keyframe,
+    ) -> Result<Step, String> {
+        let mut step = Step::default();
+        let began = Instant::now();
+        // Time is that of the keyframe and the lengths of the samples since, as the samples' own stamps may jitter.
+        let mut time_s = from.time_s;
+        for sample in data.samples.get(from.sample..to.sample).unwrap_or_default() {
+            time_s += sample.dt;
+            let (angular_velocity, specific_force) = (sample.angular_velocity, sample.specific_force);
+            let sample = ImuMean { time_ns: nanoseconds(time_s), angular_velocity, specific_force };
+            let propagated = match self {
+                Self::Filter(navigator) => navigator.propagate(&sample),
+                Self::Smoother(smoothed) => smoothed.smoother.propagate(&sample),
+            };
+            match propagated {
+                Ok(()) => {}
+                Err(error @ Refusal::Gap { .. }) => return Err(format!("at {time_s} s: {error}")),
+                Err(_) => step.refused += 1,
+            }
+        }
+        step.propagation_s = began.elapsed().as_secs_f64();
+        match self {
+            Self::Filter(navigator) => {
+                step.refused += Measured::at(data, k as u64).filter(navigator);
+                navigator.set_keyframe(k as u64);
+                let _ = navigator.estimate();
+                step.keyframe_s = began.elapsed().as_secs_f64();
+            }
+            Self::Smoother(smoothed) => smoothed.play(data, k as u64, (from, to), &mut step)?,
+        }
+        Ok(step)
+    }
+
+    /// The newest keyframe.
+    pub(crate) fn newest(&self) -> Option<Known> {
+        match self {
+            Self::Filter(navigator) => {
+                let (estimate, covariance) = navigator.estimate()?;
+                let pose = |i: usize| if i < 3 { POSITION + i } else { ROTATION + i - 3 };
+                let covariance = Matrix6::from_fn(|i, j| covariance[(pose(i), pose(j))]);
+                Some(Known::of(&estimate, covariance))
+            }
+            Self::Smoother(smoothed) => {
+                let smoother = &smoothed.smoother;
+                Some(Known::of(&smoother.estimate()?, smoother.pose_covariance()?))
+            }
+        }
+    }
+
+    /// The oldest keyframe of a full window, by its number.
+    pub(crate) fn oldest(&mut self) -> Option<(usize, Known)> {
+        let Self::Smoother(smoothed) = self else { return None };
+        let smoother = &mut smoothed.smoother;
+        if smoother.keyframes().len() < smoother.params().window {
+            return None;
+        }
+        let id = smoother.keyframes().next()?;
+        let covariance = smoother.smoothed_covariance(id)?;
+        let pose = |i: usize| if i < 3 { POSITION + i } else { ROTATION + i - 3 };
+        let covariance = Matrix6::from_fn(|i, j| covariance[(pose(i), pose(j))]);
+        Some((usize::try_from(id).ok()?, Known::of(&smoother.smoothed(id)?, covariance)))
+    }
+}
+
+impl Smoothed {
+    fn play(
+        &mut self,
+        data: &DataSet,
+        k: u64,
+        ends: (&Keyframe, &Keyframe),
+        step: &mut Step,
+    ) -> Result<(), String> {
+        let measured = Measured::at(data, k);
+        if let Some(twin) = &mut self.twin {
+            let (from, to) = ends;
+            let mut time_s = from.time_s;
+            for sample in data.samples.get(from.sample..to.sample).unwrap_or_default() {
+                time_s += sample.dt;
+                let (angular_velocity, specific_force) = (sample.angular_velocity, sample.specific_force);
+                // It refuses what the smoother refuses.
+                let _ = twin.propagate(&ImuMean { time_ns: nanoseconds(time_s), angular_velocity, specific_force });
+            }
+            measured.all(twin);
+            twin.set_keyframe(k);
+        }
+        let began = Instant::now();
+        let mut result = Ok(0);
+        let counted = allocation_counter::measure(|| result = self.keyframe(&measured, k));
+        step.keyframe_s = began.elapsed().as_secs_f64();
+        step.allocations = counted.count_total;
+        step.refused += result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?;
+        self.learn(Some(k));
+        Ok(())
+    }
+
+    /// All that is done at a keyframe; how much was refused.
+    fn keyframe(&mut self, measured: &Measured, k: u64) -> Result<u64, Refusal> {
+        let mut refused = 0;
+        self.smoother.add_keyframe(k)?;
+        if let Some(relative) = measured.relative {
+            refused += u64::from(self.smoother.add(&mut self.relative, k, relative).is_err());
+        }
+        if let Some(anchor) = measured.anchor {
+            refused += u64::from(self.smoother.add(&mut self.poses, k, anchor).is_err());
+        }
+        if let Some(fix) = measured.fix {
+            refused += u64::from(self.smoother.add(&mut self.gnss, k, fix).is_err());
+        }
+        self.smoother.update()?;
+        let _ = (self.smoother.estimate(), self.smoother.pose_covariance());
+        Ok(refused)
+    }
+
+    /// Takes the noise that the filters have found, if what it has is implausible beside that. Then it takes their estimate as
+    /// well: what was smoothed with the wrong noise is wrong.
+    fn learn(&mut self, keyframe: Option<u64>) {
+        let Some(twin) = &self.twin else { return };
+        let (learnt, plausibility) = twin.learnt();
+        if self.learnt.is_some_and(|learnt| twin.plausibility(&learnt) * IMPLAUSIBLE > plausibility) {
+            return;
+        }
+        self.learnt = Some(learnt);
+        // They were made with it, so it is accepted.
+        let _ = self.smoother.set_sensors(learnt.sensors);
+        self.gnss.set_variance_factor(learnt.gnss_variance_factor);
+        if let (Some(k), Some((estimate, covariance))) = (keyframe, twin.estimate()) {
+            // What cannot be adopted leaves the smoother as it is.
+            let _ = self.smoother.adopt::<Navigated, NAVIGATED>(k, &estimate, &covariance);
+        }
+    }
+}
+
+/// Odds against the noise that a smoother has at which it takes another: strong evidence, in the words of R. E. Kass,
+/// A. E. Raftery, "Bayes factors", Journal of the American Statistical Association 90(430), 1995.
+const IMPLAUSIBLE: f64 = 10.0;
+
+const _: () = assert!(Scaled::DIMENSION == NAVIGATION + 1);

@@ -1,0 +1,48 @@
+//! A fixed-lag smoother for position, velocity and attitude.
+//!
+//! It holds the last keyframes, and what was measured at and between them, as a problem of least squares: measurements of the
+//! last seconds can be linearised again, may arrive late, and correct earlier keyframes too.
+//!
+//! # Window
+//!
+//! Errors and states are those of the [filter](super::eskf), so that every [`Measurement`](super::Measurement) is a
+//! [`Factor`] here; optional states change from one keyframe to the next as the parameters say. The IMU between two
+//! keyframes is one factor ([`Preintegration`]). Factors concern one keyframe, or one and the one before; types of your
+//! own implement the trait.
+//!
+//! # Solution
+//!
+//! The Gauss–Newton method. The window is a chain, and is eliminated in the order of time, so that a new keyframe costs
+//! the elimination of the last two, whatever the window holds, and the covariance of the newest is its own pivot; see
+//! `elimination.rs`. What arrives late is eliminated from its keyframe on. A keyframe is linearised again where it is off by
+//! more than [`SmootherParams::relinearise_rotation`]. The oldest leaves nothing but what it had said of the next, which stays
+//! linearised where it was from then on: a direction that nothing observes, heading without a compass for one, then stays
+//! unobserved.
+//!
+//! Nothing is inverted that may be singular, and no system is refused as indeterminate: what is not known has a variance that
+//! says so.
+
+mod elimination;
+mod estimates;
+mod factor;
+mod filter;
+mod fusion;
+mod kernel;
+mod keyframe;
+mod link;
+mod matrix;
+mod params;
+mod preintegration;
+mod relative;
+mod rows;
+mod solution;
+#[cfg(test)]
+mod tests;
+
+pub use factor::{Factor, NavigationFactor};
+pub use filter::FixedLagSmoother;
+pub use kernel::Kernel;
+pub use params::SmootherParams;
+pub use preintegration::Preintegration;
+pub use rows::{MOST_ROWS, Rows};
+pub use solution::Updated;

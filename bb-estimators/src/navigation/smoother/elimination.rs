@@ -1,0 +1,264 @@
+//! Elimination in the order of time: from what is known of a keyframe to what it says of the next, and back.
+//!
+//! With the information `Rᵀ R` of a keyframe and the [`Link`] to the next, `δ = G δ⁺ + g + ν`, eliminating δ leaves
+//!
+//! * `M⁺ = Gᵀ (M⁻¹ + Q)⁻¹ G = Xᵀ X` with `X = S⁻ᵀ R G` and `Sᵀ S = I + R Q Rᵀ`,
+//! * `v⁺ = Xᵀ z` with `z = S⁻ᵀ (R⁻ᵀ v - R g)`.
+//!
+//! It is a sum of squares throughout: no digits cancel, whatever is large beside what, and what is not known at all may be
+//! a zero in R or a zero in Q. The newest keyframe comes last, so its pivot is its covariance.
+
+#![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
+use super::link::{Information, Link};
+use super::matrix::{Root, Square, add_gram, axpy, dot, mirror, times, transpose_times, transposed, zeros};
+use super::rows::{MOST_ROWS, Rows};
+use crate::navigation::math::ln;
+
+/// A keyframe, eliminated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pivot<const N: usize> {
+    /// R.
+    pub(super) root: Root<N>,
+    /// `R⁻ᵀ v`.
+    pub(super) mean: [f64; N],
+    /// S; of the last keyframe, whatever it was.
+    inner: Root<N>,
+    /// X.
+    through: Square<N>,
+}
+
+impl<const N: usize> Pivot<N> {
+    pub(super) const fn none() -> Self {
+        Self { root: Root::zeros(), mean: [0.0; N], inner: Root::zeros(), through: zeros() }
+    }
+
+    /// Takes in what is known of the keyframe.
+    #[inline]
+    pub(super) fn take(&mut self, known: &Information<N>) {
+        self.root = Root::of(&known.matrix);
+        self.mean = self.root.solve_transposed(&known.vector);
+    }
+
+    /// What it says of the next keyframe.
+    pub(super) fn eliminate(&mut self, link: &Link<N>) -> Information<N> {
+        let by_noise = self.root.times_rows(&link.noise);
+        let across = transposed(&self.root.upper);
+        let mut inner = zeros();
+        for i in 0..N {
+            let row: &mut [f64; N] = &mut inner[i];
+            row[i] = 1.0;
+            // On and above the diagonal, all that is read: R has nothing left of its own.
+            for k in i..N {
+                axpy(row, by_noise[i][k], &across[k]);
+            }
+        }
+        self.inner = Root::of(&inner);
+        self.through = self.inner.solve_transposed_rows(&self.root.times_rows(&link.back));
+        let mut z = self.mean;
+        for i in 0..N {
+            z[i] -= dot(&self.root.upper[i], &link.offset);
+        }
+        let z = self.inner.solve_transposed(&z);
+        let mut message = link.information;
+        add_gram(&mut message.matrix, &self.through);
+        axpy(&mut message.vector, 1.0, &transpose_times(&self.through, &z));
+        message
+    }
+
+    /// The mean of the newest keyframe.
+    pub(super) fn newest(&self) -> [f64; N] {
+        self.root.solve(&self.mean)
+    }
+
+    /// The mean of this keyframe, given that of the next.
+    #[inline]
+    pub(super) fn back(&self, link: &Link<N>, next: &[f64; N]) -> [f64; N] {
+        let mut mean = times(&link.back, next);
+        axpy(&mut mean, 1.0, &link.offset);
+        let mut missing = self.mean;
+        for i in 0..N {
+            missing[i] -= dot(&self.root.upper[i], &mean);
+        }
+        let missing = self.inner.solve(&self.inner.solve_transposed(&missing));
+        let correction = times(&link.noise, &transpose_times(&self.root.upper, &missing));
+        axpy(&mut mean, 1.0, &correction);
+        mean
+    }
+
+    /// The covariance of this keyframe, given that of the next.
+    ///
+    /// H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3(8),
+    /// 1965, with the noise in Joseph's form.
+    pub(super) fn covariance_back(&self, link: &Link<N>, next: &Square<N>) -> Square<N> {
+        // D⁻¹ R Q, and with it I - K.
+        let whitened = self.inner.solve_transposed_rows(&self.root.times_rows(&link.noise));
+        let mut weighted = zeros();
+        let inverse = self.inner.inverse();
+        let projected = self.root.times_rows(&link.noise);
+        for i in 0..N {
+            for k in 0..N {
+                axpy(&mut weighted[i], inverse[i][k], &projected[k]);
+            }
+        }
+        let whitened_root = self.inner.solve_transposed_rows(&self.root.upper);
+        let mut kept = zeros();
+        for i in 0..N {
+            kept[i][i] = 1.0;
+        }
+        for k in 0..N {
+            for i in 0..N {
+                axpy(&mut kept[i], -whitened[k][i], &whitened_root[k]);
+            }
+        }
+        let mut gain = zeros();
+        for i in 0..N {
+            for k in 0..N {
+                axpy(&mut gain[i], kept[i][k], &link.back[k]);
+            }
+        }
+        let mut covariance = sandwich(&gain, next);
+        let noise = sandwich(&kept, &link.noise);
+        for i in 0..N {
+            axpy(&mut covariance[i], 1.0, &noise[i]);
+        }
+        add_gram(&mut covariance, &weighted);
+        mirror(&mut covariance);
+        covariance
+    }
+}
+
+/// `A M Aᵀ`.
+fn sandwich<const N: usize>(outer: &Square<N>, inner: &Square<N>) -> Square<N> {
+    let mut product = zeros();
+    for i in 0..N {
+        let mut row = [0.0; N];
+        for k in 0..N {
+            axpy(&mut row, outer[i][k], &inner[k]);
+        }
+        for j in 0..N {
+            product[i][j] = dot(&row, &outer[j]);
+        }
+    }
+    product
+}
+
+/// What is known of a keyframe when a measurement of it is judged.
+pub(super) enum Known<'a, const N: usize> {
+    /// Of the newest: its pivot.
+    Newest(&'a Root<N>),
+    /// Of another: its covariance.
+    Other(&'a Square<N>),
+}
+
+impl<const N: usize> Known<'_, N> {
+    /// `H P Hᵀ`, on and below the diagonal, added to `sum`.
+    fn add_to(&self, rows: &[[f64; N]], sum: &mut [[f64; MOST_ROWS]; MOST_ROWS]) {
+        for (i, row) in rows.iter().enumerate() {
+            match self {
+                Self::Newest(root) => {
+                    let projected = root.solve(&root.solve_transposed(row));
+                    for j in 0..=i {
+                        sum[i][j] += dot(&projected, &rows[j]);
+                    }
+                }
+                Self::Other(covariance) => {
+                    let projected = times(covariance, row);
+                    for j in 0..=i {
+                        sum[i][j] += dot(&projected, &rows[j]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A measurement before it is fused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Judged {
+    /// Normalised innovation squared.
+    pub(super) nis: f64,
+    /// `-½ ln det S`.
+    pub(super) log_density: f64,
+    /// The first component of the whitened innovation.
+    pub(super) whitened: f64,
+}
+
+/// Compares a factor at one keyframe with what is known of that.
+pub(super) fn judge<const N: usize>(
+    factor: &Rows<N>,
+    correction: &[f64; N],
+    known: &Known<'_, N>,
+) -> Option<Judged> {
+    let mut covariance = [[0.0; MOST_ROWS]; MOST_ROWS];
+    let mut residual = factor.residual;
+    for i in 0..factor.count {
+        covariance[i][i] = 1.0;
+        residual[i] -= dot(&factor.at[i], correction);
+    }
+    known.add_to(&factor.at[..factor.count], &mut covariance);
+    decompose(factor, residual, covariance)
+}
+
+/// Compares a factor on a keyframe and the one before, whose pivot it is, with what is known of them.
+pub(super) fn judge_pair<const N: usize>(
+    factor: &Rows<N>,
+    before: &Pivot<N>,
+    link: &Link<N>,
+    corrections: (&[f64; N], &[f64; N]),
+    known: &Known<'_, N>,
+) -> Option<Judged> {
+    let mut innovation = link.innovation(factor);
+    let count = factor.count;
+    // The noise between them, given what is known of the one before.
+    let mut whitened = [[0.0; N]; MOST_ROWS];
+    for i in 0..count {
+        let by_root = times(&before.root.upper, &innovation.projected[i]);
+        whitened[i] = before.inner.solve_transposed(&by_root);
+        for k in 0..N {
+            axpy(&mut innovation.expected[i], -whitened[i][k], &before.through[k]);
+        }
+    }
+    let mut residual = factor.residual;
+    for i in 0..count {
+        for j in 0..=i {
+            innovation.covariance[i][j] -= dot(&whitened[i], &whitened[j]);
+        }
+        residual[i] -= dot(&factor.previous[i], corrections.0) + dot(&factor.at[i], corrections.1);
+    }
+    known.add_to(&innovation.expected[..count], &mut innovation.covariance);
+    decompose(factor, residual, innovation.covariance)
+}
+
+fn decompose<const N: usize>(
+    factor: &Rows<N>,
+    mut residual: [f64; MOST_ROWS],
+    mut lower: [[f64; MOST_ROWS]; MOST_ROWS],
+) -> Option<Judged> {
+    let mut judged = Judged { nis: 0.0, log_density: factor.log_density, whitened: 0.0 };
+    let mut determinant = 1.0;
+    for i in 0..factor.count {
+        for j in 0..i {
+            let mut share = lower[i][j];
+            for k in 0..j {
+                share -= lower[i][k] * lower[j][k];
+            }
+            share *= lower[j][j];
+            lower[i][j] = share;
+            lower[i][i] -= share * share;
+            residual[i] -= share * residual[j];
+        }
+        // With the factor's own noise, of 1, it is not less, but for rounding.
+        let pivot = lower[i][i].max(1e-6);
+        if !pivot.is_finite() {
+            return None;
+        }
+        determinant *= pivot;
+        lower[i][i] = 1.0 / crate::navigation::math::sqrt(pivot);
+        residual[i] *= lower[i][i];
+        judged.nis += residual[i] * residual[i];
+    }
+    judged.whitened = residual[0];
+    judged.log_density -= 0.5 * ln(determinant);
+    judged.nis.is_finite().then_some(judged)
+}

@@ -1,0 +1,137 @@
+//! What a window is made of besides the IMU, and how to add to it.
+
+use super::relative::compare;
+use super::rows::Rows;
+use crate::navigation::eskf::{Estimate, Refusal, States};
+use crate::navigation::measurement::{
+    AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, MagneticField,
+    MagneticHeading, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation, ZeroVelocity,
+};
+
+/// What was measured at one keyframe, or between it and the one before.
+///
+/// Every [`Measurement`](crate::navigation::Measurement) is one: [`Rows::measure`] is all there is to do for it. For factors of several kinds in one window,
+/// write an enum.
+///
+/// ```
+/// use bb_estimators::navigation::{Estimate, NavigationFactor, Factor, Refusal, Rows, States, POSITION};
+/// use nalgebra::{Matrix1, SMatrix, Vector3};
+///
+/// /// What is usual, and ranges to a beacon at a known place.
+/// #[derive(Clone, Copy, Debug)]
+/// enum RangesToo {
+///     Navigation(NavigationFactor),
+///     Range { beacon: Vector3<f64>, distance_m: f64, deviation_m: f64 },
+/// }
+///
+/// impl<S: States, const N: usize> Factor<S, N> for RangesToo {
+///     fn previous(&self) -> Option<u64> {
+///         match self {
+///             Self::Navigation(factor) => Factor::<S, N>::previous(factor),
+///             Self::Range { .. } => None,
+///         }
+///     }
+///
+///     fn linearise(
+///         &self,
+///         previous: Option<&Estimate<N>>,
+///         at: &Estimate<N>,
+///         rows: &mut Rows<N>,
+///     ) -> Result<(), Refusal> {
+///         match self {
+///             Self::Navigation(factor) => Factor::<S, N>::linearise(factor, previous, at, rows),
+///             Self::Range { beacon, distance_m, deviation_m } => {
+///                 let offset = at.position - beacon;
+///                 let direction = offset.try_normalize(1e-3).ok_or(Refusal::NotObservable)?;
+///                 let mut jacobian = [[0.0; N]];
+///                 for k in 0..3 {
+///                     jacobian[0][POSITION + k] = direction[k];
+///                 }
+///                 rows.set([distance_m - offset.norm()], None, &jacobian, &Matrix1::new(deviation_m * deviation_m))
+///             }
+///         }
+///     }
+/// }
+/// ```
+pub trait Factor<S: States, const N: usize> {
+    /// The keyframe before, by its id, if the factor concerns that as well.
+    fn previous(&self) -> Option<u64> {
+        None
+    }
+
+    /// Compares with what the estimates make expect. `previous` is there if [`previous`](Self::previous) named one.
+    ///
+    /// # Errors
+    ///
+    /// Why it cannot be, [`Refusal::NotObservable`] for one.
+    fn linearise(
+        &self,
+        previous: Option<&Estimate<N>>,
+        at: &Estimate<N>,
+        rows: &mut Rows<N>,
+    ) -> Result<(), Refusal>;
+}
+
+macro_rules! navigation_factors {
+    ($($measurement:ident),* $(,)?) => {
+        /// The measurements of this crate as factors. [`RelativePose`] is between a keyframe and the one before.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[allow(missing_docs, reason = "each is documented as a measurement")]
+        pub enum NavigationFactor {
+            RelativePose(RelativePose),
+            $($measurement($measurement),)*
+        }
+
+        impl From<RelativePose> for NavigationFactor {
+            fn from(measurement: RelativePose) -> Self {
+                Self::RelativePose(measurement)
+            }
+        }
+
+        $(impl From<$measurement> for NavigationFactor {
+            fn from(measurement: $measurement) -> Self {
+                Self::$measurement(measurement)
+            }
+        })*
+
+        impl<S: States, const N: usize> Factor<S, N> for NavigationFactor {
+            fn previous(&self) -> Option<u64> {
+                match self {
+                    Self::RelativePose(measurement) => Some(measurement.keyframe),
+                    _ => None,
+                }
+            }
+
+            fn linearise(
+                &self,
+                previous: Option<&Estimate<N>>,
+                at: &Estimate<N>,
+                rows: &mut Rows<N>,
+            ) -> Result<(), Refusal> {
+                match self {
+                    Self::RelativePose(measurement) => {
+                        let missing = Refusal::NoKeyframe { id: measurement.keyframe };
+                        compare::<S, N>(measurement, previous.ok_or(missing)?, at, rows)
+                    }
+                    $(Self::$measurement(measurement) => rows.measure::<S, _, _>(measurement, at),)*
+                }
+            }
+        }
+    };
+}
+
+navigation_factors!(
+    AbsolutePose,
+    BarometricHeight,
+    BodyVelocity,
+    GnssHeading,
+    GnssPosition,
+    GnssVelocity,
+    Height,
+    MagneticField,
+    MagneticHeading,
+    NonHolonomic,
+    WheelSpeed,
+    ZeroRotation,
+    ZeroVelocity,
+);

@@ -1,0 +1,300 @@
+//! The smoother: samples of the IMU become keyframes, factors tie them to the world, the oldest leave.
+
+use alloc::boxed::Box;
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+use core::marker::PhantomData;
+
+use nalgebra::{SMatrix, SVector, Vector3};
+
+use super::factor::{Factor, NavigationFactor};
+use super::keyframe::{Keyframe, Prior, after};
+use super::link::Information;
+use super::params::SmootherParams;
+use super::preintegration::Preintegration;
+use crate::attitude::ParamsError;
+use crate::navigation::eskf::{
+    EskfParams, Estimate, ImuMean, LONGEST_GAP_S, NAVIGATION, Navigation, Optional, Refusal, Start, States,
+    distinct, offset, seconds_between,
+};
+
+/// Position, velocity, attitude and biases at the last keyframes, with the optional states `S`, `N` errors in all, and
+/// factors of type `F`; see the [module](super).
+///
+/// ```
+/// use bb_estimators::navigation::{AbsolutePose, FixedLagSmoother, ImuMean, SmootherParams, Start, Stream};
+/// use nalgebra::{UnitQuaternion, Vector3};
+///
+/// let mut smoother: FixedLagSmoother = FixedLagSmoother::new(SmootherParams::default())?;
+/// let mut anchors = Stream::default();
+/// let (origin, rest, level) = (Vector3::zeros(), Vector3::zeros(), UnitQuaternion::identity());
+/// smoother.start(0, &Start::at(0, (origin, 5.0), (rest, 0.1), (level, 0.05)))?;
+/// for k in 1..=30 {
+///     for i in 1..=10 {
+///         smoother.propagate(&ImuMean {
+///             time_ns: (k * 10 + i) * 10_000_000 - 100_000_000,
+///             angular_velocity: Vector3::zeros(),
+///             specific_force: Vector3::new(0.0, 0.0, 9.80665),
+///         })?;
+///     }
+///     smoother.add_keyframe(k as u64)?;
+///     smoother.add(&mut anchors, k as u64, AbsolutePose::new((Vector3::x(), 1.0), (level, 0.05)))?;
+///     smoother.update()?;
+/// }
+/// let newest = smoother.estimate().ok_or("it has started")?;
+/// let oldest = smoother.smoothed(11).ok_or("it holds twenty keyframes")?;
+/// assert!((newest.position.x - 1.0).abs() < 0.2 && (oldest.position.x - 1.0).abs() < 0.2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION, F = NavigationFactor> {
+    pub(super) params: SmootherParams,
+    pub(super) window: VecDeque<Box<Keyframe<F, N>>>,
+    /// Keyframes that are not in the window.
+    pub(super) spare: Vec<Box<Keyframe<F, N>>>,
+    /// Since the newest keyframe.
+    pub(super) motion: Preintegration,
+    pub(super) time_ns: i64,
+    pub(super) last: ImuMean,
+    /// The first keyframe that has to be eliminated again.
+    pub(super) dirty: usize,
+    /// Keyframes before this one may have an older correction than could be had.
+    pub(super) exact_from: usize,
+    pub(super) gaps: u32,
+    pub(super) marginalised: u64,
+    pub(super) states: PhantomData<S>,
+}
+
+impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
+    /// Makes one that has not started. This is when memory is taken; later, none is.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    pub fn new(params: SmootherParams) -> Result<Self, ParamsError> {
+        const {
+            assert!(
+                N == S::DIMENSION,
+                "the second parameter of `FixedLagSmoother` must be `DIMENSION` of the first"
+            );
+            assert!(distinct(S::OPTIONAL), "an optional state is listed twice");
+            let mut i = 0;
+            while i < S::OPTIONAL.len() {
+                assert!(
+                    !matches!(S::OPTIONAL[i], Optional::Keyframe),
+                    "a window holds keyframes itself: leave out `Optional::Keyframe`"
+                );
+                i += 1;
+            }
+        }
+        params.check()?;
+        let empty = Estimate::unknown();
+        // One more than the window: the newest comes before the oldest leaves.
+        let spare = (0..=params.window).map(|_| Box::new(Keyframe::new(empty, params.factors))).collect();
+        let rest = Vector3::zeros();
+        Ok(Self {
+            params,
+            window: VecDeque::with_capacity(params.window + 1),
+            spare,
+            motion: Preintegration::new(rest, rest),
+            time_ns: 0,
+            last: ImuMean { time_ns: 0, angular_velocity: rest, specific_force: rest },
+            dirty: 0,
+            exact_from: 0,
+            gaps: 0,
+            marginalised: 0,
+            states: PhantomData,
+        })
+    }
+
+    /// The parameters it was made with, or has been given since.
+    pub fn params(&self) -> &SmootherParams {
+        &self.params
+    }
+
+    /// Changes the noise of the sensors from now on: what has been integrated stays as it is.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    pub fn set_sensors(&mut self, sensors: EskfParams) -> Result<(), ParamsError> {
+        SmootherParams { sensors, ..self.params }.check()?;
+        self.params.sensors = sensors;
+        Ok(())
+    }
+
+    /// Starts, or starts afresh, with one keyframe; optional states are zero, with the deviations of the parameters.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NonFinite`] if a value is not finite or the orientation no rotation, [`Refusal::Noise`] if a covariance is
+    /// not positive definite. The smoother is then as it was.
+    pub fn start(&mut self, id: u64, start: &Start) -> Result<(), Refusal> {
+        let (estimate, matrix) = start.information::<S, N>(&self.params.sensors)?;
+        let information = Information { matrix: matrix.data.0, vector: [0.0; N] };
+        self.spare.extend(self.window.drain(..));
+        self.last = ImuMean { time_ns: start.time_ns, ..self.last };
+        self.begin(id, estimate, Prior { information, mean: Some(estimate) });
+        Ok(())
+    }
+
+    /// Starts afresh from what a filter of the same robot estimates, with all correlations: a warm start, or another noise.
+    /// Optional states that only one of them has are dropped, or zero with the deviations of the parameters.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NonFinite`] and [`Refusal::Noise`] as [`start`](Self::start).
+    pub fn adopt<T: States, const M: usize>(
+        &mut self,
+        id: u64,
+        estimate: &Estimate<M>,
+        covariance: &SMatrix<f64, M, M>,
+    ) -> Result<(), Refusal> {
+        let mut adopted = Estimate { optional: SVector::zeros(), ..Estimate::unknown() };
+        adopted.time_ns = estimate.time_ns;
+        adopted.position = estimate.position;
+        adopted.velocity = estimate.velocity;
+        adopted.world_from_body = estimate.world_from_body;
+        adopted.accelerometer_bias = estimate.accelerometer_bias;
+        adopted.gyroscope_bias = estimate.gyroscope_bias;
+        adopted.angular_velocity = estimate.angular_velocity;
+        adopted.specific_force = estimate.specific_force;
+        // Where each error is in the filter's; none if it has it not.
+        let mut places: [Option<usize>; N] = core::array::from_fn(|i| (i < NAVIGATION).then_some(i));
+        let mut variances = [0.0; N];
+        for state in S::OPTIONAL {
+            let Some(first) = offset::<S>(*state) else { continue };
+            let process = self.params.sensors.process(*state);
+            for i in 0..state.dimension() {
+                places[first + i] = offset::<T>(*state).map(|index| index + i);
+                adopted.optional[first + i] = places[first + i].map_or(0.0, |index| estimate.optional[index]);
+                variances[first + i] = process.map_or(1.0, |process| process.deviation * process.deviation);
+            }
+        }
+        let covariance = SMatrix::<f64, N, N>::from_fn(|i, j| match (places[i], places[j]) {
+            (Some(row), Some(column)) => covariance[(row, column)],
+            (None, _) if i == j => variances[i].max(1e-24),
+            _ => 0.0,
+        });
+        if !adopted.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
+            return Err(Refusal::NonFinite);
+        }
+        let information = nalgebra::linalg::Cholesky::new(covariance).ok_or(Refusal::Noise)?.inverse();
+        let information = Information { matrix: information.data.0, vector: [0.0; N] };
+        self.spare.extend(self.window.drain(..));
+        let (angular_velocity, specific_force) = (
+            estimate.angular_velocity + estimate.gyroscope_bias,
+            estimate.specific_force + estimate.accelerometer_bias,
+        );
+        self.last = ImuMean { time_ns: estimate.time_ns, angular_velocity, specific_force };
+        self.begin(id, adopted, Prior { information, mean: Some(adopted) });
+        Ok(())
+    }
+
+    /// Begins a window with one keyframe.
+    pub(super) fn begin(&mut self, id: u64, point: Estimate<N>, prior: Prior<N>) {
+        let Some(mut keyframe) = self.spare.pop() else { return };
+        let motion = Preintegration::new(point.accelerometer_bias, point.gyroscope_bias);
+        keyframe.renew(id, point, &motion);
+        keyframe.prior = Some(prior);
+        keyframe.linearise::<S>(None, &self.params);
+        self.window.push_back(keyframe);
+        self.motion = motion;
+        self.time_ns = point.time_ns;
+        (self.dirty, self.exact_from) = (0, 0);
+        self.eliminate(1);
+    }
+
+    /// Integrates one sample of the IMU.
+    ///
+    /// A sample that covers more than [`EskfParams::longest_sample`] is a gap: the body is taken to keep velocity and
+    /// attitude, up to the noise that the parameters give a gap.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] if the smoother has not started, a value is not finite or absurdly large, time stands still or runs
+    /// back, or the gap is longer than a minute. The smoother is then as it was.
+    pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        let newest = self.window.back().ok_or(Refusal::NotStarted)?;
+        sample.check()?;
+        let dt = seconds_between(self.time_ns, sample.time_ns)?;
+        let sensors = &self.params.sensors;
+        if dt <= sensors.longest_sample {
+            self.motion.add(&sample.angular_velocity, &sample.specific_force, dt, &sensors.densities());
+            self.last = *sample;
+        } else if dt <= LONGEST_GAP_S {
+            // What holds the body up, so that it does not fall.
+            let up = Vector3::new(0.0, 0.0, sensors.gravity);
+            let now = newest.estimate::<S>().world_from_body * self.motion.rotation();
+            let force = now.inverse_transform_vector(&up) + self.motion.accelerometer_bias();
+            let rest = *self.motion.gyroscope_bias();
+            self.motion.add(&rest, &force, dt, &sensors.gap_densities());
+            self.last = ImuMean { time_ns: sample.time_ns, angular_velocity: rest, specific_force: force };
+            self.gaps = self.gaps.wrapping_add(1);
+        } else {
+            return Err(Refusal::Gap { seconds: dt });
+        }
+        self.time_ns = sample.time_ns;
+        Ok(())
+    }
+
+    /// Makes the present a keyframe. If the window is full, the oldest leaves it, and what it says stays as a prior.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NotStarted`]; [`Refusal::TimeNotIncreasing`] if there was no sample since the last keyframe, or the id is
+    /// not greater than the last.
+    pub fn add_keyframe(&mut self, id: u64) -> Result<(), Refusal> {
+        let newest = self.window.back().ok_or(Refusal::NotStarted)?;
+        let previous_ns = newest.point.time_ns;
+        if self.time_ns <= previous_ns || id <= newest.id {
+            return Err(Refusal::TimeNotIncreasing { previous_ns, time_ns: self.time_ns });
+        }
+        let mut point = after::<F, S, N>(newest, &self.motion, &self.params);
+        if !point.is_finite() {
+            return Err(Refusal::NonFinite);
+        }
+        point.time_ns = self.time_ns;
+        point.angular_velocity = self.last.angular_velocity - point.gyroscope_bias;
+        point.specific_force = self.last.specific_force - point.accelerometer_bias;
+        if self.window.len() == self.params.window {
+            self.marginalise();
+        }
+        let Some(mut keyframe) = self.spare.pop() else { return Err(Refusal::NotStarted) };
+        keyframe.renew(id, point, &self.motion);
+        keyframe.linearise::<S>(self.window.back().map(|before| &**before), &self.params);
+        self.window.push_back(keyframe);
+        self.dirty = self.dirty.min(self.window.len() - 1);
+        self.motion = Preintegration::new(point.accelerometer_bias, point.gyroscope_bias);
+        Ok(())
+    }
+
+    /// The oldest keyframe leaves.
+    fn marginalise(&mut self) {
+        if self.dirty <= 1 {
+            self.eliminate(2);
+        }
+        let Some(oldest) = self.window.pop_front() else { return };
+        self.spare.push(oldest);
+        if let Some(next) = self.window.front_mut() {
+            next.own.add(&next.incoming);
+            next.prior = Some(Prior { information: next.incoming, mean: None });
+            // It holds what was measured at the keyframe before; that cannot be linearised again.
+            next.factors.retain(|held| Factor::<S, N>::previous(&held.factor).is_none());
+            next.incoming = Information::none();
+        }
+        self.dirty = self.dirty.saturating_sub(1);
+        self.exact_from = self.exact_from.saturating_sub(1);
+        self.marginalised = self.marginalised.wrapping_add(1);
+    }
+
+    /// How many gaps were bridged.
+    pub fn gaps(&self) -> u32 {
+        self.gaps
+    }
+
+    /// How many keyframes have left the window.
+    pub fn marginalised(&self) -> u64 {
+        self.marginalised
+    }
+}

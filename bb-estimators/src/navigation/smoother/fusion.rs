@@ -1,0 +1,145 @@
+//! What was measured, at any keyframe of the window: judged by its gate, and added.
+
+use super::elimination::{Judged, Known, judge, judge_pair};
+use super::factor::Factor;
+use super::filter::FixedLagSmoother;
+use super::kernel::Kernel;
+use super::keyframe::{Held, Prior};
+use super::rows::Rows;
+use crate::navigation::eskf::{Refusal, States};
+use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
+
+impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
+    /// Adds what was measured at a keyframe of the window, in any order.
+    ///
+    /// `stream` is that of the sensor: its gate decides, and its counts and statistics tell of it. After
+    /// [`patience`](crate::navigation::StreamParams::patience) refusals at the newest keyframe it is the window that is
+    /// taken to be wrong: it begins afresh there, with its covariance raised, or, if it was the way from the keyframe
+    /// before, with the noise of that raised.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`], which the stream has counted; the smoother is then as it was. [`Refusal::NoKeyframe`] if the keyframe has
+    /// left the window, or a relative pose is not one to the keyframe before.
+    pub fn add(&mut self, stream: &mut Stream, id: u64, factor: impl Into<F>) -> Result<Fused, Refusal> {
+        self.add_robust(stream, id, factor, Kernel::Squares)
+    }
+
+    /// [`add`](Self::add) with a robust kernel: how much it weighs is decided anew as the window learns.
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn add_robust(
+        &mut self,
+        stream: &mut Stream,
+        id: u64,
+        factor: impl Into<F>,
+        kernel: Kernel,
+    ) -> Result<Fused, Refusal> {
+        let result = self.fuse(stream, id, factor.into(), kernel);
+        stream.count(&result);
+        result
+    }
+
+    fn fuse(&mut self, stream: &Stream, id: u64, factor: F, kernel: Kernel) -> Result<Fused, Refusal> {
+        if self.window.is_empty() {
+            return Err(Refusal::NotStarted);
+        }
+        let missing = Refusal::NoKeyframe { id };
+        // Ids increase, but not always by one.
+        let index = self.window.iter().rposition(|keyframe| keyframe.id == id).ok_or(missing)?;
+        let trust = 1.0 / stream.noise_factor();
+        let mut rows = Rows::new();
+        let keyframe = self.window.get(index).ok_or(missing)?;
+        if keyframe.factors.len() >= self.params.factors {
+            return Err(Refusal::Full { id });
+        }
+        let before = index.checked_sub(1).and_then(|before| self.window.get(before));
+        keyframe.rows::<S>(&factor, before.map(|before| &**before), &mut rows)?;
+        rows.weigh(trust);
+        let (judged, dimension) = (self.judged(index, &rows, factor.previous().is_some()), rows.count);
+        let judged = judged.ok_or(Refusal::NonFinite)?;
+        let Verdict { weight, raised, limit, log_likelihood } =
+            stream.weigh(judged.nis, dimension, judged.log_density, Gate::Closed)?;
+        let mut index = index;
+        if raised > 1.0 {
+            if index + 1 != self.window.len() {
+                return Err(Refusal::Gate { nis: judged.nis, limit });
+            }
+            index = self.raise(raised, factor.previous().is_some());
+        }
+        let is_robust = kernel != Kernel::Squares;
+        let ties = factor.previous().is_some();
+        let held = Held { factor, kernel, trust: trust * weight, weight: 1.0 };
+        if let Some(keyframe) = self.window.get_mut(index) {
+            keyframe.factors.push(held);
+            keyframe.is_robust |= is_robust;
+            if is_robust || raised > 1.0 {
+                self.linearise(index);
+            } else {
+                rows.weigh(weight);
+                if ties {
+                    keyframe.link.add(&rows);
+                } else {
+                    keyframe.own.add_rows(&rows.at[..dimension], &rows.residual[..dimension]);
+                }
+            }
+        }
+        self.dirty = self.dirty.min(index);
+        Ok(Fused { nis: judged.nis, dimension, weight, raised, limit, log_likelihood, whitened: judged.whitened })
+    }
+
+    /// Compares a factor with what is known so far. Corrections stay as they were at the last update, all but the newest.
+    fn judged(&mut self, index: usize, rows: &Rows<N>, ties: bool) -> Option<Judged> {
+        self.eliminate(self.window.len());
+        let newest = self.window.back_mut()?;
+        newest.correction = newest.pivot.newest();
+        let is_newest = index + 1 == self.window.len();
+        let correction = self.correction_at(index)?;
+        let covariance = if is_newest { None } else { Some(self.covariance_at(index)?) };
+        let keyframe = self.window.get(index)?;
+        let known = covariance.as_ref().map_or(Known::Newest(&keyframe.pivot.root), Known::Other);
+        if !ties {
+            return judge(rows, &correction, &known);
+        }
+        let before = self.window.get(index.checked_sub(1)?)?;
+        let earlier = before.pivot.back(&keyframe.link, &correction);
+        judge_pair(rows, &before.pivot, &keyframe.link, (&earlier, &correction), &known)
+    }
+
+    /// The correction of a keyframe as it would be solved.
+    fn correction_at(&self, index: usize) -> Option<[f64; N]> {
+        let mut correction = self.window.back()?.correction;
+        for index in (index..self.window.len() - 1).rev() {
+            let (keyframe, next) = (self.window.get(index)?, self.window.get(index + 1)?);
+            correction = keyframe.pivot.back(&next.link, &correction);
+        }
+        Some(correction)
+    }
+
+    /// Trusts the newest keyframe less, or the way to it; where that is now.
+    #[cold]
+    fn raise(&mut self, factor: f64, way: bool) -> usize {
+        let newest = self.window.len() - 1;
+        if way {
+            if let Some(keyframe) = self.window.get_mut(newest) {
+                keyframe.raised *= factor;
+            }
+            return newest;
+        }
+        let Some(keyframe) = self.window.back() else { return newest };
+        let (id, point) = (keyframe.id, keyframe.estimate::<S>());
+        let mut information = keyframe.own;
+        information.add(&keyframe.incoming);
+        information.matrix.iter_mut().flatten().for_each(|x| *x /= factor);
+        information.vector = [0.0; N];
+        self.marginalised = self.marginalised.wrapping_add(newest as u64);
+        self.spare.extend(self.window.drain(..));
+        let motion = self.motion;
+        let time_ns = self.time_ns;
+        self.begin(id, point, Prior { information, mean: Some(point) });
+        (self.motion, self.time_ns) = (motion, time_ns);
+        0
+    }
+}

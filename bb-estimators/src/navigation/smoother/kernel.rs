@@ -1,0 +1,36 @@
+//! Robust kernels: how much a measurement weighs that does not fit.
+
+use crate::navigation::math::sqrt;
+
+/// How much a factor weighs, by how many standard deviations `x` it is off: the norm of its whitened residual.
+///
+/// Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic fitting", Image and Vision Computing
+/// 15(1), 1997, section 9.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Kernel {
+    /// Least squares: weight 1.
+    #[default]
+    Squares,
+    /// Squares up to the parameter, absolute values beyond: weight `min(1, k / x)`. Usual: 1.345.
+    Huber(f64),
+    /// Weight `1 / (1 + (x / c)²)`. Usual: 2.385.
+    Cauchy(f64),
+    /// Weight `1 / (1 + (x / c)²)²`: what is far off hardly counts, and so cannot return to where it counts.
+    GemanMcClure(f64),
+}
+
+impl Kernel {
+    /// The weight for a squared norm of the whitened residual, from 0 to 1. A parameter that is not positive is none.
+    pub fn weight(self, squared: f64) -> f64 {
+        let ratio = |parameter: f64| squared / (parameter * parameter);
+        match self {
+            Self::Huber(k) if k > 0.0 && squared > k * k => k / sqrt(squared),
+            Self::Cauchy(c) if c > 0.0 => 1.0 / (1.0 + ratio(c)),
+            Self::GemanMcClure(c) if c > 0.0 => {
+                let root = 1.0 / (1.0 + ratio(c));
+                root * root
+            }
+            _ => 1.0,
+        }
+    }
+}

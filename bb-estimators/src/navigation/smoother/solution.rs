@@ -1,0 +1,159 @@
+//! The estimate of the window: elimination of what has changed, and linearising again what moved.
+
+use super::factor::Factor;
+use super::filter::FixedLagSmoother;
+use super::params::SmootherParams;
+use crate::navigation::eskf::{ROTATION, Refusal, States};
+
+/// Where a correction changes by less than this part of what is linearised again, earlier ones are left as they are until
+/// they are asked for.
+const SETTLED: f64 = 0.01;
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Updated {
+    /// How many keyframes were eliminated, each time they were.
+    pub eliminated: usize,
+    /// How many keyframes were linearised again, each time they were.
+    pub relinearised: usize,
+}
+
+impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
+    /// Linearises all that concerns a keyframe and the one before.
+    pub(super) fn linearise(&mut self, index: usize) {
+        let (before, after) = self.window.make_contiguous().split_at_mut(index);
+        if let Some(keyframe) = after.first_mut() {
+            keyframe.linearise::<S>(before.last().map(|before| &**before), &self.params);
+        }
+    }
+
+    /// Eliminates what has changed, and all that follows it, up to a keyframe.
+    pub(super) fn eliminate(&mut self, end: usize) -> usize {
+        let end = end.min(self.window.len());
+        let first = self.dirty;
+        let window = self.window.make_contiguous();
+        for index in first..end {
+            let (before, after) = window.split_at_mut(index);
+            let Some(keyframe) = after.first_mut() else { break };
+            if let Some(before) = before.last_mut() {
+                keyframe.incoming = before.pivot.eliminate(&keyframe.link);
+            }
+            let mut known = keyframe.own;
+            known.add(&keyframe.incoming);
+            keyframe.pivot.take(&known);
+        }
+        self.dirty = self.dirty.max(end);
+        self.exact_from = self.exact_from.max(first.min(self.window.len()));
+        end.saturating_sub(first)
+    }
+
+    /// Corrections from the keyframe before `from`, which has its own, back to `to`.
+    pub(super) fn solve_back(&mut self, from: usize, to: usize) {
+        for index in (to..from).rev() {
+            self.solve_one(index);
+        }
+    }
+
+    /// The correction of a keyframe, from that of the next.
+    fn solve_one(&mut self, index: usize) {
+        let window = self.window.make_contiguous();
+        let (these, after) = window.split_at_mut(index + 1);
+        if let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) {
+            keyframe.correction = keyframe.pivot.back(&next.link, &next.correction);
+        }
+    }
+
+    /// Corrections of all keyframes that have changed by more than matters, at least of those from `least` on; the first of
+    /// them.
+    fn solve(&mut self, least: usize) -> usize {
+        let Some(newest) = self.window.back_mut() else { return 0 };
+        newest.correction = newest.pivot.newest();
+        let mut first = self.window.len() - 1;
+        while first > 0 {
+            let window = self.window.make_contiguous();
+            let (these, after) = window.split_at_mut(first);
+            let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) else { break };
+            let correction = keyframe.pivot.back(&next.link, &next.correction);
+            // What is below adds up, since it is not stored.
+            if first <= least && is_settled(&correction, &keyframe.correction, &self.params) {
+                break;
+            }
+            keyframe.correction = correction;
+            first -= 1;
+        }
+        self.exact_from = first;
+        first
+    }
+
+    /// Estimates the window from all that was added.
+    ///
+    /// Keyframes that moved far are linearised again, and what they concern is eliminated again, as often as the
+    /// parameters allow. It is no error if that is not often enough: the next update goes on.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NotStarted`]; [`Refusal::NonFinite`] if the estimate is beyond all numbers: start afresh.
+    pub fn update(&mut self) -> Result<Updated, Refusal> {
+        if self.window.is_empty() {
+            return Err(Refusal::NotStarted);
+        }
+        let mut updated = Updated::default();
+        for iteration in 0..=self.params.iterations {
+            let least = self.dirty;
+            updated.eliminated += self.eliminate(self.window.len());
+            let first = self.solve(least);
+            if !self.window.range(first..).all(|keyframe| keyframe.correction.iter().all(|x| x.is_finite())) {
+                return Err(Refusal::NonFinite);
+            }
+            if iteration == self.params.iterations {
+                break;
+            }
+            let moved = self.relinearise(first);
+            updated.relinearised += moved;
+            if self.dirty >= self.window.len() {
+                break;
+            }
+        }
+        Ok(updated)
+    }
+
+    /// Linearises again what moved far or weighs otherwise, from a keyframe on; how many moved.
+    fn relinearise(&mut self, first: usize) -> usize {
+        let mut moved = 0;
+        let count = self.window.len();
+        // Where a keyframe moved, the next has to be linearised as well.
+        let mut is_next = false;
+        for index in first..count {
+            let params = &self.params;
+            let window = self.window.make_contiguous();
+            let (before, after) = window.split_at_mut(index);
+            let (before, Some(keyframe)) = (before.last(), after.first_mut()) else { continue };
+            let is_off = keyframe.is_free() && keyframe.is_off(params);
+            if is_off {
+                keyframe.relinearise::<S>();
+                moved += 1;
+            }
+            if is_off || is_next || keyframe.is_misweighed::<S>(before.map(|before| &**before)) {
+                keyframe.linearise::<S>(before.map(|before| &**before), params);
+                self.dirty = self.dirty.min(index);
+            }
+            is_next = is_off;
+        }
+        moved
+    }
+
+    /// Eliminates all of the window.
+    #[cfg(test)]
+    pub(super) fn eliminate_all(&mut self) {
+        self.dirty = 0;
+        self.eliminate(self.window.len());
+        self.solve(0);
+    }
+}
+
+/// Whether two corrections are alike: a centimetre of position, or a hundredth of what is linearised again of rotation.
+fn is_settled<const N: usize>(a: &[f64; N], b: &[f64; N], params: &SmootherParams) -> bool {
+    let is_rotation = |i: usize| (ROTATION..ROTATION + 3).contains(&i);
+    let limit = |i: usize| SETTLED * if is_rotation(i) { params.relinearise_rotation } else { 1.0 };
+    a.iter().zip(b).enumerate().all(|(i, (a, b))| (a - b).abs() < limit(i))
+}

@@ -1,0 +1,12 @@
+//! Preintegration, factors and elimination, each against another way to the same, and the laws of the smoother.
+
+// Matrices of any size need the allocator's part of nalgebra.
+#[cfg(feature = "std")]
+mod batch;
+mod cases;
+mod consistency;
+mod factors;
+mod flight;
+mod kernels;
+mod laws;
+mod preintegration;

@@ -1,0 +1,262 @@
+//! What the smoother does in single cases.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::flight::{DT_NS, Drone, Flight, N, Smoother, linear, open, sample, sensors};
+use crate::navigation::{
+    AbsolutePose, Eskf, FixedLagSmoother, GnssPosition, ImuMean, Kernel, NAVIGATION, NavigationFactor, Refusal,
+    RelativePose, SmootherParams, Start, Stream,
+};
+
+type Plain = FixedLagSmoother;
+
+fn level() -> UnitQuaternion<f64> {
+    UnitQuaternion::identity()
+}
+
+fn rest(time_ns: i64) -> ImuMean {
+    let gravity = Vector3::new(0.0, 0.0, 9.80665);
+    ImuMean { time_ns, angular_velocity: Vector3::zeros(), specific_force: gravity }
+}
+
+/// At rest, level, at the origin to within `deviation`, with `keyframes` of 0.1 s.
+fn at_rest(params: SmootherParams, deviation: f64, keyframes: u64) -> Plain {
+    let mut smoother = Plain::new(params).unwrap();
+    let start = Start::at(0, (Vector3::zeros(), deviation), (Vector3::zeros(), 0.1), (level(), 0.05));
+    smoother.start(0, &start).unwrap();
+    for k in 1..keyframes {
+        wait(&mut smoother, k);
+    }
+    smoother
+}
+
+fn wait(smoother: &mut Plain, k: u64) {
+    for i in 1..=10 {
+        smoother.propagate(&rest(((k as i64 - 1) * 10 + i) * DT_NS)).unwrap();
+    }
+    smoother.add_keyframe(k).unwrap();
+}
+
+#[test]
+fn refusals_are_named_and_counted() {
+    let mut smoother = Plain::new(SmootherParams { window: 3, factors: 2, ..SmootherParams::default() }).unwrap();
+    let mut stream = Stream::default();
+    let fix = GnssPosition::new(Vector3::zeros(), 1.0, 1.0);
+    assert_eq!(smoother.add(&mut stream, 0, fix), Err(Refusal::NotStarted));
+    assert_eq!(smoother.propagate(&rest(1)), Err(Refusal::NotStarted));
+    assert_eq!(smoother.add_keyframe(1), Err(Refusal::NotStarted));
+    assert_eq!(smoother.update(), Err(Refusal::NotStarted));
+    smoother = at_rest(SmootherParams { window: 3, factors: 2, ..SmootherParams::default() }, 1.0, 5);
+    assert_eq!(smoother.keyframes().collect::<Vec<_>>(), [2, 3, 4]);
+    let time_ns = 400_000_000;
+    let refused = Refusal::TimeNotIncreasing { previous_ns: time_ns, time_ns };
+    assert_eq!(smoother.propagate(&rest(time_ns)), Err(refused));
+    assert_eq!(smoother.add_keyframe(5), Err(refused), "no sample since the last");
+    smoother.propagate(&rest(time_ns + DT_NS)).unwrap();
+    assert!(matches!(smoother.add_keyframe(4), Err(Refusal::TimeNotIncreasing { .. })), "an id twice");
+    let nan = ImuMean { angular_velocity: Vector3::new(0.0, f64::NAN, 0.0), ..rest(2 * time_ns) };
+    assert_eq!(smoother.propagate(&nan), Err(Refusal::NonFinite));
+    let wild = ImuMean { specific_force: Vector3::new(0.0, 1e7, 0.0), ..rest(2 * time_ns) };
+    assert_eq!(smoother.propagate(&wild), Err(Refusal::OutOfRange));
+    assert!(matches!(smoother.propagate(&rest(i64::MAX)), Err(Refusal::Gap { .. })));
+    // It has left the window, it has no keyframe before it, and the other is not the one before.
+    let relative = |id| RelativePose::new(id, (Vector3::zeros(), 0.1), (level(), 0.1));
+    assert_eq!(smoother.add(&mut stream, 1, fix), Err(Refusal::NoKeyframe { id: 1 }));
+    assert_eq!(smoother.add(&mut stream, 2, relative(1)), Err(Refusal::NoKeyframe { id: 1 }));
+    assert_eq!(smoother.add(&mut stream, 4, relative(2)), Err(Refusal::NoKeyframe { id: 2 }));
+    let nan = GnssPosition::new(Vector3::new(f64::NAN, 0.0, 0.0), 1.0, 1.0);
+    assert_eq!(smoother.add(&mut stream, 4, nan), Err(Refusal::NonFinite));
+    let mut negative = fix;
+    negative.covariance = -Matrix3::identity();
+    assert_eq!(smoother.add(&mut stream, 4, negative), Err(Refusal::Noise));
+    let absurd = GnssPosition::new(Vector3::new(1e20, 0.0, 0.0), 1.0, 1.0);
+    assert_eq!(smoother.add(&mut stream, 4, absurd), Err(Refusal::OutOfRange));
+    let outlier = GnssPosition::new(Vector3::new(100.0, 0.0, 0.0), 1.0, 1.0);
+    assert!(matches!(smoother.add(&mut stream, 4, outlier), Err(Refusal::Gate { .. })));
+    smoother.add(&mut stream, 4, fix).unwrap();
+    smoother.add(&mut stream, 4, relative(3)).unwrap();
+    assert_eq!(smoother.add(&mut stream, 4, fix), Err(Refusal::Full { id: 4 }));
+    let counts = stream.counts();
+    assert_eq!((counts.fused, counts.not_applicable, counts.invalid, counts.gate), (2, 5, 3, 1));
+}
+
+#[test]
+fn a_parameter_out_of_range_is_named() {
+    let refused = Plain::new(SmootherParams { window: 1, ..SmootherParams::default() });
+    assert!(refused.is_err_and(|error| error.to_string().contains("window")));
+}
+
+/// Of a flight as the filter takes it to be, the covariance is that of the filter.
+#[test]
+fn the_newest_covariance_is_that_of_the_filter() {
+    let mut flight = Flight::new(5, 60, 0.0);
+    for measured in &mut flight.measured {
+        measured.retain(|factor| !matches!(factor, NavigationFactor::RelativePose(_)));
+    }
+    let smoother = flight.flown(linear(7));
+    let mut filter = Eskf::<Drone, N>::new(sensors()).unwrap();
+    filter.start(&flight.start).unwrap();
+    for k in 1..60 {
+        for sample in &flight.samples[k] {
+            filter.propagate(sample).unwrap();
+        }
+        for factor in &flight.measured[k] {
+            match factor {
+                NavigationFactor::GnssPosition(fix) => filter.update(&mut open(), fix).map(drop),
+                NavigationFactor::GnssVelocity(fix) => filter.update(&mut open(), fix).map(drop),
+                NavigationFactor::AbsolutePose(pose) => filter.update(&mut open(), pose).map(drop),
+                _ => Ok(()),
+            }
+            .unwrap();
+        }
+    }
+    let (here, there) = (smoother.covariance().unwrap(), filter.covariance());
+    for i in 0..N {
+        for j in 0..N {
+            let scale = (there[(i, i)] * there[(j, j)]).sqrt();
+            let apart = (here[(i, j)] - there[(i, j)]).abs();
+            assert!(apart < 1e-4 * scale, "{i} {j}: {} {}", here[(i, j)], there[(i, j)]);
+        }
+    }
+    let error = smoother.estimate().unwrap().error_to::<Drone>(filter.estimate().unwrap());
+    assert!(error.amax() < 1e-5, "{error}");
+}
+
+/// A millisecond between keyframes, and a position that is known to a thousand kilometres: the pivot is tiny beside its
+/// diagonal, and right all the same.
+#[test]
+fn a_tiny_pivot_is_no_trouble() {
+    let params = SmootherParams { window: 10, ..SmootherParams::default() };
+    let mut smoother = Plain::new(params).unwrap();
+    let start = Start::at(0, (Vector3::zeros(), 1e6), (Vector3::zeros(), 0.1), (level(), 0.05));
+    smoother.start(0, &start).unwrap();
+    for k in 1..200 {
+        smoother.propagate(&rest(k * 1_000_000)).unwrap();
+        smoother.add_keyframe(k as u64).unwrap();
+        smoother.update().unwrap();
+    }
+    let deviation = smoother.covariance().unwrap()[(0, 0)].sqrt();
+    assert!((deviation / 1e6 - 1.0).abs() < 1e-6, "{deviation}");
+    let fix = GnssPosition::new(Vector3::new(4e5, 0.0, 0.0), 1.0, 1.0);
+    smoother.add(&mut Stream::default(), 195, fix).unwrap();
+    smoother.update().unwrap();
+    let variance = smoother.covariance().unwrap()[(0, 0)];
+    assert!((smoother.estimate().unwrap().position.x - 4e5).abs() < 0.1 && (0.9..1.1).contains(&variance));
+}
+
+#[test]
+fn a_gap_grows_the_covariance_and_is_counted() {
+    let mut smoother = at_rest(SmootherParams::default(), 1.0, 3);
+    smoother.update().unwrap();
+    let before = smoother.pose_covariance().unwrap();
+    smoother.propagate(&rest(3_200_000_000)).unwrap();
+    smoother.add_keyframe(3).unwrap();
+    smoother.update().unwrap();
+    assert_eq!(smoother.gaps(), 1);
+    let (after, estimate) = (smoother.pose_covariance().unwrap(), smoother.estimate().unwrap());
+    assert!(after[(0, 0)] > 4.0 * before[(0, 0)] && after[(5, 5)] > 1.0, "{after}");
+    // At rest before, and so after.
+    assert!(estimate.position.norm() < 0.1, "{}", estimate.position);
+}
+
+#[test]
+fn a_gate_that_refuses_all_gives_way() {
+    let mut smoother = at_rest(SmootherParams::default(), 0.5, 12);
+    let mut stream = Stream::default();
+    let far = GnssPosition::new(Vector3::new(300.0, 0.0, 0.0), 1.0, 1.0);
+    for i in 0..3 {
+        let refused = smoother.add(&mut stream, 11, far);
+        assert!(matches!(refused, Err(Refusal::Gate { .. })), "{i}");
+    }
+    let fused = smoother.add(&mut stream, 11, far).unwrap();
+    assert!(fused.raised > 1.0 && stream.counts().recoveries == 1);
+    for k in 12..20 {
+        wait(&mut smoother, k);
+        let _ = smoother.add(&mut stream, k, far);
+        smoother.update().unwrap();
+    }
+    let position = smoother.estimate().unwrap().position;
+    assert!((position.x - 300.0).abs() < 3.0, "{position}");
+    // Relative poses that disagree with the IMU: it is the way that is trusted less.
+    let mut stream = Stream::default();
+    let jump = |id| RelativePose::new(id, (Vector3::new(5.0, 0.0, 0.0), 0.01), (level(), 0.01));
+    for _ in 0..3 {
+        assert!(matches!(smoother.add(&mut stream, 19, jump(18)), Err(Refusal::Gate { .. })));
+    }
+    let before = smoother.keyframes().len();
+    assert!(smoother.add(&mut stream, 19, jump(18)).unwrap().raised > 1.0);
+    smoother.update().unwrap();
+    let way = smoother.smoothed(19).unwrap().position - smoother.smoothed(18).unwrap().position;
+    // Most of it; the velocity before is as well known as it was.
+    assert!((3.0..5.1).contains(&way.x) && smoother.keyframes().len() == before, "{way}");
+}
+
+/// At rest at the origin for a second, with one pose of many 40 m off: where it is then.
+fn with_an_outlier(kernel: Kernel, at: u64) -> f64 {
+    let mut smoother = at_rest(SmootherParams::default(), 30.0, 1);
+    for k in 1..12 {
+        wait(&mut smoother, k);
+        let x = if k == at { 40.0 } else { 0.0 };
+        let pose = AbsolutePose::new((Vector3::new(x, 0.0, 0.0), 1.0), (level(), 0.05));
+        smoother.add_robust(&mut open(), k, pose, kernel).unwrap();
+        for _ in 0..5 {
+            smoother.update().unwrap();
+        }
+    }
+    smoother.estimate().unwrap().position.x
+}
+
+#[test]
+fn a_robust_kernel_takes_an_outlier_for_one() {
+    let plain = with_an_outlier(Kernel::Squares, 6);
+    assert!(plain > 2.0, "{plain}");
+    for (kernel, part) in
+        [(Kernel::Huber(1.345), 0.1), (Kernel::Cauchy(2.385), 0.02), (Kernel::GemanMcClure(3.0), 1e-3)]
+    {
+        let robust = with_an_outlier(kernel, 6);
+        assert!(robust < part * plain, "{kernel:?}: {robust}, without {plain}");
+    }
+    // What fitted when it came is found out by what comes later: the cost is convex.
+    let learnt = with_an_outlier(Kernel::Huber(1.345), 1);
+    assert!(learnt < 0.1 * plain, "{learnt}");
+}
+
+#[test]
+fn between_keyframes_it_goes_on_with_the_imu() {
+    let flight = Flight::new(4, 20, 0.0);
+    let mut smoother = flight.flown(linear(10));
+    for i in 191..=195 {
+        smoother.propagate(&sample(i)).unwrap();
+    }
+    let predicted = smoother.predicted().unwrap();
+    assert_eq!(predicted.time_ns, 195 * DT_NS);
+    for i in 196..=200 {
+        smoother.propagate(&sample(i)).unwrap();
+    }
+    let end = smoother.predicted().unwrap();
+    smoother.add_keyframe(20).unwrap();
+    let keyframe = smoother.estimate().unwrap();
+    assert!((end.position - keyframe.position).norm() < 1e-9 && (end.velocity - keyframe.velocity).norm() < 1e-9);
+    let mean = (predicted.velocity + end.velocity) * 0.5;
+    assert!(((end.position - predicted.position) / 0.05 - mean).norm() < 0.1);
+}
+
+/// From a filter of other optional states, with all correlations.
+#[test]
+fn a_warm_start_has_what_the_filter_has() {
+    let flight = Flight::new(7, 40, 1.0);
+    let first = flight.flown(linear(10));
+    let (estimate, covariance) = (first.estimate().unwrap(), first.covariance().unwrap());
+    let mut same = Smoother::new(linear(10)).unwrap();
+    same.adopt::<Drone, N>(39, &estimate, &covariance).unwrap();
+    assert!((same.covariance().unwrap() - covariance).amax() < 1e-8);
+    assert_eq!(same.estimate().unwrap().error_to::<Drone>(&estimate).amax(), 0.0);
+    let mut plain = Plain::new(SmootherParams::default()).unwrap();
+    plain.adopt::<Drone, N>(39, &estimate, &covariance).unwrap();
+    let of_navigation = covariance.fixed_view::<NAVIGATION, NAVIGATION>(0, 0).into_owned();
+    assert!((plain.covariance().unwrap() - of_navigation).amax() < 1e-8);
+    plain.propagate(&sample(391)).unwrap();
+    plain.add_keyframe(40).unwrap();
+    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &-covariance), Err(Refusal::Noise));
+    assert_eq!(plain.keyframes().collect::<Vec<_>>(), [39, 40], "it is as it was");
+}

@@ -1,0 +1,221 @@
+//! Every factor: its derivatives by both keyframes are those of numeric differentiation, where it fits and where it does not.
+
+#![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+use super::super::factor::Factor;
+use super::super::link::{Link, predicted};
+use super::super::rows::Rows;
+use super::flight::{Drone, N, sensors};
+use crate::navigation::{
+    Estimate, NAVIGATION, NavigationFactor, POSITION, Preintegration, ROTATION, RelativePose, VELOCITY,
+};
+
+type Error = SVector<f64, N>;
+
+fn vector(limit: f64) -> impl Strategy<Value = Vector3<f64>> {
+    let number = move || -limit..limit;
+    (number(), number(), number()).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+}
+
+fn estimate() -> impl Strategy<Value = Estimate<N>> {
+    let motion = (vector(100.0), vector(20.0), vector(3.0), vector(0.3), vector(0.05));
+    (motion, -0.05..0.05, vector(0.3)).prop_map(|((position, velocity, turn, force, rate), scale, arm)| {
+        let mut error = Error::zeros();
+        error.fixed_rows_mut::<3>(NAVIGATION + 1).copy_from(&arm);
+        error[NAVIGATION] = scale;
+        Estimate {
+            position,
+            velocity,
+            world_from_body: UnitQuaternion::from_scaled_axis(turn),
+            accelerometer_bias: force,
+            gyroscope_bias: rate,
+            ..Estimate::unknown()
+        }
+        .corrected::<Drone>(&error)
+    })
+}
+
+/// An error of this many standard units in all states.
+fn error() -> impl Strategy<Value = Error> {
+    proptest::array::uniform19(-1.0..1.0).prop_map(|x| Error::from_fn(|i, _| x[i]))
+}
+
+fn motion(samples: usize, turn: Vector3<f64>, force: Vector3<f64>) -> Preintegration {
+    let mut motion = Preintegration::new(Vector3::new(0.1, 0.0, -0.1), Vector3::new(0.01, -0.01, 0.0));
+    for i in 0..samples {
+        let t = i as f64 * 0.1;
+        motion.add(&(turn * t.cos()), &(force + Vector3::z() * t.sin()), 0.005, &sensors().densities());
+    }
+    motion
+}
+
+fn relative(previous: &Estimate<N>, at: &Estimate<N>, off: &Vector3<f64>) -> RelativePose {
+    let back = previous.world_from_body.inverse();
+    let translation = back * (at.position - previous.position) + off;
+    let turn = back * at.world_from_body * UnitQuaternion::from_scaled_axis(off * 0.3);
+    RelativePose::new(0, (translation, 0.05), (turn, 2e-3))
+}
+
+/// What all errors are if the world is turned about the vertical.
+fn turned(at: &Estimate<N>) -> Error {
+    let mut error = Error::zeros();
+    let mut set = |first: usize, part: Vector3<f64>| error.fixed_rows_mut::<3>(first).copy_from(&part);
+    set(POSITION, Vector3::z().cross(&at.position));
+    set(VELOCITY, Vector3::z().cross(&at.velocity));
+    set(ROTATION, Vector3::z());
+    error
+}
+
+proptest! {
+    /// Also where the measurement does not fit, the gradient of the cost is that of numeric differentiation.
+    #[test]
+    fn gradients_of_relative_poses(previous in estimate(), at in estimate(), off in vector(1.0)) {
+        let factor = NavigationFactor::from(relative(&previous, &at, &off));
+        let rows = |previous: &Estimate<N>, at: &Estimate<N>| {
+            let mut rows = Rows::<N>::new();
+            Factor::<Drone, N>::linearise(&factor, Some(previous), at, &mut rows).unwrap();
+            rows
+        };
+        let here = rows(&previous, &at);
+        let cost = |rows: &Rows<N>| 0.5 * rows.residual[..rows.count].iter().map(|r| r * r).sum::<f64>();
+        for of_previous in [true, false] {
+            let jacobian = if of_previous { &here.previous } else { &here.at };
+            let mut analytic = Error::zeros();
+            for row in 0..here.count {
+                for i in 0..N {
+                    analytic[i] += jacobian[row][i] * here.residual[row];
+                }
+            }
+            for state in 0..N {
+                let step = 1e-5;
+                let [above, below] = [step, -step].map(|step| {
+                    let mut error = Error::zeros();
+                    error[state] = step;
+                    let moved = |estimate: &Estimate<N>| estimate.corrected::<Drone>(&error);
+                    cost(&if of_previous { rows(&moved(&previous), &at) } else { rows(&previous, &moved(&at)) })
+                });
+                let numeric = (below - above) / (2.0 * step);
+                let scale = 1.0 + analytic.amax() + cost(&here);
+                prop_assert!((numeric - analytic[state]).abs() < 1e-5 * scale,
+                    "state {state} of {of_previous}: {numeric}, not {}", analytic[state]);
+            }
+        }
+    }
+
+    /// Nothing between two keyframes sees which way the world is turned, wherever they are linearised.
+    #[test]
+    fn the_world_may_turn(from in estimate(), off in error(), samples in 1_usize..40, turn in vector(2.0)) {
+        let motion = motion(samples, turn, Vector3::new(3.0, -1.0, 9.0));
+        let to = predicted::<Drone, N>(&from, &motion, &sensors()).corrected::<Drone>(&(off * 0.3));
+        let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &sensors(), 1.0);
+        let back = SMatrix::<f64, N, N>::from_fn(|i, j| link.back[i][j]);
+        let apart = (back * turned(&to) - turned(&from)).amax();
+        prop_assert!(apart < 1e-9, "{apart}");
+        let factor = NavigationFactor::from(relative(&from, &to, &Vector3::new(0.3, -0.2, 0.1)));
+        let mut rows = Rows::<N>::new();
+        Factor::<Drone, N>::linearise(&factor, Some(&from), &to, &mut rows).unwrap();
+        for row in 0..rows.count {
+            let (before, here) = (turned(&from), turned(&to));
+            let seen: f64 = (0..N).map(|i| rows.previous[row][i] * before[i] + rows.at[row][i] * here[i]).sum();
+            // Rows are divided by deviations down to 2e-3, of positions up to 170 m.
+            prop_assert!(seen.abs() < 1e-8, "row {row}: {seen}");
+        }
+    }
+
+    /// Where it fits, so is every row.
+    #[test]
+    fn relative_poses(previous in estimate(), at in estimate()) {
+        let scale = 1.0 + at.scalar::<Drone>(crate::navigation::Optional::RelativeScale);
+        let mut exact = relative(&previous, &at, &Vector3::zeros());
+        exact.translation *= scale;
+        let factor = NavigationFactor::from(exact);
+        let rows = |at: &Estimate<N>| {
+            let mut rows = Rows::<N>::new();
+            Factor::<Drone, N>::linearise(&factor, Some(&previous), at, &mut rows).unwrap();
+            rows
+        };
+        let here = rows(&at);
+        prop_assert!(here.residual.iter().all(|r| r.abs() < 1e-7));
+        for state in 0..N {
+            let step = 1e-6;
+            let [above, below] = [step, -step].map(|step| {
+                let mut error = Error::zeros();
+                error[state] = step;
+                rows(&at.corrected::<Drone>(&error)).residual
+            });
+            for row in 0..here.count {
+                let numeric = (below[row] - above[row]) / (2.0 * step);
+                prop_assert!((numeric - here.at[row][state]).abs() < 1e-4 * (1.0 + numeric.abs()));
+            }
+        }
+    }
+
+    /// The way back is the inverse of the way there.
+    #[test]
+    fn the_link_is_the_motion_backwards(
+        from in estimate(),
+        samples in 1_usize..40,
+        turn in vector(2.0),
+        force in vector(15.0),
+    ) {
+        let motion = motion(samples, turn, force);
+        let params = sensors();
+        let there = |from: &Estimate<N>| predicted::<Drone, N>(from, &motion, &params);
+        let to = there(&from);
+        let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &params, 1.0);
+        let error = |error: &Error| to.error_to::<Drone>(&there(&from.corrected::<Drone>(error)));
+        let back = SMatrix::<f64, N, N>::from_fn(|i, j| link.back[i][j]);
+        let mut forward = SMatrix::<f64, N, N>::zeros();
+        for state in 0..N {
+            let step = 1e-5;
+            let mut unit = Error::zeros();
+            unit[state] = step;
+            forward.set_column(state, &((error(&unit) - error(&-unit)) / (2.0 * step)));
+        }
+        let product = back * forward;
+        let apart = (product - SMatrix::identity()).amax();
+        // The derivative by the gyroscope's bias is to second order in the turn of a sample.
+        prop_assert!(apart < 1e-5, "{apart}: {product:.6}");
+        prop_assert!(link.offset.iter().all(|x| x.abs() < 1e-9));
+        // Forward, the noise is that of preintegration, in the axes of the first body.
+        let noise = SMatrix::<f64, N, N>::from_fn(|i, j| link.noise[i][j]);
+        let forward = forward * noise * forward.transpose();
+        let mut to_world = SMatrix::<f64, NAVIGATION, NAVIGATION>::identity();
+        for first in [POSITION, VELOCITY, ROTATION] {
+            to_world.fixed_view_mut::<3, 3>(first, first).copy_from(&from.rotation());
+        }
+        let covariance = motion.covariance();
+        let covariance = SMatrix::<f64, NAVIGATION, NAVIGATION>::from_fn(|i, j| covariance[i][j]);
+        let known = to_world * covariance * to_world.transpose();
+        for i in 0..NAVIGATION {
+            for j in 0..NAVIGATION {
+                let scale = (known[(i, i)] * known[(j, j)]).sqrt();
+                let apart = (forward[(i, j)] - known[(i, j)]).abs();
+                prop_assert!(apart < 1e-3 * scale, "{i} {j}: {} of {}", forward[(i, j)], known[(i, j)]);
+            }
+        }
+    }
+}
+
+/// Whitened rows hold what the noise says: `Hᵀ R⁻¹ H` and `Hᵀ R⁻¹ r`.
+#[test]
+fn rows_are_divided_by_their_noise() {
+    let noise = SMatrix::<f64, 2, 2>::new(4.0, 1.0, 1.0, 0.5);
+    let (at, previous) = ([[1.0, -2.0, 0.5], [0.0, 3.0, 1.0]], [[2.0, 0.0, 1.0], [1.0, 1.0, 1.0]]);
+    let mut rows = Rows::<3>::new();
+    rows.set([0.3, -0.7], Some(&previous), &at, &noise).unwrap();
+    let inverse = noise.try_inverse().unwrap();
+    let whole = |jacobian: &[[f64; 3]; 2]| SMatrix::<f64, 2, 3>::from_fn(|i, j| jacobian[i][j]);
+    let residual = SVector::<f64, 2>::new(0.3, -0.7);
+    for (jacobian, whitened) in [(&at, &rows.at), (&previous, &rows.previous)] {
+        let matrix = SMatrix::<f64, 2, 3>::from_fn(|i, j| whitened[i][j]);
+        let known = whole(jacobian).transpose() * inverse * whole(jacobian);
+        assert!((matrix.transpose() * matrix - known).amax() < 1e-13);
+        let vector = SVector::<f64, 2>::new(rows.residual[0], rows.residual[1]);
+        assert!((matrix.transpose() * vector - whole(jacobian).transpose() * inverse * residual).amax() < 1e-13);
+    }
+    assert!((rows.log_density + 0.5 * noise.determinant().ln()).abs() < 1e-13);
+}

@@ -1,0 +1,221 @@
+//! What holds of every flight.
+
+use nalgebra::{SMatrix, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+use super::flight::{Drone, Flight, N, Smoother, converged, linear, open, sensors};
+use crate::navigation::{
+    AbsolutePose, Estimate, GnssPosition, GnssVelocity, NavigationFactor, RelativePose, SmootherParams,
+};
+
+/// The largest difference of two estimates, each in its unit.
+fn apart(a: &Estimate<N>, b: &Estimate<N>) -> f64 {
+    a.error_to::<Drone>(b).amax()
+}
+
+/// The largest difference of two covariances, relative to what is known.
+fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
+    let mut largest = 0.0_f64;
+    for i in 0..N {
+        for j in 0..N {
+            largest = largest.max((a[(i, j)] - b[(i, j)]).abs() / (a[(i, i)] * a[(j, j)]).sqrt());
+        }
+    }
+    largest
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// What has left the window is not lost: all that is linear is as with all keyframes.
+    #[test]
+    fn a_window_is_the_batch(seed in any::<u64>(), window in 2_usize..12) {
+        let flight = Flight::new(seed, 40, 1.0);
+        let mut batch = flight.flown(linear(40));
+        let mut here = flight.flown(linear(window));
+        prop_assert_eq!(here.marginalised(), 40 - window as u64);
+        let ids: Vec<u64> = here.keyframes().collect();
+        prop_assert_eq!(ids.len(), window);
+        for id in ids {
+            let (all, some) = (batch.smoothed(id).unwrap(), here.smoothed(id).unwrap());
+            prop_assert!(apart(&all, &some) < 1e-9, "{id}: {}", apart(&all, &some));
+            let (all, some) = (batch.smoothed_covariance(id).unwrap(), here.smoothed_covariance(id).unwrap());
+            prop_assert!(differ(&all, &some) < 1e-9, "{id}: {}", differ(&all, &some));
+        }
+    }
+
+    /// What comes late, and in any order, makes the same estimate in the end.
+    #[test]
+    fn the_order_of_arrival_does_not_matter(
+        seed in any::<u64>(),
+        order in Just((1..12_usize).collect::<Vec<_>>()).prop_shuffle(),
+    ) {
+        let flight = Flight::new(seed, 12, 1.0);
+        let arrived = |order: &[usize]| {
+            let mut smoother = Smoother::new(converged(12)).unwrap();
+            smoother.start(0, &flight.start).unwrap();
+            for k in 1..12 {
+                flight.fly_to(&mut smoother, k);
+            }
+            for k in order {
+                for factor in flight.measured[*k].iter().rev() {
+                    smoother.add(&mut open(), *k as u64, *factor).unwrap();
+                }
+                smoother.update().unwrap();
+            }
+            smoother
+        };
+        let mut in_order = arrived(&(1..12).collect::<Vec<_>>());
+        let mut shuffled = arrived(&order);
+        // At once, the samples are freed of biases that are known better.
+        let mut at_once = flight.flown(converged(12));
+        for id in 0..12 {
+            let (a, b) = (in_order.smoothed(id).unwrap(), shuffled.smoothed(id).unwrap());
+            prop_assert!(apart(&a, &b) < 1e-8, "{id}: {}", apart(&a, &b));
+            let c = at_once.smoothed(id).unwrap();
+            prop_assert!(apart(&a, &c) < 1e-3, "{id}: {}", apart(&a, &c));
+            let (a, b) = (in_order.smoothed_covariance(id).unwrap(), shuffled.smoothed_covariance(id).unwrap());
+            prop_assert!(differ(&a, &b) < 1e-7, "{id}: {}", differ(&a, &b));
+        }
+    }
+
+    /// Nor which of the measurements of one keyframe comes first, without an update between.
+    #[test]
+    fn nor_does_that_at_one_keyframe(seed in any::<u64>()) {
+        let mut flight = Flight::new(seed, 36, 1.0);
+        let one = flight.flown(linear(5));
+        flight.measured.iter_mut().for_each(|measured| measured.reverse());
+        let other = flight.flown(linear(5));
+        let apart = apart(&one.estimate().unwrap(), &other.estimate().unwrap());
+        prop_assert!(apart < 1e-9, "{apart}");
+        prop_assert!(differ(&one.covariance().unwrap(), &other.covariance().unwrap()) < 1e-9);
+    }
+
+    /// Where the world has its origin, and which way its axes point, is nothing to it.
+    #[test]
+    fn heading_and_origin(seed in any::<u64>(), heading in -3.1..3.1, x in -1e4..1e4, y in -1e4..1e4) {
+        let flight = Flight::new(seed, 30, 1.0);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
+        let origin = Vector3::new(x, y, -0.5 * x);
+        let place = |position: &Vector3<f64>| turn * position + origin;
+        let mut other = Flight::new(seed, 30, 1.0);
+        let start = &mut other.start;
+        start.position = place(&start.position);
+        start.velocity = turn * start.velocity;
+        start.world_from_body = turn * start.world_from_body;
+        for factor in other.measured.iter_mut().flatten() {
+            match factor {
+                NavigationFactor::GnssPosition(fix) => fix.position = place(&fix.position),
+                NavigationFactor::GnssVelocity(fix) => fix.velocity = turn * fix.velocity,
+                NavigationFactor::AbsolutePose(pose) => {
+                    pose.position = place(&pose.position);
+                    pose.world_from_body = turn * pose.world_from_body;
+                }
+                _ => {}
+            }
+        }
+        let params = SmootherParams { sensors: sensors(), window: 10, ..SmootherParams::default() };
+        let (here, there) = (flight.flown(params).estimate().unwrap(), other.flown(params).estimate().unwrap());
+        prop_assert!((place(&here.position) - there.position).norm() < 1e-6);
+        prop_assert!((turn * here.velocity - there.velocity).norm() < 1e-6);
+        prop_assert!((turn * here.world_from_body).angle_to(&there.world_from_body) < 1e-6);
+        prop_assert!((here.gyroscope_bias - there.gyroscope_bias).norm() < 1e-7);
+    }
+
+    /// What no sensor tells stays unknown, however often it is linearised again: without a compass or a position, heading
+    /// and position are never better known than at the start.
+    #[test]
+    fn what_is_unobservable_stays_unknown(seed in any::<u64>()) {
+        let mut flight = Flight::new(seed, 80, 1.0);
+        for measured in &mut flight.measured {
+            measured.retain(|factor| matches!(factor, NavigationFactor::RelativePose(_)));
+        }
+        // A velocity that is known in the world is as good as a heading.
+        flight.start.velocity_covariance *= 1e6;
+        let params = SmootherParams { relinearise_rotation: 1e-3, ..linear(6) };
+        let params = SmootherParams { iterations: 3, ..params };
+        let mut smoother = Smoother::new(params).unwrap();
+        smoother.start(0, &flight.start).unwrap();
+        let mut least = f64::INFINITY;
+        for k in 1..80 {
+            flight.fly_to(&mut smoother, k);
+            flight.measure(&mut smoother, k);
+            smoother.update().unwrap();
+            let covariance = smoother.covariance().unwrap();
+            least = least.min(covariance[(8, 8)]);
+            prop_assert!(covariance[(0, 0)] + covariance[(1, 1)] >= 2.0 * (1.0 - 1e-9));
+        }
+        prop_assert!(least >= 0.05 * 0.05 * (1.0 - 1e-9), "{least}");
+    }
+
+    /// Any numbers at all leave it as it was or with finite numbers.
+    #[test]
+    fn absurd_measurements(
+        seed in any::<u64>(),
+        numbers in proptest::collection::vec(prop_oneof![
+            any::<f64>(), Just(f64::NAN), Just(f64::INFINITY), Just(1e300), Just(-1e-300), -10.0..10.0
+        ], 7),
+    ) {
+        let flight = Flight::new(seed, 12, 1.0);
+        let mut smoother = flight.flown(linear(6));
+        let vector = Vector3::new(numbers[0], numbers[1], numbers[2]);
+        let [x, y, z, w] = [numbers[3], numbers[4], numbers[5], numbers[6]];
+        let turn = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
+        let mut stream = open();
+        let before = smoother.estimate().unwrap();
+        let mut refused = 0;
+        let factors: [NavigationFactor; 4] = [
+            GnssPosition::new(vector, x, y).into(),
+            GnssVelocity::new(vector, z, w).into(),
+            AbsolutePose::new((vector, x), (turn, y)).into(),
+            RelativePose::new(10, (vector, z), (turn, w)).into(),
+        ];
+        for factor in factors {
+            refused += u64::from(smoother.add(&mut stream, 11, factor).is_err());
+        }
+        let counts = stream.counts();
+        prop_assert_eq!(counts.invalid + counts.not_applicable + counts.gate, refused);
+        match smoother.update() {
+            Ok(_) => prop_assert!(smoother.estimate().unwrap().is_finite()),
+            Err(error) => prop_assert!(false, "{}", error),
+        }
+        if refused == 4 {
+            prop_assert!(apart(&before, &smoother.estimate().unwrap()) < 1e-9);
+        }
+    }
+}
+
+/// A new keyframe costs the elimination of what it changes, whatever the window holds.
+#[test]
+fn only_the_end_is_eliminated_again() {
+    for window in [5, 10, 100] {
+        let flight = Flight::new(3, 160, 1.0);
+        let params = SmootherParams { sensors: sensors(), window, ..SmootherParams::default() };
+        let mut smoother = Smoother::new(params).unwrap();
+        smoother.start(0, &flight.start).unwrap();
+        let mut costs = Vec::new();
+        for k in 1..160 {
+            flight.fly_to(&mut smoother, k);
+            flight.measure(&mut smoother, k);
+            costs.push(smoother.update().unwrap().eliminated);
+        }
+        costs.drain(..40);
+        costs.sort_unstable();
+        assert!(costs[costs.len() / 2] <= 1, "{window}: {costs:?}");
+    }
+}
+
+/// Incrementally as from scratch.
+#[test]
+fn elimination_is_the_same_from_the_start() {
+    let flight = Flight::new(9, 50, 1.0);
+    let smoother = flight.flown(linear(15));
+    let mut afresh = smoother.clone();
+    afresh.eliminate_all();
+    let differ = differ(&smoother.covariance().unwrap(), &afresh.covariance().unwrap());
+    assert!(differ < 1e-12, "{differ}");
+    for id in smoother.keyframes().collect::<Vec<_>>() {
+        let (a, b) = (smoother.clone().smoothed(id).unwrap(), afresh.smoothed(id).unwrap());
+        assert!(apart(&a, &b) < 1e-10, "{id}: {}", apart(&a, &b));
+    }
+}

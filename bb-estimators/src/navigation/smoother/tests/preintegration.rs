@@ -1,0 +1,113 @@
+//! Preintegration against the filter, which goes sample by sample, against numeric differentiation and integrating again.
+
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+use super::super::preintegration::Preintegration;
+use crate::navigation::math::rotation_vector;
+use crate::navigation::{Eskf, EskfParams, ImuDensities, ImuMean, NAVIGATION, Start};
+
+const DT: f64 = 0.005;
+
+/// A sample of a body that turns and shakes.
+fn motion(seed: f64) -> impl Fn(usize) -> (Vector3<f64>, Vector3<f64>) {
+    move |i| {
+        let t = i as f64 * DT + seed;
+        let turn = Vector3::new((3.0 * t).sin(), 2.0 * (2.3 * t).cos(), 1.5 * (0.7 * t).sin());
+        (turn, Vector3::new(5.0 * (9.0 * t).cos(), (4.0 * t).sin(), 9.8 + 3.0 * (7.0 * t).sin()))
+    }
+}
+
+fn integrated(seed: f64, samples: usize, biases: &SVector<f64, 6>, densities: &ImuDensities) -> Preintegration {
+    let mut all = Preintegration::new(biases.fixed_rows::<3>(0).into(), biases.fixed_rows::<3>(3).into());
+    let sample = motion(seed);
+    for i in 0..samples {
+        let (turn, force) = sample(i);
+        all.add(&turn, &force, DT, densities);
+    }
+    all
+}
+
+fn params() -> EskfParams {
+    EskfParams {
+        gyroscope_noise: 2e-3,
+        accelerometer_noise: 3e-2,
+        gyroscope_bias_walk: 4e-3,
+        accelerometer_bias_walk: 5e-2,
+        ..EskfParams::default()
+    }
+}
+
+fn densities() -> ImuDensities {
+    params().densities()
+}
+
+proptest! {
+    /// Mean and covariance are those of the filter, without gravity and from a state that is known.
+    #[test]
+    fn it_is_the_filter_in_one_step(seed in 0.0..100.0, samples in 1_usize..200) {
+        let biases = SVector::<f64, 6>::new(0.1, -0.2, 0.05, 0.01, -0.02, 0.005);
+        let all = integrated(seed, samples, &biases, &densities());
+        let mut filter: Eskf = Eskf::new(EskfParams { gravity: 1.0, ..params() }).unwrap();
+        // As known as a filter can be.
+        let known = 1e-9;
+        let rest = (Vector3::zeros(), known);
+        let start = Start {
+            accelerometer_bias: biases.fixed_rows::<3>(0).into(),
+            gyroscope_bias: biases.fixed_rows::<3>(3).into(),
+            accelerometer_bias_deviation: known,
+            gyroscope_bias_deviation: known,
+            ..Start::at(0, rest, rest, (UnitQuaternion::identity(), known))
+        };
+        filter.start(&start).unwrap();
+        let sample = motion(seed);
+        for i in 0..samples {
+            let (angular_velocity, specific_force) = sample(i);
+            let time_ns = (i as i64 + 1) * 5_000_000;
+            filter.propagate(&ImuMean { time_ns, angular_velocity, specific_force }).unwrap();
+        }
+        let seconds = all.seconds();
+        let fall = Vector3::new(0.0, 0.0, -seconds);
+        let estimate = filter.estimate().unwrap();
+        prop_assert!((all.velocity() + fall - estimate.velocity).norm() < 1e-11);
+        prop_assert!((all.position() + fall * (0.5 * seconds) - estimate.position).norm() < 1e-11);
+        prop_assert!(all.rotation().angle_to(&estimate.world_from_body) < 1e-7);
+        let covariance = SMatrix::<f64, NAVIGATION, NAVIGATION>::from_fn(|i, j| all.covariance()[i][j]);
+        let scale = |i: usize, j: usize| (covariance[(i, i)] * covariance[(j, j)]).sqrt() + 1e-15;
+        for i in 0..NAVIGATION {
+            for j in 0..NAVIGATION {
+                let apart = (covariance[(i, j)] - filter.covariance()[(i, j)]).abs();
+                prop_assert!(apart < 1e-6 * scale(i, j), "{i} {j}: {apart} of {}", scale(i, j));
+            }
+        }
+        prop_assert!(covariance.cholesky().is_some());
+    }
+
+    /// Derivatives by the biases, against integrating again with other ones.
+    #[test]
+    fn derivatives_by_biases(seed in 0.0..100.0, samples in 1_usize..60) {
+        let at = SVector::<f64, 6>::new(0.1, -0.2, 0.05, 0.01, -0.02, 0.005);
+        let here = integrated(seed, samples, &at, &densities());
+        let step = 1e-5;
+        for bias in 0..6 {
+            let [above, below] = [step, -step].map(|step| {
+                let mut biases = at;
+                biases[bias] += step;
+                integrated(seed, samples, &biases, &densities())
+            });
+            let columns = if bias < 3 { &here.by_accelerometer } else { &here.by_gyroscope };
+            let column = |matrix: &Matrix3<f64>| matrix.column(bias % 3).into_owned();
+            let check = |numeric: Vector3<f64>, matrix: &Matrix3<f64>, what: &str| {
+                let apart = (numeric / (2.0 * step) - column(matrix)).norm();
+                let seconds = here.seconds();
+                // The derivative of the mean over one sample is to second order in its turn.
+                prop_assert!(apart < 1e-5 * seconds, "{what} by {bias}: {apart} after {seconds} s");
+                Ok(())
+            };
+            check(above.position() - below.position(), &columns.position, "position")?;
+            check(above.velocity() - below.velocity(), &columns.velocity, "velocity")?;
+            let turned = rotation_vector(&(above.rotation() * below.rotation().inverse()));
+            check(turned, &columns.rotation, "rotation")?;
+        }
+    }
+}
