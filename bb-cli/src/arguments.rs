@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::calibrate::Calibrate;
 use crate::evaluate::Evaluator;
 use crate::filters::{Axes, Chosen, Setting};
 use crate::navigation::{self, NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
@@ -27,6 +28,11 @@ enum Command {
     Eval {
         #[command(subcommand)]
         what: Eval,
+    },
+    /// Finds the errors of sensors from a recording of them.
+    Calibrate {
+        #[command(subcommand)]
+        what: Calibrate,
     },
 }
 
@@ -140,6 +146,7 @@ struct AttitudeArguments {
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
     Navigation(Navigation),
+    Calibrate(Calibrate),
     /// Prints this.
     Print(String),
 }
@@ -164,7 +171,10 @@ pub(crate) struct Attitude {
 
 /// Reads the command line. An error is what to print, and has the exit code: help, which was asked for, has 0.
 pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job, clap::Error> {
-    let Bb { command: Command::Eval { what } } = Bb::try_parse_from(arguments)?;
+    let what = match Bb::try_parse_from(arguments)?.command {
+        Command::Eval { what } => what,
+        Command::Calibrate { what } => return Ok(Job::Calibrate(what)),
+    };
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,
         Eval::Navigation(NavigationArguments { list: true, .. }) => {

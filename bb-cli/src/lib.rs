@@ -10,6 +10,7 @@
 
 mod arguments;
 mod averages;
+mod calibrate;
 mod error_plot;
 mod evaluate;
 mod files;
@@ -54,6 +55,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Job::Attitude(attitude) => eval_attitude(attitude),
         Job::Navigation(navigation) => eval_navigation(navigation),
         Job::Print(text) => say(text).map(|()| true),
+        Job::Calibrate(calibrate) => calibrate.run().and_then(|(text, is_any)| say(&text).map(|()| is_any)),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

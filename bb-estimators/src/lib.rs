@@ -10,6 +10,7 @@
 //! | `Mekf<Marg>(…)`, `Vqf<Marg>(…)`, `Madgwick<Marg>(…)`, … in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
 //! | `Madgwick<ImuAndMagnetometer>(…)` on a link | `input imu`, driver, and `input magnetic_field`, of two sensors | `Orientation` of the link |
 //! | `Vqf<Marg, AttitudeOutputs>(…)`, … | as before | `output orientation`, and `output status`: bias, rest, disturbance |
+//! | `Calibrated<Marg>(…)` in a sensor | the sensor's `Imu` or `Marg` | the same, calibrated |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
 //! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry` and `input pose` | `Odometry` of the link |
@@ -20,6 +21,7 @@
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 pub mod attitude;
+pub mod calibration;
 pub mod navigation;
 pub mod params;
 #[cfg(feature = "simulation")]
@@ -32,6 +34,8 @@ use bb_core::payload::{Imu, Odometry, Orientation};
 pub use attitude::average::OrientationAverage;
 #[cfg(feature = "runtime")]
 pub use attitude::{Attitude, ImuAndMagnetometer};
+#[cfg(feature = "runtime")]
+pub use calibration::Calibrated;
 #[cfg(feature = "simulation")]
 pub use simulation::SimulatedImu;
 
