@@ -4,7 +4,7 @@
 #![allow(dead_code, unreachable_pub)]
 
 #[path = "../../../integrations/mcap/tests/bags/common.rs"]
-mod bags;
+pub mod bags;
 
 use bags::ros::*;
 use bb_core::nalgebra::{UnitQuaternion, Vector3 as V};
