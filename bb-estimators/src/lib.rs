@@ -19,6 +19,8 @@
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
+// What a sensor gives never panics; a test may.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod attitude;
 pub mod calibration;

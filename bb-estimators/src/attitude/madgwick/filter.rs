@@ -55,7 +55,7 @@ impl<T: Real> AttitudeFilter<T> for MadgwickFilter<T> {
 }
 
 impl<T: Real> MadgwickFilter<T> {
-    #[inline(never)]
+    #[inline]
     fn update_any(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         if let Some(step) = self.state.admit(sample)? {
             self.step(&step.world_from_body, step.dt_s, sample, step.up, step.field);
@@ -130,7 +130,7 @@ impl<T: Real> MadgwickFilter<T> {
 ///
 /// Zero where there is nothing to gain, except at the top of F, upside down, which is left about the body's
 /// x or y axis.
-#[inline]
+#[inline(always)]
 fn descent<T: Real>(
     world_from_body: &UnitQuaternion<T>,
     up: &Vector3<T>,
