@@ -219,14 +219,16 @@ fn folders_of_the_runtime_import_only_from_below() {
     assert!(upward.is_empty(), "{upward:#?}");
 }
 
-/// The modules of `bb-macros` by path, each with its code.
-fn modules_of_the_macros() -> BTreeMap<Vec<String>, String> {
-    let source = root().join("bb-macros/src");
+/// The modules of a crate by path, each with its code.
+fn modules_of(krate: &str) -> BTreeMap<Vec<String>, String> {
+    let source = root().join(krate).join("src");
     let mut files = Vec::new();
     code_below(&source, &mut files);
-    // That name is left out above for the model checker's.
-    code_below(&source.join("model"), &mut files);
-    files.push(source.join("model.rs"));
+    if source.join("model").is_dir() {
+        // That name is left out above for the model checker's.
+        code_below(&source.join("model"), &mut files);
+        files.push(source.join("model.rs"));
+    }
     let module = |file: PathBuf| {
         let inside = file.strip_prefix(&source).expect("it is below").with_extension("");
         let path: Vec<String> = inside.iter().map(|name| name.to_string_lossy().into_owned()).collect();
@@ -291,12 +293,23 @@ fn groups_of_paths_are_read_one_by_one() {
     assert_eq!(paths, ["a::b", "a::c::d", "a::c::e", "f"]);
 }
 
-/// Neither the folders of the macros' crate nor the files in one of them import each other in a circle. What a folder's own
-/// file offers to those in it, as types that hold each other, is no import of theirs.
+/// Neither the folders of a crate nor the files in one of them import each other in a circle. What a folder's own file
+/// offers to those in it, as types that hold each other, is no import of theirs.
 #[test]
-fn the_macros_have_no_circle_of_modules() {
-    let modules = modules_of_the_macros();
-    assert!(modules.len() > 100, "{} modules", modules.len());
+fn no_modules_import_each_other_in_a_circle() {
+    for krate in ["bb-macros", "bb-cli", "integrations/mcap", "integrations/metrics"] {
+        let circles = circles_of(krate);
+        assert!(circles.is_empty(), "{krate}: {circles:#?}");
+    }
+    // Of the others, the folders below `lib.rs`; see the lists of their layers as well.
+    for krate in ["bb-core", "bb-estimators"] {
+        let circles: Vec<_> = circles_of(krate).into_iter().filter(|circle| circle.starts_with("lib: ")).collect();
+        assert!(circles.is_empty(), "{krate}: {circles:#?}");
+    }
+}
+
+fn circles_of(krate: &str) -> Vec<String> {
+    let modules = modules_of(krate);
     // Of each folder, which of its modules import which others.
     let mut imports: BTreeMap<Vec<String>, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
     for (module, code) in &modules {
@@ -314,8 +327,11 @@ fn the_macros_have_no_circle_of_modules() {
             }
         }
     }
-    assert!(imports[&Vec::new()]["verify"].contains("model"), "imports are found");
-    assert!(imports[&vec!["expand".to_owned()]]["wiring"].contains("types"), "imports are found");
+    if krate == "bb-macros" {
+        assert!(imports[&Vec::new()]["verify"].contains("model"), "imports are found");
+        assert!(imports[&vec!["expand".to_owned()]]["wiring"].contains("types"), "imports are found");
+    }
+    let mut circles = Vec::new();
     for (folder, imports) in &imports {
         for start in imports.keys() {
             let mut reached: BTreeSet<&String> = BTreeSet::new();
@@ -325,11 +341,116 @@ fn the_macros_have_no_circle_of_modules() {
                     next.extend(imports.get(module).into_iter().flatten());
                 }
             }
-            assert!(
-                !reached.contains(start),
-                "crate/{}: {start} imports itself, through {reached:?}",
-                folder.join("/")
-            );
+            if reached.contains(start) {
+                let folder = if folder.is_empty() { "lib".to_owned() } else { folder.join("/") };
+                circles.push(format!("{folder}: {start} imports itself, through {reached:?}"));
+            }
         }
     }
+    circles
+}
+
+/// The modules of the algorithms, from the bottom up.
+const ALGORITHMS: [&str; 5] = ["params", "attitude", "navigation", "calibration", "simulation"];
+
+/// The code of a file without its tests and comments.
+fn code_of(file: &Path) -> String {
+    let text = std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    let text = text.split("#[cfg(test)]\nmod ").next().unwrap_or("");
+    let code: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+    code.join("\n")
+}
+
+#[test]
+fn algorithms_import_only_from_below() {
+    let source = root().join("bb-estimators/src");
+    let mut files = Vec::new();
+    code_below(&source, &mut files);
+    let mut upward = Vec::new();
+    for file in files {
+        let inside = file.strip_prefix(&source).expect("it is below").to_string_lossy().into_owned();
+        let folder = inside.split('/').next().unwrap_or("").trim_end_matches(".rs").to_owned();
+        let Some(layer) = ALGORITHMS.iter().position(|name| *name == folder) else {
+            assert_eq!(folder, "lib", "{folder} has no layer");
+            continue;
+        };
+        for name in named_in_crate(&code_of(&file)) {
+            let is_below = ALGORITHMS.iter().position(|other| *other == name).is_some_and(|other| other <= layer);
+            // The list of filters is a macro at the top of the crate.
+            if !is_below && name != "attitude_filters" {
+                upward.push(format!("{inside} names crate::{name}"));
+            }
+        }
+    }
+    assert!(upward.is_empty(), "{upward:#?}");
+}
+
+/// The algorithms cannot depend on the macro, and read units where there is no standard library.
+#[test]
+fn units_of_parameters_are_those_of_the_language() {
+    let table = |file: &str| {
+        let text = read(file);
+        let table = text.split("const UNITS: ").nth(1).and_then(|rest| rest.split("];").next());
+        table.unwrap_or_else(|| panic!("{file} has no table")).to_owned()
+    };
+    let language = table("bb-macros/src/units.rs");
+    assert!(language.contains("\"rad\""));
+    assert_eq!(language, table("bb-estimators/src/params/units.rs"));
+}
+
+/// Which module of `attitude` each of its public names is from.
+fn homes(attitude: &str, list: &str) -> std::collections::BTreeMap<String, String> {
+    let mut homes = std::collections::BTreeMap::new();
+    for statement in attitude.split("pub use ").skip(1).filter_map(|rest| rest.split(';').next()) {
+        let Some((module, names)) = statement.split_once("::") else { continue };
+        for name in names.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|name| !name.is_empty()) {
+            homes.insert(name.to_owned(), module.to_owned());
+        }
+    }
+    for line in list.lines() {
+        let words: Vec<&str> = line.trim().trim_end_matches(';').split(' ').collect();
+        if let [module, _, filter, params] = *words {
+            homes.insert(filter.to_owned(), module.to_owned());
+            homes.insert(params.to_owned(), module.to_owned());
+        }
+    }
+    homes
+}
+
+#[test]
+fn modules_of_attitude_form_no_circle() {
+    let source = root().join("bb-estimators/src/attitude");
+    let list = code_of(&source.join("filters.rs"));
+    let homes = homes(&code_of(&source.with_extension("rs")), &list);
+    assert_eq!(homes.get("MekfParams").map(String::as_str), Some("mekf"), "the list is read");
+    let mut files = Vec::new();
+    code_below(&source, &mut files);
+    let mut edges: std::collections::BTreeMap<String, std::collections::BTreeSet<String>> = Default::default();
+    for file in files {
+        let inside = file.strip_prefix(&source).expect("it is below").to_string_lossy().into_owned();
+        let module = inside.split('/').next().unwrap_or("").trim_end_matches(".rs").to_owned();
+        if module == "laws" {
+            continue;
+        }
+        let mut code = code_of(&file).replace("crate::attitude::", "crate::");
+        if !inside.contains('/') {
+            code = code.replace("super::", "crate::");
+        }
+        let mut named: Vec<String> = named_in_crate(&code).into_iter().map(str::to_owned).collect();
+        if module == "any" {
+            // What its macro names of every line of the list.
+            named.extend(list.lines().filter_map(|line| Some(line.trim().split_once(' ')?.0.to_owned())));
+        }
+        let named = named.into_iter().map(|name| homes.get(&name).cloned().unwrap_or(name));
+        let is_module =
+            |name: &String| source.join(name).with_extension("rs").exists() || source.join(name).is_dir();
+        edges.entry(module.clone()).or_default().extend(named.filter(is_module).filter(|name| *name != module));
+    }
+    assert!(edges["any"].contains("mekf") && edges["mekf"].contains("rotation"), "{edges:?}");
+    // Modules that import nothing that is left are taken away until none is.
+    while let Some(free) = edges.iter().find(|(_, named)| named.iter().all(|name| !edges.contains_key(name))) {
+        let free = free.0.clone();
+        edges.remove(&free);
+    }
+    assert!(edges.is_empty(), "these import one another: {edges:#?}");
 }

@@ -1,6 +1,6 @@
 //! Plays samples in motion through one filter, for callgrind to count; the commands are in `docs/attitude.md`.
 //!
-//! `instructions FILE FILTER six|nine UPDATES`
+//! `instructions FILE FILTER six|nine UPDATES [each]`: in one call, as `benches/peers` counts; with `each` one call an update.
 
 use bb_cli::{Axes, Chosen, End, Recording, Running, Topics};
 use bb_core::nalgebra::UnitQuaternion;
@@ -14,8 +14,11 @@ const SAMPLES: usize = 20_000;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [file, name, axes, updates] = &*arguments else {
-        return Err("write: instructions FILE FILTER six|nine UPDATES".into());
+    let ([file, name, axes, updates], each) = (match &*arguments {
+        [four @ .., each] if each == "each" => (four, true),
+        all => (all, false),
+    }) else {
+        return Err("write: instructions FILE FILTER six|nine UPDATES [each]".into());
     };
     let axes = if axes == "six" { Axes::Six } else { Axes::Nine };
     let mut filter = Chosen::named(name, axes, &[])?.start()?;
@@ -24,8 +27,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     while samples.len() < SAMPLES && matches!(recording.read(&mut samples, SAMPLES)?, End::NotYet) {}
     let samples = samples.get(..updates.parse()?).ok_or("the recording has not so many samples in motion")?;
     let mut estimates = Vec::with_capacity(SAMPLES);
-    for sample in samples {
-        one(&mut *filter, sample, &mut estimates);
+    if each {
+        for sample in samples {
+            one(&mut *filter, sample, &mut estimates);
+        }
+    } else {
+        filter.run(samples, &mut estimates);
     }
     black_box(estimates);
     Ok(())

@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::calibrate::Calibrate;
 use crate::evaluate::Evaluator;
 use crate::filters::{Axes, Chosen, Setting};
 use crate::navigation::{self, NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
@@ -29,6 +30,11 @@ enum Command {
     Eval {
         #[command(subcommand)]
         what: Eval,
+    },
+    /// Finds the errors of sensors from a recording of them.
+    Calibrate {
+        #[command(subcommand)]
+        what: Calibrate,
     },
 }
 
@@ -147,6 +153,7 @@ struct AttitudeArguments {
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
     Navigation(Navigation),
+    Calibrate(Calibrate),
     /// Prints this.
     Print(String),
     Other(commands::Command),
@@ -176,6 +183,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
     let what = match Bb::try_parse_from(arguments)?.command {
         Command::Eval { what } => what,
         Command::Other(command) => return Ok(Job::Other(command)),
+        Command::Calibrate { what } => return Ok(Job::Calibrate(what)),
     };
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,

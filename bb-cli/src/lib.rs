@@ -14,6 +14,7 @@
 
 mod arguments;
 mod averages;
+mod calibrate;
 mod commands;
 mod error_plot;
 mod evaluate;
@@ -64,6 +65,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Job::Navigation(navigation) => eval_navigation(navigation),
         Job::Print(text) => say(text),
         Job::Other(command) => command.run(),
+        Job::Calibrate(calibrate) => calibrate.run().and_then(|(text, is_any)| Ok(say(&text)? && is_any)),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

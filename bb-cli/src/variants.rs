@@ -60,6 +60,13 @@ pub struct Offset(Field, u32);
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Field(f64);
 
+impl Field {
+    /// T.
+    pub(crate) fn tesla(self) -> f64 {
+        self.0
+    }
+}
+
 impl Variants {
     /// How many there are of one recording; 1 if nothing is changed, too.
     pub fn count(&self) -> u32 {

@@ -43,14 +43,14 @@ mod estimator;
 mod laws;
 
 pub use crate::params::ParamsError;
-pub use any::{About, AnyFilter, AnyParams, FilterParams};
+pub use any::{AnyFilter, AnyParams, FilterParams};
 pub use error::{ErrorStatistics, OrientationError};
 #[cfg(feature = "runtime")]
 pub use estimator::{
     Attitude, AttitudeOutput, AttitudeOutputs, AttitudeStatus, Frames, ImuAndMagnetometer, InertialInput,
     InertialInputs,
 };
-pub use filter::AttitudeFilter;
+pub use filter::{About, AttitudeFilter};
 pub use real::Real;
 pub use sample::{ImuSample, MAX_ANGULAR_VELOCITY, MAX_MAGNETIC_FIELD, MAX_SPECIFIC_FORCE, Quantity, SampleError};
 pub use state::MAX_GAP_S;

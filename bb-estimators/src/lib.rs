@@ -10,6 +10,7 @@
 //! | `Mekf<Marg>(…)`, `Vqf<Marg>(…)`, `Madgwick<Marg>(…)`, … in a sensor | the sensor's `Marg`: nine axes | `Orientation` of the sensor |
 //! | `Madgwick<ImuAndMagnetometer>(…)` on a link | `input imu`, driver, and `input magnetic_field`, of two sensors | `Orientation` of the link |
 //! | `Vqf<Marg, AttitudeOutputs>(…)`, … | as before | `output orientation`, and `output status`: bias, rest, disturbance |
+//! | `Calibrated<Marg>(…)` in a sensor | the sensor's `Imu` or `Marg` | the same, calibrated |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
 //! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry` and `input pose` | `Odometry` of the link |
@@ -18,11 +19,14 @@
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
+// What a sensor gives never panics; a test may.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 #[cfg(feature = "smoother")]
 extern crate alloc;
 
 pub mod attitude;
+pub mod calibration;
 pub mod navigation;
 pub mod params;
 #[cfg(feature = "simulation")]
@@ -35,6 +39,8 @@ use bb_core::payload::{Imu, Odometry, Orientation};
 pub use attitude::average::OrientationAverage;
 #[cfg(feature = "runtime")]
 pub use attitude::{Attitude, ImuAndMagnetometer};
+#[cfg(feature = "runtime")]
+pub use calibration::Calibrated;
 #[cfg(feature = "simulation")]
 pub use simulation::SimulatedImu;
 

@@ -13,6 +13,10 @@ struct Components;
 struct Attitude;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/calibrate.md")]
+struct Calibrate;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/navigation.md")]
 struct Navigation;
 

@@ -2,17 +2,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
+use super::{About, AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::{Parameter, Params, Value};
-
-/// What a filter is for: in its folder, for the command and the guides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct About {
-    /// When to take it.
-    pub when: &'static str,
-    /// How it works, in a sentence.
-    pub idea: &'static str,
-}
 
 /// Writes what there is one variant a filter of.
 macro_rules! any {

@@ -1,6 +1,6 @@
 //! How far an orientation misses the measured directions of gravity and field.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::Real;
 
@@ -51,4 +51,12 @@ pub(super) fn expected<T: Real>(world_from_body: &UnitQuaternion<T>) -> [Vector3
     let (xx, yy, zz, xy, xz, yz) = (x * x2, y * y2, z * z2, x * y2, x * z2, y * z2);
     let (wx, wy, wz) = (w * x2, w * y2, w * z2);
     [Vector3::new(T::ONE - yy - zz, xy - wz, xz + wy), Vector3::new(xz - wy, yz + wx, T::ONE - xx - yy)]
+}
+
+/// Up, as it is expected in the body frame, times the squared norm of `world_from_body`, which may have any.
+#[inline]
+pub(super) fn expected_up<T: Real>(world_from_body: &Quaternion<T>) -> Vector3<T> {
+    let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
+    let (x2, y2) = (x + x, y + y);
+    Vector3::new(x2 * z - w * y2, y2 * z + w * x2, (w * w + z * z) - (x * x + y * y))
 }

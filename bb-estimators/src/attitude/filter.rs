@@ -86,3 +86,12 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
     /// Forgets every sample; the parameters stay.
     fn reset(&mut self);
 }
+
+/// What a filter is for: in its folder, for the command and the guides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct About {
+    /// When to take it.
+    pub when: &'static str,
+    /// How it works, in a sentence.
+    pub idea: &'static str,
+}

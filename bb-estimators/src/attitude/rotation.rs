@@ -47,31 +47,28 @@ pub(super) fn turn<T: Real>(world_from_body: &UnitQuaternion<T>, rotation: &Vect
     )
 }
 
-/// [`turn`] by a rotation whose squared angle, `squared`, is below [`SERIES_SQUARED_ANGLE`]. It also brings the norm back to
-/// 1 from what rounding made of it before.
+/// [`turn`] by a rotation whose squared angle, `squared`, is below [`SERIES_SQUARED_ANGLE`].
 #[inline]
 pub(super) fn turn_little<T: Real>(
     world_from_body: &UnitQuaternion<T>,
     rotation: &Vector3<T>,
     squared: T,
 ) -> UnitQuaternion<T> {
-    let q = world_from_body;
-    let norm = T::of(1.5) - T::HALF * ((q.i * q.i + q.k * q.k) + (q.j * q.j + q.w * q.w));
-    let (cos, scale) = series_of_half_angle(squared);
-    let (cos, scale) = (cos * norm, scale * norm);
-    let (x, y, z) = (scale * rotation.x, scale * rotation.y, scale * rotation.z);
-    unit(
-        cos * q.w - q.i * x - q.j * y - q.k * z,
-        cos * q.i + q.w * x + q.j * z - q.k * y,
-        cos * q.j + q.w * y + q.k * x - q.i * z,
-        cos * q.k + q.w * z + q.i * y - q.j * x,
-    )
+    normalised(&turn_by_tangent(world_from_body, &(rotation * tangent_of_half(squared))))
+}
+
+/// The factor that makes the tangent of half of it of an angle, for its square, rad², below [`SERIES_SQUARED_ANGLE`]: the
+/// first term left out is below 1e-12.
+#[inline]
+pub(super) fn tangent_of_half<T: Real>(squared_angle: T) -> T {
+    let s = squared_angle;
+    T::HALF + s * (T::of(1.0 / 24.0) + s * (T::of(1.0 / 240.0) + s * T::of(17.0 / 40320.0)))
 }
 
 /// `world_from_body ⊗ (1, tangent)`: turns the body about a vector given in the body frame, by twice the arc tangent of
-/// its length. Cheaper than [`turn`], and the same but for the third order. The result is longer than 1.
+/// its length. Cheaper than [`turn`], and the same but for the third order. The result is longer than `world_from_body`.
 #[inline]
-pub(super) fn turn_by_tangent<T: Real>(world_from_body: &UnitQuaternion<T>, tangent: &Vector3<T>) -> Quaternion<T> {
+pub(super) fn turn_by_tangent<T: Real>(world_from_body: &Quaternion<T>, tangent: &Vector3<T>) -> Quaternion<T> {
     let (q, x, y, z) = (world_from_body, tangent.x, tangent.y, tangent.z);
     Quaternion::new(
         q.w - q.i * x - q.j * y - q.k * z,
@@ -177,6 +174,18 @@ mod tests {
             let exact = start * UnitQuaternion::from_scaled_axis(axis * (2.0 * tangent.atan()));
             let turned = normalised(&turn_by_tangent(&start, &(axis * tangent)));
             assert!(turned.angle_to(&exact) < 1e-14 && (turned.norm() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_little_turn_is_by_its_angle() {
+        let start = UnitQuaternion::<f64>::from_euler_angles(0.3, -1.1, 2.0);
+        let axis = Vector3::new(0.48, -0.6, 0.64);
+        for angle in [0.0, 1e-300, 1e-9, 1e-3, 0.05, 0.0999] {
+            let exact = start * UnitQuaternion::from_scaled_axis(axis * angle);
+            let turned = turn_little(&start, &(axis * angle), angle * angle);
+            assert!((turned.coords - exact.coords).norm() < 1e-13, "angle {angle}");
+            assert!((turned.norm() - 1.0).abs() < 1e-15);
         }
     }
 

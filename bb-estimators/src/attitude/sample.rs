@@ -140,6 +140,14 @@ impl<T: Real> ImuSample<T> {
         })
     }
 
+    /// Whether angular velocity and specific force are within what a sensor can give, and the force shows where up is.
+    #[inline(always)]
+    pub(super) fn is_usual(&self) -> bool {
+        let rate = self.angular_velocity.norm_squared();
+        let force = self.specific_force.norm_squared();
+        rate <= square(MAX_ANGULAR_VELOCITY) && force <= square(MAX_SPECIFIC_FORCE) && force > square(FREE_FALL)
+    }
+
     #[cold]
     fn check_components(&self, magnetometer: bool) -> Result<(), SampleError> {
         check(Quantity::AngularVelocity, &self.angular_velocity, MAX_ANGULAR_VELOCITY)?;

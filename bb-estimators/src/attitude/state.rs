@@ -42,6 +42,23 @@ impl<T: Real> AttitudeState<T> {
         Self { magnetometer, previous_ns: None, world_from_body: None, heading_known: false }
     }
 
+    /// The time since the previous sample, s, and the orientation then, for a sample without a field to use and with nothing
+    /// unusual: with six axes that is nearly every one. `None` for all others, which are left to [`admit`](Self::admit).
+    #[inline(always)]
+    pub(super) fn admit_usual(&mut self, sample: &ImuSample<T>) -> Option<(T, UnitQuaternion<T>)> {
+        if sample.magnetic_field.is_some() && self.magnetometer {
+            return None;
+        }
+        let world_from_body = self.world_from_body?;
+        let previous_ns = self.previous_ns.as_mut()?;
+        let dt_ns = sample.time_ns.checked_sub(*previous_ns)?;
+        if !(1..=MAX_GAP_NS).contains(&dt_ns) || !sample.is_usual() {
+            return None;
+        }
+        *previous_ns = sample.time_ns;
+        Some((T::seconds(dt_ns), world_from_body))
+    }
+
     /// Checks a sample. `None` if the state has started or restarted with it and there is nothing to step.
     #[inline]
     pub(super) fn admit(&mut self, sample: &ImuSample<T>) -> Result<Option<Step<T>>, SampleError> {

@@ -5,7 +5,7 @@ mod callgrind;
 mod pairs;
 mod peers;
 
-use bb_cli::{Averages, Chosen, Degrees, End, FILTERS, Recording, Running, Score, Setting, Topics};
+use bb_cli::{Averages, Chosen, Degrees, End, Recording, Running, Score, Setting, Topics};
 use bb_estimators::attitude::ImuSample;
 use pairs::{PAIRS, Pair};
 use std::error::Error;
@@ -93,9 +93,8 @@ fn start(pair: &Pair, side: Side) -> Result<Box<dyn Running>, Box<dyn Error>> {
 }
 
 fn ours(pair: &Pair) -> Result<Chosen, String> {
-    let filter = FILTERS.iter().find(|filter| filter.name == pair.ours).ok_or("no such filter")?;
     let settings = pair.settings.iter().map(|text| text.parse()).collect::<Result<Vec<Setting>, _>>()?;
-    Chosen::all(&[filter], pair.axes, &settings)?.pop().ok_or_else(|| "no such filter".into())
+    Chosen::named(pair.ours, pair.axes, &settings)
 }
 
 /// The samples from the first motion on.

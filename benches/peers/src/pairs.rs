@@ -80,6 +80,13 @@ pub const PAIRS: &[Pair] = &[
         axes: Axes::Nine,
         peer: peers::fusion_best,
     },
+    Pair {
+        name: "mahony/ahrs_mahony/six",
+        ours: "mahony",
+        settings: &["proportional_gain=0.18", "integral_gain=0.0015"],
+        axes: Axes::Six,
+        peer: || peers::mahony(0.18, 0.0015),
+    },
     Pair { name: "vqf/vqf_rs/nine", ours: "vqf", settings: &[], axes: Axes::Nine, peer: peers::vqf },
     Pair { name: "vqf/vqf_rs/six", ours: "vqf", settings: &[], axes: Axes::Six, peer: peers::vqf },
     Pair { name: "mekf/vqf_rs/nine", ours: "mekf", settings: &[], axes: Axes::Nine, peer: peers::vqf },

@@ -3,8 +3,9 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::MadgwickParams;
-use crate::attitude::directions::{horizontal_axis, misalignment};
-use crate::attitude::rotation::{turn, turn_by_tangent};
+use crate::attitude::directions::{expected_up, horizontal_axis, misalignment};
+use crate::attitude::rotation::{SERIES_SQUARED_ANGLE, tangent_of_half, turn, turn_by_tangent};
+use crate::attitude::sample::Directions;
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
@@ -31,21 +32,12 @@ impl<T: Real> AttitudeFilter<T> for MadgwickFilter<T> {
         &self.params
     }
 
+    #[inline]
     fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
-        let Some(step) = self.state.admit(sample)? else {
-            return Ok(());
-        };
-        // q̇ = ½ q ⊗ ω - β ∇F/‖∇F‖, and with ∇F = -2 q ⊗ e the second part is a turn at 2 β about e.
-        let predicted = turn(&step.world_from_body, &(sample.angular_velocity * step.dt_s));
-        let Some(up) = step.up else {
-            self.state.store(&predicted, step.field);
-            return Ok(());
-        };
-        let descent = descent(&predicted, &up, step.field.as_ref());
-        // The tangent of half the angle, to the fourth order.
-        let half = T::of(self.params.beta) * step.dt_s;
-        let tangent = half * (T::ONE + half * half * (T::of(1.0 / 3.0)));
-        self.state.store(&turn_by_tangent(&predicted, &(descent * tangent)), step.field);
+        match self.state.admit_usual(sample) {
+            Some((dt_s, before)) => self.step_to_gravity(&before, dt_s, sample),
+            None => return self.update_any(sample),
+        }
         Ok(())
     }
 
@@ -62,6 +54,70 @@ impl<T: Real> AttitudeFilter<T> for MadgwickFilter<T> {
     }
 }
 
+impl<T: Real> MadgwickFilter<T> {
+    #[inline]
+    fn update_any(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
+        if let Some(step) = self.state.admit(sample)? {
+            self.step(&step.world_from_body, step.dt_s, sample, step.up, step.field);
+        }
+        Ok(())
+    }
+
+    /// q̇ = ½ q ⊗ ω - β ∇F/‖∇F‖, and with ∇F = -2 q ⊗ e the second part is a turn at 2 β about e.
+    #[inline(always)]
+    fn step(
+        &mut self,
+        before: &UnitQuaternion<T>,
+        dt_s: T,
+        sample: &ImuSample<T>,
+        up: Option<Vector3<T>>,
+        field: Option<Vector3<T>>,
+    ) {
+        let predicted = turn(before, &(sample.angular_velocity * dt_s));
+        let Some(up) = up else {
+            self.state.store(&predicted, field);
+            return;
+        };
+        let descent = descent(&predicted, &up, field.as_ref());
+        self.state.store(&turn_by_tangent(&predicted, &(descent * self.tangent(dt_s))), field);
+    }
+
+    /// The same without a field, where neither the predicted quaternion nor the specific force has to have unit norm, since
+    /// the gradient's norm does not count.
+    #[inline(always)]
+    fn step_to_gravity(&mut self, before: &UnitQuaternion<T>, dt_s: T, sample: &ImuSample<T>) {
+        let squared_angle = sample.angular_velocity.norm_squared() * (dt_s * dt_s);
+        let rotation = sample.angular_velocity * (dt_s * tangent_of_half(squared_angle));
+        let predicted = turn_by_tangent(before, &rotation);
+        let force = &sample.specific_force;
+        let error = force.cross(&expected_up(&predicted));
+        let squared = error.norm_squared();
+        let least = T::above_rounding(NO_GRADIENT);
+        if squared_angle < T::of(SERIES_SQUARED_ANGLE) && squared > least * least * force.norm_squared() {
+            let tangent = self.tangent(dt_s) / squared.sqrt();
+            self.state.store(&turn_by_tangent(&predicted, &(error * tangent)), None);
+        } else {
+            self.step_far(dt_s, sample);
+        }
+    }
+
+    /// A turn that is not small, or an orientation that agrees exactly or not at all.
+    #[cold]
+    fn step_far(&mut self, dt_s: T, sample: &ImuSample<T>) {
+        if let (Some(before), Ok(Directions { up, .. })) = (self.state.world_from_body(), sample.directions(false))
+        {
+            self.step(&before, dt_s, sample, up, None);
+        }
+    }
+
+    /// The tangent of half the angle of a step, to the fourth order.
+    #[inline(always)]
+    fn tangent(&self, dt_s: T) -> T {
+        let half = T::of(self.params.beta) * dt_s;
+        half * (T::ONE + half * half * (T::of(1.0 / 3.0)))
+    }
+}
+
 /// The direction, a unit vector in the body frame, about which the body has to turn to descend fastest on
 ///
 /// `F(q) = ½ ‖Rᵀẑ - a‖² + ½ ‖Rᵀb - m‖²`,
@@ -74,7 +130,7 @@ impl<T: Real> AttitudeFilter<T> for MadgwickFilter<T> {
 ///
 /// Zero where there is nothing to gain, except at the top of F, upside down, which is left about the body's
 /// x or y axis.
-#[inline]
+#[inline(always)]
 fn descent<T: Real>(
     world_from_body: &UnitQuaternion<T>,
     up: &Vector3<T>,

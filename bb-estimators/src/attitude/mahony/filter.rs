@@ -6,7 +6,7 @@ use super::MahonyParams;
 use crate::attitude::directions::{horizontal_axis, misalignment};
 use crate::attitude::rotation::{SERIES_SQUARED_ANGLE, renormalised, turn, turn_little};
 use crate::attitude::sample::Directions;
-use crate::attitude::state::{AttitudeState, Step};
+use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
@@ -41,19 +41,14 @@ impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
         &self.params
     }
 
+    #[inline]
     fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
-        let Some(step) = self.state.admit(sample)? else {
-            self.error = Vector3::zeros();
-            return Ok(());
+        let Some((dt_s, before)) = self.state.admit_usual(sample) else {
+            return self.update_any(sample);
         };
-        // A path for each, so that neither carries what the other needs.
-        match (&step.up, &step.field) {
-            (Some(up), Some(field)) if self.state.heading_is_known() => {
-                self.correct(&step, sample, up, Some(field))
-            }
-            (Some(up), None) => self.correct(&step, sample, up, None),
-            _ => self.turn_far(sample, step.dt_s),
-        }
+        let force = &sample.specific_force;
+        let up = force * (T::ONE / force.norm_squared().sqrt());
+        self.correct(&before, dt_s, sample, &up, None);
         Ok(())
     }
 
@@ -79,18 +74,40 @@ impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
 }
 
 impl<T: Real> MahonyFilter<T> {
+    #[inline(never)]
+    fn update_any(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
+        let Some(step) = self.state.admit(sample)? else {
+            self.error = Vector3::zeros();
+            return Ok(());
+        };
+        match (&step.up, &step.field) {
+            (Some(up), Some(field)) if self.state.heading_is_known() => {
+                self.correct(&step.world_from_body, step.dt_s, sample, up, Some(field));
+            }
+            _ => self.turn_far(sample, step.dt_s),
+        }
+        Ok(())
+    }
+
     #[inline(always)]
-    fn correct(&mut self, step: &Step<T>, sample: &ImuSample<T>, up: &Vector3<T>, field: Option<&Vector3<T>>) {
+    fn correct(
+        &mut self,
+        before: &UnitQuaternion<T>,
+        dt_s: T,
+        sample: &ImuSample<T>,
+        up: &Vector3<T>,
+        field: Option<&Vector3<T>>,
+    ) {
         // Ṙ = R [Ω - b + k_P ω_mes]×: first the correction, which is known in the body frame of the sample before, then
         // the gyroscope; the two turns in one, to the third order of what is small (Baker, Campbell, Hausdorff).
-        let rotation = (sample.angular_velocity - self.bias) * step.dt_s;
-        let correction = self.error * self.gain(step.dt_s);
-        let both = rotation + correction + (correction * T::HALF).cross(&rotation);
+        let rotation = (sample.angular_velocity - self.bias) * dt_s;
+        let turning = self.error + self.error.cross(&rotation) * T::HALF;
+        let both = rotation + turning * self.gain(dt_s);
         let squared = both.norm_squared();
         if squared < T::of(SERIES_SQUARED_ANGLE) {
-            self.compare(turn_little(&step.world_from_body, &both, squared), step.dt_s, up, field);
+            self.compare(turn_little(before, &both, squared), dt_s, up, field);
         } else {
-            self.turn_far(sample, step.dt_s);
+            self.turn_far(sample, dt_s);
         }
     }
 

@@ -1,0 +1,83 @@
+//! What the field says about the heading.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::MekfFilter;
+use crate::attitude::Real;
+use crate::attitude::initial::heading_error;
+use crate::attitude::mekf::errors::ROTATION;
+use crate::attitude::mekf::field::{FieldReference, Verdict, in_plane};
+use crate::attitude::mekf::iron::{Adoption, FieldMeans};
+use crate::attitude::mekf::measurement::Heading;
+use crate::attitude::rotation::turn_heading;
+
+/// How long a disturbance of the field lasts for a body that moves, s.
+const FIELD_TIME_S: f64 = 0.5;
+
+/// A heading that is known from before is turned to the field beyond this difference, rad, and two standard deviations.
+const REOPENED: f64 = 0.15;
+
+/// A heading this far from an undisturbed field contradicts it, rad and standard deviations.
+const CONTRADICTION: f64 = 0.35;
+
+const CONTRADICTION_DEVIATIONS: f64 = 4.0;
+
+impl<T: Real> MekfFilter<T> {
+    /// What the field says about the heading, less the offset and the lag.
+    pub(super) fn heading(&mut self, dt: T, fields: &FieldMeans<T>) -> Heading<T> {
+        let FieldMeans { rotation, field, rate } = fields;
+        let field = field - rotation * self.iron.offset - rate * self.iron.lag();
+        let plane = in_plane(&field);
+        let squared = plane[0] * plane[0];
+        let reference = self.field.get_or_insert_with(|| FieldReference::new(plane));
+        let angle = field.x.atan2(field.y);
+        let deviation = self.errors.variance(ROTATION + 2).max(T::ZERO).sqrt();
+        let contradicts = angle.abs() > T::of(CONTRADICTION).max(T::of(CONTRADICTION_DEVIATIONS) * deviation);
+        let disturbance = match reference.observe(dt, plane, contradicts) {
+            Verdict::Disturbed(variance) => variance,
+            Verdict::HeadingUnknown => {
+                self.errors.doubt(ROTATION + 2, angle * angle);
+                T::ZERO
+            }
+        };
+        let horizontal = reference.horizontal();
+        let usual = T::of(self.params.field_disturbance * self.params.field_disturbance);
+        let least = T::of(0.25) * horizontal * horizontal * reference.squared_norm();
+        let rate = (rate.x * field.y - rate.y * field.x) / squared.max(least);
+        // What is not known of the offset, across the field, as a fraction of its norm.
+        let across = rotation.tr_mul(&Vector3::new(field.y, -field.x, T::ZERO)) / squared.max(least).sqrt();
+        let unknown = across.dot(&(self.iron.covariance() * across)) / reference.squared_norm();
+        let disturbed = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown) / (horizontal * horizontal);
+        Heading {
+            angle,
+            slope: reference.vertical() / horizontal,
+            variance: disturbed / dt + rate * rate * self.iron.lag_variance(),
+        }
+    }
+
+    /// Takes an offset that the field has shown, and the heading where the fields are all that shows it.
+    #[cold]
+    pub(super) fn adopt(&mut self, orientation: UnitQuaternion<T>, adoption: &Adoption<T>) -> UnitQuaternion<T> {
+        let Adoption { field, variance, is_heading, is_other_field, duration } = adoption;
+        // What the window says about the heading was with the offset before.
+        self.measurements.forget_heading();
+        if *is_heading || *is_other_field {
+            self.field = Some(FieldReference::seen(in_plane(field), *duration));
+        }
+        let Some(angle) = heading_error(&field.normalize()) else { return orientation };
+        let known = self.errors.variance(ROTATION + 2) + *variance;
+        let is_evident = angle.abs() > T::of(REOPENED) && angle * angle > T::of(4.0) * known;
+        if !is_heading && !is_evident {
+            return orientation;
+        }
+        let turned = turn_heading(&orientation, angle);
+        let rotation = turn_heading(&UnitQuaternion::identity(), angle);
+        let (sin, cos) = angle.sin_cos();
+        self.errors.turn_heading([cos, sin]);
+        self.errors.doubt(ROTATION + 2, if *is_heading { *variance } else { *variance + angle * angle });
+        self.vertical.turn(&rotation);
+        self.iron.turn(&rotation);
+        self.rotation = *turned.to_rotation_matrix().matrix();
+        turned
+    }
+}

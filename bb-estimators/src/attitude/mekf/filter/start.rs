@@ -1,0 +1,104 @@
+//! How the filter starts, and starts again: with a sample, after a gap, and where what it knows is contradicted.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::{INITIAL_HEADING, INITIAL_TILT, MekfFilter};
+use crate::attitude::initial::heading_error;
+use crate::attitude::mekf::errors::{BIAS, CALIBRATION, FORCE_LATENCY, ROTATION, VELOCITY};
+use crate::attitude::mekf::measurement::Measurements;
+use crate::attitude::mekf::rest::Rest;
+use crate::attitude::mekf::vertical::Vertical;
+use crate::attitude::mekf::window::Window;
+use crate::attitude::rotation::{turn_heading, turn_upright};
+use crate::attitude::{AttitudeFilter, ImuSample, Real};
+
+/// Standard deviation of the velocity at the start, m/s: a hand, a pedestrian.
+const INITIAL_VELOCITY: f64 = 1.0;
+
+impl<T: Real> MekfFilter<T> {
+    /// After a start from a sample, the first one or the one after a gap.
+    #[cold]
+    pub(super) fn restart(&mut self, sample: &ImuSample<T>) {
+        let Some(orientation) = self.state.world_from_body() else {
+            return;
+        };
+        let direction = sample.magnetic_field.filter(|_| self.params.magnetometer).map(|field| field.normalize());
+        self.heading_known = direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
+        self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
+        self.last_field = sample.magnetic_field.unwrap_or_default();
+        self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
+        self.vertical = Vertical::new(true);
+    }
+
+    /// Resets the orientation's errors; what is known of the sensors stays.
+    pub(super) fn begin(&mut self, orientation: &UnitQuaternion<T>, tilt_deviation: T, heading_deviation: T) {
+        // Without a magnetometer there is no heading to be wrong.
+        let heading_deviation = if self.params.magnetometer { heading_deviation } else { T::ZERO };
+        // All of a window or nothing: one horizontal axis alone would depend on where north is.
+        while self.measurements.take(&mut self.errors) {}
+        self.correct();
+        self.errors.mean[VELOCITY..VELOCITY + 2].fill(T::ZERO);
+        self.errors.forget::<2>(ROTATION, tilt_deviation * tilt_deviation);
+        self.errors.forget::<1>(ROTATION + 2, heading_deviation * heading_deviation);
+        self.errors.forget::<2>(VELOCITY, T::of(INITIAL_VELOCITY * INITIAL_VELOCITY));
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        self.window = Window::new();
+        self.measurements = Measurements::none();
+        self.vertical = Vertical::new(false);
+        self.iron.begin(true);
+    }
+
+    /// Doubts what is known of the sensors as at the start.
+    pub(super) fn forget_sensors(&mut self) {
+        let params = &self.params;
+        self.errors.forget::<3>(BIAS, T::of(params.initial_bias * params.initial_bias));
+        self.errors.forget::<9>(CALIBRATION, T::of(params.calibration_error * params.calibration_error));
+        let latency = T::of(params.accelerometer_latency);
+        self.errors.forget::<1>(FORCE_LATENCY, latency * latency);
+    }
+
+    /// The body accelerated at the start: levels it by the mean specific force since, known up to `deviation`, rad.
+    /// The heading is that of the last field; what is known of the sensors stays.
+    #[cold]
+    pub(super) fn level_start(
+        &mut self,
+        orientation: UnitQuaternion<T>,
+        up: &Vector3<T>,
+        deviation: T,
+    ) -> UnitQuaternion<T> {
+        let mut orientation = turn_upright(&orientation, up);
+        if self.params.magnetometer
+            && let Some(field) = self.last_field.try_normalize(T::ZERO)
+            && let Some(error) = heading_error(&(orientation * field))
+        {
+            orientation = turn_heading(&orientation, error);
+            self.field = None;
+        }
+        let vertical = self.vertical.clone();
+        self.begin(&orientation, deviation, T::of(INITIAL_HEADING));
+        self.vertical = vertical;
+        self.vertical.levelled();
+        orientation
+    }
+
+    /// The tilt contradicts the mean specific force: restarts it, and the heading with the next field.
+    #[cold]
+    pub(super) fn level(&mut self, orientation: UnitQuaternion<T>, up: &Vector3<T>) -> UnitQuaternion<T> {
+        let orientation = turn_upright(&orientation, up);
+        self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
+        self.forget_sensors();
+        self.heading_known = !self.params.magnetometer;
+        self.field = None;
+        orientation
+    }
+
+    /// Numbers beyond all reason came in, and no knowledge is left: restarts from the orientation.
+    #[cold]
+    pub(super) fn recover(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
+        let (state, heading_known) = (self.state.clone(), self.heading_known);
+        self.reset();
+        (self.state, self.heading_known) = (state, heading_known);
+        self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
+        orientation
+    }
+}

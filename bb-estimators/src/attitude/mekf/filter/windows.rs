@@ -1,0 +1,121 @@
+//! The end of a window: errors taken to now, corrected by, and what the window measures.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::MekfFilter;
+use crate::attitude::Real;
+use crate::attitude::mekf::errors::{BIAS, CALIBRATION, ProcessNoise, ROTATION};
+use crate::attitude::mekf::iron::FieldMeans;
+use crate::attitude::mekf::measurement::Measurements;
+use crate::attitude::mekf::vertical::Contradiction;
+use crate::attitude::mekf::window::Window;
+use crate::attitude::rotation::turn;
+
+/// How long a velocity lasts, s: the pseudo-measurement of zero has errors correlated over twice this time.
+const VELOCITY_TIME_S: f64 = 0.5;
+
+/// Time constant of the mean square acceleration, s.
+const ACCELERATION_TIME_CONSTANT_S: f64 = 2.0;
+
+/// Velocity at rest, in a mean over a second, m/s: the table trembles.
+const REST_VELOCITY: f64 = 0.05;
+
+/// Noise of the accelerometer, of its scale and of the lever arm's rotation, m/s/√s.
+const ACCELEROMETER_NOISE: f64 = 0.02;
+
+/// What the gyroscope's mean over a second at rest may differ from its bias by, rad/s: 0.07°/s.
+const REST_BIAS: f64 = 1.2e-3;
+
+/// A bias at rest this many standard deviations off has stepped.
+const BIAS_STEP: f64 = 4.0;
+
+/// The greatest difference to the bias that rest is believed for, rad/s: 2°/s, VQF's `biasClip`.
+const MAX_REST_BIAS: f64 = 0.035;
+
+impl<T: Real> MekfFilter<T> {
+    /// Ends a window: takes the errors to now, corrects by them, and looks at what the window says.
+    pub(super) fn close_window(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
+        while self.measurements.take(&mut self.errors) {}
+        let window = core::mem::replace(&mut self.window, Window::new());
+        let (params, dt) = (&self.params, window.duration);
+        let rotation_noise = T::of(params.gyroscope_noise * params.gyroscope_noise) * dt
+            + T::of(params.gyroscope_rate_noise * params.gyroscope_rate_noise) * window.squared_rate;
+        self.errors.propagate(
+            &window,
+            &ProcessNoise {
+                rotation: rotation_noise,
+                bias: T::of(params.bias_drift * params.bias_drift) * dt,
+                velocity: T::of(ACCELEROMETER_NOISE * ACCELEROMETER_NOISE) * dt,
+            },
+        );
+        if !self.errors.are_sane() {
+            return self.recover(orientation);
+        }
+
+        let correction = self.correct();
+        let orientation = correction * orientation;
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        let force = correction * window.force;
+        match self.vertical.add(dt, &correction, &force) {
+            Some(Contradiction::Start(up, deviation)) => return self.level_start(orientation, &up, deviation),
+            Some(Contradiction::Tilt(up)) => return self.level(orientation, &up),
+            None => {}
+        }
+        self.iron.correct(&correction);
+        let fields = window.mean_field(&correction);
+        let adoption = fields
+            .as_ref()
+            .and_then(|fields| self.iron.observe(dt, fields, self.rest.is_detected(), self.field.as_ref()));
+        self.measure(dt, fields.as_ref(), &force);
+        match adoption {
+            Some(adoption) => self.adopt(orientation, &adoption),
+            None => orientation,
+        }
+    }
+
+    /// Moves the mean errors into what they are errors of; returns the rotation.
+    pub(super) fn correct(&mut self) -> UnitQuaternion<T> {
+        let mean = &mut self.errors.mean;
+        let rotation = Vector3::new(mean[ROTATION], mean[ROTATION + 1], mean[ROTATION + 2]);
+        for i in 0..3 {
+            self.bias[i] += mean[BIAS + i];
+            for k in 0..3 {
+                self.calibration[(i, k)] += mean[CALIBRATION + 3 * i + k];
+            }
+        }
+        mean[..CALIBRATION + 9].fill(T::ZERO);
+        turn(&UnitQuaternion::identity(), &rotation)
+    }
+
+    /// Looks at what a window says, for the samples of the next one to take.
+    fn measure(&mut self, dt: T, fields: Option<&FieldMeans<T>>, force: &Vector3<T>) {
+        let resting = self.rest.is_detected();
+        let squared = (force.x * force.x + force.y * force.y) / (dt * dt);
+        let gain = (dt / T::of(ACCELERATION_TIME_CONSTANT_S)).min(T::ONE);
+        self.squared_acceleration += (squared - self.squared_acceleration) * gain;
+        let velocity_variance = if resting {
+            T::of(REST_VELOCITY * REST_VELOCITY) / dt
+        } else {
+            let growth = T::of(self.params.acceleration_time * self.params.acceleration_time);
+            let squared = T::of(self.params.velocity * self.params.velocity) + growth * self.squared_acceleration;
+            squared * T::TWO * T::of(VELOCITY_TIME_S) / dt
+        };
+        let bias = resting.then(|| self.rest_bias(dt));
+        let heading = fields.map(|fields| self.heading(dt, fields));
+        self.measurements = Measurements::new(velocity_variance, heading, bias);
+    }
+
+    /// What the gyroscope reads at rest is its bias.
+    fn rest_bias(&mut self, dt: T) -> (Vector3<T>, T) {
+        let difference = self.rest.rate - self.bias;
+        let squared = difference.norm_squared();
+        let expected = self.errors.variance(BIAS) + T::of(REST_BIAS * REST_BIAS);
+        if squared > T::of(BIAS_STEP * BIAS_STEP) * expected {
+            for axis in 0..3 {
+                self.errors.doubt(BIAS + axis, squared);
+            }
+        }
+        let most = (T::of(MAX_REST_BIAS * MAX_REST_BIAS) / squared.max(T::of(1e-12))).min(T::ONE).sqrt();
+        (difference * most, T::of(REST_BIAS * REST_BIAS) / dt)
+    }
+}

@@ -1,0 +1,57 @@
+//! Why there is no calibration.
+
+use core::error::Error;
+use core::fmt;
+
+/// Why the measurements give no calibration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CalibrationError {
+    /// Rest, or measurements, in too few directions.
+    TooFew {
+        /// What was counted, in the plural.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many it takes.
+        needed: usize,
+    },
+    /// A value is NaN or infinite.
+    NonFinite,
+    /// The directions do not determine a parameter.
+    NotObservable {
+        /// Which: `scale` or `offset`, about the axis that is known least.
+        parameter: &'static str,
+        /// How well it would be known: standard deviation, as a part of the norm.
+        deviation: f64,
+        /// The most that is accepted.
+        limit: f64,
+    },
+    /// The measurements do not lie on an ellipsoid.
+    NoEllipsoid,
+}
+
+impl fmt::Display for CalibrationError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooFew { what, found, needed } => {
+                write!(f, "there are {found} {what}, and it takes {needed}: turn the sensor to more directions")
+            }
+            Self::NonFinite => f.write_str("a measurement is not finite"),
+            Self::NotObservable { parameter, deviation, .. } if deviation.is_infinite() => {
+                write!(f, "the {parameter} is not determined: turn the sensor to directions that are further apart")
+            }
+            Self::NotObservable { parameter, deviation, limit } => write!(
+                f,
+                "the {parameter} would be known to {:.1} % only, and at most {:.1} % is accepted: turn the sensor to \
+                 directions that are further apart",
+                100.0 * deviation,
+                100.0 * limit
+            ),
+            Self::NoEllipsoid => {
+                f.write_str("the measurements do not lie on an ellipsoid: is the surrounding field disturbed?")
+            }
+        }
+    }
+}
+
+impl Error for CalibrationError {}

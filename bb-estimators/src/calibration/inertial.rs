@@ -1,0 +1,146 @@
+//! Gyroscope and accelerometer, from rests.
+
+use nalgebra::{ComplexField, Matrix3, Vector3};
+
+use super::ellipsoid::{self, Point, Shape};
+use super::{CalibrationError, Linear, Rest};
+
+/// The gyroscope's offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GyroscopeFit {
+    /// What it reads at rest, rad/s, body frame.
+    pub offset: Vector3<f64>,
+    /// Standard deviation of each axis: of the noise in the mean, and of what the rests differ by.
+    pub deviation: Vector3<f64>,
+    /// Root mean square over the rests of what they differ from the offset by, rad/s, a component.
+    pub residual: f64,
+}
+
+/// What of the accelerometer was fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// Offset and scale: with six to eight directions.
+    Scale,
+    /// Misalignment as well: with nine directions and more.
+    ScaleAndMisalignment,
+}
+
+/// The accelerometer's calibration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AccelerometerFit {
+    /// Offset, m/s², and scale with misalignment, upper triangular.
+    pub calibration: Linear,
+    /// What was fitted.
+    pub model: Model,
+    /// In how many directions the sensor rested, those within 15° taken as one.
+    pub directions: usize,
+    /// Standard deviations of the offset, m/s².
+    pub offset_deviation: Vector3<f64>,
+    /// Standard deviations of the matrix.
+    pub matrix_deviation: Matrix3<f64>,
+    /// Root mean square over the rests of what the calibrated norm misses gravity by, m/s².
+    pub residual: f64,
+    /// The same before the calibration.
+    pub residual_before: f64,
+}
+
+/// Cosine of the angle within which two directions are one.
+const ONE_DIRECTION: f64 = 0.966;
+
+/// What the mean of a rest is wrong by beyond its noise, m/s²: a bias that wanders, a table that trembles. 0.2 mg.
+const INSTABILITY: f64 = 2e-3;
+
+/// The least directions for offset and scale, and for misalignment too.
+const SIX: usize = 6;
+const NINE: usize = 9;
+
+/// The worst standard deviation of scale and of offset that is accepted, as a part of gravity.
+const LIMIT: f64 = 0.01;
+
+/// The gyroscope's offset: the mean over the rests, weighed by their length.
+///
+/// # Errors
+///
+/// There is no rest, or one that is not finite.
+pub fn gyroscope(rests: &[Rest]) -> Result<GyroscopeFit, CalibrationError> {
+    if rests.is_empty() {
+        return Err(CalibrationError::TooFew { what: "rests", found: 0, needed: 1 });
+    }
+    let samples: f64 = rests.iter().map(|rest| rest.samples as f64).sum();
+    let offset = rests.iter().map(|rest| rest.rate * rest.samples as f64).sum::<Vector3<f64>>() / samples;
+    let noise =
+        rests.iter().map(|rest| rest.rate_deviation * rest.rate_deviation * rest.samples as f64).sum::<f64>();
+    let squares = |rest: &Rest| (rest.rate - offset).component_mul(&(rest.rate - offset));
+    let spread = rests.iter().map(squares).sum::<Vector3<f64>>() / rests.len() as f64;
+    if !offset.iter().chain(spread.iter()).all(|value| value.is_finite()) {
+        return Err(CalibrationError::NonFinite);
+    }
+    // Of the mean over all samples, and over the rests as far as they differ by more.
+    let of_noise = noise / (samples * samples);
+    let others = rests.len().saturating_sub(1).max(1) as f64;
+    let deviation = spread.map(|variance| ComplexField::sqrt((variance / others).max(of_noise)));
+    Ok(GyroscopeFit { offset, deviation, residual: ComplexField::sqrt(spread.mean()) })
+}
+
+/// The accelerometer's offset and scale from rests in six directions, and its misalignment from nine: at rest it measures
+/// `gravity`, m/s², in whatever direction. Poses need not be exact.
+///
+/// # Errors
+///
+/// Too few directions, or ones that do not determine all; rests that are not finite, or that no calibration explains.
+pub fn accelerometer(rests: &[Rest], gravity: f64) -> Result<AccelerometerFit, CalibrationError> {
+    let is_finite =
+        |rest: &Rest| rest.force.iter().all(|value| value.is_finite()) && rest.force_deviation.is_finite();
+    if !(rests.iter().all(is_finite) && gravity.is_finite() && gravity > 0.0) {
+        return Err(CalibrationError::NonFinite);
+    }
+    let directions = directions(rests);
+    let (shape, model) = match directions {
+        ..SIX => {
+            return Err(CalibrationError::TooFew {
+                what: "directions in which it rested",
+                found: directions,
+                needed: SIX,
+            });
+        }
+        SIX..NINE => (Shape::Diagonal, Model::Scale),
+        _ => (Shape::Triangular, Model::ScaleAndMisalignment),
+    };
+    // Readings in g are as good a start as those in m/s².
+    let norm = rests.iter().map(|rest| rest.force.norm()).sum::<f64>() / rests.len() as f64;
+    let scale = gravity / norm.max(f64::MIN_POSITIVE);
+    let start = Linear { offset: Vector3::zeros(), matrix: Matrix3::identity() * scale };
+    let points = rests.iter().map(|rest| {
+        let noise = rest.force_deviation * scale;
+        let deviation = ComplexField::sqrt(noise * noise / rest.samples as f64 + INSTABILITY * INSTABILITY);
+        Point { measured: rest.force, deviation }
+    });
+    let fit = ellipsoid::fit(points, gravity, shape, start)?;
+    let checks = [
+        ("offset", fit.offset_deviation.max() * scale / gravity),
+        ("scale", fit.matrix_deviation.diagonal().max() / scale),
+    ];
+    for (parameter, deviation) in checks {
+        if deviation.is_nan() || deviation > LIMIT {
+            return Err(CalibrationError::NotObservable { parameter, deviation, limit: LIMIT });
+        }
+    }
+    let squares = |rest: &Rest| (rest.force.norm() - gravity) * (rest.force.norm() - gravity);
+    let before = rests.iter().map(squares).sum::<f64>() / rests.len() as f64;
+    Ok(AccelerometerFit {
+        calibration: fit.linear,
+        model,
+        directions,
+        offset_deviation: fit.offset_deviation,
+        matrix_deviation: fit.matrix_deviation,
+        residual: fit.residual,
+        residual_before: ComplexField::sqrt(before),
+    })
+}
+
+/// How many directions the rests have: each that is not near one before it.
+fn directions(rests: &[Rest]) -> usize {
+    let near = |a: &Rest, b: &Rest| a.force.dot(&b.force) > ONE_DIRECTION * a.force.norm() * b.force.norm();
+    let is_new = |index: &usize| !rests[..*index].iter().any(|before| near(before, &rests[*index]));
+    (0..rests.len()).filter(is_new).count()
+}
