@@ -1,6 +1,7 @@
 //! A bag: a file and the topics in it.
 
 mod imu;
+mod message;
 mod messages;
 mod samples;
 #[cfg(feature = "sqlite")]
@@ -9,7 +10,8 @@ mod summary;
 mod truth;
 
 pub use imu::{BagImu, BagImuOptions, IMU, MAGNETIC_FIELD};
-pub use messages::{BagMessage, BagMessages};
+pub use message::BagMessage;
+pub use messages::BagMessages;
 pub use samples::MargSamples;
 pub use truth::{Bool, MOVING, ODOMETRY, POSE, Truth};
 
@@ -17,7 +19,7 @@ use crate::definition::MessageDefinition;
 use crate::error::{RecordingError, RecordingErrorKind};
 use crate::file::{Channels, Record, Records, full_name};
 use crate::layout::PATH;
-use messages::Wanted;
+use message::Wanted;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -181,7 +183,7 @@ impl Bag {
             let mut new = Wanted { topic: first.name.clone(), expected: 0, count: 0 };
             for topic in same {
                 if only_cdr {
-                    messages::check(&topic.name, &topic.encoding).map_err(fail)?;
+                    message::check(&topic.name, &topic.encoding).map_err(fail)?;
                 }
                 new.expected = new.expected.saturating_add(topic.messages.unwrap_or(0));
             }

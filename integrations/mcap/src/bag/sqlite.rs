@@ -1,7 +1,7 @@
 //! Bags in SQLite, which `ros2 bag record` wrote by default until Iron: files that end in `.db3`.
 
 use super::Topic;
-use super::messages::{BagMessage, MessageKind, Wanted};
+use super::message::{BagMessage, MessageKind, Wanted};
 use crate::error::RecordingErrorKind;
 use crate::file::{LIMIT, full_name, unpack};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, params};

@@ -1,7 +1,7 @@
 //! The records of one chunk, which mcap unpacks.
 
 use super::fields::Fields;
-use super::records::{FRAME, LIMIT};
+use super::frame::{FRAME, LIMIT};
 use mcap::McapError;
 use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};

@@ -5,6 +5,7 @@
 //! skipped unread, and a chunk that breaks off is read as far as it goes. mcap unpacks the chunks.
 
 use super::chunk::{Chunk, ChunkFault};
+use super::frame::{FRAME, LIMIT, unframe};
 use super::record::Record;
 use crate::error::RecordingErrorKind;
 use mcap::MAGIC;
@@ -12,19 +13,6 @@ use mcap::records::op;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
-
-/// The longest record or unpacked chunk that is taken, in bytes. Recorders make chunks of about a megabyte; what
-/// exceeds this by far is damage, and would be believed to the point of filling the memory.
-pub(crate) const LIMIT: u64 = 256 << 20;
-
-/// Every record starts with its kind (one byte) and its length (eight bytes, little endian).
-pub(crate) const FRAME: usize = 1 + 8;
-
-/// Splits the frame of a record into kind and length.
-pub(crate) fn unframe(frame: [u8; FRAME]) -> (u8, u64) {
-    let [opcode, length @ ..] = frame;
-    (opcode, u64::from_le_bytes(length))
-}
 
 /// A file, and where in it the reading is.
 pub(crate) struct Records {

@@ -1,0 +1,14 @@
+//! The frame of a record.
+
+/// The longest record or unpacked chunk that is taken, in bytes. Recorders make chunks of about a megabyte; what
+/// exceeds this by far is damage, and would be believed to the point of filling the memory.
+pub(crate) const LIMIT: u64 = 256 << 20;
+
+/// Every record starts with its kind (one byte) and its length (eight bytes, little endian).
+pub(crate) const FRAME: usize = 1 + 8;
+
+/// Splits the frame of a record into kind and length.
+pub(crate) fn unframe(frame: [u8; FRAME]) -> (u8, u64) {
+    let [opcode, length @ ..] = frame;
+    (opcode, u64::from_le_bytes(length))
+}
