@@ -72,6 +72,7 @@ const SMOOTHED: [Smoothed; SETS - 1] = [
 ];
 
 #[test]
+#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
 fn the_smoother_errs_no_more_than_known() -> Result<(), Box<dyn Error>> {
     let Some(folder) = navigation()? else { return Ok(()) };
     let smoother = NAVIGATION_FILTERS.iter().find(|filter| filter.name == "smoother").ok_or("no such filter")?;
@@ -95,6 +96,7 @@ fn the_smoother_errs_no_more_than_known() -> Result<(), Box<dyn Error>> {
 
 /// With the noise that GTSAM was given, the smoother gives GTSAM's figures: they are the same problem.
 #[test]
+#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
 fn a_tuned_smoother_agrees_with_gtsam() -> Result<(), Box<dyn Error>> {
     let Some(folder) = navigation()? else { return Ok(()) };
     let single =

@@ -25,6 +25,7 @@ fn score<T: Real>(recording: &Recording, samples: &[ImuSample], row: &Row) -> Re
 }
 
 #[test]
+#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
 fn single_precision_is_as_accurate() -> Result<(), Box<dyn Error>> {
     let rows = known::rows()?;
     let Some(files) = broad()? else { return Ok(()) };
