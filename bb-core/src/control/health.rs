@@ -53,6 +53,10 @@ impl Control {
 
     fn process_report(&self, estimator: usize, report: Report) {
         let mut step = self.step();
+        if step.state.has_ended {
+            // An island that was still busy. The last report is being made, or has been.
+            return;
+        }
         step.line(Event::Report { estimator });
         match report {
             Report::Health(report) => step.health_changed(estimator, report),
@@ -146,6 +150,9 @@ impl Step<'_> {
     }
 
     fn lost(&mut self, estimator: usize, last_run: MonotonicTime) {
+        if self.state.has_ended {
+            return;
+        }
         let Some(health) = self.state.health.get_mut(estimator) else { return };
         if health.state == HealthState::Lost {
             return;
@@ -223,5 +230,63 @@ impl Step<'_> {
                 self.hardware_error(SafetyError { path, message });
             }
         }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::control::system::{Declared, Parts};
+    use crate::control::topics::SystemTopics;
+    use crate::declaration::EstimatorDeclaration;
+    use crate::lifecycle::Supervision;
+    use crate::message::Origin;
+    use crate::node::SharedNode;
+    use crate::time::Clock;
+    use crate::topology::Topology;
+
+    static NOTHING: Topology = Topology { links: &[], joints: &[] };
+    static ESTIMATORS: [EstimatorDeclaration; 1] = [EstimatorDeclaration::NONE];
+
+    #[test]
+    fn what_an_island_reports_after_the_end_counts_no_more() {
+        let declared = Declared {
+            topology: &NOTHING,
+            states: &[],
+            categories: &[],
+            commands: &[],
+            parameters: &[],
+            estimators: &ESTIMATORS,
+        };
+        let node = SharedNode::new(0, &ESTIMATORS[0]);
+        let control = Control::new(Parts {
+            declared,
+            mode: Mode::Virtual,
+            topics: Arc::new(SystemTopics::new(declared)),
+            clock: Clock::virtual_at(MonotonicTime::ZERO),
+            origin: Origin::default(),
+            commands: Vec::new(),
+            parameters: ParameterValues::new(vec![]),
+            supervision: Supervision::default(),
+            nodes: Box::new([node.clone()]),
+            journal: None,
+            telemetry: None,
+        });
+        let report = |to| {
+            let transition = HealthTransition {
+                estimator: "estimator/base/pose",
+                source: "sensor/base/imu",
+                from: HealthState::Healthy,
+                to,
+                reason: HealthReason::Diverged,
+                time: MonotonicTime::ZERO,
+            };
+            control.report(0, Report::Health(HealthReport { transition, epoch: 0 }));
+        };
+        report(HealthState::Degraded);
+        assert_eq!((node.statistics().transitions, node.health()), (1, HealthState::Degraded));
+        control.end(drop);
+        report(HealthState::Healthy);
+        assert_eq!((node.statistics().transitions, node.health()), (1, HealthState::Degraded));
     }
 }
