@@ -6,11 +6,17 @@ use super::MonotonicTime;
 ///
 /// A reading arrives after it was measured: later by the time that the transport takes, which varies by milliseconds on USB, a
 /// serial port or a loaded machine. The counter that many devices send along does not vary. This clock learns how far the
-/// counter is from the robot's clock, from the readings that were delayed least: the time that it gives is never after the
-/// arrival, and after the measurement by the smallest delay that has been seen, plus what the device's oscillator may have
-/// drifted since. (Readings that arrive at the same time are kept in order by a nanosecond each.)
+/// counter is from the robot's clock, from the readings that were delayed least. The time that it gives is never after the
+/// arrival, and after the measurement by the smallest delay of the last 10 to 20 s (and 16 readings), plus what the device's
+/// oscillator may have drifted since. (Readings that arrive at the same time are kept in order by a nanosecond each.)
 ///
-/// The counter may wrap, start again from zero, or stand still for a while; the clock then learns anew.
+/// - The counter may wrap, also several times between two readings: the arrivals tell how often, as long as delays differ by
+///   less than half a wrap.
+/// - A counter that jumps ahead of the arrivals by more than a second, or back, was started again: the clock learns anew at once.
+/// - One that has stood still is taken for a transport that is late, since both look the same, until no reading of 10 to 20 s
+///   has been on time.
+/// - A reading that is overtaken by another gets its own, earlier time.
+/// - Without a rate that is positive and finite, the time of a reading is its arrival.
 ///
 /// ```
 /// use bb_core::MonotonicTime;
@@ -25,11 +31,13 @@ use super::MonotonicTime;
 /// assert!(late.nanos_since(at(110)).abs() < 10_000);
 /// ```
 //
-// The lower envelope of arrival minus device time, tilted by the largest drift: one-way synchronisation as in L. Zhang, Z. Liu,
-// C. Xia, "Clock synchronization algorithms for network measurements", INFOCOM 2002, with one point kept instead of a hull.
+// The lower envelope of arrival minus device time over a sliding window, tilted by the largest drift: one-way synchronisation as
+// in L. Zhang, Z. Liu, C. Xia, "Clock synchronization algorithms for network measurements", INFOCOM 2002, with the minimum of
+// two windows kept instead of a hull.
 #[derive(Clone, Debug)]
 pub struct DeviceClock {
-    nanos_per_tick: f64,
+    /// None without a rate.
+    nanos_per_tick: Option<f64>,
     /// Ticks after which the counter is at zero again; none for 64 bits.
     modulus: Option<u64>,
     /// How much faster or slower the device may count, relative.
@@ -42,76 +50,118 @@ struct State {
     ticks: u64,
     /// Ticks since the first reading.
     elapsed: u64,
-    /// Of that first reading on the robot's clock, as far as is known: in nanoseconds.
-    origin: f64,
+    arrival: MonotonicTime,
     last: MonotonicTime,
-    window: Window,
+    /// The first reading's time on the robot's clock, as far as this window and the one before tell, in nanoseconds.
+    origin: [f64; 2],
+    window_start: MonotonicTime,
+    readings: u32,
 }
 
-/// The smallest delay within a while.
-#[derive(Clone, Copy, Debug)]
-struct Window {
-    start: MonotonicTime,
-    least: f64,
-}
+const WINDOW_NANOS: i64 = 10_000_000_000;
+const WINDOW_READINGS: u32 = 16;
 
-/// Readings that all seem to be delayed by more than `STALE` for as long as `WINDOW` are not: the counter stood still.
-const STALE_NANOS: f64 = 1e9;
-const WINDOW_NANOS: i64 = 2_000_000_000;
+/// By how much a reading may be ahead of its arrival, as the one before was late, or behind, as it was overtaken.
+const TOLERANCE_NANOS: f64 = 1e9;
+
+/// What a reading is to the one before.
+enum Step {
+    /// So many ticks later.
+    Later(u64),
+    /// So many ticks earlier.
+    Overtaken(u64),
+    /// The counter was started again.
+    Restarted,
+}
 
 impl DeviceClock {
     /// Of a counter of `bits` bits, 64 at most, that counts `ticks_per_second`.
     pub fn new(ticks_per_second: f64, bits: u32) -> Self {
         let modulus = 1_u64.checked_shl(bits).filter(|_| bits < 64);
-        Self { nanos_per_tick: 1e9 / ticks_per_second, modulus, drift: 2e-4, state: None }
+        let nanos_per_tick = Some(1e9 / ticks_per_second).filter(|nanos| nanos.is_finite() && *nanos > 0.0);
+        Self { nanos_per_tick, modulus, drift: 2e-4, state: None }
     }
 
     /// How far the rate of the device's oscillator may be off, relative; 2e-4 (200 ppm) unless set. Crystals are within
-    /// 1e-4, and internal oscillators of microcontrollers within 1e-2.
+    /// 1e-4, and internal oscillators of microcontrollers within 1e-2. From 0 to 0.5. A device that is off by more gets times
+    /// before the measurement, by the excess over 10 to 20 s.
     pub fn with_drift(mut self, drift: f64) -> Self {
-        self.drift = drift;
+        self.drift = if drift.is_nan() { self.drift } else { drift.clamp(0.0, 0.5) };
         self
     }
 
     /// When the counter was at `ticks`, of a reading that has arrived at `arrival`. Later readings get later times, as long as
     /// the counter goes on.
     pub fn time_of(&mut self, ticks: u64, arrival: MonotonicTime) -> MonotonicTime {
+        let Some(nanos_per_tick) = self.nanos_per_tick else { return arrival };
         let ticks = self.modulus.map_or(ticks, |modulus| ticks % modulus);
-        let next = self.state.and_then(|state| self.next(state, ticks, arrival)).unwrap_or(State {
-            ticks,
-            elapsed: 0,
-            origin: arrival.as_nanos() as f64,
-            last: arrival,
-            window: Window { start: arrival, least: 0.0 },
-        });
-        self.state.insert(next).last
+        let Some(before) = self.state else { return self.restart(ticks, arrival) };
+        match self.step(before, ticks, arrival, nanos_per_tick) {
+            Step::Later(step) => match before.elapsed.checked_add(step) {
+                Some(elapsed) => {
+                    let next = self.follow(before, ticks, elapsed, arrival, nanos_per_tick);
+                    self.state.insert(next).last
+                }
+                None => self.restart(ticks, arrival),
+            },
+            Step::Overtaken(step) => before.last.plus_nanos(-((step as f64 * nanos_per_tick) as i64)).min(arrival),
+            Step::Restarted => self.restart(ticks, arrival),
+        }
     }
 
-    /// None if the counter does not go on.
-    fn next(&self, before: State, ticks: u64, arrival: MonotonicTime) -> Option<State> {
-        let step = match self.modulus {
-            Some(modulus) => (ticks + modulus - before.ticks) % modulus,
-            None => ticks.checked_sub(before.ticks)?,
-        };
-        if self.modulus.is_some_and(|modulus| step > modulus / 2) {
-            return None;
-        }
-        let elapsed = before.elapsed.checked_add(step)?;
-        let device = elapsed as f64 * self.nanos_per_tick;
-        let arrived = arrival.as_nanos() as f64;
-        let mut origin = (before.origin + self.drift * step as f64 * self.nanos_per_tick).min(arrived - device);
-        let delay = arrived - device - origin;
-        let mut window = Window { least: before.window.least.min(delay), ..before.window };
-        if arrival.nanos_since(window.start) > WINDOW_NANOS {
-            if window.least > STALE_NANOS {
-                origin += window.least;
+    fn restart(&mut self, ticks: u64, arrival: MonotonicTime) -> MonotonicTime {
+        let origin = [arrival.as_nanos() as f64, f64::INFINITY];
+        let state = State { ticks, elapsed: 0, arrival, last: arrival, origin, window_start: arrival, readings: 1 };
+        self.state.insert(state).last
+    }
+
+    fn step(&self, before: State, ticks: u64, arrival: MonotonicTime, nanos_per_tick: f64) -> Step {
+        let passed = arrival.nanos_since(before.arrival) as f64;
+        let limit = passed * (1.0 + self.drift) + TOLERANCE_NANOS;
+        let later = ticks.wrapping_sub(before.ticks);
+        let (later, earlier) = match self.modulus {
+            Some(modulus) => {
+                let later = later % modulus;
+                // The number of wraps that agrees best with the arrivals.
+                let wraps = ((passed / nanos_per_tick - later as f64) / modulus as f64).round().max(0.0);
+                // Beyond any counter that is read: a conversion saturates.
+                (later.saturating_add((wraps as u64).saturating_mul(modulus)), modulus - later)
             }
-            window = Window { start: arrival, least: f64::INFINITY };
+            None => (later, later.wrapping_neg()),
+        };
+        if later as f64 * nanos_per_tick <= limit {
+            Step::Later(later)
+        } else if earlier as f64 * nanos_per_tick <= TOLERANCE_NANOS && passed.abs() <= TOLERANCE_NANOS {
+            Step::Overtaken(earlier)
+        } else {
+            Step::Restarted
         }
-        let time = MonotonicTime::from_nanos((origin + device) as i64).min(arrival);
+    }
+
+    fn follow(
+        &self,
+        before: State,
+        ticks: u64,
+        elapsed: u64,
+        arrival: MonotonicTime,
+        nanos_per_tick: f64,
+    ) -> State {
+        let device = elapsed as f64 * nanos_per_tick;
+        let passed = (elapsed - before.elapsed) as f64 * nanos_per_tick;
+        // A device that is slow by `d` counts `1 − d` of the time.
+        let tilt = passed * self.drift / (1.0 - self.drift);
+        let mut origin = before.origin.map(|origin| origin + tilt);
+        let (mut window_start, mut readings) = (before.window_start, before.readings + 1);
+        if arrival.nanos_since(window_start) > WINDOW_NANOS && before.readings >= WINDOW_READINGS {
+            origin = [f64::INFINITY, origin[0]];
+            window_start = arrival;
+            readings = 1;
+        }
+        origin[0] = origin[0].min(arrival.as_nanos() as f64 - device);
+        let time = MonotonicTime::from_nanos((origin[0].min(origin[1]) + device) as i64).min(arrival);
         // A first reading that was delayed is found out by the next ones; time does not go back for that.
-        let earliest = if step > 0 { before.last.plus_nanos(1) } else { before.last };
-        Some(State { ticks, elapsed, origin, last: time.max(earliest), window })
+        let earliest = if elapsed > before.elapsed { before.last.plus_nanos(1) } else { before.last };
+        State { ticks, elapsed, arrival, last: time.max(earliest), origin, window_start, readings }
     }
 }
 
@@ -133,13 +183,13 @@ mod tests {
             rate in -1e-4..1e-4_f64,
             start in any::<u64>(),
         ) {
-            let mut clock = DeviceClock::new(1e6, 16);
+            let mut clock = DeviceClock::new(1e6, 18);
             let (mut arrived, mut best) = (0, i64::MAX);
             let mut last = None;
             for (index, delay) in delays.iter().enumerate() {
                 // 100 Hz by the robot's clock, read by a counter of 1 MHz that runs at a rate of its own.
                 let measured = 10_000_000 * index as i64;
-                let ticks = start.wrapping_add((measured as f64 * (1.0 + rate) / 1e3) as u64) % (1 << 16);
+                let ticks = start.wrapping_add((measured as f64 * (1.0 + rate) / 1e3) as u64) % (1 << 18);
                 // A transport keeps the order.
                 arrived = (measured + least + delay).max(arrived);
                 let time = clock.time_of(ticks, at(arrived)).as_nanos();
@@ -174,14 +224,71 @@ mod tests {
         let mut read = |ticks: u64, ms: i64| clock.time_of(ticks, at(ms * 1_000_000)).as_nanos() / 1_000;
         assert_eq!(read(3_000_000, 100), 100_000);
         assert_eq!(read(3_010_000, 110), 110_000);
-        // Off and on.
+        // Off and on; and on again with a count above the one before.
         assert_eq!(read(0, 5_000), 5_000_000);
-        assert_eq!(read(10_000, 5_010), 5_010_000);
-        // It slept for 3 s and went on counting from where it was: believed to be delayed for 2 s, then no longer.
-        let times: Vec<i64> = (1..=400).map(|n| read(10_000 + n * 10_000, 8_010 + n as i64 * 10)).collect();
+        assert_eq!(read(90_000_000, 5_010), 5_010_000);
+        // It stood still for 0.9 s and went on counting from there: believed to be late for 20 s, then no longer.
+        let times: Vec<i64> = (1..=2_100).map(|n| read(90_000_000 + n * 10_000, 5_910 + n as i64 * 10)).collect();
         assert!((5_020_000..5_021_000).contains(&times[0]), "{}", times[0]);
-        assert_eq!(times[399], 12_010_000);
+        assert_eq!(times[2_099], 26_910_000);
         assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+
+    #[test]
+    fn readings_may_be_further_apart_than_a_wrap() {
+        // 16 bits of microseconds wrap after 65.5 ms.
+        for period_ms in [40, 70, 98, 1000, 60_000] {
+            let mut clock = DeviceClock::new(1e6, 16);
+            for n in 0..500 {
+                let ms = n * period_ms;
+                let time = clock.time_of(ms as u64 * 1000 % 65_536, at(ms * 1_000_000)).as_nanos();
+                assert!((time - ms * 1_000_000).abs() <= 2_000, "{period_ms} ms, reading {n}: {time}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_device_as_slow_as_it_may_be_gets_no_time_before_the_measurement() {
+        for drift in [2e-4, 1e-2] {
+            let mut clock = DeviceClock::new(1e6, 32).with_drift(drift);
+            for n in 0..100_000_i64 {
+                let measured = n * 100_000_000;
+                let ticks = (measured as f64 / 1e3 * (1.0 - drift)) as u64;
+                let time = clock.time_of(ticks & 0xffff_ffff, at(measured + 1_000_000)).as_nanos();
+                assert!(time >= measured + 1_000_000 - 3_000, "{drift}: {} ns early", measured - time);
+            }
+        }
+    }
+
+    #[test]
+    fn one_late_reading_of_a_slow_sensor_is_not_believed() {
+        let mut clock = DeviceClock::new(1e6, 32);
+        for n in 0..100_i64 {
+            let delay = if n == 50 { 1_500_000_000 } else { 5_000_000 };
+            let measured = n * 5_000_000_000;
+            let time = clock.time_of(measured as u64 / 1_000, at(measured + delay)).as_nanos();
+            // Drift of at most 200 ppm within 5 s.
+            assert!((measured + 5_000_000..=measured + 6_100_000).contains(&time), "{n}: {}", time - measured);
+        }
+    }
+
+    #[test]
+    fn a_reading_that_was_overtaken_gets_its_own_time() {
+        let mut clock = DeviceClock::new(1e6, 32);
+        let mut read = |ms: i64, arrival: i64| clock.time_of(ms as u64 * 1_000, at(arrival * 1_000_000)).as_nanos();
+        (0..100).for_each(|n| assert!(read(n * 10, n * 10 + 1) > 0));
+        let overtaken = read(970, 992);
+        assert!((overtaken - 971_000_000).abs() < 10_000, "{overtaken}");
+        let next = read(1000, 1008);
+        assert!((next - 1_001_000_000).abs() < 10_000, "{next}");
+    }
+
+    #[test]
+    fn without_a_rate_the_arrival_is_the_time() {
+        for rate in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let mut clock = DeviceClock::new(rate, 32);
+            assert_eq!([clock.time_of(1, at(5)), clock.time_of(2, at(9))], [at(5), at(9)]);
+        }
     }
 
     #[test]
