@@ -39,7 +39,7 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// A sample that the filter refuses (time that stands still, absurd values) leaves it as it was and emits nothing.
+/// A sample that the filter refuses (time that does not increase, absurd values) changes nothing and emits nothing.
 #[derive(Debug)]
 pub struct Attitude<F, I = Imu, O = Orientation> {
     filter: F,

@@ -39,7 +39,7 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
     ///
     /// # Errors
     ///
-    /// [`SampleError`] if a value is not finite or absurdly large, or if time stands still or runs back. The
+    /// [`SampleError`] if a value is not finite or absurdly large, or if time does not increase. The
     /// filter is then as it was before the call.
     fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError>;
 
@@ -67,7 +67,7 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
         None
     }
 
-    /// Whether the sensor lies still. `None` if the filter does not tell.
+    /// Whether the sensor is at rest. `None` if the filter does not tell.
     fn is_at_rest(&self) -> Option<bool> {
         None
     }

@@ -12,7 +12,7 @@
 //! * θ, the rotation error in the world: `R_true = exp(θ) R`,
 //! * b and E, the gyroscope's bias and its scale and misalignment: `ω_true = ω - b - E ω`,
 //! * v, the horizontal velocity,
-//! * the lag of the accelerometer behind the gyroscope.
+//! * the latency of the accelerometer relative to the gyroscope.
 //!
 //! # Prediction
 //!
@@ -23,15 +23,15 @@
 //! # Tilt
 //!
 //! `v̇ = R f - g`, hence `δv̇ = θ × R f`. A body does not get faster for ever: its velocity is zero up to a deviation
-//! that lasts for some time T, which a white error of variance `2 σ² T / dt` in windows of dt stands for. So
+//! that lasts for some time T; in windows of dt, a white error of variance `2 σ² T / dt` has the same effect. So
 //! accelerations count for as little as their mean does, where a low-pass of the specific force counts them all
 //! up to its time constant. The deviation grows with the accelerations of late; at rest it is next to nothing.
 //!
 //! # Heading
 //!
 //! The angle of the field to north, less the magnetometer's offset and lag, which least squares beside the filter give;
-//! see `iron.rs`. It sees θ about the vertical, and tilt by the field's slope. Its error is a disturbance that lasts as long as the body takes to pass it, and is as great as the
-//! field's norm and dip show; see `field.rs`.
+//! see `iron.rs`. It observes θ about the vertical, and tilt by the field's slope. Its error is a disturbance that lasts as
+//! long as the body takes to pass it, and is as large as the field's norm and dip show; see `field.rs`.
 //!
 //! # Work
 //!

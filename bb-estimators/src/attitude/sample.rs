@@ -73,7 +73,7 @@ pub enum SampleError {
         /// The greatest magnitude that is accepted.
         limit: f64,
     },
-    /// Time stands still or runs back.
+    /// The time stamp does not increase.
     TimeNotIncreasing {
         /// The stamp of the last sample that was taken.
         previous_ns: i64,

@@ -9,7 +9,7 @@
 //! The orientation is a product of three rotations: `world_from_body = heading ⊗ level ⊗ inertial_from_body`.
 //!
 //! * `inertial_from_body` integrates the gyroscope less its bias. Its frame drifts slowly, as a whole.
-//! * In that frame gravity stands still but for the drift, so that a strong low-pass of the specific force, as a
+//! * In that frame gravity is constant except for the drift, so that a strong low-pass of the specific force, as a
 //!   vector with its length, leaves gravity alone, whatever the rotation of the body. `level` turns it upright.
 //! * `heading`, an angle about the vertical, goes to that of the field by a first-order filter. A disturbed field
 //!   cannot tilt.

@@ -10,9 +10,9 @@ use super::{CalibrationError, Linear, Rest};
 pub struct GyroscopeFit {
     /// What it reads at rest, rad/s, body frame.
     pub offset: Vector3<f64>,
-    /// Standard deviation of each axis: of the noise in the mean, and of what the rests differ by.
+    /// Standard deviation of each axis: from the noise of the mean and the spread of the rests.
     pub deviation: Vector3<f64>,
-    /// Root mean square over the rests of what they differ from the offset by, rad/s, a component.
+    /// Root mean square difference between the rests and the offset, rad/s, per component.
     pub residual: f64,
 }
 
@@ -38,7 +38,7 @@ pub struct AccelerometerFit {
     pub offset_deviation: Vector3<f64>,
     /// Standard deviations of the matrix.
     pub matrix_deviation: Matrix3<f64>,
-    /// Root mean square over the rests of what the calibrated norm misses gravity by, m/s².
+    /// Root mean square difference between the calibrated norm and gravity over the rests, m/s².
     pub residual: f64,
     /// The same before the calibration.
     pub residual_before: f64,
@@ -47,7 +47,7 @@ pub struct AccelerometerFit {
 /// Cosine of the angle within which two directions are one.
 const ONE_DIRECTION: f64 = 0.966;
 
-/// What the mean of a rest is wrong by beyond its noise, m/s²: a bias that wanders, a table that trembles. 0.2 mg.
+/// Error of the mean of a rest beyond its noise, m/s²: a bias that wanders, a table that trembles. 0.2 mg.
 const INSTABILITY: f64 = 2e-3;
 
 /// The least directions for offset and scale, and for misalignment too.

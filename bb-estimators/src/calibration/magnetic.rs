@@ -16,7 +16,7 @@ pub struct MagnetometerFit {
     pub offset_deviation: Vector3<f64>,
     /// Standard deviations of the matrix.
     pub matrix_deviation: Matrix3<f64>,
-    /// Root mean square of what the calibrated norm misses `norm` by.
+    /// Root mean square difference between the calibrated norm and `norm`.
     pub residual: f64,
     /// The same before the calibration, about the mean norm.
     pub residual_before: f64,

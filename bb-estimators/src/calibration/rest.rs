@@ -145,7 +145,7 @@ impl Rests {
         if !is_finite || (self.window.count > 0.0 && sample.time_ns <= self.window.end_ns) {
             return None;
         }
-        // A gap in the samples is none of rest.
+        // A gap in the samples ends a rest.
         let gap = sample.time_ns.saturating_sub(self.window.end_ns) as f64 * 1e-9;
         if self.window.count > 0.0 && gap > self.params.window {
             self.window = Sums::default();

@@ -102,7 +102,7 @@ impl fmt::Display for SetError<'_> {
 
 impl Error for SetError<'_> {}
 
-/// A unit behind a number, with the blank before it.
+/// A unit after a number, with the space before it.
 struct Unit(&'static str);
 
 impl fmt::Display for Unit {

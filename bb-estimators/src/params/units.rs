@@ -7,7 +7,7 @@ use core::f64::consts::PI;
 pub(super) enum Quantity {
     /// A number, in the unit that was asked for.
     Number(f64),
-    /// A number with a unit of another dimension, or one that is none.
+    /// A number with an unknown unit, or one of another dimension.
     OtherUnit,
     /// No number.
     None,
@@ -19,7 +19,7 @@ pub(super) fn quantity(text: &str, unit: &str) -> Quantity {
     if let Ok(number) = text.parse() {
         return Quantity::Number(number);
     }
-    // The longest start that is a number: `5e-3 m`, but also `5e` where the `e` begins a unit that is none.
+    // The longest prefix that is a number: `5e-3` of `5e-3 m`, `5` of `5e m`.
     let starts = text.char_indices().map(|(index, _)| index).filter(|index| *index > 0).rev();
     let found = starts.into_iter().find_map(|end| {
         let (number, rest) = text.split_at(end);
@@ -45,7 +45,7 @@ struct Unit {
 }
 
 impl Unit {
-    /// `deg/s`, `m/s^2`; a `/` belongs to the symbol behind it alone.
+    /// `deg/s`, `m/s^2`; a `/` applies to the next symbol only.
     fn parse(text: &str) -> Option<Self> {
         let mut product = Self { dimension: [0; 6], factor: 1.0 };
         let mut sign = 1;

@@ -10,7 +10,7 @@ const AMBIGUOUS: f64 = 1e-12;
 
 /// The average of two orientations with weights, which need not add up to 1.
 ///
-/// The average lies on the shorter arc between the two. With equal weights it is halfway, as by slerp, and
+/// The average is on the shorter arc between the two. With equal weights it is halfway, as by slerp, and
 /// with one weight 0 it is the other orientation. Otherwise it is closer to the heavier one than slerp at
 /// `w₂/(w₁ + w₂)`, to which it tends for small angles. For inputs `world_from_body` the result is one, too.
 ///

@@ -40,7 +40,7 @@ impl Frames {
     /// As the robot declares them.
     ///
     /// # Errors
-    /// A moving joint lies between an input and the output.
+    /// There is a moving joint between an input and the output.
     pub fn of(context: &Context) -> Result<Self, Fault> {
         let turned = |rotation: nalgebra::UnitQuaternion<f64>| {
             (rotation.angle() > 0.0).then(|| rotation.to_rotation_matrix().into_inner())

@@ -21,7 +21,7 @@ pub trait AttitudeOutput: Outputs + Sized {
 pub struct AttitudeStatus {
     /// The gyroscope's bias, rad/s, in the frame of the orientation.
     pub gyroscope_bias: Option<Vector3<f64>>,
-    /// Whether the sensor lies still.
+    /// Whether the sensor is at rest.
     pub is_at_rest: Option<bool>,
     /// Whether the magnetic field is disturbed.
     pub is_magnetically_disturbed: Option<bool>,

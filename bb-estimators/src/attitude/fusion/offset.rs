@@ -1,4 +1,4 @@
-//! The gyroscope's offset, from when the sensor lies still.
+//! The gyroscope's offset, measured at rest.
 
 use core::f64::consts::PI;
 

@@ -147,7 +147,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     }
 
     /// As of the last window's end, at most 0.1 s ago. Without a magnetometer the heading's own variance is 0: it is
-    /// right by definition at the start, and what it drifts by since is in here.
+    /// right by definition at the start, and its drift since then is included.
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
         let mut in_world = self.errors.block(ROTATION);

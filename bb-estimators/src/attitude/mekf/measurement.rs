@@ -46,7 +46,7 @@ impl<T: Real> Measurements<T> {
         self.heading = None;
     }
 
-    /// Takes the next scalar; `false` if there is none left.
+    /// Takes the next scalar; `false` if none is left.
     pub(super) fn take(&mut self, errors: &mut Errors<T>) -> bool {
         let taken = self.next;
         match taken {

@@ -1,4 +1,4 @@
-//! Whether the sensor lies still, and what the gyroscope reads then.
+//! Detects rest, and averages what the gyroscope reads during it.
 
 use crate::attitude::Real;
 use nalgebra::Vector3;

@@ -15,7 +15,7 @@ pub(super) struct Bias<T> {
     /// (rad/s)², body frame.
     covariance: Matrix3<T>,
     /// The rotation from body to the level frame, and the horizontal part of the bias in that, both low-passed as
-    /// the specific force is: what the inclination has been corrected by stems from as long ago.
+    /// the specific force is: the corrections of the inclination are delayed by the same time.
     rotations: LowPass<T, 9>,
     biases: LowPass<T, 2>,
 }

@@ -75,7 +75,7 @@ impl<T: Real, const N: usize> LowPass<T, N> {
             *mean += (*input - *mean) / samples;
         }
         self.elapsed_s += dt_s;
-        // Of the first sample it is not known what time it stands for: the same as this one.
+        // The first sample has no period of its own; it gets that of this one.
         self.samples = (self.elapsed_s + dt_s < time_constant_s).then_some(samples);
         self.low
     }

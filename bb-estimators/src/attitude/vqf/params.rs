@@ -8,14 +8,14 @@ params! {
     pub struct VqfParams {
         /// How soon the inclination follows the low-passed specific force.
         ///
-        /// Small: accelerations tilt the estimate. Large: what the gyroscope drifts by tilts it for long.
+        /// Small: accelerations tilt the estimate. Large: gyroscope drift tilts it for a long time.
         ///
         /// Source: the paper's `tauAcc`.
         tilt_time_constant: f64 = 3.0, in 1e-3..=1e6, unit "s";
         /// How soon the heading follows an undisturbed field.
         ///
-        /// Small: magnetic disturbances turn the estimate. Large: what the gyroscope drifts by turns it for long, and a
-        /// wrong start takes that long to go.
+        /// Small: magnetic disturbances turn the estimate. Large: gyroscope drift turns it for a long time, and so does
+        /// a wrong start.
         ///
         /// Source: the paper's `tauMag`.
         heading_time_constant: f64 = 9.0, in 1e-3..=1e6, unit "s";
@@ -132,13 +132,14 @@ params! {
         new_field_time: f64 = 20.0, in 0.0..=1e6, unit "s";
         /// As `new_field_time`, for the first reference.
         ///
-        /// Small: a disturbance becomes the reference. Large: for long there is none, and all fields count as disturbed.
+        /// Small: a disturbance becomes the reference. Large: there is no reference for a long time, and all fields count as
+        /// disturbed.
         ///
         /// Source: the paper's `magNewFirstTime`.
         first_field_time: f64 = 5.0, in 0.0..=1e6, unit "s";
         /// The least low-passed angular velocity that counts as motion for a new reference.
         ///
-        /// Small: the field of a sensor that lies beside a magnet becomes the reference. Large: only fast motion counts.
+        /// Small: the field of a sensor beside a magnet becomes the reference. Large: only fast motion counts.
         ///
         /// Source: the paper's `magNewMinGyr`.
         new_field_angular_velocity: f64 = 20.0 * DEGREE, in 0.0..=1000.0, shown "20°/s", unit "rad/s";
