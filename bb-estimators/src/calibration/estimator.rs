@@ -91,7 +91,7 @@ impl Calibrate for Marg {
 
 impl<I> Estimator for Calibrated<I>
 where
-    I: Calibrate + for<'a> Inputs<View<'a> = Stamped<I>>,
+    I: Calibrate + for<'a> Inputs<View<'a> = &'a Stamped<I>>,
 {
     type Options = CalibratedOptions;
     type Input = I;
