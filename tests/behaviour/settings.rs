@@ -96,6 +96,16 @@ robot! {
     }
 }
 
+robot! {
+    robot Narrow;
+    parameters {
+        gain: f64 = 0.5, range: 0.0..=2.0;
+    }
+    link base {
+        sensor source: External<Number>() { estimator every: Every(port = "/dev/null", gain = param::gain); }
+    }
+}
+
 fn options(builder: Builder<Set>) -> EveryOptions {
     let simulation = builder.simulate().expect("the robot starts");
     simulation.call(set::sensor::base::source::every, Which).expect("it answers")
@@ -192,8 +202,12 @@ fn values_out_of_their_range_are_refused_where_they_are_written() {
     };
     assert_eq!(
         wrong("[sensor.base.source.every]\ntimeout = \"1 s\"\nmaximum_range = \"31 m\""),
-        "rover.toml:3:17: sensor/base/source/every/maximum_range: option `maximum_range` is 31 m, but must be in \
-         0.1..=30.0 m"
+        "rover.toml:3:17: sensor/base/source/every/maximum_range: must be in 0.1..=30.0 m, found `31`"
+    );
+    assert_eq!(
+        wrong("[sensor.base.source.every]\nretries = 9\nmaximum_range = \"0 m\"\nretires = 1").lines().count(),
+        3,
+        "all ranges and names at once"
     );
     assert_eq!(
         wrong("sensor.base.source.every.timeout = \"-1 s\""),
@@ -216,6 +230,29 @@ fn values_out_of_their_range_are_refused_where_they_are_written() {
     assert_eq!(wrong("sensor = 3"), "rover.toml:1:1: sensor: there is no such setting; `--list` shows all");
     let missing = Set::builder().load_settings("no such file.toml").expect_err("it is not there");
     assert!(missing.to_string().starts_with("no such file.toml: cannot be read: "), "{missing}");
+}
+
+#[test]
+fn a_parameter_is_held_against_the_options_that_are_bound_to_it() {
+    let mut builder = Narrow::builder();
+    let error = builder.set("param/gain", "1.5").expect_err("the option takes less").to_string();
+    assert_eq!(
+        error,
+        "param/gain: sensor/base/source/every/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
+    );
+}
+
+/// Tables of which every key is a comment, as `--list` writes them, say nothing.
+#[test]
+fn empty_tables_of_known_paths_are_taken() {
+    let mut builder = Set::builder();
+    let before = builder.settings().to_string();
+    let empty = "[sensor]\n[sensor.base.source.every]\n# port = 1\n[param]\n[param.tuning]\n";
+    builder.set_from_toml("rover.toml", empty).expect("nothing is set");
+    assert_eq!(builder.settings().to_string(), before);
+    let mut narrow = Narrow::builder();
+    let listed = narrow.settings().to_string();
+    narrow.set_from_toml("list", &listed).expect("what is listed is read");
 }
 
 #[test]

@@ -56,8 +56,12 @@ impl<R: Robot> Builder<R> {
     /// As [`Builder::load_settings`].
     #[cfg(feature = "toml")]
     pub fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
-        let is_setting = assign::names(self);
-        let assignments = file::read(name, text, |path| is_setting.contains(path))?;
+        let names = assign::names(self);
+        let assignments = file::read(name, text, |path| match path {
+            path if names.contains(path) => file::Known::Setting,
+            path if assign::is_beginning(&names, path) => file::Known::Table,
+            _ => file::Known::No,
+        })?;
         assign::assign(self, &assignments)
     }
 

@@ -5,6 +5,7 @@ use super::assign::{Assignment, assign};
 use super::error::Place;
 use crate::run::{Builder, Robot};
 use std::ffi::OsString;
+use std::io::{ErrorKind, Write};
 
 impl<R: Robot> Builder<R> {
     /// Takes the settings out of a program's arguments and returns the others:
@@ -50,10 +51,10 @@ impl<R: Robot> Builder<R> {
         }
         assign(self, &read.settings)?;
         if read.lists {
-            print!("{}", self.settings());
+            say(&self.settings().to_string())?;
         }
         if read.shows_schema {
-            println!("{}", R::settings_schema());
+            say(&format!("{}\n", R::settings_schema()))?;
         }
         Ok((!read.lists && !read.shows_schema).then_some(read.others))
     }
@@ -121,6 +122,14 @@ fn setting(argument: OsString) -> Result<Assignment, SettingsError> {
         return Err(wrong(format!("expected `--set PATH=VALUE`, found `--set {argument}`")));
     };
     Ok(Assignment::from_text(Place::Argument, path.trim(), value))
+}
+
+/// A reader that has read enough (`| head`) is no mistake.
+fn say(text: &str) -> Result<(), SettingsError> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(wrong(format!("cannot print: {error}"))),
+        _ => Ok(()),
+    }
 }
 
 fn wrong(message: impl Into<String>) -> SettingsError {

@@ -59,6 +59,13 @@ pub(super) fn names<R: Robot>(builder: &mut Builder<R>) -> BTreeSet<String> {
     options.chain(R::PARAMETERS.iter().map(|declared| declared.path.to_owned())).collect()
 }
 
+/// Whether a setting is below this path.
+#[cfg(feature = "toml")]
+pub(super) fn is_beginning(names: &BTreeSet<String>, path: &str) -> bool {
+    let start = format!("{path}/");
+    names.range(start.clone()..).next().is_some_and(|name| name.starts_with(&start))
+}
+
 /// Sets all of `assignments`; none, if one of them is wrong.
 pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignment]) -> Result<(), SettingsError> {
     let names = names(builder);
@@ -79,7 +86,7 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
                     Some(options) => {
                         let (copy, by) = changed.entry(component).or_insert_with(|| (options.copy(), Vec::new()));
                         by.push(assignment);
-                        option(copy.as_mut(), field, assignment)
+                        option(copy.as_mut(), field, assignment).and_then(|()| in_range(copy.as_mut(), field))
                     }
                     None => Err("has no options".to_owned()),
                 },
@@ -91,13 +98,17 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
         }
     }
     if problems.is_empty() {
-        for (copy, by) in changed.values() {
-            if let Err(message) = copy.validate() {
-                // The message names the option, as `#[derive(Options)]` writes it.
-                let is_named =
-                    |assignment: &&&Assignment| message.contains(&format!("`{}`", last(&assignment.path)));
-                let culprit = by.iter().find(is_named).or(by.first());
-                problems.extend(culprit.map(|assignment| assignment.problem(message)));
+        for (component, (copy, by)) in &changed {
+            // Ranges were looked at above: this is what the options say of each other, or what code has set.
+            if let Err(message) = copy.validate()
+                && let Some(first) = by.first()
+            {
+                problems.push(SettingProblem::new(first.place.clone(), paths[*component], message));
+            }
+        }
+        for assignment in assignments {
+            if let Some(message) = refused_by_bound::<R>(builder, &paths, &parameters, &assignment.path) {
+                problems.push(assignment.problem(message));
             }
         }
     }
@@ -133,6 +144,42 @@ pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'stati
     let is_bound = |bound: &&(usize, &str, usize)| bound.0 == component && bound.1 == last(path);
     let (_, _, parameter) = R::BOUND_OPTIONS.iter().find(is_bound)?;
     Some(R::PARAMETERS.get(*parameter)?.path)
+}
+
+/// Why an option that is bound to this parameter would refuse its new value.
+fn refused_by_bound<R: Robot>(
+    builder: &mut Builder<R>,
+    paths: &[&str],
+    parameters: &[ParameterValue],
+    path: &str,
+) -> Option<String> {
+    let number = R::PARAMETERS.iter().position(|declared| declared.path == path)?;
+    let value = match parameters.get(number)? {
+        ParameterValue::Float(value) => *value,
+        ParameterValue::Integer(value) => *value as f64,
+        ParameterValue::Bool(_) | ParameterValue::Text(_) => return None,
+    };
+    R::BOUND_OPTIONS.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
+        let fields = fields::<R>(&mut builder.options, *component).iter();
+        let range = fields.filter(|field| field.name == *name).find_map(|field| field.range)?;
+        let path = paths.get(*component)?;
+        let is_inside = (range.start..=range.end).contains(&value);
+        (!is_inside)
+            .then(|| format!("{path}/{name} is bound to it, and must be in {}, found `{value}`", range.text))
+    })
+}
+
+/// Whether an option that is a number keeps its range.
+fn in_range(options: &mut dyn AnyOptions, field: usize) -> Result<(), String> {
+    let Some(declared) = options.fields().get(field).copied() else { return Ok(()) };
+    let number = options.setting(field).and_then(|setting| setting.number());
+    match (declared.range, number) {
+        (Some(range), Some(number)) if !(range.start..=range.end).contains(&number) => {
+            let unit = declared.dimension.map_or(String::new(), |dimension| unit::si_unit(dimension.exponents));
+            Err(format!("must be in {} {unit}", range.text).trim_end().to_owned() + &format!(", found `{number}`"))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn last(path: &str) -> &str {

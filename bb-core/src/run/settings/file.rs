@@ -8,15 +8,26 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// All settings of a file, in the order of their lines. A table is either on the way to a setting or, where `is_setting`
-/// says so, the value of one.
+/// What a path is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Known {
+    /// A setting: a table there is its value.
+    Setting,
+    /// The beginning of one: a table there holds settings.
+    Table,
+    /// Neither.
+    No,
+}
+
+/// All settings of a file, in the order of their lines.
 pub(super) fn read(
     name: &str,
     text: &str,
-    is_setting: impl Fn(&str) -> bool,
+    is_known: impl Fn(&str) -> Known,
 ) -> Result<Vec<Assignment>, SettingsError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (table, errors) = DeTable::parse_recoverable(text);
-    let mut reader = Reader { name: name.into(), text, is_setting, found: Vec::new(), problems: Vec::new() };
+    let mut reader = Reader { name: name.into(), text, is_known, found: Vec::new(), problems: Vec::new() };
     for error in errors {
         let place = reader.place(error.span().map_or(0, |span| span.start));
         reader.problems.push(SettingProblem::new(place, "", error.message()));
@@ -43,13 +54,13 @@ pub(super) fn read(
 struct Reader<'a, F> {
     name: Arc<str>,
     text: &'a str,
-    is_setting: F,
+    is_known: F,
     /// With the place in the text.
     found: Vec<(usize, Assignment)>,
     problems: Vec<SettingProblem>,
 }
 
-impl<F: Fn(&str) -> bool> Reader<'_, F> {
+impl<F: Fn(&str) -> Known> Reader<'_, F> {
     fn table(&mut self, above: &str, table: &DeTable<'_>) {
         for (key, value) in table {
             let path = match above {
@@ -57,7 +68,10 @@ impl<F: Fn(&str) -> bool> Reader<'_, F> {
                 above => format!("{above}/{}", key.get_ref()),
             };
             match value.get_ref() {
-                DeValue::Table(inner) if !(self.is_setting)(&path) && !inner.is_empty() => self.table(&path, inner),
+                DeValue::Table(inner) if (self.is_known)(&path) == Known::Table => self.table(&path, inner),
+                DeValue::Table(inner) if (self.is_known)(&path) == Known::No && !inner.is_empty() => {
+                    self.table(&path, inner)
+                }
                 _ => self.setting(path, key.span().start, value),
             }
         }
@@ -65,7 +79,7 @@ impl<F: Fn(&str) -> bool> Reader<'_, F> {
 
     fn setting(&mut self, path: String, start: usize, value: &Spanned<DeValue<'_>>) {
         // What is wrong with a name is shown at the name, and what is wrong with a value at the value.
-        let start = if (self.is_setting)(&path) { value.span().start } else { start };
+        let start = if (self.is_known)(&path) == Known::Setting { value.span().start } else { start };
         let place = self.place(start);
         let json = json(value.get_ref());
         self.found.push((start, Assignment { place, path, json, text: None }));
@@ -86,7 +100,8 @@ fn json(value: &DeValue<'_>) -> String {
         DeValue::String(text) => to_json(&text.to_string()),
         DeValue::Integer(integer) => match i128::from_str_radix(integer.as_str(), integer.radix()) {
             Ok(integer) => integer.to_string(),
-            Err(_) => integer.to_string(),
+            // Larger than any: as a text it is refused with what was expected.
+            Err(_) => to_json(&integer.to_string()),
         },
         DeValue::Float(float) => to_json(&float.as_str().parse().unwrap_or(f64::NAN)),
         DeValue::Boolean(value) => value.to_string(),
