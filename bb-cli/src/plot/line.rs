@@ -68,12 +68,15 @@ fn extreme(points: &[Point], is_before: impl Fn(f64, f64) -> bool) -> usize {
     values.reduce(|best, next| if is_before(next.1, best.1) { next } else { best }).map_or(0, |(index, _)| index)
 }
 
-/// Runs of finite values, interrupted between a value and the next where `is_break` says so.
+/// What is larger is no measurement, and the difference of two such is not finite: the marks of an axis would never end.
+const LARGEST: f64 = 1e300;
+
+/// Runs of values that can be drawn, interrupted between a value and the next where `is_break` says so.
 fn runs(points: &[Point], is_break: impl Fn(f64, f64) -> bool) -> Vec<Vec<(f64, f64)>> {
     let mut runs: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut run: Vec<(f64, f64)> = Vec::new();
     for (time, value) in points {
-        let value = value.filter(|value| value.is_finite());
+        let value = value.filter(|value| value.abs() <= LARGEST);
         let is_next = match (run.last(), value) {
             (Some((_, last)), Some(value)) => !is_break(*last, value),
             (_, value) => value.is_some(),
@@ -100,6 +103,12 @@ mod tests {
         assert_eq!(line.runs, [vec![(0.0, 1.0)], vec![(3.0, 2.0), (4.0, 300.0)]]);
         let angle = Line::degrees("", (0, 0, 0), 1, &points);
         assert_eq!(angle.runs, [vec![(0.0, 1.0)], vec![(3.0, 2.0)], vec![(4.0, 300.0)]]);
+    }
+
+    #[test]
+    fn what_no_axis_can_hold_is_left_out() {
+        let points = [(0.0, Some(9e307)), (1.0, Some(-9e307)), (2.0, Some(1.0)), (3.0, Some(f64::INFINITY))];
+        assert_eq!(Line::new("", (0, 0, 0), 1, &points).runs, [vec![(2.0, 1.0)]]);
     }
 
     /// One sample among a hundred thousand, whichever way it goes, is seen.
