@@ -325,7 +325,11 @@ fn the_macros_have_no_circle_of_modules() {
                     next.extend(imports.get(module).into_iter().flatten());
                 }
             }
-            assert!(!reached.contains(start), "crate/{}: {start} imports itself, through {reached:?}", folder.join("/"));
+            assert!(
+                !reached.contains(start),
+                "crate/{}: {start} imports itself, through {reached:?}",
+                folder.join("/")
+            );
         }
     }
 }

@@ -126,6 +126,14 @@ pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Re
     if is_type && let Ok(other) = input.fork().call(Ident::parse_any) {
         return Err(syn::Error::new(place, format!("the name comes first, then the type: `{other}: {name}`")));
     }
+    if input.peek(syn::token::Paren) {
+        let message = if is_type {
+            format!("a name comes first, then the type, as in `name: {name}()`")
+        } else {
+            format!("expected `:` and {what} after `{name}`; parentheses follow the type, and hold its options")
+        };
+        return Err(syn::Error::new(place, message));
+    }
     let colon: syn::Result<Token![:]> = input.parse();
     colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }

@@ -3,8 +3,8 @@
 use super::Notes;
 use super::block::{braced, items_of, semicolon};
 use proc_macro2::Ident;
-use syn::Attribute;
 use syn::parse::ParseStream;
+use syn::{Attribute, Token};
 
 /// An operational state of the robot, beside those that every robot has.
 #[derive(Clone, Debug)]
@@ -21,6 +21,9 @@ impl State {
         let mut states = Vec::new();
         items_of(&body, "expected the name of a state, as in `degraded;`", notes, |head, input, notes| {
             let name = head.name(input)?;
+            if input.peek(Token![:]) || input.peek(Token![=]) {
+                return Err(input.error("a state is a name alone, as in `degraded;`; a command leads to it"));
+            }
             semicolon(input, &format!("the state `{name}`"), notes);
             states.push(Self { attributes: head.attributes, name });
             Ok(())
