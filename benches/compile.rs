@@ -1,5 +1,6 @@
-//! What a robot costs to compile: seconds of `cargo check` for 10, 100 and 1,000 sensors with an estimator each, per
-//! declaration, after everything it depends on is built; and beside it a crate without a robot.
+//! What a robot costs to compile: seconds of `cargo check` for 10, 100 and 1,000 sensors with an estimator each, and of
+//! `cargo build` for 10 and 100, per declaration, after everything it depends on is built; and beside it a crate without a
+//! robot. A build without optimization writes the code of every estimator, which a check does not.
 //!
 //! `cargo bench -p bb-benches --bench compile` prints one JSON object a line. It makes a crate in the target folder.
 
@@ -16,19 +17,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = workspace.join("target/bench-compile");
     std::fs::create_dir_all(folder.join("src"))?;
     std::fs::write(folder.join("Cargo.toml"), manifest(&workspace))?;
-    let empty_s = check(&folder, "")?;
-    for estimators in [10, 100, 1000] {
-        let seconds = check(&folder, &robot(estimators))?;
-        // A sensor and an estimator.
-        let per_declaration_ms = (seconds - empty_s) * 1e3 / (2 * estimators) as f64;
-        let line = serde_json::json!({
-            "name": "cargo_check",
-            "estimators": estimators,
-            "seconds": seconds,
-            "beside_seconds": empty_s,
-            "ms_per_declaration": per_declaration_ms,
-        });
-        println!("{line}");
+    for (command, sizes) in [("check", &[10, 100, 1000][..]), ("build", &[10, 100])] {
+        let empty_s = compile(&folder, command, "")?;
+        for estimators in sizes {
+            let seconds = compile(&folder, command, &robot(*estimators))?;
+            // A sensor and an estimator.
+            let per_declaration_ms = (seconds - empty_s) * 1e3 / (2 * estimators) as f64;
+            let line = serde_json::json!({
+                "name": format!("cargo_{command}"),
+                "estimators": estimators,
+                "seconds": seconds,
+                "beside_seconds": empty_s,
+                "ms_per_declaration": per_declaration_ms,
+            });
+            println!("{line}");
+        }
     }
     Ok(())
 }
@@ -55,8 +58,8 @@ fn robot(estimators: usize) -> String {
     source + "} }\n"
 }
 
-/// The median time of a check of the crate with this source.
-fn check(folder: &Path, source: &str) -> Result<f64, Box<dyn Error>> {
+/// The median time of a `cargo check` or `cargo build` of the crate with this source.
+fn compile(folder: &Path, command: &str, source: &str) -> Result<f64, Box<dyn Error>> {
     let file: PathBuf = folder.join("src/lib.rs");
     let mut seconds = Vec::new();
     // The first builds what it depends on.
@@ -65,7 +68,7 @@ fn check(folder: &Path, source: &str) -> Result<f64, Box<dyn Error>> {
         let started = Instant::now();
         // Without what an earlier run has left.
         let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["check", "--quiet"]).env("CARGO_INCREMENTAL", "0").current_dir(folder);
+        cargo.args([command, "--quiet"]).env("CARGO_INCREMENTAL", "0").current_dir(folder);
         let status = cargo.status()?;
         if !status.success() {
             return Err("the robot does not compile".into());
