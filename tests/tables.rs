@@ -19,7 +19,7 @@ fn filters() -> impl Iterator<Item = FilterParams> {
     FilterParams::ALL.iter().map(|default| default())
 }
 
-/// What stands between `<!-- NAME -->` and `<!-- end -->` is `table`, or becomes it.
+/// What is between `<!-- NAME -->` and `<!-- end -->` is `table`, or becomes it.
 fn hold(file: &str, name: &str, table: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{file}: {error}"));

@@ -1,4 +1,4 @@
-//! What the guides say that commands print, they print. `UPDATE_GUIDES=1` writes it anew.
+//! What the guides say that commands print, they print. `UPDATE_GUIDES=1` rewrites it.
 
 mod common;
 

@@ -107,7 +107,7 @@ pub trait Params {
     ///
     /// # Errors
     ///
-    /// A name that is none, with the nearest one; a text that is no value of the parameter; a value outside its range.
+    /// An unknown name, with the nearest one; a text that is no value of the parameter; a value outside its range.
     /// Nothing is changed then.
     fn set<'t>(&mut self, name: &'t str, text: &'t str) -> Result<(), SetError<'t>> {
         let parameters = self.parameters();

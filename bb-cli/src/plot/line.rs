@@ -5,7 +5,7 @@ use super::palette::Colour;
 /// More points than pixels show nothing more.
 const MOST_POINTS: usize = 4000;
 
-/// Seconds and a value; none where there is none.
+/// Seconds and a value; `None` where the value is missing.
 pub type Point = (f64, Option<f64>);
 
 /// Values over time.

@@ -8,7 +8,7 @@ use crate::component::{Estimator, Inputs, OptionField, Options, Outputs, TakenAt
 use crate::stub::UNKNOWN_INDEX;
 
 /// That an estimator has its required options among those `given`, its inputs among those `declared`, and an output declared
-/// if it has several. `declared` is none for a nested estimator, whose one input is its sensor's.
+/// if it has several. `declared` is `None` for a nested estimator, whose one input is its sensor's.
 ///
 /// All that is missing is one message, since all of it is missing at one word.
 #[track_caller]
@@ -67,7 +67,7 @@ const fn missing_input<I: Inputs>(estimator: &str, declared: &[&str]) -> Option<
             found = found || equal(declared[number], field.name);
             number += 1;
         }
-        // A misspelt name is reported as such, and may stand for this one.
+        // A misspelt name is reported as such, and may be meant to be this one.
         if !found && !misspelt {
             let text = Text::new("").name(estimator).push(" needs an input ").name(field.name);
             return Some(text.push("; declare it: `input ").push(field.name).push(": …;`"));

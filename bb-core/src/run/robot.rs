@@ -79,7 +79,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// The actuator of that number; none beyond the last.
     #[doc(hidden)]
     fn actuator(wiring: &Self::Wiring, actuator: usize) -> Option<&dyn AnyActuator>;
-    /// Publishes a recorded message of a sensor or a service; false if the publisher of that number is none, or has another
+    /// Publishes a recorded message of a sensor or a service; false if that publisher is an estimator's, or has another
     /// payload.
     #[doc(hidden)]
     fn feed(wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, now: MonotonicTime) -> bool;

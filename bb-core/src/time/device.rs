@@ -12,7 +12,7 @@ use super::MonotonicTime;
 ///
 /// - The counter may wrap, also several times between two readings: the arrivals tell how often, as long as delays differ by
 ///   less than half a wrap.
-/// - A counter that jumps ahead of the arrivals by more than a second, or back, was started again: the clock learns anew at once.
+/// - A counter that jumps ahead of the arrivals by more than a second, or back, was started again: the clock starts over at once.
 /// - One that has stood still is taken for a transport that is late, since both look the same, until no reading of 10 to 20 s
 ///   has been on time.
 /// - A reading that is overtaken by another gets its own, earlier time.

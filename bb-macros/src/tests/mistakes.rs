@@ -1,7 +1,7 @@
 //! What people write who know another language or another tool: each robot with the errors that it gets.
 //!
 //! `mistakes/mistakes.txt` is the table: after `===` what the mistake is, then the robot, and after `---` its errors as
-//! `line:column text | message`. `UPDATE_MISTAKES=1 cargo test -p bb-macros mistakes` writes the errors anew; read them as the
+//! `line:column text | message`. `UPDATE_MISTAKES=1 cargo test -p bb-macros mistakes` rewrites the errors; read them as the
 //! one who made the mistake would.
 
 use super::{diagnostics, tokens};

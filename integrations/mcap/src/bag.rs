@@ -53,7 +53,7 @@ impl Topic {
     ///
     /// # Errors
     ///
-    /// If the file has no definition of the type that can be read, and it is none of those that are known; in words.
+    /// If the file has no definition of the type that can be read, and the type is not a known one; in words.
     pub fn message_definition(&self) -> Result<MessageDefinition, String> {
         MessageDefinition::of(&self.schema, &self.definition_encoding, &self.definition)
     }

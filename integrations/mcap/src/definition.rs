@@ -70,7 +70,7 @@ impl MessageDefinition {
     /// Of a type in the full spelling, by what the file has of it: a text, and how that is written. Both may be empty.
     ///
     /// # Errors
-    /// The text cannot be read, and the type is none of those that are known; in words.
+    /// The text cannot be read, and the type is not a known one; in words.
     pub(crate) fn of(name: &str, encoding: &str, text: &str) -> Result<Self, String> {
         if encoding == Schema::ENCODING && !text.trim().is_empty() {
             return Self::parse(name, text);

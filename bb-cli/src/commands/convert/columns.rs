@@ -28,7 +28,7 @@ const WHATS: [(&str, What); 7] = [
 ];
 
 impl What {
-    /// What `*` stands for, one for each column.
+    /// What `*` matches, one for each column.
     fn components(self) -> &'static [&'static str] {
         match self {
             Self::Time | Self::Moving => &[""],

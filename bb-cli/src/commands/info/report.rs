@@ -82,7 +82,7 @@ fn one(content: &Content) -> String {
     };
     let mut rows = vec![["topic", "type", "messages", "rate", "longest period"].map(String::from)];
     for topic in &content.topics {
-        // A rate of two messages is none.
+        // Two messages give no rate.
         let periods = topic.periods.as_ref().filter(|_| topic.messages > 2);
         rows.push([
             topic.name.clone(),

@@ -77,7 +77,7 @@ impl FieldShape {
         Self { name, shape }
     }
 
-    /// What stands in a struct without fields.
+    /// What a struct without fields holds.
     #[doc(hidden)]
     pub const NOTHING: Self = Self { name: NOTHING, shape: Shape::U8 };
 }

@@ -25,7 +25,7 @@ struct Table {
 struct Line {
     name: &'static str,
     doc: &'static str,
-    /// In TOML; else why there is none.
+    /// In TOML; else why it cannot be written.
     value: Result<String, String>,
     /// Range and unit.
     limits: String,

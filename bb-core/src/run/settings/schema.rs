@@ -35,7 +35,7 @@ enum Node {
     Table(BTreeMap<String, Node>),
 }
 
-/// Puts a schema in its place. Where a setting is already at a table's, the whole path is a name, as in the file.
+/// Puts a schema in its place. What is below a setting of its own, an estimator named like an option of its sensor, is left out.
 fn insert(root: &mut BTreeMap<String, Node>, path: &str, schema: String) {
     let mut table = &mut *root;
     let mut names: Vec<&str> = path.split('/').collect();

@@ -25,7 +25,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.add_robust(stream, id, factor, Kernel::Squares)
     }
 
-    /// [`add`](Self::add) with a robust kernel: how much it weighs is decided anew as the window learns.
+    /// [`add`](Self::add) with a robust kernel: how much it weighs is decided again as the window learns.
     ///
     /// # Errors
     ///

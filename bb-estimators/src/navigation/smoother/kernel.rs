@@ -20,7 +20,7 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// The weight for a squared norm of the whitened residual, from 0 to 1. A parameter that is not positive is none.
+    /// The weight for a squared norm of the whitened residual, from 0 to 1. With a parameter that is not positive, the weight is 1.
     pub fn weight(self, squared: f64) -> f64 {
         let ratio = |parameter: f64| squared / (parameter * parameter);
         match self {

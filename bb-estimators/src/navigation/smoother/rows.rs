@@ -35,7 +35,7 @@ impl<const N: usize> Rows<N> {
     /// # Errors
     ///
     /// [`Refusal::Noise`] if the covariance is not positive definite, [`Refusal::NonFinite`] and [`Refusal::OutOfRange`] for
-    /// numbers that are none or absurd.
+    /// numbers that are NaN or absurdly large.
     pub fn set<const D: usize>(
         &mut self,
         residual: [f64; D],

@@ -38,7 +38,7 @@ fn short(name: &str) -> String {
 
 /// The field that a line declares; none if it is empty or a comment or declares a constant.
 fn field(line: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<Option<Field>, String> {
-    // A `#` in a constant of text is none of a comment; but constants are not kept.
+    // A `#` in a text constant starts no comment; but constants are not kept.
     let line = line.split('#').next().unwrap_or("").trim();
     let Some((kind, rest)) = line.split_once(char::is_whitespace) else {
         return if line.is_empty() { Ok(None) } else { Err(format!("a name is missing in `{line}`")) };

@@ -17,7 +17,7 @@ fn fields(definition: &MessageDefinition, index: usize, reader: &mut Reader<'_>)
     });
     let fields = fields.collect::<Result<Vec<_>, _>>()?;
     if fields.is_empty() {
-        // What stands in a struct without fields.
+        // What a struct without fields holds.
         reader.raw(1, "a byte")?;
     }
     Ok(Value::Message(fields))

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::super::kernel::Kernel;
 
-/// The cost that each kernel stands for, of a distance `x`.
+/// The cost of each kernel at a distance `x`.
 fn cost(kernel: Kernel, x: f64) -> f64 {
     match kernel {
         Kernel::Squares => 0.5 * x * x,
