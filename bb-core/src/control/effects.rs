@@ -18,7 +18,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[derive(Default)]
 pub(super) struct Effects {
     pub(super) wakers: Wakers,
-    pub(super) logs: Vec<Log>,
+    logs: Vec<Log>,
+    /// Lines for loggers wait, and no thread writes them yet.
+    has_lines: bool,
     /// Commands to begin.
     pub(super) begun: Vec<Arc<Task>>,
     /// Commands whose futures are to be dropped.
@@ -43,6 +45,9 @@ pub(super) enum Log {
     Refused(Refusal),
 }
 
+/// A disarm callback, its number among those that run, and the path of its component.
+type NumberedHook = (usize, &'static str, DisarmHook);
+
 /// Lines for loggers, in order. Loggers are user code, and may block: one thread of the pool at a time is in them.
 #[derive(Default)]
 pub(super) struct Reporter(Mutex<Reports>);
@@ -57,15 +62,43 @@ struct Reports {
 /// Lines that wait for a logger that blocks; beyond, new ones are counted and dropped.
 const MOST_LOGS: usize = 4096;
 
+impl Reporter {
+    /// True if nobody is writing lines: the caller has them written.
+    fn queue(&self, logs: impl IntoIterator<Item = Log>) -> bool {
+        let mut reports = lock(&self.0);
+        for log in logs {
+            if reports.logs.len() < MOST_LOGS {
+                reports.logs.push_back(log);
+            } else {
+                reports.skipped += 1;
+            }
+        }
+        !std::mem::replace(&mut reports.is_running, true)
+    }
+}
+
 impl Effects {
     pub(super) fn log(&mut self, log: Log) {
         self.logs.push(log);
     }
 
+    /// Queues the lines for loggers. Called under the lock of the control state, so that they keep the order of the entries.
+    pub(super) fn queue_lines(&mut self, control: &Control) {
+        // The pool's threads are no part of a model.
+        if !self.logs.is_empty() && !cfg!(loom) {
+            self.has_lines = control.0.reporter.queue(self.logs.drain(..));
+        }
+    }
+
     pub(super) fn run(self, control: &Control) {
-        let Self { wakers, logs, begun, cancelled, results, hooks, dropped, forgotten, wired } = self;
+        let Self { wakers, logs: _, has_lines, begun, cancelled, results, hooks, dropped, forgotten, wired } = self;
         // First of all: hardware.
-        if let Some((generation, hooks)) = hooks {
+        let without_thread = hooks.map(|(generation, hooks)| (generation, control.start_hooks(generation, hooks)));
+        // Before anything that may block: until then, no other thread writes lines.
+        if has_lines {
+            control.start_writing_logs();
+        }
+        if let Some((generation, hooks)) = without_thread {
             control.run_hooks(generation, hooks);
         }
         let mut wakers_of_results = Vec::new();
@@ -89,9 +122,6 @@ impl Effects {
             Mode::Real => {}
             Mode::Virtual | Mode::Replay => code(),
         }
-        if !logs.is_empty() {
-            control.report(logs);
-        }
         for task in cancelled {
             task.cancel();
         }
@@ -110,14 +140,15 @@ impl Control {
         }
     }
 
-    /// Runs disarm callbacks, each on a thread of its own; on virtual time they wait for [`Self::run_pending_hooks`].
-    fn run_hooks(&self, generation: u64, all: Vec<(&'static str, DisarmHook)>) {
+    /// Runs disarm callbacks, each on a thread of its own, and returns those for which there is none; on virtual time all wait
+    /// for [`Self::run_pending_hooks`].
+    fn start_hooks(&self, generation: u64, all: Vec<(&'static str, DisarmHook)>) -> Vec<NumberedHook> {
         if self.0.mode != Mode::Real {
             lock(&self.0.pending_hooks).push_back(all);
-            return;
+            return Vec::new();
         }
         if all.is_empty() {
-            return self.hook_returned(generation, None, None);
+            self.hook_returned(generation, None, None);
         }
         let mut left = Vec::new();
         for (index, (path, hook)) in all.into_iter().enumerate() {
@@ -127,8 +158,12 @@ impl Control {
                 left.push((index, path, kept));
             }
         }
-        // Without a thread of its own, a callback runs here: hardware that is made safe late is better than never.
-        for (index, path, hook) in left {
+        left
+    }
+
+    /// Runs disarm callbacks here: hardware that is made safe late is better than never.
+    fn run_hooks(&self, generation: u64, hooks: Vec<NumberedHook>) {
+        for (index, path, hook) in hooks {
             self.run_hook(generation, index, path, hook);
         }
     }
@@ -161,23 +196,7 @@ impl Control {
         faults.newest.push_back(fault);
     }
 
-    fn report(&self, logs: Vec<Log>) {
-        // The pool's threads are no part of a model.
-        if cfg!(loom) {
-            return;
-        }
-        let mut reports = lock(&self.0.reporter.0);
-        for log in logs {
-            if reports.logs.len() < MOST_LOGS {
-                reports.logs.push_back(log);
-            } else {
-                reports.skipped += 1;
-            }
-        }
-        if std::mem::replace(&mut reports.is_running, true) {
-            return;
-        }
-        drop(reports);
+    fn start_writing_logs(&self) {
         match self.0.mode {
             Mode::Real => {
                 let control = self.clone();

@@ -98,7 +98,8 @@ impl Step<'_> {
     /// Releases the lock and has done what follows.
     pub(super) fn finish(mut self) {
         self.publish_machine(None);
-        let Self { control, state, effects, .. } = self;
+        let Self { control, state, mut effects, .. } = self;
+        effects.queue_lines(control);
         drop(state);
         control.0.changed.notify_all();
         effects.run(control);
