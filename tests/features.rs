@@ -65,7 +65,7 @@ fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
     if std::env::var_os("BB_TEST_SIGNAL").is_some() {
         let mut running = Stoppable::builder().start()?;
         running.stop_on_signals()?;
-        running.arm();
+        running.arm().expect("it may be armed");
         println!("it is {}", running.safety());
         running.wait();
         println!("it is {}", running.stop().safety);

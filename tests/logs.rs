@@ -55,9 +55,48 @@ robot! {
     }
 }
 
+/// A robot without disarm callbacks.
+pub mod harmless {
+    use super::Number;
+    use bb_core::prelude::*;
+
+    robot! {
+        /// Has nothing that must be made safe.
+        pub robot Harmless;
+        link base { sensor number: External<Number>(); }
+    }
+}
+
 /// Keeps each event in a line.
 #[derive(Clone, Default)]
 struct Lines(Arc<Mutex<Vec<String>>>);
+
+/// The subscriber of the process, which one test has at a time.
+static LINES: Mutex<Option<Lines>> = Mutex::new(None);
+
+/// Calls `test` with what is logged meanwhile.
+fn logged(
+    test: impl FnOnce() -> Result<(), Box<dyn std::error::Error>>,
+) -> Result<Vec<String>, Box<dyn std::error::Error>> {
+    let mut of_process = LINES.lock().unwrap_or_else(PoisonError::into_inner);
+    let lines = match &*of_process {
+        Some(lines) => lines.clone(),
+        None => {
+            let lines = Lines::default();
+            tracing::subscriber::set_global_default(lines.clone())?;
+            of_process.insert(lines).clone()
+        }
+    };
+    lines.take();
+    test()?;
+    Ok(lines.take())
+}
+
+impl Lines {
+    fn take(&self) -> Vec<String> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
 
 struct Line(String);
 
@@ -93,16 +132,16 @@ impl Subscriber for Lines {
 
 #[test]
 fn changes_of_safety_and_health_faults_and_refusals_are_events() -> Result<(), Box<dyn std::error::Error>> {
-    let lines = Lines::default();
-    tracing::subscriber::set_global_default(lines.clone())?;
-    let mut simulation = Logging::builder().simulate()?;
-    let at = |millis| MonotonicTime::ZERO + Duration::from_millis(millis);
-    simulation.command(logging::command::arm, NoArguments)?;
-    simulation.publish(logging::sensor::base::number, at(1), Number(-1.0));
-    assert!(simulation.command(logging::command::arm, NoArguments).is_err(), "it is armed");
-    assert!(!simulation.disarm());
-    simulation.stop();
-    let lines = std::mem::take(&mut *lines.0.lock().unwrap_or_else(PoisonError::into_inner));
+    let lines = logged(|| {
+        let mut simulation = Logging::builder().simulate()?;
+        let at = |millis| MonotonicTime::ZERO + Duration::from_millis(millis);
+        simulation.command(logging::command::arm, NoArguments)?;
+        simulation.publish(logging::sensor::base::number, at(1), Number(-1.0));
+        assert!(simulation.command(logging::command::arm, NoArguments).is_err(), "it is armed");
+        assert!(simulation.disarm().is_err());
+        simulation.stop();
+        Ok(())
+    })?;
     let expected = [
         "INFO message=safety changed from=disarmed to=armed",
         "INFO message=state changed",
@@ -116,5 +155,40 @@ fn changes_of_safety_and_health_faults_and_refusals_are_events() -> Result<(), B
     for expected in expected {
         assert!(left.any(|line| line.starts_with(expected)), "{expected} is not in its place in {lines:#?}");
     }
+    Ok(())
+}
+
+#[test]
+fn changes_of_safety_are_logged_in_their_order() -> Result<(), Box<dyn std::error::Error>> {
+    let lines = logged(|| {
+        let robot = harmless::Harmless::builder().start()?;
+        std::thread::scope(|scope| {
+            for _ in 0..3 {
+                let live = robot.live();
+                scope.spawn(move || {
+                    for _ in 0..100 {
+                        let _ = live.arm();
+                        let _ = live.disarm();
+                    }
+                });
+            }
+        });
+        robot.arm().expect("it may be armed");
+        robot.stop();
+        // Loggers run on a thread of the pool.
+        std::thread::sleep(Duration::from_millis(200));
+        Ok(())
+    })?;
+    let mut now = "disarmed".to_owned();
+    let changes = lines.iter().filter_map(|line| line.split_once("safety changed from=")).map(|(_, change)| change);
+    let mut all = 0;
+    for change in changes {
+        let (from, to) = change.split_once(" to=").ok_or("a change has two states")?;
+        assert_eq!(from, now, "change {all} of {lines:#?}");
+        now = to.to_owned();
+        all += 1;
+    }
+    // At the least those of the stop: armed, disarming, disarmed.
+    assert!(all >= 3 && now == "disarmed", "{all} changes, then {now}");
     Ok(())
 }

@@ -38,6 +38,6 @@ pub use crate::declaration::{
     ParameterValues, Role,
 };
 pub use crate::event::{
-    CategoryDeclaration, CommandEvent, CommandPhase, ParameterChange, ParameterValue, Refusal, RefusalReason,
-    Safety, SafetyError, SafetyTransition, StateTransition,
+    ArmError, CategoryDeclaration, CommandEvent, CommandPhase, DisarmError, ParameterChange, ParameterValue,
+    Refusal, RefusalReason, Safety, SafetyError, SafetyTransition, StateTransition,
 };

@@ -1,11 +1,13 @@
 //! What the runtime publishes about itself on its own topics.
 
+mod arming;
 mod command;
 mod fault;
 mod health;
 mod parameter;
 mod safety;
 
+pub use arming::{ArmError, DisarmError};
 pub use command::{CategoryDeclaration, CommandEvent, CommandPhase, Refusal, RefusalReason, StateTransition};
 pub use fault::ComponentFault;
 pub use health::{HealthReason, HealthState, HealthTransition};

@@ -61,7 +61,10 @@ pub use component::{
 };
 pub use control::Execution;
 pub use declaration::{ParameterError, Role};
-pub use event::{ComponentFault, HealthReason, HealthState, HealthTransition, ParameterValue, Refusal, Safety};
+pub use event::{
+    ArmError, ComponentFault, DisarmError, HealthReason, HealthState, HealthTransition, ParameterValue, Refusal,
+    Safety,
+};
 pub use fault::Fault;
 pub use message::{Field, Finite, Frame, Origin, Payload, Stamped};
 pub use pubsub::{

@@ -138,7 +138,7 @@ pub(super) fn measure() -> Result<Vec<Line>, Box<dyn std::error::Error>> {
 fn stop(hangs: bool) -> Result<[f64; 2], Box<dyn std::error::Error>> {
     HANGS.store(hangs, Ordering::SeqCst);
     let running = Stuck::builder().start()?;
-    running.arm();
+    running.arm().expect("it may be armed");
     if hangs {
         running.command(stuck::command::block, NoArguments)?;
         for sensor in [stuck::sensor::base::camera, stuck::sensor::base::imu] {

@@ -109,7 +109,7 @@ fn child() {
     options.flush_messages = 50;
     let recorder = Recorder::new(file, journal, options).expect("it can be created").spawn().expect("a thread");
     let running = builder.start().expect("it starts");
-    running.arm();
+    running.arm().expect("it may be armed");
     for round in 0_u32.. {
         running.publish(again::sensor::base::number, running.clock().now(), Number(f64::from(round % 100)));
         running.publish(again::sensor::base::pan::encoder, running.clock().now(), Number(1.0));

@@ -161,7 +161,7 @@ fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Box<dyn s
         refused(bus.start_command("command/go", goal)),
         "`go` is refused: it is not allowed in the state `disarmed`"
     );
-    assert!(bus.arm());
+    assert_eq!(bus.arm(), Ok(()));
     assert_eq!((bus.safety(), bus.state()), (Safety::Armed, "idle"));
     let events = simulation.subscribe(open::command::go);
     let going = bus.start_command("command/go", goal)?;
@@ -186,7 +186,7 @@ fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Box<dyn s
     let default = bus.start_command("command/go", "")?;
     simulation.run_until(at(61));
     assert_eq!(result(&default), Some(Ok(r#"{"name":"","stops":0}"#.to_owned())));
-    assert!(bus.disarm());
+    assert_eq!(bus.disarm(), Ok(()));
     assert_eq!(simulation.safety(), Safety::Disarmed);
     Ok(())
 }
@@ -195,7 +195,7 @@ fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Box<dyn s
 fn arguments_that_do_not_fit_are_refused_with_the_field() -> Result<(), StartError> {
     let simulation = Open::builder().simulate()?;
     let bus = simulation.bus();
-    assert!(bus.arm());
+    assert_eq!(bus.arm(), Ok(()));
     for (arguments, field) in [
         (r#"{"name": "dock", "stops": []}"#, "speed"),
         (r#"{"name": "dock", "speed": "fast", "stops": []}"#, "speed"),
@@ -222,7 +222,7 @@ fn messages_say_which_process_they_come_from() -> Result<(), StartError> {
     let all = builder.subscribe_any(Select::All, None, Overflow::default());
     let mut simulation = builder.simulate()?;
     simulation.publish(open::sensor::base::number, at(5), Number(1.0));
-    assert!(simulation.arm());
+    assert_eq!(simulation.arm(), Ok(()));
     simulation.bus().publisher::<Number>("radio").expect("it is free").publish(Number(1.0));
     let origins: Vec<_> = double.drain().map(|number| (number.origin.robot, number.origin.node)).collect();
     assert_eq!(origins, [("Open", "left_computer")]);

@@ -1,6 +1,7 @@
 //! Several threads at once: nothing is lost uncounted, orders are kept, nobody waits for ever.
 
 use crate::components::{Number, within};
+use bb_core::ArmError;
 use bb_core::DynamicSubscription;
 use bb_core::node::DropReason;
 use bb_core::prelude::*;
@@ -299,7 +300,7 @@ fn a_robot_that_has_stopped_answers_whatever_it_is_asked() {
         live.publish(crowded::sensor::base::a, live.clock().now(), Number(1.0));
         assert!(live.call(crowded::estimator::base::ordered, Ask).is_err());
         assert!(live.cast(crowded::estimator::base::ordered, Tell).is_err());
-        assert!(!live.arm() && live.disarm());
+        assert_eq!((live.arm(), live.disarm()), (Err(ArmError::Stopping), Ok(())));
         assert!(live.subscribe(crowded::sensor::base::a).recv().is_none());
         live.set_parameter(crowded::param::gain, 2.0).expect("it is finite");
         assert_eq!(live.report(), report, "it was the last one");

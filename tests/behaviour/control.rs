@@ -3,6 +3,7 @@
 use crate::components::{Counter, Number, at};
 use bb_core::control::{CommandError, CommandPhase, RefusalReason};
 use bb_core::prelude::*;
+use bb_core::{ArmError, DisarmError};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// What a [`Move`] is told.
@@ -217,7 +218,7 @@ fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Res
 fn a_command_that_begins_where_it_is_started_has_the_time_of_its_start() -> Result<(), Box<dyn std::error::Error>> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     simulation.run_until(at(200));
     let eager = simulation.command(commanded::command::eager, NoArguments)?;
     simulation.run_until(at(300));
@@ -229,7 +230,7 @@ fn a_command_that_begins_where_it_is_started_has_the_time_of_its_start() -> Resu
 fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Box<dyn std::error::Error>> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     let parking = Target { millis: 1, does: Some(commanded::state::parked) };
     simulation.command(commanded::command::go, parking)?;
     simulation.run_until(at(10));
@@ -249,7 +250,7 @@ fn a_command_fails_times_out_or_is_cancelled_and_each_is_told() -> Result<(), Bo
     let builder = Commanded::builder();
     let events = builder.subscribe(commanded::command::go);
     let mut simulation = builder.simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     let mut outcome = |target, cancelled_at: Option<i64>| -> Result<_, Box<dyn std::error::Error>> {
         let start = simulation.clock().now();
         let execution = simulation.command(commanded::command::go, target)?;
@@ -279,7 +280,7 @@ fn a_command_fails_times_out_or_is_cancelled_and_each_is_told() -> Result<(), Bo
 fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Box<dyn std::error::Error>> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     let first = simulation.command(commanded::command::turn, millis(500))?;
     let second = simulation.command(commanded::command::turn, millis(500))?;
     let refusal = simulation.command(commanded::command::turn, millis(500)).expect_err("two are the limit");
@@ -313,7 +314,7 @@ fn an_actuator_moves_only_while_armed_and_is_made_safe() -> Result<(), Box<dyn s
     let error = simulation.actuate(servo, Number(1.0)).expect_err("it is disarmed").to_string();
     assert_eq!(error, "the robot is not armed (disarmed)");
     let seen = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     simulation.actuate(servo, Number(1.0))?;
     assert!(simulation.actuate(servo, Number(f64::NAN)).is_err());
     assert!(HAS_TORQUE.load(Ordering::SeqCst));
@@ -322,7 +323,7 @@ fn an_actuator_moves_only_while_armed_and_is_made_safe() -> Result<(), Box<dyn s
     assert!(seen.try_recv().is_none());
     let going = simulation.command(commanded::command::go, millis(500))?;
     simulation.run_until(at(10));
-    assert!(simulation.disarm());
+    assert_eq!(simulation.disarm(), Ok(()));
     simulation.run_until(at(20));
     assert_eq!(going.try_result(), Some(Err(CommandError::Cancelled)));
     assert!(!HAS_TORQUE.load(Ordering::SeqCst));
@@ -336,7 +337,7 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Box<d
     let builder = Commanded::builder();
     let errors = builder.subscribe(system::SafetyErrors);
     let mut simulation = builder.simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     REFUSES.store(true, Ordering::SeqCst);
     let disarming = simulation.command(commanded::command::disarm, NoArguments)?;
     simulation.run_until(at(10));
@@ -347,13 +348,17 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Box<d
         (error.path, error.message.as_str()),
         ("actuator/base/pan/servo", "disarming failed: the brake does not close")
     );
-    assert!(!simulation.arm() && !simulation.disarm(), "neither leads out");
+    assert_eq!(
+        (simulation.arm(), simulation.disarm()),
+        (Err(ArmError::Error), Err(DisarmError::Error)),
+        "neither leads out"
+    );
     let refusal = simulation.command(commanded::command::arm, NoArguments).expect_err("it is not safe");
     assert_eq!(refusal.reason, RefusalReason::Safety);
-    simulation.force_disarm();
+    assert!(simulation.force_disarm().is_err(), "the brake still does not close");
     assert_eq!(simulation.safety(), Safety::Disarmed);
     REFUSES.store(false, Ordering::SeqCst);
-    assert!(simulation.arm());
+    assert_eq!(simulation.arm(), Ok(()));
     Ok(())
 }
 
@@ -363,7 +368,7 @@ fn an_actuator_that_fails_is_made_anew() -> Result<(), Box<dyn std::error::Error
     let mut simulation = Commanded::builder().simulate()?;
     let servo = commanded::actuator::base::pan::servo;
     let made = MADE.load(Ordering::SeqCst);
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     let error = simulation.actuate(servo, Number(-1.0)).expect_err("it stalls").to_string();
     assert_eq!(error, "the actuator failed: stalled");
     assert!(simulation.actuate(servo, Number(1.0)).is_err(), "it waits for its restart");
@@ -381,7 +386,7 @@ fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Box<
         (builder.subscribe(commanded::controller::follow), builder.subscribe(commanded::bridge::dashboard));
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(150));
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     simulation.run_until(at(350));
     assert_eq!(follow.drain().map(|number| number.0).collect::<Vec<_>>(), [0.0, 0.0, 1.0, 1.0]);
     assert_eq!(counts.drain().map(|number| number.0).collect::<Vec<_>>(), [1.0, 10.0, 10.0, 10.0]);

@@ -4,6 +4,7 @@ use crate::components::{Number, at, within};
 use bb_core::control::{CommandError, CommandPhase};
 use bb_core::prelude::*;
 use bb_core::run::ActuatorError;
+use bb_core::{ArmError, DisarmError};
 use std::future::Future;
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -274,7 +275,7 @@ fn motor_stops_first(place: &'static str, way: &'static str) {
         builder.telemetry(move |_, _| HERE.pass(place));
     }
     let running = builder.start().expect("it starts");
-    assert!(running.arm());
+    assert_eq!(running.arm(), Ok(()));
     safety.drain().for_each(drop);
     HERE.close(place);
     set_stopped(false);
@@ -306,7 +307,7 @@ fn motor_stops_first(place: &'static str, way: &'static str) {
             returned.send(running).expect("the test waits for it");
         }
         _ => {
-            running.disarm();
+            running.disarm().expect("all can be made safe");
             drop(running);
         }
     });
@@ -368,7 +369,7 @@ fn a_silent_estimator_is_lost_and_its_command_runs_while_the_code_of_others_hang
             let builder = Hanging::builder();
             let (health, alarms) = (builder.subscribe(system::Health), builder.subscribe(hanging::command::alarm));
             let running = builder.start().expect("it starts");
-            assert!(running.arm());
+            assert_eq!(running.arm(), Ok(()));
             HERE.close(place);
             if place == "a command" {
                 // As many as there are cores, and more.
@@ -398,7 +399,7 @@ fn a_command_that_blocks_times_out() {
         let builder = Hanging::builder();
         let events = builder.subscribe(hanging::command::hurried);
         let running = builder.start().expect("it starts");
-        assert!(running.arm());
+        assert_eq!(running.arm(), Ok(()));
         HERE.close("a command");
         let hurried = running.command(hanging::command::hurried, NoArguments).expect("it is allowed");
         HERE.wait_for(1);
@@ -527,7 +528,7 @@ fn an_actuator_that_fails_and_cannot_be_made_safe_is_an_error_and_nobody_arms() 
     let builder = Crane::builder();
     let errors = builder.subscribe(system::SafetyErrors);
     let mut simulation = builder.simulate()?;
-    assert!(simulation.arm());
+    assert_eq!(simulation.arm(), Ok(()));
     simulation.actuate(crane::actuator::base::hook::winch, Number(1.0)).expect("it moves");
     assert!(simulation.actuate(crane::actuator::base::hook::winch, Number(-1.0)).is_err());
     simulation.run_until(at(5));
@@ -538,12 +539,13 @@ fn an_actuator_that_fails_and_cannot_be_made_safe_is_an_error_and_nobody_arms() 
     // Nor later, when it was made again.
     for millis in [5, 1000, 5000] {
         simulation.run_until(at(millis));
-        assert!(!simulation.arm() && !simulation.disarm() && !simulation.bus().arm());
+        assert_eq!((simulation.arm(), simulation.bus().arm()), (Err(ArmError::Error), Err(ArmError::Error)));
+        assert_eq!(simulation.disarm(), Err(DisarmError::Error));
         assert!(simulation.command(crane::command::arm, NoArguments).is_err());
         assert_eq!(simulation.safety(), Safety::Error);
     }
-    simulation.force_disarm();
-    assert!(simulation.arm(), "whoever forces it has seen to that");
+    simulation.force_disarm().expect("all can be made safe");
+    assert_eq!(simulation.arm(), Ok(()), "the caller has checked that it is safe");
     Ok(())
 }
 
@@ -554,11 +556,11 @@ fn an_actuator_that_cannot_be_made_safe_is_an_error_in_real_time_too() {
         let builder = Crane::builder();
         let safety = builder.subscribe(system::SafetyState);
         let running = builder.start().expect("it starts");
-        assert!(running.arm());
+        assert_eq!(running.arm(), Ok(()));
         assert!(running.actuate(crane::actuator::base::hook::winch, Number(-1.0)).is_err());
         let mut changes = std::iter::from_fn(|| safety.recv_timeout(PATIENCE)).map(|change| change.to);
         assert!(changes.any(|safety| safety == Safety::Error));
-        assert!(!running.arm());
+        assert!(running.arm().is_err());
         assert_eq!(running.stop().safety, Safety::Error);
     });
 }
@@ -567,7 +569,7 @@ fn an_actuator_that_cannot_be_made_safe_is_an_error_in_real_time_too() {
 fn what_a_cancelled_command_holds_moves_nothing_even_when_the_robot_is_armed_again() -> Result<(), StartError> {
     let _alone = alone();
     let mut simulation = Crane::builder().simulate()?;
-    assert!(simulation.arm());
+    assert_eq!(simulation.arm(), Ok(()));
     let lending = simulation.command(crane::command::lend, NoArguments).expect("it is idle");
     simulation.run_until(at(10));
     let context = LENT.lock().unwrap_or_else(PoisonError::into_inner).take().expect("it runs");
@@ -576,8 +578,8 @@ fn what_a_cancelled_command_holds_moves_nothing_even_when_the_robot_is_armed_aga
     let progress = bus.publisher::<Number>("progress").expect("it is free");
     assert_eq!(winch.send(Number(1.0)), Ok(()));
     assert!(!context.is_cancelled());
-    assert!(simulation.disarm());
-    assert!(simulation.arm());
+    assert_eq!(simulation.disarm(), Ok(()));
+    assert_eq!(simulation.arm(), Ok(()));
     assert_eq!(lending.try_result(), Some(Err(CommandError::Cancelled)));
     let moved = MOVED.load(Ordering::SeqCst);
     assert!(context.is_cancelled());
@@ -589,8 +591,8 @@ fn what_a_cancelled_command_holds_moves_nothing_even_when_the_robot_is_armed_aga
     let heard = simulation.subscribe_any(Select::Path("progress"), None, Overflow::default());
     progress.publish(Number(1.0));
     assert!(heard.try_recv().is_none());
-    simulation.disarm();
-    assert!(!bus.arm(), "it arms no robot either");
+    simulation.disarm().expect("all can be made safe");
+    assert!(bus.arm().is_err(), "it arms no robot either");
     Ok(())
 }
 
@@ -599,12 +601,12 @@ fn arming_waits_until_the_code_of_a_cancelled_command_has_returned() {
     let _alone = alone();
     within(60, || {
         let running = Crane::builder().start().expect("it starts");
-        assert!(running.arm());
+        assert_eq!(running.arm(), Ok(()));
         HERE.close("a command on its way");
         let late = running.command(crane::command::late, NoArguments).expect("it is idle");
         HERE.wait_for(1);
         let moved = MOVED.load(Ordering::SeqCst);
-        assert!(running.disarm());
+        assert_eq!(running.disarm(), Ok(()));
         assert_eq!(late.wait_timeout(PATIENCE), Some(Err(CommandError::Cancelled)));
         let (armed, is_armed) = mpsc::channel();
         let live = running.live();
@@ -616,7 +618,7 @@ fn arming_waits_until_the_code_of_a_cancelled_command_has_returned() {
         assert_eq!(running.safety(), Safety::Disarmed);
         HERE.open();
         let (is_armed, tried) = is_armed.recv_timeout(PATIENCE).expect("the command is gone");
-        assert!(is_armed);
+        assert_eq!(is_armed, Ok(()));
         assert!(matches!(tried, Some(Err(ActuatorError::Cancelled | ActuatorError::NotArmed(_)))), "{tried:?}");
         assert_eq!(MOVED.load(Ordering::SeqCst), moved);
     });
@@ -628,7 +630,7 @@ fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<
     let builder = Crane::builder();
     let errors = builder.subscribe(system::SafetyErrors);
     let mut simulation = builder.simulate()?;
-    assert!(simulation.arm());
+    assert_eq!(simulation.arm(), Ok(()));
     simulation.run_until(at(50));
     let made_safe = MADE_SAFE.load(Ordering::SeqCst);
     IS_HOT.store(true, Ordering::SeqCst);
@@ -639,9 +641,9 @@ fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<
     assert_eq!(MADE_SAFE.load(Ordering::SeqCst), made_safe + 1);
     let error = errors.try_recv().map(|error| (error.path, error.payload.message));
     assert_eq!(error, Some(("sensor/base/thermometer", "it burns".to_owned())));
-    assert!(!simulation.arm());
+    assert!(simulation.arm().is_err());
     // A robot that is disarmed is in `error` as well.
-    simulation.force_disarm();
+    simulation.force_disarm().expect("all can be made safe");
     IS_HOT.store(true, Ordering::SeqCst);
     simulation.run_until(at(200));
     assert_eq!(simulation.safety(), Safety::Error);

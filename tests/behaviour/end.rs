@@ -79,6 +79,53 @@ robot! {
     }
 }
 
+/// Needs a while to be made safe.
+#[derive(Debug)]
+pub(crate) struct Brake;
+
+impl Sensor for Brake {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        context.on_disarm(|| {
+            std::thread::sleep(Duration::from_millis(150));
+            Ok(())
+        });
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot Braking;
+    commands { idle: Idle; }
+    link base {
+        sensor number: External<Number>() {
+            estimator echo: Echo() { lost_after: 30 ms; on_lost: idle; }
+        }
+        sensor brake: Brake() { rate: 10 Hz; }
+    }
+}
+
+#[test]
+fn an_estimator_is_not_lost_because_the_robot_stops() -> Result<(), StartError> {
+    let builder = Braking::builder();
+    let health = builder.subscribe(system::Health);
+    let running = builder.start()?;
+    // Its only message, right before the stop, which takes longer than `lost_after`.
+    running.publish(braking::sensor::base::number, running.clock().now(), Number(1.0));
+    let report = running.stop();
+    let changes: Vec<_> = health.drain().map(|change| (change.to, change.reason)).collect();
+    assert!(changes.is_empty(), "{changes:?}");
+    let refused: u64 = report.commands.iter().map(|command| command.refused).sum();
+    assert_eq!(refused, 0);
+    Ok(())
+}
+
 /// All that may be asked of a robot, over and over, until it says that it has stopped; and ten times more.
 fn ask_for_everything(live: &bb_core::Live<Ending>, number: u32) {
     let own = live.bus().publisher::<Number>(&format!("own/{number}")).expect("it still runs");
@@ -90,8 +137,8 @@ fn ask_for_everything(live: &bb_core::Live<Ending>, number: u32) {
         let _ = live.command(ending::command::idle, Way::default());
         let _ = live.set_parameter(ending::param::gain, f64::from(round));
         let _ = live.bus().set_parameter("param/gain", f64::from(round));
-        live.arm();
-        live.disarm();
+        let _ = live.arm();
+        let _ = live.disarm();
         if live.cast(ending::sensor::base::number::echo, number).is_err() {
             left -= 1;
         }

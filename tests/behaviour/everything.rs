@@ -127,7 +127,7 @@ fn a_week_takes_no_more_memory_than_an_hour() -> Result<(), Box<dyn std::error::
     let mut builder = Whole::builder();
     builder.supervision().max_restarts = usize::MAX;
     let mut simulation = builder.simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     simulation.run_until(at(3_600_000));
     let after_an_hour = memory();
     simulation.run_until(at(7 * 24 * 3_600_000));

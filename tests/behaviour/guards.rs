@@ -134,7 +134,7 @@ fn an_estimator_brakes_and_reports_a_hardware_error() -> Result<(), Failure> {
     again(|simulation| {
         // What a sensor said as it was made.
         assert_eq!(simulation.safety(), Safety::Error);
-        assert!(simulation.force_disarm() && simulation.arm());
+        assert_eq!((simulation.force_disarm(), simulation.arm()), (Ok(()), Ok(())));
         braked();
         // After a restart there is one brake, not two.
         simulation.publish(hoist::sensor::base::load, at(1), Number(WRONG));
@@ -152,17 +152,17 @@ fn an_estimator_brakes_and_reports_a_hardware_error() -> Result<(), Failure> {
 fn a_command_brakes_while_it_runs() -> Result<(), Failure> {
     let _alone = alone();
     again(|simulation| {
-        assert!(simulation.force_disarm() && simulation.arm());
+        assert_eq!((simulation.force_disarm(), simulation.arm()), (Ok(()), Ok(())));
         braked();
         simulation.command(hoist::command::lift, NoArguments)?;
         simulation.run_until(at(5));
-        assert!(simulation.disarm());
+        assert_eq!(simulation.disarm(), Ok(()));
         assert_eq!(braked(), [1, 1], "it was running");
         simulation.run_until(at(6));
-        assert!(simulation.arm());
+        assert_eq!(simulation.arm(), Ok(()));
         simulation.command(hoist::command::lift, NoArguments)?;
         simulation.run_until(at(30));
-        assert!(simulation.disarm());
+        assert_eq!(simulation.disarm(), Ok(()));
         assert_eq!(braked(), [1, 0], "it has ended");
         Ok(())
     })?;

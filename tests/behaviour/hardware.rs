@@ -188,11 +188,11 @@ fn a_callback_that_does_something_and_fails_does_so_in_a_replay() -> Result<(), 
         let all = builder.subscribe_any(Select::All, None, overflow());
         let mut simulation = builder.simulate()?;
         if arms {
-            assert!(simulation.arm());
+            assert_eq!(simulation.arm(), Ok(()));
         }
         simulation.run_until(at(50));
         if !stops {
-            assert!(!simulation.disarm());
+            assert!(simulation.disarm().is_err());
         }
         let report = simulation.stop();
         assert_eq!(report.safety, Safety::Error);
@@ -236,12 +236,12 @@ fn a_robot_that_has_ended_keeps_nothing_open() -> Result<(), Failure> {
 fn a_commands_callbacks_end_with_it_whatever_they_hold() -> Result<(), Failure> {
     let _alone = alone();
     let mut simulation = Guarded::builder().simulate()?;
-    assert!(simulation.arm());
+    assert_eq!(simulation.arm(), Ok(()));
     for millis in 1..=20 {
         simulation.command(guarded::command::lift, NoArguments)?;
         simulation.run_until(at(millis));
     }
-    assert!(simulation.disarm());
+    assert_eq!(simulation.disarm(), Ok(()));
     assert_eq!(BRAKED.load(Ordering::SeqCst), 0);
     Ok(())
 }
@@ -251,7 +251,7 @@ fn a_component_that_was_left_out_guards_nothing() -> Result<(), Failure> {
     let _alone = alone();
     IS_SKIPPED.store(true, Ordering::SeqCst);
     let simulation = Guarded::builder().simulate()?;
-    assert!(simulation.arm() && simulation.disarm());
+    assert_eq!((simulation.arm(), simulation.disarm()), (Ok(()), Ok(())));
     Ok(())
 }
 
@@ -309,11 +309,11 @@ fn a_forced_disarm_does_not_reopen_a_stop() {
     within(60, || {
         for _ in 0..20 {
             let running = Guarded::builder().start().expect("it starts");
-            running.arm();
+            running.arm().expect("it may be armed");
             let live = running.live();
             let forcing = std::thread::spawn(move || {
                 for _ in 0..200 {
-                    live.force_disarm();
+                    let _ = live.force_disarm();
                 }
             });
             assert_eq!(running.stop().safety, Safety::Disarmed);

@@ -96,7 +96,7 @@ impl Run {
         let builder = Watched::builder();
         let transitions = builder.subscribe(system::Health);
         let simulation = builder.simulate()?;
-        simulation.arm();
+        simulation.arm().expect("it may be armed");
         Ok(Self { simulation, transitions, now: 0 })
     }
 

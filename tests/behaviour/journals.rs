@@ -251,7 +251,7 @@ fn again(script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>) -> 
     let (journaled, builder) = Journaled::new();
     let mut simulation = builder.simulate()?;
     let moves = moves_of(&simulation);
-    assert!(simulation.arm());
+    assert_eq!(simulation.arm(), Ok(()));
     script(&mut simulation)?;
     let report = simulation.stop();
     Ok((journaled.expect_the_same_again(&moves, &report)?, report))
@@ -262,7 +262,7 @@ fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Heard, Re
     let (journaled, builder) = Journaled::new();
     let running = builder.start()?;
     let moves = moves_of(&running);
-    assert!(running.arm());
+    assert_eq!(running.arm(), Ok(()));
     script(&running);
     let report = running.stop();
     Ok((journaled.expect_the_same_again(&moves, &report)?, report))
@@ -492,8 +492,8 @@ fn everything_at_once_on_many_threads_expect_the_same_again() {
                             drive.cancel();
                         }
                         if round % 20 == 10 {
-                            running.disarm();
-                            running.arm();
+                            let _ = running.disarm();
+                            let _ = running.arm();
                         }
                     }
                 });

@@ -123,7 +123,7 @@ fn what_is_asked_for_in_init_comes_before_the_first_message() {
 fn commands_to_an_actuator_are_published_in_the_order_in_which_it_carried_them_out() {
     within(60, || {
         let running = Orderly::builder().start().expect("it starts");
-        assert!(running.arm());
+        assert_eq!(running.arm(), Ok(()));
         let motor = orderly::actuator::base::pan::motor;
         let room = Overflow::DropOldest { capacity: 10_000 };
         let told = running.subscribe_any(Select::Path(motor.path()), None, room);
@@ -175,8 +175,8 @@ fn who_listens_to_the_robot_itself_may_call_it_back() {
             let call = move || {
                 live.set_parameter(orderly::param::gain, 2.0).expect("it is finite");
                 let _ = live.command(orderly::command::disarm, NoArguments);
-                live.disarm();
-                live.arm();
+                let _ = live.disarm();
+                let _ = live.arm();
                 called.send((live.safety(), live.report().faults.len())).expect("the test waits for it");
             };
             match topic {
@@ -214,10 +214,10 @@ fn the_sink_of_a_journal_may_ask_the_robot() {
         });
         let mut simulation = builder.simulate().expect("it starts");
         assert!(live.set(simulation.live()).is_ok());
-        assert!(simulation.arm());
+        assert_eq!(simulation.arm(), Ok(()));
         simulation.set_parameter(orderly::param::gain, 2.0).expect("it is finite");
         simulation.run_for(Duration::from_millis(3));
-        assert!(simulation.disarm());
+        assert_eq!(simulation.disarm(), Ok(()));
         assert!(is_asked.try_iter().count() > 5);
         simulation.stop();
     });

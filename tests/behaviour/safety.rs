@@ -101,9 +101,9 @@ fn a_sensor_that_was_made_anew_is_made_safe_once() -> Result<(), StartError> {
     builder.supervision().max_restarts = 1000;
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(3000));
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     STOPPED.lock().expect("nobody panics with it").clear();
-    assert!(simulation.disarm());
+    assert_eq!(simulation.disarm(), Ok(()));
     let last = MADE.load(Ordering::SeqCst) - 1;
     assert!(last > 3, "it has broken");
     assert_eq!(*STOPPED.lock().expect("nobody panics with it"), [last]);
@@ -114,7 +114,7 @@ fn a_sensor_that_was_made_anew_is_made_safe_once() -> Result<(), StartError> {
 fn an_actuator_that_panics_is_made_safe() -> Result<(), StartError> {
     let _alone = ALONE.lock();
     let simulation = Powered::builder().simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     assert!(simulation.actuate(powered::actuator::base::pan::motor, Number(PANICS)).is_err());
     assert!(!TORQUE.load(Ordering::SeqCst));
     Ok(())
@@ -126,13 +126,17 @@ fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<
     let builder = Powered::builder();
     let errors = builder.subscribe(system::SafetyErrors);
     let running = builder.start()?;
-    running.arm();
+    running.arm().expect("it may be armed");
     running.actuate(powered::actuator::base::pan::motor, Number(PANICS_AT_DISARM)).expect("it does as told");
-    assert!(!running.disarm());
+    let why = running.disarm().expect_err("it panics").to_string();
+    assert_eq!(
+        why,
+        "not everything could be made safe: `actuator/base/pan/motor`: disarming failed: panicked: no brake"
+    );
     assert_eq!(running.safety(), Safety::Error);
     let message = errors.try_recv().map(|error| error.payload.message);
     assert_eq!(message.as_deref(), Some("disarming failed: panicked: no brake"));
-    assert!(!running.force_disarm(), "it still cannot");
+    assert!(running.force_disarm().is_err(), "it still cannot");
     assert_eq!(running.safety(), Safety::Disarmed);
     Ok(())
 }
@@ -143,10 +147,12 @@ fn a_disarm_that_hangs_is_an_error_and_does_not_keep_the_robot_from_stopping() {
     within(60, || {
         LET_GO.store(false, Ordering::SeqCst);
         let running = Powered::builder().start().expect("it starts");
-        running.arm();
+        running.arm().expect("it may be armed");
         running.actuate(powered::actuator::base::pan::motor, Number(HANGS_AT_DISARM)).expect("it does as told");
         let start = std::time::Instant::now();
-        assert!(!running.disarm());
+        let why = running.disarm().expect_err("it hangs").to_string();
+        let expected = "not everything could be made safe: `actuator/base/pan/motor`: did not come back from disarming in time";
+        assert_eq!(why, expected);
         assert!((5..8).contains(&start.elapsed().as_secs()));
         assert_eq!(running.safety(), Safety::Error);
         let start = std::time::Instant::now();
@@ -174,15 +180,15 @@ fn whoever_arms_and_disarms_at_once_agrees_in_the_end() {
                 scope.spawn(move || {
                     for round in 0..200 {
                         if (thread + round) % 2 == 0 {
-                            running.arm()
+                            let _ = running.arm();
                         } else {
-                            running.disarm()
-                        };
+                            let _ = running.disarm();
+                        }
                     }
                 });
             }
         });
-        running.disarm();
+        running.disarm().expect("all can be made safe");
         let mut safety = Safety::Disarmed;
         for change in changes.drain() {
             assert_eq!(change.from, safety);

@@ -111,7 +111,7 @@ fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(
     let errors = builder.subscribe(system::SafetyErrors);
     let brother = builder.subscribe(family::sensor::base::neck::head::head_pulse::brother);
     let mut simulation = builder.simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     let start: Vec<_> = (0..4).map(made).collect();
     let since = |number: usize| made(number) - start[number];
     for failure in 1_u32..=13 {
@@ -138,7 +138,7 @@ fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(
 fn a_fault_never_touches_another_component_however_often_it_comes() -> Result<(), StartError> {
     let _alone = ALONE.lock();
     let mut simulation = Family::builder().simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     let start: Vec<_> = (0..4).map(made).collect();
     for round in 1..=200 {
         simulation.publish(family::sensor::base::neck::head::number, at(20 * round), Number(4.0));

@@ -89,7 +89,7 @@ fn virtual_day(seed: u64) -> Result<bool, Box<dyn Error>> {
     builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
     let all = builder.subscribe_any(Select::All, None, room());
     let mut simulation = builder.simulate()?;
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     let live = simulation.live();
     for _ in 0..60 {
         simulation.run_for(Duration::from_micros(random.below(9000)));
@@ -113,7 +113,7 @@ fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
     builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
     let all = builder.subscribe_any(Select::All, None, room());
     let running = builder.start()?;
-    running.arm();
+    running.arm().expect("it may be armed");
     let disturbers: Vec<_> = (0..2)
         .map(|number| {
             let live = running.live();

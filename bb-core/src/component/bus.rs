@@ -3,7 +3,7 @@
 use super::host::Host;
 use super::{Accepts, ActuatorError, Fault, Permit};
 use crate::declaration::ParameterError;
-use crate::event::{ParameterValue, Safety};
+use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::message::codec::Shape;
 use crate::message::nearest::nearest_path;
 use crate::message::{Payload, Stamp};
@@ -164,13 +164,19 @@ impl Bus {
         self.host.safety()
     }
 
-    /// Arms the robot; true if it is armed now. See [`Live::arm`](crate::Live::arm).
-    pub fn arm(&self) -> bool {
-        self.permit.is_valid() && self.host.arm(&self.permit)
+    /// Arms the robot. See [`Live::arm`](crate::Live::arm).
+    ///
+    /// # Errors
+    /// Why it is not armed.
+    pub fn arm(&self) -> Result<(), ArmError> {
+        self.host.arm(&self.permit)
     }
 
-    /// Disarms the robot; true if everything could be made safe. See [`Live::disarm`](crate::Live::disarm).
-    pub fn disarm(&self) -> bool {
+    /// Disarms the robot. See [`Live::disarm`](crate::Live::disarm).
+    ///
+    /// # Errors
+    /// Why it may not be safe.
+    pub fn disarm(&self) -> Result<(), DisarmError> {
         self.host.disarm()
     }
 

@@ -4,7 +4,7 @@ use super::guardian::Guardian;
 use super::{Fault, Permit};
 use crate::component::bus::{CommandInfo, DynamicExecution};
 use crate::declaration::ParameterError;
-use crate::event::{ParameterValue, Safety};
+use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::message::Origin;
 use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::time::Clock;
@@ -18,8 +18,8 @@ pub(crate) trait Host: Guardian {
     fn is_stopping(&self) -> bool;
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
-    fn arm(&self, permit: &Permit) -> bool;
-    fn disarm(&self) -> bool;
+    fn arm(&self, permit: &Permit) -> Result<(), ArmError>;
+    fn disarm(&self) -> Result<(), DisarmError>;
     fn parameter(&self, path: &str) -> Option<ParameterValue>;
     fn set_parameter(&self, path: &str, value: ParameterValue, permit: &Permit) -> Result<(), ParameterError>;
     /// The declared topics.

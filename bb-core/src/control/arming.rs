@@ -6,7 +6,7 @@ use super::machine::IDLE;
 use super::step::Step;
 use super::system::{Control, Disarming, Limit, Phase, State};
 use crate::component::{DisarmHook, Guardian, Permit};
-use crate::event::{Safety, SafetyError};
+use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
 use std::time::Duration;
@@ -41,8 +41,11 @@ impl State {
 }
 
 impl Control {
-    /// Arms the robot, unless it is in `error` or stops; true if it is armed now. Waits until cancelled commands are gone.
-    pub(crate) fn arm(&self, permit: &Permit) -> bool {
+    /// Arms the robot, unless it is in `error` or stops. Waits until cancelled commands are gone.
+    pub(crate) fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
+        if !permit.is_valid() {
+            return Err(ArmError::Cancelled);
+        }
         match self.0.mode {
             Mode::Real => {
                 // If it is in vain, the entry finds them still there.
@@ -56,29 +59,28 @@ impl Control {
         let mut step = self.step();
         // A command may have been cancelled while it waited.
         if !permit.is_valid() {
-            return false;
+            return Err(ArmError::Cancelled);
         }
         step.line(Event::Arm);
-        let is_free = !step.state.has_lingering() && !step.state.is_stopping;
-        if step.state.machine.safety == Safety::Disarmed && is_free {
+        let result = step.may_arm();
+        if result.is_ok() && step.state.machine.safety == Safety::Disarmed {
             step.state.machine.safety = Safety::Armed;
             step.state.machine.resting = IDLE;
         }
-        let is_armed = step.state.machine.safety == Safety::Armed;
         step.finish();
-        is_armed
+        result
     }
 
-    /// Disarms the robot: commands are cancelled and the disarm callbacks run. True if everything could be made safe; else
-    /// the safety state is `error`, out of which `force` leads even if something still fails.
-    pub(crate) fn disarm(&self, force: bool) -> bool {
+    /// Disarms the robot: commands are cancelled and the disarm callbacks run. If not everything could be made safe, the
+    /// safety state is `error`, which `force` leaves even if something still fails.
+    pub(crate) fn disarm(&self, force: bool) -> Result<(), DisarmError> {
         let mut step = self.step();
         if step.state.is_stopped() {
-            return step.state.last_disarm_was_safe;
+            return step.state.last_disarm.clone();
         }
         let (generation, is_new) = match step.state.machine.safety {
-            Safety::Error if !force => return false,
-            Safety::Disarmed if !force => return true,
+            Safety::Error if !force => return Err(DisarmError::Error),
+            Safety::Disarmed if !force => return Ok(()),
             Safety::Disarming => (step.state.generation, false),
             Safety::Armed | Safety::Disarmed | Safety::Error => {
                 step.line(Event::Disarm { force });
@@ -96,12 +98,13 @@ impl Control {
         step.finish();
         match self.0.mode {
             // A callback must not wait for itself.
-            Mode::Real if hooks::is_inside(self.id()) => return false,
+            Mode::Real if hooks::is_inside(self.id()) => return Err(DisarmError::Callback),
             Mode::Real => drop(self.wait_until(DISARM_WITHIN + MARGIN, |state| !state.is_disarming(generation))),
             Mode::Virtual => while self.run_pending_hooks() {},
             Mode::Replay => {}
         }
-        self.lock().last_disarm_was_safe
+        let state = self.lock();
+        if state.is_disarming(generation) { Err(DisarmError::Unfinished) } else { state.last_disarm.clone() }
     }
 
     /// In a replay: disarms as the journal has it.
@@ -226,6 +229,25 @@ impl Guardian for Control {
 }
 
 impl Step<'_> {
+    /// Whether the robot is armed or may be.
+    fn may_arm(&self) -> Result<(), ArmError> {
+        match self.state.machine.safety {
+            Safety::Armed => Ok(()),
+            Safety::Error => Err(ArmError::Error),
+            _ if self.state.is_stopping => Err(ArmError::Stopping),
+            Safety::Disarming => Err(ArmError::Disarming),
+            Safety::Disarmed if self.state.has_lingering() => Err(ArmError::Lingering(self.lingering())),
+            Safety::Disarmed => Ok(()),
+        }
+    }
+
+    /// The paths of commands that were cancelled and whose code has not returned.
+    fn lingering(&self) -> Vec<&'static str> {
+        let executions = self.state.executions.iter();
+        let lingering = executions.filter(|execution| matches!(execution.phase, Phase::Lingering));
+        lingering.filter_map(|execution| self.declared(execution.command)).map(|declared| declared.path).collect()
+    }
+
     /// Motion is inhibited from here on; the disarm callbacks run once the lock is released. The generation.
     pub(super) fn begin_disarming(&mut self, by: Option<u64>, name: Option<&'static str>, force: bool) -> u64 {
         // Those of commands too, which end below.
@@ -259,11 +281,15 @@ impl Step<'_> {
         self.line(Event::Disarmed { errors: errors.clone() });
         self.control.0.limits.clear(Limit::Disarming(disarming.generation));
         let is_safe = errors.is_empty();
-        self.state.last_disarm_was_safe = is_safe;
-        for error in errors {
-            self.publish_safety_error(error);
-        }
         let is_error = disarming.to_error || !(is_safe || disarming.force);
+        for error in &errors {
+            self.publish_safety_error(error.clone());
+        }
+        self.state.last_disarm = match is_error {
+            _ if !is_safe => Err(DisarmError::Failed(errors)),
+            true => Err(DisarmError::Error),
+            false => Ok(()),
+        };
         self.state.machine.safety = if is_error { Safety::Error } else { Safety::Disarmed };
         let name = disarming.by.and_then(|id| self.name_of(id));
         self.publish_machine(name);

@@ -185,7 +185,7 @@ impl Control {
 }
 
 impl Step<'_> {
-    fn declared(&self, command: usize) -> Option<&'static CommandDeclaration> {
+    pub(super) fn declared(&self, command: usize) -> Option<&'static CommandDeclaration> {
         self.control.0.declared.commands.get(command)
     }
 

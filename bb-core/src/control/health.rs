@@ -110,6 +110,10 @@ impl Control {
             return true;
         }
         let mut step = self.step();
+        if step.state.is_stopping {
+            // Its inputs end because the robot stops.
+            return true;
+        }
         let last_run = self.0.nodes.get(estimator).map_or(MonotonicTime::ZERO, |node| node.last_run());
         step.line(Event::Lost { estimator, last_run });
         step.lost(estimator, last_run);

@@ -12,7 +12,9 @@ use crate::component::{DisarmHook, Host, Permit};
 use crate::declaration::{
     CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, ParameterValues, Supervisor,
 };
-use crate::event::{CategoryDeclaration, ComponentFault, HealthState, HealthTransition, Safety, SafetyError};
+use crate::event::{
+    CategoryDeclaration, ComponentFault, DisarmError, HealthState, HealthTransition, Safety, SafetyError,
+};
 use crate::fault::Fault;
 use crate::journal::Journal;
 use crate::lifecycle::Supervision;
@@ -147,7 +149,7 @@ pub(super) struct State {
     pub(super) health: Vec<Health>,
     pub(super) components: Vec<Supervised>,
     pub(super) disarming: Option<Disarming>,
-    pub(super) last_disarm_was_safe: bool,
+    pub(super) last_disarm: Result<(), DisarmError>,
     /// How often the robot was disarmed.
     pub(super) generation: u64,
     pub(super) is_stopping: bool,
@@ -253,7 +255,7 @@ impl Control {
             health: vec![Health::default(); declared.estimators.len()],
             components: Vec::new(),
             disarming: None,
-            last_disarm_was_safe: true,
+            last_disarm: Ok(()),
             generation: 0,
             is_stopping: false,
             has_ended: false,

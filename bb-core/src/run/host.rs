@@ -5,7 +5,7 @@ use super::actuator::AnyActuator;
 use crate::component::{CommandInfo, DisarmHook, DynamicExecution, Guardian, Host, Permit};
 use crate::control::{Control, Islands, Wired};
 use crate::declaration::ParameterError;
-use crate::event::{ParameterValue, Safety};
+use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::fault::Fault;
 use crate::journal::{Event, Journal, Recorded};
 use crate::message::Origin;
@@ -61,11 +61,11 @@ impl<R: Robot> Host for RobotHost<R> {
         self.control.safety()
     }
 
-    fn arm(&self, permit: &Permit) -> bool {
+    fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
         self.control.arm(permit)
     }
 
-    fn disarm(&self) -> bool {
+    fn disarm(&self) -> Result<(), DisarmError> {
         self.control.disarm(false)
     }
 

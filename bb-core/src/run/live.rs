@@ -7,7 +7,7 @@ use super::{ActuatorError, Bus, Report, Robot, SensorHandle};
 use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Permit, Sensor};
 use crate::control::Execution;
 use crate::declaration::{ParameterError, ParameterType};
-use crate::event::{Refusal, Safety};
+use crate::event::{ArmError, DisarmError, Refusal, Safety};
 use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
@@ -137,20 +137,28 @@ impl<R: Robot> Live<R> {
         self.0.control.safety()
     }
 
-    /// Arms the robot, as a command would; true if it is armed now. In `error` it stays disarmed.
-    pub fn arm(&self) -> bool {
+    /// Arms the robot, as a command would. A robot that is armed already stays so.
+    ///
+    /// # Errors
+    /// Why it is not armed: it is in `error`, is being disarmed or stops, or the code of cancelled commands has not returned
+    /// within 5 s.
+    pub fn arm(&self) -> Result<(), ArmError> {
         self.settled(|machine| machine.control.arm(&Permit::UNLIMITED))
     }
 
-    /// Disarms the robot: commands are cancelled, and whoever owns hardware makes it safe, within 5 s. True if all could;
-    /// else the safety state is `error`.
-    pub fn disarm(&self) -> bool {
+    /// Disarms the robot: commands are cancelled, and whoever owns hardware makes it safe, within 5 s.
+    ///
+    /// # Errors
+    /// What could not be made safe; the safety state is `error` then.
+    pub fn disarm(&self) -> Result<(), DisarmError> {
         self.settled(|machine| machine.control.disarm(false))
     }
 
-    /// Leads out of the safety state `error`, even if something still cannot be made safe: whoever calls it has seen to
-    /// that.
-    pub fn force_disarm(&self) -> bool {
+    /// Leaves the safety state `error`, even if something still cannot be made safe: the caller has checked that.
+    ///
+    /// # Errors
+    /// What could not be made safe again. The safety state is `disarmed` all the same.
+    pub fn force_disarm(&self) -> Result<(), DisarmError> {
         self.settled(|machine| machine.control.disarm(true))
     }
 

@@ -169,7 +169,7 @@ fn commands_and_states() {
     assert_eq!(before["bb_operational_state{state=\"rested\"}"], 0.0);
 
     simulation.command(watched::command::wait, NoArguments).expect_err("it is disarmed");
-    simulation.arm();
+    simulation.arm().expect("it may be armed");
     simulation.command(watched::command::wait, NoArguments).expect("it is idle");
     simulation.run_for(Duration::from_millis(500));
     let during = parse(&exporter.render());

@@ -1,0 +1,70 @@
+//! Why a robot could not be armed or disarmed.
+
+use super::SafetyError;
+use std::fmt;
+
+/// Why a robot is not armed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ArmError {
+    /// The safety state is `error`; only a forced disarm leads out.
+    Error,
+    /// The robot is being disarmed.
+    Disarming,
+    /// The robot stops.
+    Stopping,
+    /// The code of these commands, which were cancelled, has not returned.
+    Lingering(Vec<&'static str>),
+    /// The command that arms it was cancelled.
+    Cancelled,
+}
+
+/// Why a robot may not be safe.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DisarmError {
+    /// These disarm callbacks failed or did not return in time.
+    Failed(Vec<SafetyError>),
+    /// The safety state is `error`, and this disarm was not forced, or hardware reported an error meanwhile.
+    Error,
+    /// A disarm callback called: the robot is being disarmed, and the callback must not wait for itself.
+    Callback,
+    /// The robot is being disarmed, and the thread that limits its time is gone.
+    Unfinished,
+}
+
+impl fmt::Display for ArmError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the robot was not armed: ")?;
+        match self {
+            Self::Error => f.write_str("its safety state is `error`, which only a forced disarm leaves"),
+            Self::Disarming => f.write_str("it is being disarmed"),
+            Self::Stopping => f.write_str("it stops"),
+            Self::Lingering(paths) => {
+                write!(f, "the code of cancelled commands has not returned: {}", paths.join(", "))
+            }
+            Self::Cancelled => f.write_str("the command that arms it was cancelled"),
+        }
+    }
+}
+
+impl fmt::Display for DisarmError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Failed(errors) => {
+                f.write_str("not everything could be made safe")?;
+                for (index, SafetyError { path, message }) in errors.iter().enumerate() {
+                    write!(f, "{}`{path}`: {message}", if index == 0 { ": " } else { "; " })?;
+                }
+                Ok(())
+            }
+            Self::Error => f.write_str("the safety state is `error`"),
+            Self::Callback => f.write_str("a disarm callback cannot wait for the robot to be disarmed"),
+            Self::Unfinished => f.write_str("the robot is still being disarmed"),
+        }
+    }
+}
+
+impl std::error::Error for ArmError {}
+
+impl std::error::Error for DisarmError {}
