@@ -42,7 +42,7 @@ fn every_folder_of_code_is_on_the_map() {
         let entries = std::fs::read_dir(&source).unwrap_or_else(|error| panic!("{}: {error}", source.display()));
         for entry in entries.flatten().filter(|entry| entry.path().is_dir()) {
             let folder = format!("{krate}/src/{}", entry.file_name().to_string_lossy());
-            // A folder stands on the map itself, or as the file beside it of the same name.
+            // The map lists a folder itself or the file of the same name beside it.
             let is_there = map.contains(&format!("{folder}/")) || map.contains(&format!("{folder}.rs"));
             assert!(is_there, "ARCHITECTURE.md does not name {folder}");
         }

@@ -1,4 +1,4 @@
-//! What is done to the rover: by whoever trips over its cables, and by its operator.
+//! What happens to the rover: cables that are pulled, and commands of its operator.
 
 use bb_core::prelude::*;
 

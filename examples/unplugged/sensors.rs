@@ -38,7 +38,7 @@ impl Sensor for Gyroscope {
     }
 
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Imu>, Fault> {
-        // A rover whose wheels stall stands.
+        // A rover with stalled wheels is at rest.
         let speed = if WHEELS_STALLED.includes(now) { 0.0 } else { self.0.speed };
         let angular_velocity = Vector3::new(0.0, 0.0, speed / RADIUS_M);
         let linear_acceleration = Vector3::new(0.0, speed * speed / RADIUS_M, 9.81);

@@ -75,7 +75,7 @@ impl Line {
         Some(Self::new(time, Kind::State, format!("{from} -> {to}"), command.unwrap_or("")))
     }
 
-    /// What stands above the lines.
+    /// The heading above the lines.
     pub(crate) fn header() -> String {
         row("time, s", "what", "", "why")
     }

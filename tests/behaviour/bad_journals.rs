@@ -65,7 +65,7 @@ fn of_rig() -> Result<Vec<Entry>, Failure> {
 }
 
 #[test]
-fn a_journal_of_a_robot_whose_sensors_stand_in_another_order_is_refused() -> Result<(), Failure> {
+fn a_journal_of_a_robot_with_its_sensors_in_another_order_is_refused() -> Result<(), Failure> {
     let _alone = alone();
     let lines = of_rig()?;
     let error = right_first::Rig::builder().replay()?.play(lines.clone()).expect_err("it is of another robot");

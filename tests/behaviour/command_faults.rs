@@ -208,7 +208,7 @@ fn a_future_that_panics_when_it_is_dropped_ends_as_it_would_have() {
 }
 
 #[test]
-fn a_result_is_waited_for_as_long_as_one_likes_and_taken_once() {
+fn a_result_can_be_awaited_for_any_time_and_taken_once() {
     within(60, || {
         let running = Unruly::builder().start().expect("it starts");
         let sleeping = running.command(unruly::command::patient, Kind::Sleep).expect("it is allowed");

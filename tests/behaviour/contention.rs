@@ -130,7 +130,7 @@ static ALONE: Mutex<()> = Mutex::new(());
 const ORDERED: &str = "estimator/base/ordered";
 
 #[test]
-fn nothing_is_lost_uncounted_whoever_publishes_and_whatever_fails() {
+fn every_lost_message_is_counted_whatever_publishes_or_fails() {
     let _alone = ALONE.lock();
     within(60, || {
         const EACH: u64 = 20_000;
@@ -179,7 +179,7 @@ fn nothing_is_lost_uncounted_whoever_publishes_and_whatever_fails() {
 }
 
 #[test]
-fn one_that_hangs_does_not_hold_up_those_who_publish() {
+fn an_estimator_that_hangs_does_not_delay_publishers() {
     let _alone = ALONE.lock();
     within(60, || {
         let running = Crowded::builder().start().expect("it starts");

@@ -363,7 +363,7 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Box<d
 }
 
 #[test]
-fn an_actuator_that_fails_is_made_anew() -> Result<(), Box<dyn std::error::Error>> {
+fn an_actuator_that_fails_is_restarted() -> Result<(), Box<dyn std::error::Error>> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
     let servo = commanded::actuator::base::pan::servo;

@@ -351,7 +351,7 @@ fn the_motor_stops_first_while_a_command_or_another_actuator_hangs() {
 }
 
 #[test]
-fn the_motor_stops_first_while_somebody_who_listens_hangs() {
+fn the_motor_stops_first_while_a_subscriber_hangs() {
     motor_stops_first_whatever_way(&[
         "a subscriber of a sensor",
         "a subscriber of the safety state",
@@ -523,7 +523,7 @@ robot! {
 }
 
 #[test]
-fn an_actuator_that_fails_and_cannot_be_made_safe_is_an_error_and_nobody_arms() -> Result<(), StartError> {
+fn an_actuator_that_fails_and_cannot_be_made_safe_leads_to_error() -> Result<(), StartError> {
     let _alone = alone();
     let builder = Crane::builder();
     let errors = builder.subscribe(system::SafetyErrors);

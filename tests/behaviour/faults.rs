@@ -100,7 +100,7 @@ fn a_component_that_cannot_start_is_named() {
 }
 
 #[test]
-fn a_component_that_fails_starts_anew_alone_from_a_clean_state() -> Result<(), StartError> {
+fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), StartError> {
     for (fails_by, message) in
         [("error", "covariance is not positive definite"), ("panic", "panicked: index out of bounds")]
     {

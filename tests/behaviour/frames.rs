@@ -125,7 +125,7 @@ fn transforms_are_the_products_of_the_fixed_joints() -> Result<(), StartError> {
     assert!((back.far - Vector3::new(-2.0, 1.0, -3.0)).norm() < 1e-12);
     assert!((back.far_x + Vector3::y()).norm() < 1e-12);
 
-    // A sensor at a joint stands where the joint stands, fixed to the parent.
+    // A sensor at a joint is at the origin of the joint, fixed to the parent.
     let at_joint = at_joint.drain().last().expect("it emitted");
     assert!((at_joint.far - Vector3::new(-2.0, 0.0, -3.0)).norm() < 1e-12);
 

@@ -245,7 +245,7 @@ fn an_estimator_without_a_budget_recovers_as_well() -> Result<(), StartError> {
 }
 
 #[test]
-fn a_command_gets_the_change_and_a_refused_one_leaves_a_trace_but_the_change_stands() -> Result<(), StartError> {
+fn a_command_gets_the_change_and_a_refused_one_is_counted_and_changes_nothing() -> Result<(), StartError> {
     let builder = Watched::builder();
     let events = builder.subscribe(watched::command::slow_down);
     let mut run = Run { transitions: builder.subscribe(system::Health), simulation: builder.simulate()?, now: 0 };

@@ -162,7 +162,7 @@ fn when_woken<T: Payload>(subscription: &mut Subscription<T>, run: impl FnMut() 
 }
 
 #[test]
-fn who_listens_to_the_robot_itself_may_call_it_back() {
+fn a_subscriber_of_a_system_topic_may_call_the_robot() {
     within(120, || {
         for topic in ["safety", "state", "parameter", "command"] {
             let builder = Orderly::builder();

@@ -98,7 +98,7 @@ robot! {
 const BOUND: bb_core::EstimatorHandle<Tuned, Bound, Number> = tuned::sensor::base::number::bound;
 
 #[test]
-fn changes_are_published_in_their_order_and_the_last_one_stands() {
+fn changes_are_published_in_their_order_and_the_last_one_holds() {
     within(60, || {
         let builder = Tuned::builder();
         let roomy = Overflow::DropOldest { capacity: 1 << 16 };
@@ -150,7 +150,7 @@ fn what_an_option_cannot_hold_becomes_the_nearest_it_can() -> Result<(), Box<dyn
 }
 
 #[test]
-fn whoever_listens_by_path_may_come_and_go_while_others_publish() {
+fn subscribers_by_path_may_come_and_go_while_others_publish() {
     within(60, || {
         const EACH: u64 = 20_000;
         let builder = Tuned::builder();

@@ -290,7 +290,7 @@ robot! {
 }
 
 #[test]
-fn a_sensor_that_panics_when_it_is_asked_where_it_starts_is_made_anew() -> Result<(), StartError> {
+fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     let _alone = alone();
     STARTLES.store(2, Ordering::SeqCst);
     let builder = Nervous::builder();

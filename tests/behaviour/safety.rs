@@ -94,7 +94,7 @@ robot! {
 static ALONE: Mutex<()> = Mutex::new(());
 
 #[test]
-fn a_sensor_that_was_made_anew_is_made_safe_once() -> Result<(), StartError> {
+fn a_restarted_sensor_is_made_safe_once() -> Result<(), StartError> {
     let _alone = ALONE.lock();
     let mut builder = Powered::builder();
     builder.options(powered::sensor::base::pan::head::lidar).breaks = true;
@@ -168,7 +168,7 @@ fn a_disarm_that_hangs_is_an_error_and_does_not_keep_the_robot_from_stopping() {
 }
 
 #[test]
-fn whoever_arms_and_disarms_at_once_agrees_in_the_end() {
+fn threads_that_arm_and_disarm_at_once_agree_in_the_end() {
     let _alone = ALONE.lock();
     within(60, || {
         let builder = Powered::builder();

@@ -206,7 +206,7 @@ robot! {
 }
 
 #[test]
-fn a_sensor_that_panics_when_it_is_made_anew_is_made_anew_after_longer() {
+fn a_sensor_that_panics_when_it_is_restarted_backs_off() {
     within(60, || {
         let builder = Unplugged::builder();
         let numbers = builder.subscribe(unplugged::sensor::base::flaky);

@@ -109,7 +109,7 @@ fn what_does_not_fit_while_it_hangs_is_counted_and_the_rest_comes_in_order() {
 }
 
 #[test]
-fn it_is_made_anew_ticks_and_is_lost_as_any_other() {
+fn it_restarts_ticks_and_is_lost_as_any_other() {
     let _alone = ALONE.lock();
     within(60, || {
         let builder = Laden::builder();
