@@ -113,13 +113,14 @@ fn the_top_level_is_the_project() {
 }
 
 /// The folders of the runtime, from the bottom up.
-const LAYERS: [&str; 16] = [
+const LAYERS: [&str; 17] = [
     "fault",
     "time",
     "message",
     "payload",
     "pubsub",
     "topology",
+    "kinematics",
     "event",
     "declaration",
     "journal",

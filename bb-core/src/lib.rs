@@ -9,6 +9,7 @@
 //! | time, real or virtual | [`time`] |
 //! | subscriptions | [`pubsub`] |
 //! | links, joints and the transforms between them | [`topology`] |
+//! | where the links of a moving robot are | [`kinematics`] |
 //! | what the runtime publishes about itself | [`event`] |
 //! | what `robot!` declares | [`declaration`] |
 //! | the journal of a run, and its replay | [`journal`], [`Replay`] |
@@ -35,6 +36,7 @@ pub mod control;
 pub mod declaration;
 pub mod event;
 pub mod journal;
+pub mod kinematics;
 pub mod lifecycle;
 pub mod message;
 pub mod node;

@@ -1,0 +1,176 @@
+//! From one link to another.
+
+use super::KinematicsError;
+use super::coordinates::{Motion, Rate};
+use super::model::{Kinematics, LinkId, check};
+use nalgebra::{Dim, Isometry3, Matrix, RawStorageMut, U6, Vector3, Vector6};
+
+/// The joints between two links, prepared: those that are fixed are multiplied out, so that a chain without moving joints is
+/// a constant.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// From the last body that carries both towards the tip.
+    to_tip: Box<[Step]>,
+    /// From there towards the base.
+    to_base: Box<[Step]>,
+    body_from_tip: Isometry3<f64>,
+    base_from_body: Isometry3<f64>,
+    positions: usize,
+    velocities: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    parent_from_joint: Isometry3<f64>,
+    joint_from_parent: Isometry3<f64>,
+    motion: Motion,
+}
+
+impl Kinematics {
+    /// The chain from `base` to `tip`, any two links.
+    ///
+    /// # Errors
+    /// A link is none of this robot.
+    pub fn chain(&self, base: LinkId, tip: LinkId) -> Result<Chain, KinematicsError> {
+        let (base, tip) = (self.placement(base)?, self.placement(tip)?);
+        let (mut of_base, mut of_tip) = (self.ancestors(base.body), self.ancestors(tip.body));
+        // What carries both moves neither in the frame of the other.
+        while of_base.last().is_some() && of_base.last() == of_tip.last() {
+            of_base.pop();
+            of_tip.pop();
+        }
+        let steps = |bodies: Vec<usize>| -> Box<[Step]> {
+            let bodies = bodies.into_iter().rev().filter_map(|body| self.bodies.get(body));
+            bodies
+                .map(|body| Step {
+                    parent_from_joint: body.parent_from_joint,
+                    joint_from_parent: body.joint_from_parent,
+                    motion: body.motion,
+                })
+                .collect()
+        };
+        let (mut to_tip, mut to_base) = (steps(of_tip), steps(of_base));
+        let mut body_from_tip = tip.body_from_link;
+        let mut base_from_body = base.body_from_link.inverse();
+        // Without joints on one side, its constant goes into the other's first.
+        if to_base.is_empty() {
+            match to_tip.first_mut() {
+                Some(first) => {
+                    first.parent_from_joint = base_from_body * first.parent_from_joint;
+                    first.joint_from_parent = first.parent_from_joint.inverse();
+                }
+                None => body_from_tip = base_from_body * body_from_tip,
+            }
+            base_from_body = Isometry3::identity();
+        } else if to_tip.is_empty()
+            && let Some(first) = to_base.first_mut()
+        {
+            first.joint_from_parent *= body_from_tip;
+            first.parent_from_joint = first.joint_from_parent.inverse();
+            body_from_tip = Isometry3::identity();
+        }
+        let (positions, velocities) = (self.positions(), self.velocities());
+        Ok(Chain { to_tip, to_base, body_from_tip, base_from_body, positions, velocities })
+    }
+
+    /// A body and those that carry it, up to the root.
+    fn ancestors(&self, body: Option<usize>) -> Vec<usize> {
+        std::iter::successors(body, |body| self.bodies.get(*body).and_then(|body| body.parent)).collect()
+    }
+}
+
+impl Chain {
+    /// `base_from_tip` at a position.
+    ///
+    /// # Errors
+    /// Another number of positions than the robot has.
+    pub fn transform(&self, positions: &[f64]) -> Result<Isometry3<f64>, KinematicsError> {
+        check("positions", self.positions, positions)?;
+        let mut from_tip = self.body_from_tip;
+        for step in self.to_tip.iter().rev() {
+            from_tip = step.parent_from_joint * step.motion.carry(positions, &from_tip);
+        }
+        if self.to_base.is_empty() {
+            return Ok(from_tip);
+        }
+        for step in &self.to_base {
+            from_tip = step.motion.carry_back(positions, &(step.joint_from_parent * from_tip));
+        }
+        Ok(self.base_from_body * from_tip)
+    }
+
+    /// `base_from_tip`, and into `jacobian` the velocity of the tip relative to the base for a unit of each velocity: that of
+    /// the tip's origin, m/s, in the first three rows, the angular one, rad/s, in the others, in the axes of the base. A
+    /// column a velocity of the robot; those that do not move the chain are zero.
+    ///
+    /// # Errors
+    /// Another number of positions, or of columns, than the robot has.
+    pub fn jacobian<C: Dim, S: RawStorageMut<f64, U6, C>>(
+        &self,
+        positions: &[f64],
+        jacobian: &mut Matrix<f64, U6, C, S>,
+    ) -> Result<Isometry3<f64>, KinematicsError> {
+        check("positions", self.positions, positions)?;
+        let (expected, given) = (self.velocities, jacobian.ncols());
+        if expected != given {
+            return Err(KinematicsError::Coordinates { what: "columns", expected, given });
+        }
+        jacobian.fill(0.0);
+        // In the axes of the tip, which both sides know.
+        let mut from_tip = self.body_from_tip;
+        for step in self.to_tip.iter().rev() {
+            add_columns(&step.motion, &from_tip, 1.0, jacobian);
+            from_tip = step.parent_from_joint * step.motion.carry(positions, &from_tip);
+        }
+        for step in &self.to_base {
+            from_tip = step.motion.carry_back(positions, &(step.joint_from_parent * from_tip));
+            // What moves the base moves the tip the other way, seen from there.
+            add_columns(&step.motion, &from_tip, -1.0, jacobian);
+        }
+        let base_from_tip = self.base_from_body * from_tip;
+        let rotation = base_from_tip.rotation.to_rotation_matrix();
+        for mut column in jacobian.column_iter_mut() {
+            let linear = rotation * Vector3::new(column[0], column[1], column[2]);
+            let angular = rotation * Vector3::new(column[3], column[4], column[5]);
+            column.copy_from(&Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z));
+        }
+        Ok(base_from_tip)
+    }
+
+    /// How many moving joints there are between the two links.
+    pub fn joints(&self) -> usize {
+        self.to_tip.len() + self.to_base.len()
+    }
+
+    /// Whether a velocity moves it.
+    pub(super) fn has(&self, velocity: usize) -> bool {
+        let mut has = false;
+        for step in self.to_tip.iter().chain(&self.to_base) {
+            step.motion.each_velocity(|moved, _| has |= moved == velocity);
+        }
+        has
+    }
+}
+
+/// What a joint does to the tip, in the axes of the tip.
+#[inline]
+fn add_columns<C: Dim, S: RawStorageMut<f64, U6, C>>(
+    motion: &Motion,
+    child_from_tip: &Isometry3<f64>,
+    sign: f64,
+    jacobian: &mut Matrix<f64, U6, C, S>,
+) {
+    let tip_from_child = child_from_tip.rotation.inverse();
+    let tip = &child_from_tip.translation.vector;
+    motion.each_velocity(|velocity, Rate { linear, angular }| {
+        let linear = tip_from_child * ((linear + angular.cross(tip)) * sign);
+        let angular = tip_from_child * (angular * sign);
+        let mut column = jacobian.column_mut(velocity);
+        column[0] += linear.x;
+        column[1] += linear.y;
+        column[2] += linear.z;
+        column[3] += angular.x;
+        column[4] += angular.y;
+        column[5] += angular.z;
+    });
+}

@@ -1,0 +1,79 @@
+//! What cannot be computed.
+
+use std::fmt;
+
+/// Why a robot has no kinematics, or a state does not fit it.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum KinematicsError {
+    /// No path of joints leads from the root to that link.
+    Unreachable {
+        /// The link.
+        link: &'static str,
+    },
+    /// Two joints carry that link, or one carries the root.
+    TwoParents {
+        /// The link.
+        link: &'static str,
+    },
+    /// That joint moves along or about an axis that is absent, zero or not finite.
+    NoAxis {
+        /// The joint.
+        joint: &'static str,
+    },
+    /// That joint mimics one that it cannot follow: itself in the end, or one that has not exactly one degree of freedom.
+    Mimic {
+        /// The joint.
+        joint: &'static str,
+    },
+    /// There is no link of that name or number.
+    NoLink(String),
+    /// A number is NaN or infinite.
+    NotFinite {
+        /// What it is a part of.
+        what: &'static str,
+    },
+    /// No position was found that reaches a target; it may still be within reach.
+    NotConverged {
+        /// How far the best position is from it, m.
+        position_error: f64,
+        /// By which angle, rad; 0 if only a position was asked for.
+        rotation_error: f64,
+        /// How many iterations were made, restarts included.
+        iterations: u32,
+    },
+    /// A slice has another length than the robot has coordinates.
+    Coordinates {
+        /// Positions, velocities or accelerations.
+        what: &'static str,
+        /// How many there are.
+        expected: usize,
+        /// How many were given.
+        given: usize,
+    },
+}
+
+impl fmt::Display for KinematicsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unreachable { link } => write!(f, "no joints lead from the root to the link `{link}`"),
+            Self::TwoParents { link } => {
+                write!(f, "the link `{link}` is carried by more than one joint, or is the root")
+            }
+            Self::NoAxis { joint } => write!(f, "the joint `{joint}` moves, and has no axis of finite length"),
+            Self::Mimic { joint } => {
+                write!(f, "the joint `{joint}` mimics itself, or a joint without exactly one degree of freedom")
+            }
+            Self::NoLink(name) => write!(f, "there is no link `{name}`"),
+            Self::NotFinite { what } => write!(f, "the {what} has a number that is not finite"),
+            Self::NotConverged { position_error, rotation_error, iterations } => write!(
+                f,
+                "no position found that reaches the target: {position_error:.3e} m and {rotation_error:.3e} rad off after \
+                 {iterations} iterations"
+            ),
+            Self::Coordinates { what, expected, given } => write!(f, "{given} {what} for a robot of {expected}"),
+        }
+    }
+}
+
+impl std::error::Error for KinematicsError {}

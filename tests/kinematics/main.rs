@@ -1,0 +1,6 @@
+//! Where moving robots are, how fast, and how their joints reach a target.
+
+mod inverse;
+mod laws;
+mod pinocchio;
+mod robots;
