@@ -22,6 +22,7 @@ mod hardware;
 mod health;
 mod hygiene;
 mod journals;
+mod made_safe;
 mod navigation;
 mod order;
 mod outputs;

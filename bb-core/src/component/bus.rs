@@ -151,7 +151,7 @@ impl Bus {
     /// There is no such command, the arguments do not fit its shape, or it is refused.
     pub fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault> {
         self.check_permit()?;
-        self.host.start_command(path, arguments)
+        self.host.start_command(path, arguments, &self.permit)
     }
 
     /// The operational state.
@@ -186,10 +186,7 @@ impl Bus {
     }
 
     fn check_permit(&self) -> Result<(), Fault> {
-        if self.permit.is_valid() {
-            return Ok(());
-        }
-        Err(Fault::new("the command that asks for this has ended or was cancelled"))
+        self.permit.check()
     }
 
     /// All topics; none if the robot is gone.

@@ -183,7 +183,7 @@ impl ComponentContext {
     /// callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that fails or takes longer
     /// leads to the safety state `error`. A restart of the component replaces what it registered before.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
-        self.host.on_disarm(self.path, Arc::new(hook));
+        self.host.on_disarm(self.path, None, Arc::new(hook));
     }
 
     /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error

@@ -36,7 +36,7 @@ pub(crate) trait Host: Guardian {
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
     fn actuators(&self) -> Vec<&'static str>;
     fn commands(&self) -> Vec<CommandInfo>;
-    fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault>;
+    fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault>;
 }
 
 impl fmt::Debug for dyn Host {

@@ -15,8 +15,10 @@ pub enum ArmError {
     Stopping,
     /// The code of these commands, which were cancelled, has not returned.
     Lingering(Vec<&'static str>),
-    /// The command that arms it was cancelled.
+    /// The robot was disarmed while this waited, or the command that arms it was cancelled.
     Cancelled,
+    /// The robot is replayed: its journal says when it is armed.
+    Replay,
 }
 
 /// Why a robot may not be safe.
@@ -31,6 +33,8 @@ pub enum DisarmError {
     Callback,
     /// The robot is being disarmed, and the thread that limits its time is gone.
     Unfinished,
+    /// The robot is replayed: its journal says when it is disarmed.
+    Replay,
 }
 
 impl fmt::Display for ArmError {
@@ -43,7 +47,8 @@ impl fmt::Display for ArmError {
             Self::Lingering(paths) => {
                 write!(f, "the code of cancelled commands has not returned: {}", paths.join(", "))
             }
-            Self::Cancelled => f.write_str("the command that arms it was cancelled"),
+            Self::Cancelled => f.write_str("it was disarmed meanwhile, or the command that arms it was cancelled"),
+            Self::Replay => f.write_str("it is replayed"),
         }
     }
 }
@@ -61,6 +66,7 @@ impl fmt::Display for DisarmError {
             Self::Error => f.write_str("the safety state is `error`"),
             Self::Callback => f.write_str("a disarm callback cannot wait for the robot to be disarmed"),
             Self::Unfinished => f.write_str("the robot is still being disarmed"),
+            Self::Replay => f.write_str("the robot is replayed"),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::describe::difference;
 use super::machine::Machine;
 use super::visit::Visitable;
 use super::{Live, Report, Robot};
-use crate::component::{HandleCall, HandleCast, Permit};
+use crate::component::{HandleCall, HandleCast};
 use crate::declaration::ParameterValues;
 use crate::journal::{Callback, Entry, Event, Publishers, Recorded, Request, decoded};
 use crate::node::{Key, NodeEntry, Replayed, know_calls, know_casts};
@@ -246,10 +246,7 @@ impl<R: Robot> Replay<R> {
             Event::Cancel { execution } => control.cancel(execution),
             Event::Timeout { execution } => control.timed_out(execution),
             Event::Gone { execution } => control.gone(execution),
-            Event::Arm => {
-                // Whether it succeeds follows from the state.
-                let _ = control.arm(&Permit::UNLIMITED);
-            }
+            Event::Arm => control.replay_arm(),
             Event::Disarm { force } => {
                 control.replay_disarm(force);
             }
