@@ -2,9 +2,11 @@
 
 mod cells;
 mod columns;
+mod source;
 mod units;
 mod write;
 
+use crate::Progress;
 use cells::{Table, Times};
 use clap::Args;
 use columns::{Columns, Quantity};
@@ -14,7 +16,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// The CSV: with or without a head, cells separated by commas, semicolons or tabs.
+    /// The CSV, or `-` for the standard input: with or without a head, cells separated by commas, semicolons or tabs.
     #[arg(value_name = "INPUT.csv")]
     input: PathBuf,
     /// The bag to write; must not exist.
@@ -86,7 +88,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     let times = rate.map_or(Times::Column, Times::Rate);
     let mut table = Table::open(input, &columns, times).map_err(|fault| in_file(input, fault))?;
     let mut bag = write::Bag::create(out)?;
-    let progress = crate::Progress::new("converting", table.bytes());
+    let progress =
+        table.bytes().map_or_else(|| Progress::spinner("converting"), |bytes| Progress::new("converting", bytes));
     let mut truths = truths.into_iter().peekable();
     let written = loop {
         match table.next().map_err(|fault| in_file(input, fault)) {
