@@ -58,6 +58,15 @@ impl Chosen {
         &self.params
     }
 
+    /// The same without its magnetometer, if there are six axes.
+    pub(crate) fn on(&self, axes: Axes) -> Result<Self, String> {
+        let mut params = self.params;
+        if axes == Axes::Six && params.get(MAGNETOMETER).is_some() {
+            params.set(MAGNETOMETER, "false").map_err(|error| format!("{}: {error}", self.name()))?;
+        }
+        Ok(Self { params })
+    }
+
     /// A filter that has seen no sample yet.
     ///
     /// # Errors

@@ -29,6 +29,8 @@ mod report;
 mod score;
 mod table;
 mod topics;
+mod truths;
+mod units;
 mod values;
 mod variants;
 
@@ -110,11 +112,7 @@ fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     let Attitude { paths, evaluator, json, plot } = attitude;
     let files = files::recordings(paths);
     let evaluations = evaluate::evaluate_all(&files, evaluator);
-    let text = if *json {
-        report::json(&evaluations, evaluator.axes)?
-    } else {
-        report::table(&evaluations, evaluator.axes)
-    };
+    let text = if *json { report::json(&evaluations)? } else { report::table(&evaluations, evaluator.axes) };
     say(&text)?;
     let is_whole = report::complain(&evaluations);
     if let Some(plot) = plot {

@@ -78,6 +78,11 @@ impl Variants {
         *self != Self { seed: self.seed, ..Self::default() }
     }
 
+    /// Whether the magnetometer reads something else.
+    pub(crate) fn changes_field(&self) -> bool {
+        self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some()
+    }
+
     pub(crate) fn check(&self, axes: crate::Axes) -> Result<(), String> {
         if self.count() > MOST {
             return Err(format!(
@@ -85,9 +90,7 @@ impl Variants {
                 self.count()
             ));
         }
-        let field =
-            self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some();
-        if field && axes == crate::Axes::Six {
+        if self.changes_field() && axes == crate::Axes::Six {
             return Err("--axes 6 takes no magnetometer, so --offset, --magnet, --disturb and --drift change \
                         nothing; leave them out"
                 .into());

@@ -1,11 +1,11 @@
 //! `bb info`: what is in recordings, and what looks wrong with them.
 
 mod date;
+mod quantities;
 mod remark;
 mod report;
 mod scan;
 mod times;
-mod units;
 
 use crate::files;
 use clap::Args;
