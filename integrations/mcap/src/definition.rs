@@ -27,6 +27,8 @@ struct Message {
     /// `sensor_msgs/Imu`
     name: String,
     fields: Vec<Field>,
+    /// The names of the numbers of `kind`, of a message that is an enum.
+    variants: Vec<(u32, Arc<str>)>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,6 +53,8 @@ enum Kind {
     F32,
     F64,
     Text,
+    /// The number of an enum's variant, whose names the message of this index has.
+    Variant(usize),
     /// By index.
     Message(usize),
 }
