@@ -52,7 +52,7 @@ pub struct RecorderReport {
     pub messages: u64,
     /// Messages that the operating system has: they survive the death of the process.
     pub flushed: u64,
-    /// Messages lost since the recorder was too slow for the room that its subscription has.
+    /// Messages lost since the recorder was too slow for the room that its subscriptions have.
     pub lost: u64,
     /// Messages left out since they have more than 128 MiB, which no chunk that is read back may hold.
     pub too_large: u64,
@@ -66,7 +66,8 @@ pub struct Recorder {
     writer: Option<Box<FileWriter>>,
     /// The same file, to wait for the disk.
     to_sync: Option<File>,
-    subscription: DynamicSubscription,
+    /// The first is waited for, the others are looked at.
+    subscriptions: Vec<DynamicSubscription>,
     options: RecorderOptions,
     channels: HashMap<&'static str, Channel>,
     report: RecorderReport,
@@ -135,14 +136,8 @@ impl Recorder {
         options: RecorderOptions,
     ) -> Result<Self, RecordingError> {
         let fail = |error| RecordingError::new(file, write_error(0, error));
-        // Before the run rather than at the first message: nobody looks at a recorder's errors then.
         let mut names = Names::default();
-        for (path, schemas) in subscription.schemas() {
-            let mut schemas = schemas.iter();
-            schemas
-                .try_for_each(|schema| names.take(path, schema))
-                .map_err(|kind| RecordingError::new(file, kind))?;
-        }
+        take_names(&mut names, &subscription).map_err(|kind| RecordingError::new(file, kind))?;
         let robot = options.robot.as_ref().filter(|_| options.transforms);
         let frames = robot.map(|robot| Frames::new(robot.topology, options.body.clone()));
         let mut writer = options.mcap().create(BufWriter::new(output)).map_err(fail)?;
@@ -151,7 +146,7 @@ impl Recorder {
             path: file.to_owned(),
             writer: Some(Box::new(writer)),
             to_sync,
-            subscription,
+            subscriptions: vec![subscription],
             options,
             channels: HashMap::new(),
             report: RecorderReport::default(),
@@ -164,15 +159,34 @@ impl Recorder {
         })
     }
 
+    /// Records what this subscription gets as well. Each has its own queue: where messages that come often have one, and those
+    /// that are rare another, a slow disk loses none of the rare. A message that both get is recorded twice.
+    ///
+    /// # Errors
+    /// As those of [`new`](Self::new) that are of the paths.
+    pub fn also(mut self, subscription: DynamicSubscription) -> Result<Self, RecordingError> {
+        if let Err(kind) = take_names(&mut self.names, &subscription) {
+            let path = self.path.clone();
+            drop(self);
+            // As `new` leaves no file behind.
+            let _ = std::fs::remove_file(&path);
+            return Err(RecordingError::new(&path, kind));
+        }
+        self.subscriptions.push(subscription);
+        Ok(self)
+    }
+
     /// Writes all messages that wait now; how many.
     ///
     /// # Errors
     /// The file cannot be written on, the disk is full say. Nothing more is recorded then.
     pub fn drain(&mut self) -> Result<u64, RecordingError> {
         let before = self.report.messages;
-        for _ in 0..self.subscription.waiting() {
-            let Some(message) = self.subscription.try_recv() else { break };
-            self.record(&message)?;
+        for index in 0..self.subscriptions.len() {
+            for _ in 0..self.subscriptions[index].waiting() {
+                let Some(message) = self.subscriptions[index].try_recv() else { break };
+                self.record(&message)?;
+            }
         }
         self.flush_if_due()?;
         Ok(self.report.messages - before)
@@ -197,7 +211,8 @@ impl Recorder {
 
     /// What has been recorded so far.
     pub fn report(&self) -> RecorderReport {
-        RecorderReport { lost: self.subscription.lagged(), ..self.report }
+        let lost = self.subscriptions.iter().map(DynamicSubscription::lagged).sum();
+        RecorderReport { lost, ..self.report }
     }
 
     /// Writes what waits, and the end of the file.
@@ -223,7 +238,8 @@ impl Recorder {
 
     /// Waits for a message, and writes it and all that wait after it.
     pub(crate) fn work(&mut self, wait: Duration) -> Result<(), RecordingError> {
-        if let Some(message) = self.subscription.recv_timeout(wait.min(self.options.flush_interval)) {
+        let wait = wait.min(self.options.flush_interval);
+        if let Some(message) = self.subscriptions.first().and_then(|first| first.recv_timeout(wait)) {
             self.record(&message)?;
         }
         self.drain().map(drop)
@@ -428,6 +444,14 @@ impl From<io::Error> for WriteFault {
     fn from(error: io::Error) -> Self {
         Self::File(error.into())
     }
+}
+
+/// Refuses two types of one name before the run rather than at the first message: nobody looks at a recorder's errors then.
+fn take_names(names: &mut Names, subscription: &DynamicSubscription) -> Result<(), RecordingErrorKind> {
+    for (path, schemas) in subscription.schemas() {
+        schemas.iter().try_for_each(|schema| names.take(path, schema))?;
+    }
+    Ok(())
 }
 
 fn add(writer: &mut FileWriter, names: &mut Names, channel: &Description) -> Result<u16, WriteFault> {
