@@ -11,6 +11,8 @@ pub(crate) struct Periods {
     /// The standard deviation.
     pub(crate) std_s: f64,
     pub(crate) median_s: f64,
+    /// Whether messages come at a rate; unknown of few.
+    pub(crate) regular: Option<bool>,
     /// Where messages are missing. Only of messages that come regularly it can be told.
     #[serde(skip)]
     pub(crate) gaps: Vec<Gap>,
@@ -32,7 +34,8 @@ pub(crate) struct Gap {
 
 /// A period longer than so many medians is a gap.
 const GAP: f64 = 3.0;
-/// Messages are regular if nine of ten periods are within this many medians, of at least so many.
+/// Messages are regular if nine of ten periods are at most this many medians, and as many not that many times shorter, of
+/// at least so many: events come in bursts.
 const REGULAR: f64 = 2.0;
 const FEWEST: usize = 8;
 
@@ -49,23 +52,40 @@ impl Periods {
         let mean_s = sorted.iter().sum::<f64>() / count;
         let variance = sorted.iter().map(|step| (step - mean_s).powi(2)).sum::<f64>() / count;
         let median_s = sorted[sorted.len() / 2];
-        let is_regular = sorted.len() >= FEWEST && sorted[sorted.len() * 9 / 10] <= REGULAR * median_s;
-        let gaps = steps().enumerate().filter(|(_, step)| is_regular && *step > GAP * median_s);
+        let tenths = |tenths: usize| sorted[sorted.len() * tenths / 10];
+        let is_regular = tenths(9) <= REGULAR * median_s && tenths(1) * REGULAR >= median_s && median_s > 0.0;
+        let regular = (sorted.len() >= FEWEST).then_some(is_regular);
+        let gaps = steps().enumerate().filter(|(_, step)| regular == Some(true) && *step > GAP * median_s);
         Some(Self {
             mean_s,
             min_s: first,
             max_s: last,
             std_s: variance.sqrt(),
             median_s,
+            regular,
             gaps: gaps.map(|(after, length_s)| Gap { after, length_s }).collect(),
             backward: steps().enumerate().filter(|(_, step)| *step < 0.0).map(|(index, _)| index + 1).collect(),
             repeated: steps().filter(|step| *step == 0.0).count(),
         })
     }
 
-    /// Messages a second.
+    /// The same of events: they come when something happens, so that none is missing.
+    pub(crate) fn of_events(self) -> Self {
+        Self { regular: Some(false), gaps: Vec::new(), ..self }
+    }
+
+    /// Messages a second, of those that come at a rate.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
-        (self.mean_s > 0.0).then(|| 1.0 / self.mean_s)
+        (self.mean_s > 0.0 && self.regular != Some(false)).then(|| 1.0 / self.mean_s)
+    }
+
+    /// The rate with so many decimals, for a table.
+    pub(crate) fn rate_in_words(&self, decimals: usize) -> String {
+        match (self.rate_hz(), self.regular) {
+            (Some(rate), _) => format!("{rate:.decimals$} Hz"),
+            (None, Some(false)) => "irregular".to_owned(),
+            (None, _) => "-".to_owned(),
+        }
     }
 }
 
@@ -92,6 +112,24 @@ mod tests {
         assert_eq!(Periods::of(&[0, 5 * MS, 900 * MS]).expect("there are some").gaps, []);
         assert_eq!(Periods::of(&[7]), None);
         assert_eq!(Periods::of(&[]), None);
+    }
+
+    /// As health changes: twice within a millisecond, then nothing for a while.
+    #[test]
+    fn bursts_have_no_rate_and_no_gaps() {
+        let bursts: Vec<i64> =
+            (0..40).map(|index| (index / 2 * 1000 + index % 2 + index / 20 * 9000) * MS).collect();
+        let at_once: Vec<i64> = (0..40).map(|index| index / 10 * 1000 * MS).collect();
+        for times in [bursts, at_once] {
+            let periods = Periods::of(&times).expect("there are some");
+            assert_eq!((periods.regular, periods.rate_hz(), &*periods.gaps), (Some(false), None, &[][..]));
+            assert_eq!(periods.rate_in_words(1), "irregular");
+        }
+        let mut times: Vec<i64> = (0..40).map(|index| index * 1000 * MS).collect();
+        times.push(90_000 * MS);
+        assert_eq!(Periods::of(&times).expect("there are some").gaps.len(), 1);
+        let events = Periods::of(&times).expect("there are some").of_events();
+        assert_eq!((events.rate_hz(), &*events.gaps), (None, &[][..]));
     }
 
     #[test]

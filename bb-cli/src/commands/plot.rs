@@ -5,7 +5,7 @@ mod units;
 
 use crate::periods::Periods;
 use crate::plot::{Line, PALETTE, Panel, Picture, Point};
-use crate::topics::{TopicReader, find, log_ns, open};
+use crate::topics::{TopicReader, find, is_named, log_ns, open};
 use bb_mcap::{Bag, Topic, Value};
 use clap::Args;
 use select::{Group, Path, groups};
@@ -75,11 +75,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     }
 }
 
+/// The topic and the path of a field in it. The name of a topic may have dots: the longest that fits is taken.
+fn topic_and_field<'a, 'b>(bag: &'a Bag, field: &'b str) -> Result<(&'a Topic, &'b str), String> {
+    let dots = field.match_indices('.').map(|(at, _)| at).chain([field.len()]);
+    let known = dots.filter(|end| bag.topics().iter().any(|topic| is_named(topic, &field[..*end]))).last();
+    let (name, path) = match known {
+        Some(end) => (&field[..end], field[end..].trim_start_matches('.')),
+        None => field.split_once('.').unwrap_or((field, "")),
+    };
+    Ok((find(bag, name)?, path))
+}
+
 /// Finds the topic, and by its first message the fields.
 fn choose<'a>(bag: &'a Bag, field: &str) -> Result<Chosen<'a>, String> {
     let in_file = |fault: String| format!("{}: {fault}", bag.path().display());
-    let (name, path) = field.split_once('.').unwrap_or((field, ""));
-    let topic = find(bag, name)?;
+    let (topic, path) = topic_and_field(bag, field)?;
     let reader = TopicReader::new(topic).map_err(in_file)?;
     let mut messages = bag.messages_in_any_encoding(&[&topic.name]).map_err(|error| error.to_string())?;
     let first = messages.next().ok_or_else(|| in_file(format!("{} has no messages", topic.name)))?;

@@ -4,7 +4,7 @@ use super::quantities;
 use super::remark::{Remark, Subject};
 use super::times::Times;
 use crate::periods::Periods;
-use crate::topics::{TopicReader, log_ns};
+use crate::topics::{TopicReader, is_of_events, log_ns};
 use crate::units::Units;
 use bb_mcap::Bag;
 use std::collections::HashMap;
@@ -54,8 +54,8 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
 
     let mut topics: HashMap<_, Open> = HashMap::new();
     for topic in bag.topics() {
-        let reader = TopicReader::new(topic).ok();
-        topics.insert((topic.name.clone(), topic.schema.clone()), Open { reader, ..Open::default() });
+        let (reader, times) = (TopicReader::new(topic).ok(), Times::new(is_of_events(topic)));
+        topics.insert((topic.name.clone(), topic.schema.clone()), Open { reader, times, ..Open::default() });
     }
     let mut span_ns: Option<(i64, i64)> = None;
     let mut messages = 0;

@@ -6,6 +6,8 @@ use crate::periods::Periods;
 /// The times of the messages of a topic.
 #[derive(Debug, Default)]
 pub(super) struct Times {
+    /// Whether messages come only when something happens.
+    of_events: bool,
     log_ns: Vec<i64>,
     /// Those in the headers, as long as all messages have one.
     stamp_ns: Vec<i64>,
@@ -15,6 +17,10 @@ pub(super) struct Times {
 const JUMP_S: f64 = 1.0;
 
 impl Times {
+    pub(super) fn new(of_events: bool) -> Self {
+        Self { of_events, ..Self::default() }
+    }
+
     pub(super) fn push(&mut self, log_ns: i64, stamp_ns: Option<i64>) {
         self.log_ns.push(log_ns);
         self.stamp_ns.extend(stamp_ns);
@@ -30,7 +36,8 @@ impl Times {
     }
 
     pub(super) fn periods(&self) -> Option<Periods> {
-        Periods::of(self.measured())
+        let periods = Periods::of(self.measured());
+        if self.of_events { periods.map(Periods::of_events) } else { periods }
     }
 
     /// Gaps and jumps, each by the time since the start of the recording.

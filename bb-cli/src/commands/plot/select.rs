@@ -135,7 +135,11 @@ fn collect(value: &Value, path: &Path, is_whole: bool, groups: &mut Vec<Group>) 
     };
     let is_left_out = |step: &Step| match step {
         Step::Field(name) => {
-            is_whole && (name == "header" || name.contains("covariance") || is_unknown(name, value))
+            is_whole
+                && (name == "header"
+                    || name.contains("covariance")
+                    || is_unknown(name, value)
+                    || is_time_of_payload(name, value))
         }
         Step::Index(_) => false,
     };
@@ -156,6 +160,11 @@ fn is_unknown(name: &str, message: &Value) -> bool {
         Some(Value::List(values)) => values.first().and_then(Value::as_f64) == Some(-1.0),
         _ => false,
     }
+}
+
+/// Whether a field is a time of a message of a payload that ROS has none for: these are what is plotted over.
+fn is_time_of_payload(name: &str, message: &Value) -> bool {
+    ["monotonic_time", "wall_time"].contains(&name) && message.field("payload").is_some()
 }
 
 fn label(step: &Step) -> String {
@@ -208,6 +217,20 @@ mod tests {
             chosen("rate_covariance").expect("chosen"),
             [of("rate_covariance", &["rate_covariance[0]", "rate_covariance[1]"])]
         );
+    }
+
+    #[test]
+    fn of_a_payload_the_times_are_no_curves() {
+        let own = message(r#"{"header":{"stamp":{"sec":1}},"monotonic_time":5,"wall_time":6,"payload":{"x":1}}"#);
+        let paths = |path: &str| {
+            let groups = groups(&own, &Path::parse(path).expect("is one")).expect("has some");
+            groups.iter().map(|group| group.path.to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!(paths(""), ["payload"]);
+        assert_eq!(paths("wall_time"), ["wall_time"]);
+        // What another has of that name is a number like any other.
+        let other = message(r#"{"wall_time":6,"x":1}"#);
+        assert_eq!(groups(&other, &Path::default()).expect("has some")[0].fields.len(), 2);
     }
 
     #[test]
