@@ -3,8 +3,8 @@
 mod common;
 
 use common::bb;
-use std::path::Path;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 const WORKSPACE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
@@ -30,29 +30,68 @@ fn the_project_compiles_passes_its_tests_and_records() {
     // The versions that the workspace has, so that nothing is fetched, and what it has built.
     std::fs::copy(Path::new(WORKSPACE).join("Cargo.lock"), folder.join("Cargo.lock")).expect("copies");
     let target = Path::new(env!("CARGO_BIN_EXE_bb")).ancestors().nth(2).expect("target/debug/bb");
-    let cargo = |command: &str| {
+    let cargo = |command: &[&str]| {
         let output = Command::new(env!("CARGO"))
             .current_dir(&folder)
-            .args([command, "--offline", "--quiet"])
+            .args([&command[..1], &["--offline", "--quiet"]].concat())
             .args(["--config", "profile.dev.package.nalgebra.opt-level=2"])
+            .args(&command[1..])
             .env("CARGO_TARGET_DIR", target)
             .output()
             .expect("runs");
         let text = |bytes| String::from_utf8(bytes).expect("is text");
         let (out, err) = (text(output.stdout), text(output.stderr));
-        assert!(output.status.success() && !err.contains("warning"), "cargo {command}\n{out}\n{err}");
-        out
+        assert!(output.status.success() && !err.contains("warning"), "cargo {command:?}\n{out}\n{err}");
+        (out, err)
     };
-    let tests = cargo("test");
+    let (tests, _) = cargo(&["test"]);
     assert!(tests.contains("2 passed"), "{tests}");
-    let run = cargo("run");
-    let recording = run.lines().find(|line| line.contains("look at it with")).expect("it is recorded");
-    let recording = folder.join(recording.split(':').next().expect("is named"));
+    let (run, logs) = cargo(&["run", "--", "2"]);
+    assert!(logs.contains(" INFO ") && !logs.contains('\u{1b}'), "no colours where it is no terminal: {logs}");
+    assert!(!logs.contains(" WARN "), "{logs}");
+    let recording = recorded(&run, &folder);
     let info = bb(&["info", recording.to_str().expect("is text")]);
     assert_eq!(info.code, Some(0), "{}", info.err);
     assert!(info.out.contains("/sensor/body/thermometer/smooth  "), "{}", info.out);
     let echo = bb(&["echo", recording.to_str().expect("is text"), "sensor/body/thermometer", "--limit", "1"]);
     assert!(echo.out.contains("temperature_k: 29"), "{}", echo.out);
+    let hz = bb(&["hz", recording.to_str().expect("is text")]);
+    let cells = |topic: &str| {
+        let line = hz.out.lines().find(|line| line.split_whitespace().next() == Some(topic)).expect("is there");
+        line.split_whitespace().skip(2).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert!(cells("/safety").iter().all(|cell| cell == "-"), "events have no rate: {}", hz.out);
+    assert!(cells("/sensor/body/thermometer").contains(&"Hz".to_owned()), "{}", hz.out);
+
+    // Ctrl-C ends it as its time does; and two that begin at once have a file each.
+    #[cfg(unix)]
+    {
+        let start = || {
+            let mut command = Command::new(target.join("debug/fresh-oven"));
+            let command = command.current_dir(&folder).stdout(Stdio::piped()).stderr(Stdio::null());
+            command.spawn().expect("runs")
+        };
+        let running = [start(), start()];
+        std::thread::sleep(std::time::Duration::from_secs(2));
+        let files = running.map(|child| {
+            let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+            assert!(kill.expect("runs").success(), "it still runs");
+            let output = child.wait_with_output().expect("ends");
+            assert!(output.status.success(), "{:?}", output.status);
+            recorded(&String::from_utf8(output.stdout).expect("is text"), &folder)
+        });
+        assert_ne!(files[0], files[1]);
+        for file in files {
+            let info = bb(&["info", file.to_str().expect("is text")]);
+            assert_eq!(info.code, Some(0), "it is whole: {}", info.err);
+        }
+    }
+}
+
+/// The recording that a run names.
+fn recorded(out: &str, folder: &Path) -> PathBuf {
+    let line = out.lines().find(|line| line.contains("look at it with")).expect("it is recorded");
+    folder.join(line.split(':').next().expect("is named"))
 }
 
 #[test]

@@ -26,8 +26,9 @@ const FILES: [(&str, &str); 6] = [
     ("src/low_pass.rs", include_str!("../../templates/project/src/low_pass.rs")),
 ];
 
-/// The crates that a project depends on, and where they are in a checkout.
-const CRATES: [(&str, &str); 2] = [("bb-core", "bb-core"), ("bb-mcap", "integrations/mcap")];
+/// The crates that a project depends on, where they are in a checkout, and the features that it needs: Ctrl-C.
+const CRATES: [(&str, &str, &[&str]); 2] =
+    [("bb-core", "bb-core", &["signals"]), ("bb-mcap", "integrations/mcap", &[])];
 
 /// Where this command was built.
 const CHECKOUT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -94,7 +95,7 @@ fn package(name: &str) -> Result<String, String> {
 /// The lines of the manifest.
 fn dependencies(path: Option<&Path>) -> Result<String, String> {
     let has_all =
-        |checkout: &Path| CRATES.iter().all(|(_, folder)| checkout.join(folder).join("Cargo.toml").is_file());
+        |checkout: &Path| CRATES.iter().all(|(_, folder, _)| checkout.join(folder).join("Cargo.toml").is_file());
     let checkout = match path {
         Some(path) if !has_all(path) => {
             return Err(format!("{} is no checkout of bb: it has no bb-core/Cargo.toml", path.display()));
@@ -105,10 +106,16 @@ fn dependencies(path: Option<&Path>) -> Result<String, String> {
     let checkout = checkout
         .map(|path| path.canonicalize().map_err(|error| format!("{}: {error}", path.display())))
         .transpose()?;
-    let lines = CRATES.map(|(name, folder)| match &checkout {
-        // A string of TOML between single quotes has no escapes, which paths of Windows need.
-        Some(checkout) => format!("{name} = {{ path = '{}' }}", checkout.join(folder).display()),
-        None => format!("{name} = \"{}\"", env!("CARGO_PKG_VERSION")),
+    let lines = CRATES.map(|(name, folder, features)| {
+        let from = match &checkout {
+            // A string of TOML between single quotes has no escapes, which paths of Windows need.
+            Some(checkout) => format!("path = '{}'", checkout.join(folder).display()),
+            None => format!("version = \"{}\"", env!("CARGO_PKG_VERSION")),
+        };
+        match features.is_empty() {
+            true => format!("{name} = {{ {from} }}"),
+            false => format!("{name} = {{ {from}, features = {features:?} }}"),
+        }
     });
     Ok(lines.join("\n"))
 }

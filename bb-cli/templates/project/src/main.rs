@@ -7,6 +7,7 @@ use bb_core::prelude::*;
 use bb_mcap::{Recorder, RecorderOptions};
 use low_pass::LowPass;
 use std::error::Error;
+use std::io::IsTerminal;
 use std::time::SystemTime;
 use thermometer::Thermometer;
 
@@ -22,26 +23,50 @@ robot! {
     }
 }
 
+/// What comes often, and what is rare: each is recorded from a queue of its own, so that a slow disk loses samples and no fault.
+const SAMPLES: Select<'static> = Select::Below("sensor");
+const EVENTS: Select<'static> = Select::AnyOf(&[
+    Select::Path("fault"),
+    Select::Path("health"),
+    Select::Path("state_machine"),
+    Select::Below("safety"),
+]);
+
+/// Runs until Ctrl-C, or for so many seconds: `cargo run -- 3`.
 fn main() -> Result<(), Box<dyn Error>> {
-    // What the robot tells of itself: restarts, what was left out, faults.
-    tracing_subscriber::fmt().with_writer(std::io::stderr).init();
+    let seconds: Option<u64> = std::env::args().nth(1).map(|seconds| seconds.parse()).transpose()?;
+    // What the robot tells of itself: restarts, what was left out, faults. A file gets no colours.
+    let stderr = std::io::stderr;
+    tracing_subscriber::fmt().with_writer(stderr).with_ansi(stderr().is_terminal()).init();
 
     let builder = Oven::builder();
     let smooth = builder.subscribe(oven::sensor::body::thermometer::smooth);
-    let all = builder.subscribe_any(Select::All, None, Overflow::DropOldest { capacity: 10_000 });
+    let samples = builder.subscribe_any(SAMPLES, None, Overflow::DropOldest { capacity: 10_000 });
+    let events = builder.subscribe_any(EVENTS, None, Overflow::DropOldest { capacity: 1_000 });
     std::fs::create_dir_all("recordings")?;
-    let now_s = SystemTime::UNIX_EPOCH.elapsed()?.as_secs();
-    let file = format!("recordings/run-{now_s}.mcap");
-    let recorder = Recorder::new(&file, all, RecorderOptions::of::<Oven>())?.spawn()?;
+    // By time, and by process for runs that begin at once: a recording is never overwritten.
+    let seconds_since_1970 = SystemTime::UNIX_EPOCH.elapsed()?.as_secs();
+    let file = format!("recordings/run-{seconds_since_1970}-{}.mcap", std::process::id());
+    let recorder = Recorder::new(&file, samples, RecorderOptions::of::<Oven>())?.also(events)?.spawn()?;
 
-    let running = builder.start()?; // in real time, a thread for each sensor
-    for _ in 0..3 {
-        std::thread::sleep(Duration::from_secs(1));
-        if let Some(temperature) = smooth.drain().last() {
+    let mut running = builder.start()?; // in real time, a thread for each sensor
+    running.stop_on_signals()?;
+    if let Some(seconds) = seconds {
+        let live = running.live();
+        std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_secs(seconds));
+            live.request_stop();
+        });
+    }
+    // Once a second; the messages end when the robot has stopped.
+    let printer = std::thread::spawn(move || {
+        for temperature in std::iter::from_fn(|| smooth.recv()).step_by(20) {
             println!("{}: {:.2} K", temperature.monotonic_time, temperature.temperature_k);
         }
-    }
+    });
+    running.wait();
     println!("{}", running.stop()); // what was published where
+    let _ = printer.join();
     let report = recorder.stop()?;
     println!("{file}: {} messages; look at it with `bb info {file}`", report.messages);
     Ok(())
