@@ -7,6 +7,10 @@ use std::path::{Path, PathBuf};
 /// What the files on the command line are called at their end.
 pub(crate) const EXTENSION: &str = "mcap";
 
+/// What recordings are called at their end that are not read, or only by another build: of a folder they are taken too, so
+/// that each is named with the way out.
+const OTHERS: [&str; 6] = [".db3", ".bag", ".mcap.zstd", ".mcap.zst", ".db3.zstd", ".mcap.gz"];
+
 /// The recordings in the order of the arguments, those of a folder by name; a path that leads to none carries the
 /// reason.
 pub(crate) fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)> {
@@ -37,9 +41,14 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
         let path = entry.path();
         if entry.file_type()?.is_dir() {
             collect(&path, found)?;
-        } else if path.extension().is_some_and(|end| end == EXTENSION) {
+        } else if is_recording(&path) {
             found.push(path);
         }
     }
     Ok(())
+}
+
+fn is_recording(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.extension().is_some_and(|end| end == EXTENSION) || OTHERS.iter().any(|end| name.ends_with(end))
 }
