@@ -5,6 +5,7 @@
 
 #[path = "../../../integrations/mcap/tests/bags/common.rs"]
 pub mod bags;
+pub mod poses;
 
 use bags::ros::*;
 use bb_core::nalgebra::{UnitQuaternion, Vector3 as V};
