@@ -1,4 +1,4 @@
-//! Errors over time: a panel a recording, a line a filter.
+//! Plots of errors over time: one panel per recording, one line per filter.
 
 use crate::evaluate::Evaluation;
 use crate::filters::Axes;
@@ -6,7 +6,7 @@ use crate::plot::{Line, PALETTE, Panel, Picture};
 use crate::report::name;
 use std::path::Path;
 
-/// A picture of more is larger than most viewers open.
+/// Most viewers cannot open larger pictures.
 const MOST_PANELS: usize = 40;
 
 pub(crate) fn draw(file: &Path, evaluations: &[Evaluation], axes: Axes) -> Result<(), String> {

@@ -1,4 +1,4 @@
-//! Plays recordings through filters.
+//! Runs filters on recordings.
 
 mod doubts;
 
@@ -17,10 +17,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Samples that are read, then played: enough that the clock costs nothing, few enough to stay in the cache.
+/// Samples per block: enough that reading the clock costs nothing, few enough to stay in the cache.
 const BLOCK: usize = 1024;
 
-/// Whether the heading is within two sigma, and which convention the truth has, is asked once in so many samples.
+/// Headings are compared with two sigma, and truths with other conventions, once per this many samples.
 const ASKED: usize = 64;
 
 /// The length of the progress bar for one recording.
@@ -35,28 +35,28 @@ pub struct Evaluator {
     pub axes: Axes,
     /// The topics to take.
     pub topics: Topics,
-    /// Starts the filters so many seconds before the first motion, instead of at the first sample.
+    /// Starts the filters this many seconds before the first motion, instead of at the first sample.
     pub before_motion_s: Option<f64>,
-    /// How the recordings are changed.
+    /// How the recordings are modified.
     pub variants: Variants,
     /// Whether to keep the errors over time.
     pub keep_errors: bool,
 }
 
-/// What one recording gave.
+/// The results of one recording.
 #[derive(Debug)]
 pub struct Evaluation {
     /// The recording.
     pub file: PathBuf,
-    /// Which variant of it, from 0; none if the recording is not changed.
+    /// The number of the variant, from 0; `None` if the recording is not modified.
     pub variant: Option<u32>,
     /// The axes of the runs: six, where the magnetometer's topic holds no message.
     pub axes: Axes,
-    /// One run a filter, in the order of the filters; or why there is none.
+    /// One run per filter, in the order of the filters; or the reason why there is none.
     pub runs: Result<Vec<Run>, String>,
-    /// What broke the recording off, if it did; the runs are of what came before.
+    /// Why the recording breaks off, if it does; the runs are of the part before.
     pub broken: Option<String>,
-    /// What to know about the runs.
+    /// Remarks on the runs.
     pub notes: Vec<String>,
 }
 
@@ -67,16 +67,16 @@ pub struct Run {
     pub filter: &'static str,
     /// Its errors.
     pub score: Score,
-    /// Of how many headings it told the standard deviation, and how many were within two of them.
+    /// For how many headings it reported a standard deviation, and how many of them were within two.
     pub within_two_sigma: (u64, u64),
-    /// How long it took for a sample, on average, with reading its orientation; ns.
+    /// Mean time per sample, including reading the orientation, in ns.
     pub ns_per_update: f64,
-    /// Error over time: seconds since the first sample, degrees; none where the truth is unknown. Total with nine axes,
-    /// else inclination.
+    /// Error over time: seconds since the first sample, and degrees, `None` where the truth is unknown. The total error with
+    /// nine axes, else the inclination.
     pub errors: Vec<(f64, Option<f64>)>,
 }
 
-/// Evaluates recordings on all cores, with a progress bar on the terminal; gives them in their order.
+/// Evaluates recordings on all cores, with a progress bar on the terminal, and returns the results in order.
 pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &Evaluator) -> Vec<Evaluation> {
     let variants = evaluator.variants.count() as usize;
     let progress = Progress::new("evaluating", BAR * (files.len() * variants) as u64);
@@ -108,12 +108,12 @@ pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &
     done.into_iter().map(|(_, evaluation)| evaluation).collect()
 }
 
-/// Plays one recording through the filters, or the first of its variants. Moves the progress by 1,000.
+/// Runs the filters on one recording, or on the first of its variants. Advances the progress by 1,000.
 pub fn evaluate(file: &Path, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
     evaluate_variant(file, 0, evaluator, progress)
 }
 
-/// Plays one variant of a recording through the filters, by its index below [`Variants::count`]. Moves the progress by
+/// Runs the filters on one variant of a recording, by its index below [`Variants::count`]. Advances the progress by
 /// 1,000.
 pub fn evaluate_variant(file: &Path, variant: u32, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
     let mut shown = 0;
@@ -203,7 +203,7 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     Ok(Evaluation { file: file.to_owned(), variant, axes: recording.axes, runs, broken, notes })
 }
 
-/// A filter under way.
+/// A running filter and its errors.
 struct Player {
     name: &'static str,
     filter: Box<dyn Running>,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What the times between messages have in common.
+/// Statistics of the times between messages.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Periods {
     pub(crate) mean_s: f64,
@@ -13,13 +13,13 @@ pub(crate) struct Periods {
     pub(crate) median_s: f64,
     /// Whether messages come at a rate; unknown of few.
     pub(crate) regular: Option<bool>,
-    /// Where messages are missing. Only of messages that come regularly it can be told.
+    /// Where messages are missing; known only if they come regularly.
     #[serde(skip)]
     pub(crate) gaps: Vec<Gap>,
-    /// Where the time goes back: indices of the messages after it.
+    /// Where time goes backwards: indices of the messages after it.
     #[serde(skip)]
     pub(crate) backward: Vec<usize>,
-    /// How many messages have the time of the one before.
+    /// How many messages have the same time as the previous one.
     #[serde(skip)]
     pub(crate) repeated: usize,
 }
@@ -32,10 +32,10 @@ pub(crate) struct Gap {
     pub(crate) length_s: f64,
 }
 
-/// A period longer than so many medians is a gap.
+/// A period longer than this many medians is a gap.
 const GAP: f64 = 3.0;
-/// Messages are regular if nine of ten periods are at most this many medians, and as many not that many times shorter, of
-/// at least so many: events come in bursts.
+/// Messages are regular if nine of ten periods are at most this many medians, and nine of ten are not that many times
+/// shorter. At least `FEWEST` periods are needed. Events come in bursts.
 const REGULAR: f64 = 2.0;
 const FEWEST: usize = 8;
 
@@ -69,12 +69,12 @@ impl Periods {
         })
     }
 
-    /// The same of events: they come when something happens, so that none is missing.
+    /// The same for events: they come when something happens, so they have no gaps.
     pub(crate) fn of_events(self) -> Self {
         Self { regular: Some(false), gaps: Vec::new(), ..self }
     }
 
-    /// Messages a second, of those that come at a rate.
+    /// Messages per second, if they come at a rate.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
         (self.mean_s > 0.0 && self.regular != Some(false)).then(|| 1.0 / self.mean_s)
     }

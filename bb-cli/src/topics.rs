@@ -67,7 +67,7 @@ impl TopicReader {
             Self::Cdr(definition) => message.value(definition).map_err(|error| error.to_string()),
             Self::Json => serde_json::from_slice(&message.data)
                 .map(|FromJson(value)| value)
-                .map_err(|error| format!("a message of {} is no JSON: {error}", message.topic)),
+                .map_err(|error| format!("a message of {} is not JSON: {error}", message.topic)),
         }
     }
 

@@ -277,7 +277,7 @@ impl FromStr for Field {
             .iter()
             .find_map(|(unit, value)| Some((text.strip_suffix(unit)?, *value)))
             .ok_or("no unit; write a number with nT, uT, mT or T, as 30uT")?;
-        let number: f64 = number.trim().parse().map_err(|_| format!("`{number}` is no number"))?;
+        let number: f64 = number.trim().parse().map_err(|_| format!("`{number}` is not a number"))?;
         let tesla = number * unit;
         if !(0.0..=1.0).contains(&tesla) {
             return Err("must be from 0 to 1 T".into());

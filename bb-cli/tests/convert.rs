@@ -152,7 +152,7 @@ fn what_is_wrong_is_told_by_line_and_column() {
         ("word", "0,1,2,3,4,5,6\n1,1,2,x,4,5,6\n", "line 3, column 4 (gz): `x` is not a number"),
         ("short", "0,1,2,3,4,5,6\n\n1,1,2\n", "line 4, column 4 (gz): is missing, since the line has 3 columns"),
         ("empty", "0,1,2,3,,5,6\n", "line 2, column 5 (acc): `` is not a number"),
-        ("time", "0,1,2,3,4,5,6\nnan,1,2,3,4,5,6\n", "line 3, column 1 (t): `nan` is no time"),
+        ("time", "0,1,2,3,4,5,6\nnan,1,2,3,4,5,6\n", "line 3, column 1 (t): `nan` is not a time"),
         (
             "huge",
             "0,1,2,3,4,5,6\r\n\r\n1,1e400,2,3,4,5,6\r\n",
@@ -189,7 +189,7 @@ fn what_is_wrong_is_told_by_line_and_column() {
         ("time=t gyr=gx,gy,gzz acc=5-7", 1, "no column `gzz`; did you mean `gz`?"),
         ("gyr=2-4 acc=5-7", 1, "--columns: time is needed, as time=1:us, or --rate"),
         ("time=t gyr=2-4", 1, "--columns: gyr and acc are needed"),
-        ("time=t gyr=2-4:rpm acc=5-7", 2, "no unit `rpm`; there is rad/s, deg/s, dps"),
+        ("time=t gyr=2-4:rpm acc=5-7", 2, "no unit `rpm`; there are rad/s, deg/s, dps"),
         ("time=t gyro=2-4 acc=5-7", 2, "no quantity `gyro`; did you mean `gyr`?"),
     ] {
         let output = convert(&input, &bag("bad_map.mcap"), &["--columns", map]);

@@ -209,7 +209,7 @@ fn any_type_is_read_by_its_definition() {
     );
     let output = bb(&["echo", name, "/json"]);
     assert_eq!(output.out, "z: 1\na:\n  b: [true, NaN, \"x\"]\n---\n");
-    assert!(output.err.contains("a message of /json is no JSON"), "{}", output.err);
+    assert!(output.err.contains("a message of /json is not JSON"), "{}", output.err);
     let output = bb(&["echo", name, "/other"]);
     assert!(output.err.contains("encoded as `protobuf`, and only `cdr` and `json` are read"), "{}", output.err);
     // It is counted all the same.

@@ -105,6 +105,6 @@ fn what_is_there_is_not_touched() {
     assert_eq!(code, Some(2));
     assert!(said.contains("a package's name begins with a letter"), "{said}");
     let (code, said) = new(&["elsewhere", "--path", "taken"]);
-    assert_eq!((code, &*said), (Some(1), "error: taken is no checkout of bb: it has no bb-core/Cargo.toml\n"));
+    assert_eq!((code, &*said), (Some(1), "error: taken is not a checkout of bb: it has no bb-core/Cargo.toml\n"));
     assert!(!folder.with_file_name("elsewhere").exists());
 }

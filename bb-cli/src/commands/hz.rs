@@ -1,4 +1,4 @@
-//! `bb hz`: how often the messages of topics come.
+//! `bb hz`: the rates of topics.
 
 use crate::periods::Periods;
 use crate::table::aligned;
@@ -8,13 +8,13 @@ use serde::Serialize;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// Prints how often messages come: by the stamps in their headers, or by the log where they have none.
+/// Prints the rates of topics, by the stamps in the headers, or by the log times if there are none.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A recording or a ROS 2 bag.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// The topics; all without one.
+    /// The topics; by default all.
     #[arg(value_name = "TOPIC")]
     topics: Vec<String>,
     /// Prints an array of objects instead of the table.

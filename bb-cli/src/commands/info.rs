@@ -11,7 +11,7 @@ use crate::files;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Prints what is in recordings: topics, types, rates, and what looks wrong: gaps, clocks, units, damage.
+/// Describes recordings: topics, types, rates, and what looks wrong (gaps, clocks, units, damage).
 #[derive(Debug, Args)]
 #[command(after_help = "Exit code: 0; 1 if a file is damaged or could not be read; 2 for a wrong use.")]
 pub(crate) struct Arguments {

@@ -4,14 +4,14 @@ use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes a project that compiles and runs: a sensor and an estimator of its own, their test, a recording, logs.
+/// Creates a project that compiles and runs: its own sensor and estimator, tests, a recording, logs.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The name of the package, and of the folder, which must not exist.
+    /// The name of the package and of the folder, which must not exist yet.
     #[arg(value_name = "NAME", value_parser = package)]
     name: String,
-    /// The checkout of bb that the project depends on. [default: the one that this command was built in, while it is
-    /// there; else the published crates]
+    /// The checkout of bb that the project depends on. [default: the one that this command was built from, if it still
+    /// exists; else the published crates]
     #[arg(long, value_name = "FOLDER")]
     path: Option<PathBuf>,
 }
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     Ok(true)
 }
 
-/// A name that cargo takes for a package and that does not hide a crate.
+/// Checks that cargo accepts the name for a package, and that it does not shadow a crate.
 fn package(name: &str) -> Result<String, String> {
     const TAKEN: [&str; 14] = [
         "test",
@@ -98,7 +98,7 @@ fn dependencies(path: Option<&Path>) -> Result<String, String> {
         |checkout: &Path| CRATES.iter().all(|(_, folder, _)| checkout.join(folder).join("Cargo.toml").is_file());
     let checkout = match path {
         Some(path) if !has_all(path) => {
-            return Err(format!("{} is no checkout of bb: it has no bb-core/Cargo.toml", path.display()));
+            return Err(format!("{} is not a checkout of bb: it has no bb-core/Cargo.toml", path.display()));
         }
         Some(path) => Some(path),
         None => Some(Path::new(CHECKOUT)).filter(|checkout| has_all(checkout)),
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn a_folder_that_is_no_checkout_is_refused() {
         let fault = dependencies(Some(Path::new("/"))).expect_err("is none");
-        assert_eq!(fault, "/ is no checkout of bb: it has no bb-core/Cargo.toml");
+        assert_eq!(fault, "/ is not a checkout of bb: it has no bb-core/Cargo.toml");
         assert!(dependencies(None).expect("is one").contains("bb-core = { path = '"));
     }
 }

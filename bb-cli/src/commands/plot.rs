@@ -13,17 +13,17 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Plots fields of messages over time, by the stamps in their headers, or by the log where they have none.
+/// Plots fields of messages over time, by the stamps in the headers, or by the log times if there are none.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
     /// A recording or a ROS 2 bag.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// What to plot: a field of a topic, all numbers in it, or all of a topic but header and covariances.
+    /// What to plot: a field of a topic with all numbers in it, or a whole topic except header and covariances.
     #[arg(value_name = "TOPIC[.FIELD]", required = true)]
     fields: Vec<String>,
-    /// The file to write, an SVG or a PNG; replaced if it exists.
+    /// The SVG or PNG file to write; an existing one is replaced.
     #[arg(long, value_name = "FILE", value_parser = picture)]
     out: PathBuf,
 }
@@ -33,7 +33,7 @@ const EXAMPLES: &str = "Examples:
   bb plot walk.mcap /imu.angular_velocity /imu.linear_acceleration.z --out imu.png
   bb plot walk.mcap '/scan.ranges[0]' --out front.svg";
 
-/// A picture of more is larger than most viewers open.
+/// Most viewers cannot open larger pictures.
 const MOST_PANELS: usize = 40;
 
 fn picture(file: &str) -> Result<PathBuf, String> {

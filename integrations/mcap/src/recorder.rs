@@ -1,4 +1,4 @@
-//! Writes what a subscription gets.
+//! Writes what subscriptions receive.
 
 mod background;
 mod frames;
@@ -50,16 +50,16 @@ pub(crate) const END: &str = "bb.recorder";
 pub struct RecorderReport {
     /// Messages written.
     pub messages: u64,
-    /// Messages that the operating system has: they survive the death of the process.
+    /// Messages that were handed to the operating system: they survive the end of the process.
     pub flushed: u64,
-    /// Messages lost since the recorder was too slow for the room that its subscriptions have.
+    /// Messages lost because the recorder was too slow for the capacity of its subscriptions.
     pub lost: u64,
-    /// Messages left out since they have more than 128 MiB, which no chunk that is read back may hold.
+    /// Messages left out because they exceed 128 MiB, which is more than readers accept.
     pub too_large: u64,
 }
 
-/// Writes what a subscription gets into a file, when its owner says so ([`drain`](Self::drain): on virtual time) or on a
-/// thread of its own ([`spawn`](Self::spawn)). Dropping it ends the file.
+/// Writes what a subscription receives to a file, either when [`drain`](Self::drain) is called, as for a simulation, or on
+/// its own thread ([`spawn`](Self::spawn)). Dropping it completes the file.
 pub struct Recorder {
     path: PathBuf,
     /// None once the file has its end, or an error came.
@@ -107,11 +107,11 @@ struct Bytes {
 const LARGEST: usize = LIMIT as usize / 2;
 
 impl Recorder {
-    /// Creates the file `path` for what `subscription` gets.
+    /// Creates the file `path` for what `subscription` receives.
     ///
     /// # Errors
-    /// The file exists already, or cannot be created; or two of the paths publish different types that would have one name
-    /// in the file.
+    /// The file exists already or cannot be created, or two of the paths publish different types that would have the same
+    /// name in the file.
     pub fn new(
         path: impl AsRef<Path>,
         subscription: DynamicSubscription,
@@ -159,11 +159,11 @@ impl Recorder {
         })
     }
 
-    /// Records what this subscription gets as well. Each has its own queue: where messages that come often have one, and those
-    /// that are rare another, a slow disk loses none of the rare. A message that both get is recorded twice.
+    /// Also records what this subscription receives. Each subscription has its own queue, so that frequent messages do not push
+    /// out rare ones when the disk is slow. A message that several subscriptions receive is recorded several times.
     ///
     /// # Errors
-    /// As those of [`new`](Self::new) that are of the paths.
+    /// A path publishes a type that would have the same name in the file as a different one.
     pub fn also(mut self, subscription: DynamicSubscription) -> Result<Self, RecordingError> {
         if let Err(kind) = take_names(&mut self.names, &subscription) {
             let path = self.path.clone();
@@ -176,10 +176,10 @@ impl Recorder {
         Ok(self)
     }
 
-    /// Writes all messages that wait now; how many.
+    /// Writes all waiting messages, and returns their number.
     ///
     /// # Errors
-    /// The file cannot be written on, the disk is full say. Nothing more is recorded then.
+    /// Writing failed, for example because the disk is full. Nothing more is recorded then.
     pub fn drain(&mut self) -> Result<u64, RecordingError> {
         let before = self.report.messages;
         for index in 0..self.subscriptions.len() {
@@ -192,10 +192,10 @@ impl Recorder {
         Ok(self.report.messages - before)
     }
 
-    /// Hands all that is written to the operating system.
+    /// Hands everything that was written to the operating system.
     ///
     /// # Errors
-    /// The file cannot be written on.
+    /// Writing failed.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.guarded(|recorder, writer| {
             writer.flush()?;
@@ -215,16 +215,16 @@ impl Recorder {
         RecorderReport { lost, ..self.report }
     }
 
-    /// Writes what waits, and the end of the file.
+    /// Writes the waiting messages and the end of the file.
     ///
     /// # Errors
-    /// The file cannot be written on.
+    /// Writing failed.
     pub fn finish(mut self) -> Result<RecorderReport, RecordingError> {
         self.end()?;
         Ok(self.report())
     }
 
-    /// Writes on a thread of its own from now on.
+    /// Continues on its own thread.
     ///
     /// # Errors
     /// The thread cannot be started.

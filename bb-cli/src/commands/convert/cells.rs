@@ -223,7 +223,7 @@ impl Cells<'_> {
         let time_ns = match exact_ns(cell, self.quantity.factor) {
             Some(time_ns) => time_ns,
             None => match self.number(0)? {
-                nan if nan.is_nan() => return Err(self.fault(0, format!("`{cell}` is no time"))),
+                nan if nan.is_nan() => return Err(self.fault(0, format!("`{cell}` is not a time"))),
                 // Beyond the range it saturates, and is refused below.
                 time => (time * self.quantity.factor * 1e9).round() as i64,
             },

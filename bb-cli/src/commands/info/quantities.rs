@@ -1,4 +1,4 @@
-//! What the values of a topic say of their units.
+//! What the values of a topic suggest about their units.
 
 use super::remark::{Remark, Subject};
 use crate::units::Units;

@@ -1,4 +1,4 @@
-//! What is printed of what is in files.
+//! The output of `bb info`.
 
 use super::date::date;
 use super::remark::Remark;

@@ -39,7 +39,9 @@ impl Path {
             steps.extend(parts.next().filter(|name| !name.is_empty()).map(|name| Step::Field(name.to_owned())));
             for index in parts {
                 let index = index.strip_suffix(']').and_then(|index| index.parse().ok());
-                steps.push(Step::Index(index.ok_or_else(|| format!("`{part}` is no element; write ranges[3]"))?));
+                steps.push(Step::Index(
+                    index.ok_or_else(|| format!("`{part}` is not an element; write ranges[3]"))?,
+                ));
             }
         }
         Ok(Self(steps))
@@ -103,8 +105,8 @@ pub(super) fn groups(message: &Value, path: &Path) -> Result<Vec<Group>, String>
                 let length = values.len();
                 values.get(*index).ok_or_else(|| format!("`{way}` has {length} elements, and no [{index}]"))?
             }
-            (Step::Field(name), _) => return Err(format!("`{way}` is no message, and has no field `{name}`")),
-            (Step::Index(_), _) => return Err(format!("`{way}` is no list of numbers")),
+            (Step::Field(name), _) => return Err(format!("`{way}` is not a message, so it has no field `{name}`")),
+            (Step::Index(_), _) => return Err(format!("`{way}` is not a list of numbers")),
         };
         way = way.join(step.clone());
     }
@@ -237,11 +239,11 @@ mod tests {
     fn a_wrong_field_is_answered_with_those_there_are() {
         let fault = |path: &str| chosen(path).expect_err("it is wrong");
         assert_eq!(fault("rat.x"), "no field `rat`; did you mean `rate`?");
-        assert_eq!(fault("rate.q"), "no field `rate.q`; there is x, y");
-        assert_eq!(fault("rate.x.y"), "`rate.x` is no message, and has no field `y`");
+        assert_eq!(fault("rate.q"), "no field `rate.q`; there are x, y");
+        assert_eq!(fault("rate.x.y"), "`rate.x` is not a message, so it has no field `y`");
         assert_eq!(fault("long[20]"), "`long` has 20 elements, and no [20]");
         assert_eq!(fault("long"), "`long` holds no number to plot; of a list of more than 16 name an element");
-        assert_eq!(fault("list[a]"), "`list[a]` is no element; write ranges[3]");
+        assert_eq!(fault("list[a]"), "`list[a]` is not an element; write ranges[3]");
         assert_eq!(
             fault("pose.name"),
             "`pose.name` holds no number to plot; of a list of more than 16 name an element"

@@ -65,7 +65,7 @@ fn field(line: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<Option
         Some((element, bound)) => {
             let bound = bound.strip_suffix(']').ok_or_else(|| format!("`]` is missing in `{kind}`"))?;
             let length = bound.strip_prefix("<=").unwrap_or(bound).parse();
-            let length = length.map_err(|_| format!("`{bound}` is no length in `{kind}`"))?;
+            let length = length.map_err(|_| format!("`{bound}` is not a length in `{kind}`"))?;
             (element, if bound.starts_with('<') { Count::Any } else { Count::Exactly(length) })
         }
     };
@@ -196,7 +196,7 @@ mod tests {
         assert_eq!(fault("float64"), "a/A: a name is missing in `float64`");
         assert_eq!(fault("float65 x"), "a/A: a/float65 is not defined");
         assert_eq!(fault("float64[3 x"), "a/A: `]` is missing in `float64[3`");
-        assert_eq!(fault("float64[-3] x"), "a/A: `-3` is no length in `float64[-3]`");
+        assert_eq!(fault("float64[-3] x"), "a/A: `-3` is not a length in `float64[-3]`");
         assert_eq!(fault("wstring x"), "a/A: `wstring` is not read, since writers disagree on its bytes");
         assert_eq!(fault("===\nfloat64 x"), "`MSG:` is missing in `float64 x`");
         assert_eq!(fault("A again"), "a/A contains itself, or too many messages in one another");
