@@ -25,7 +25,7 @@ fn the_project_compiles_passes_its_tests_and_records() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fresh-oven");
     let _ = std::fs::remove_dir_all(&folder);
     let (code, said) = new(&["fresh-oven", "--path", WORKSPACE]);
-    assert_eq!((code, &*said), (Some(0), "made fresh-oven; next: cd fresh-oven && cargo run\n"));
+    assert_eq!((code, &*said), (Some(0), "created fresh-oven; next: cd fresh-oven && cargo run\n"));
 
     // The versions that the workspace has, so that nothing is fetched, and what it has built.
     std::fs::copy(Path::new(WORKSPACE).join("Cargo.lock"), folder.join("Cargo.lock")).expect("copies");

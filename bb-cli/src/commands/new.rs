@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     let folder = Path::new(name);
     fs::create_dir(folder).map_err(|error| match error.kind() {
         std::io::ErrorKind::AlreadyExists => format!("{name} exists already; choose another name, or remove it"),
-        _ => format!("{name} cannot be made: {error}"),
+        _ => format!("{name} cannot be created: {error}"),
     })?;
     for (file, text) in FILES {
         let text = text.replace("{{name}}", name).replace("{{dependencies}}", &dependencies);
@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
         let made = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(&path, text));
         made.map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
     }
-    crate::say(&format!("made {name}; next: cd {name} && cargo run\n"))?;
+    crate::say(&format!("created {name}; next: cd {name} && cargo run\n"))?;
     Ok(true)
 }
 

@@ -23,7 +23,7 @@ robot! {
     }
 }
 
-/// What comes often, and what is rare: each is recorded from a queue of its own, so that a slow disk loses samples and no fault.
+/// Frequent and rare messages are recorded from separate queues, so that a slow disk loses samples but no events.
 const SAMPLES: Select<'static> = Select::Below("sensor");
 const EVENTS: Select<'static> = Select::AnyOf(&[
     Select::Path("fault"),
@@ -35,7 +35,7 @@ const EVENTS: Select<'static> = Select::AnyOf(&[
 /// Runs until Ctrl-C, or for so many seconds: `cargo run -- 3`.
 fn main() -> Result<(), Box<dyn Error>> {
     let seconds: Option<u64> = std::env::args().nth(1).map(|seconds| seconds.parse()).transpose()?;
-    // What the robot tells of itself: restarts, what was left out, faults. A file gets no colours.
+    // Logs: faults, restarts, changes of health and safety. Without colours if stderr is a file.
     let stderr = std::io::stderr;
     tracing_subscriber::fmt().with_writer(stderr).with_ansi(stderr().is_terminal()).init();
 
@@ -44,12 +44,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let samples = builder.subscribe_any(SAMPLES, None, Overflow::DropOldest { capacity: 10_000 });
     let events = builder.subscribe_any(EVENTS, None, Overflow::DropOldest { capacity: 1_000 });
     std::fs::create_dir_all("recordings")?;
-    // By time, and by process for runs that begin at once: a recording is never overwritten.
+    // Named by time and process, since an existing recording is not overwritten.
     let seconds_since_1970 = SystemTime::UNIX_EPOCH.elapsed()?.as_secs();
     let file = format!("recordings/run-{seconds_since_1970}-{}.mcap", std::process::id());
     let recorder = Recorder::new(&file, samples, RecorderOptions::of::<Oven>())?.also(events)?.spawn()?;
 
-    let mut running = builder.start()?; // in real time, a thread for each sensor
+    let mut running = builder.start()?; // in real time, with a thread per sensor
     running.stop_on_signals()?;
     if let Some(seconds) = seconds {
         let live = running.live();
@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             live.request_stop();
         });
     }
-    // Once a second; the messages end when the robot has stopped.
+    // Prints once a second; the messages end when the robot has stopped.
     let printer = std::thread::spawn(move || {
         for temperature in std::iter::from_fn(|| smooth.recv()).step_by(20) {
             println!("{}: {:.2} K", temperature.monotonic_time, temperature.temperature_k);
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 mod tests {
     use super::*;
 
-    /// On virtual time: ten seconds take milliseconds, and give the same each time.
+    /// On virtual time: ten seconds take milliseconds, and every run gives the same result.
     #[test]
     fn the_temperature_is_smoothed() -> Result<(), Box<dyn Error>> {
         let builder = Oven::builder();
