@@ -34,9 +34,11 @@ pub(crate) struct Gap {
 
 /// A period longer than this many medians is a gap.
 const GAP: f64 = 3.0;
-/// Messages are regular if nine of ten periods are at most this many medians, and nine of ten are not that many times
-/// shorter. At least `FEWEST` periods are needed. Events come in bursts.
+/// Messages are regular if nine of ten periods are at most this many medians,
 const REGULAR: f64 = 2.0;
+/// and nine of ten are not this many times shorter than the median, as those of a burst are;
+const BURST: f64 = 10.0;
+/// known only of at least this many periods.
 const FEWEST: usize = 8;
 
 impl Periods {
@@ -53,7 +55,7 @@ impl Periods {
         let variance = sorted.iter().map(|step| (step - mean_s).powi(2)).sum::<f64>() / count;
         let median_s = sorted[sorted.len() / 2];
         let tenths = |tenths: usize| sorted[sorted.len() * tenths / 10];
-        let is_regular = tenths(9) <= REGULAR * median_s && tenths(1) * REGULAR >= median_s && median_s > 0.0;
+        let is_regular = tenths(9) <= REGULAR * median_s && tenths(1) * BURST >= median_s && median_s > 0.0;
         let regular = (sorted.len() >= FEWEST).then_some(is_regular);
         let gaps = steps().enumerate().filter(|(_, step)| regular == Some(true) && *step > GAP * median_s);
         Some(Self {
@@ -120,6 +122,8 @@ mod tests {
         let bursts: Vec<i64> =
             (0..40).map(|index| (index / 2 * 1000 + index % 2 + index / 20 * 9000) * MS).collect();
         let at_once: Vec<i64> = (0..40).map(|index| index / 10 * 1000 * MS).collect();
+        let late: Vec<i64> = (0..40).map(|index| (index * 50 + index % 3 * 20) * MS).collect();
+        assert_eq!(Periods::of(&late).expect("there are some").regular, Some(true), "jitter is no burst");
         for times in [bursts, at_once] {
             let periods = Periods::of(&times).expect("there are some");
             assert_eq!((periods.regular, periods.rate_hz(), &*periods.gaps), (Some(false), None, &[][..]));

@@ -10,6 +10,8 @@ use crate::filters::Axes;
 const DOUBTFUL: f64 = 20.0 * PI / 180.0;
 /// and another convention is named if its error is below that, and so many times smaller.
 const CLEARER: f64 = 3.0;
+/// Conventions whose errors differ by less than this, rad, are not told apart.
+const ALIKE: f64 = 0.5 * PI / 180.0;
 /// A verdict needs so many samples.
 const FEWEST: u64 = 3;
 
@@ -100,8 +102,10 @@ impl Truths {
         let others = self.others.iter().zip(&CONVENTIONS).filter_map(|(errors, convention)| {
             Some(Verdict { name: convention.name, as_read, otherwise: rms(errors)? })
         });
-        // Of those that fit alike the first: with six axes some differ in nothing.
-        let best = others.reduce(|best, other| if other.otherwise < best.otherwise { other } else { best })?;
+        let others: Vec<Verdict> = others.collect();
+        let least = others.iter().map(|other| other.otherwise).reduce(f64::min)?;
+        // With six axes, or little motion, some are alike but for noise: the first of those is the likeliest.
+        let best = others.into_iter().find(|other| other.otherwise <= least + ALIKE)?;
         (best.otherwise < DOUBTFUL && best.otherwise * CLEARER < as_read).then_some(best)
     }
 }
@@ -143,6 +147,19 @@ mod tests {
         }
         assert_eq!(said(|truth| truth.inverse(), Axes::Six), Some(CONVENTIONS[0].name));
         assert_eq!(said(|truth| ned * truth, Axes::Six), Some(CONVENTIONS[1].name));
+    }
+
+    /// About one level axis, the inverse and others have the same inclination but for the noise.
+    #[test]
+    fn of_conventions_that_fit_alike_the_first_is_named() {
+        let mut truths = Truths::default();
+        for index in 0..200 {
+            let angle = f64::from(index) * 0.03;
+            let truth = UnitQuaternion::from_scaled_axis(Vector3::x() * angle);
+            let estimate = UnitQuaternion::from_euler_angles(0.001, 0.001 * angle.cos(), 0.0) * truth;
+            truths.add(&estimate, &truth.inverse());
+        }
+        assert_eq!(truths.verdict(Axes::Six).map(|verdict| verdict.name), Some(CONVENTIONS[0].name));
     }
 
     #[test]

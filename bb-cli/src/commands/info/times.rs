@@ -75,7 +75,8 @@ impl Times {
                 format!("{count} back in time; the farthest by {farthest_s:.6} s, at {at_s:.3} s"),
             ));
         }
-        if periods.repeated > 0 && has_stamps {
+        // Several events may happen at one instant.
+        if periods.repeated > 0 && has_stamps && !self.of_events {
             let count = periods.repeated;
             let text = match count {
                 1 => format!("1 message has the {what} of the one before"),
@@ -166,6 +167,16 @@ mod tests {
         );
         let twice = |index| EVEN(index - index % 2);
         assert_eq!(remarks(EVEN, twice), ["50 messages have the stamp of the one before"]);
+    }
+
+    #[test]
+    fn events_may_happen_at_one_instant() {
+        let remarks = |of_events| {
+            let mut times = Times::new(of_events);
+            (0..20).for_each(|index| times.push(5_000 * MS + index / 2, Some(5_000 * MS + index / 2)));
+            times.remarks(5_000 * MS).len()
+        };
+        assert_eq!((remarks(false), remarks(true)), (1, 0));
     }
 
     #[test]

@@ -32,14 +32,16 @@ const EVENTS: Select<'static> = Select::AnyOf(&[
     Select::Below("safety"),
 ]);
 
-/// Runs until Ctrl-C, or for so many seconds: `cargo run -- 3`.
+/// Runs until Ctrl-C, or for a number of seconds: `cargo run -- 3`.
 fn main() -> Result<(), Box<dyn Error>> {
-    let seconds: Option<u64> = std::env::args().nth(1).map(|seconds| seconds.parse()).transpose()?;
     // Logs: faults, restarts, changes of health and safety. Without colours if stderr is a file.
     let stderr = std::io::stderr;
     tracing_subscriber::fmt().with_writer(stderr).with_ansi(stderr().is_terminal()).init();
 
-    let builder = Oven::builder();
+    let mut builder = Oven::builder();
+    // `--list`, `--config FILE`, `--set PATH=VALUE`: options without recompiling. Other arguments are returned.
+    let Some(others) = builder.take_arguments(std::env::args_os().skip(1))? else { return Ok(()) };
+    let seconds: Option<u64> = others.first().map(|seconds| seconds.to_string_lossy().parse()).transpose()?;
     let smooth = builder.subscribe(oven::sensor::body::thermometer::smooth);
     let samples = builder.subscribe_any(SAMPLES, None, Overflow::DropOldest { capacity: 10_000 });
     let events = builder.subscribe_any(EVENTS, None, Overflow::DropOldest { capacity: 1_000 });
