@@ -78,7 +78,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
 /// The topic and the path of a field in it. The name of a topic may have dots: the longest that fits is taken.
 fn topic_and_field<'a, 'b>(bag: &'a Bag, field: &'b str) -> Result<(&'a Topic, &'b str), String> {
     let dots = field.match_indices('.').map(|(at, _)| at).chain([field.len()]);
-    let known = dots.filter(|end| bag.topics().iter().any(|topic| is_named(topic, &field[..*end]))).last();
+    let is_topic = |end: &usize| bag.topics().iter().any(|topic| is_named(topic, &field[..*end]));
+    let known = dots.rev().find(is_topic);
     let (name, path) = match known {
         Some(end) => (&field[..end], field[end..].trim_start_matches('.')),
         None => field.split_once('.').unwrap_or((field, "")),
