@@ -1,15 +1,15 @@
-//! The command `bb`: recordings looked at, plotted and converted, filters scored on them, projects begun. The guide is
+//! The command `bb`: inspects, plots and converts recordings, scores filters on them, and creates projects. The guide is
 //! `docs/command.md`.
 //!
-//! `bb eval attitude FILES…` plays each bag through the filters and prints their errors against the truth; the guide is
-//! `docs/evaluate.md`. What it is made of is a library, for others that score: [`Score`] and [`Averages`] are the one
-//! definition of the figures, [`evaluate`](fn@evaluate) gives them for one recording, [`Picture`] draws
+//! `bb eval attitude FILES…` runs the filters on each bag and prints their errors against the truth; the guide is
+//! `docs/evaluate.md`. It is also available as a library: [`Score`] and [`Averages`] define the
+//! figures, [`evaluate`](fn@evaluate) computes them for one recording, and [`Picture`] plots
 //! lines over time.
 //!
 //! `bb eval navigation DATA…` does the same for navigation filters on data sets of CSV files; [`evaluate_navigation`] is its
 //! library.
 
-// A robot must not stop because a value was not what it was taken for.
+// A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod arguments;
@@ -29,6 +29,8 @@ mod report;
 mod score;
 mod table;
 mod topics;
+mod truths;
+mod units;
 mod values;
 mod variants;
 
@@ -49,13 +51,13 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Runs the command with these arguments, its own name first. The exit code is 2 for a wrong use and 1 for a
-/// recording that could not be evaluated, or not to its end.
+/// Runs the command with these arguments, the first of which is its name. The exit code is 2 for wrong arguments, and 1 for
+/// a recording that could not be evaluated to its end.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let job = match arguments::parse(arguments) {
         Ok(job) => job,
         Err(error) => {
-            // A terminal that is gone is told nothing.
+            // The terminal may be gone.
             let _ = error.print();
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
@@ -110,11 +112,7 @@ fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     let Attitude { paths, evaluator, json, plot } = attitude;
     let files = files::recordings(paths);
     let evaluations = evaluate::evaluate_all(&files, evaluator);
-    let text = if *json {
-        report::json(&evaluations, evaluator.axes)?
-    } else {
-        report::table(&evaluations, evaluator.axes)
-    };
+    let text = if *json { report::json(&evaluations)? } else { report::table(&evaluations, evaluator.axes) };
     say(&text)?;
     let is_whole = report::complain(&evaluations);
     if let Some(plot) = plot {
@@ -124,7 +122,7 @@ fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     Ok(is_whole)
 }
 
-/// Prints; whether anybody still reads: one who has read enough (`| head`) is no error.
+/// Prints, and returns whether the output is still open: a closed pipe (`| head`) is not an error.
 fn say(text: &str) -> Result<bool, String> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Ok(()) => Ok(true),

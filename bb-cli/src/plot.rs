@@ -1,4 +1,4 @@
-//! Lines over time, as a picture.
+//! Plots of lines over time.
 
 mod line;
 mod palette;
@@ -25,10 +25,10 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Whether a picture can be written there: to be asked before the run, and told in plain words.
+    /// Checks before a run whether a picture can be written there.
     ///
     /// # Errors
-    /// The file's name ends neither in `.svg` nor in `.png`, or its folder is not there.
+    /// The file's name ends neither in `.svg` nor in `.png`, or its folder does not exist.
     pub fn check(file: &Path, option: &str) -> Result<(), String> {
         if format(file).is_none() {
             let file = file.with_extension("svg");
@@ -48,7 +48,7 @@ impl Picture {
     /// It cannot be written there.
     pub fn write(&self, file: &Path) -> Result<(), String> {
         Self::check(file, "a plot")?;
-        // The font comes along, so that a plot needs nothing of the machine.
+        // The font is compiled in, so that plots do not depend on the machine.
         register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
             .map_err(|_| "the plot's font cannot be read")?;
         let (width, height) = self.panel_size;

@@ -19,8 +19,8 @@ pub struct Line {
 }
 
 impl Line {
-    /// A line through the values, interrupted where there is none. Of points too many to show, the smallest and the
-    /// largest stay.
+    /// A line through the values, interrupted where they are missing. If there are more points than pixels, the smallest and
+    /// the largest are kept.
     pub fn new(label: impl Into<String>, colour: Colour, width: u32, points: &[Point]) -> Self {
         let thinned = thin(points, MOST_POINTS / 2, |points, thinned| {
             let low = extreme(points, |a, b| a < b);

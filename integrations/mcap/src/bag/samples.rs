@@ -6,12 +6,11 @@ use bb_core::prelude::*;
 
 /// The samples of a recorded IMU at the stamps of their headers, in the order of the file.
 ///
-/// A reading of the magnetometer goes with the IMU's sample of the same stamp, if that comes just before or after it in the
-/// file, or else with the sample before it: bags hold messages of one instant in any order, so a sample waits for the next
-/// one. Samples may be out of order; estimators
-/// refuse those.
+/// A reading of the magnetometer belongs to the IMU sample with the same stamp, if that comes just before or after it in the
+/// file, or else to the sample before it. Bags contain messages of one instant in any order, so each sample waits for the next
+/// one. Samples may be out of order; estimators refuse those.
 ///
-/// An error comes after the last sample before it, and is the end.
+/// An error comes after the last sample before it, and ends the iteration.
 #[derive(Debug)]
 pub struct MargSamples {
     messages: BagMessages,
