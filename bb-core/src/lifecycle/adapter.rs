@@ -77,7 +77,7 @@ macro_rules! component {
 
 component! {
     /// An estimator.
-    pub AsEstimator: Estimator, Context
+    pub(crate) AsEstimator: Estimator, Context
 }
 
 component! {

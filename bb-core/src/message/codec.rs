@@ -22,7 +22,7 @@
 mod algebra;
 mod collections;
 mod definitions;
-mod derive;
+pub(crate) mod derive;
 mod error;
 mod intern;
 mod json;
@@ -38,8 +38,6 @@ mod tests;
 mod type_description;
 mod writer;
 
-#[doc(hidden)]
-pub use derive::{FieldOf, NotField, is_any, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
 pub(crate) use intern::intern;

@@ -21,7 +21,8 @@ mod member;
 #[cfg(all(test, loom))]
 mod model;
 
-pub use self::any::{AnyIsland, Replayed};
+pub use self::any::IslandOf;
+pub(crate) use self::any::{AnyIsland, Replayed};
 use self::inbox::{Entry, Inbox, Pending, Taken};
 use self::inside::{Inside, Within};
 pub(crate) use self::member::take_turn;

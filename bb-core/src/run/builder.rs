@@ -284,3 +284,11 @@ impl<R: Robot> fmt::Debug for Builder<R> {
         f.debug_tuple("Builder").field(&R::NAME).finish()
     }
 }
+
+/// No robot is.
+#[doc(hidden)]
+#[diagnostic::on_unimplemented(
+    message = "a robot is assembled with `{Self}::builder()`, and there is no `new`",
+    label = "call `builder` instead"
+)]
+pub trait MadeByNew {}

@@ -14,6 +14,9 @@ use std::{
     time::Duration,
 };
 
+/// Finds an island in a wiring.
+pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
+
 /// What all islands of a robot with the wiring `W` have in common.
 pub trait AnyIsland<W> {
     /// The island as declared.
