@@ -108,10 +108,11 @@ pub mod __private {
         check_position, check_reachable, check_required, check_role, find_input, find_output,
     };
     pub use crate::component::binding::{Binding, FromParameter};
+    pub use crate::component::field::{FromQuantity, FromText};
     pub use crate::component::inputs::{At, FieldIndex, InputAt, Slot, SyncMiss, TakenAt, declare};
-    pub use crate::component::options::{FromQuantity, FromText};
+    pub use crate::component::options::AnyOptions;
     pub use crate::component::outputs::{EmittedAt, OutputAt};
-    pub use crate::component::setting::{AnyOptions, ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
+    pub use crate::component::setting::{ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
     pub use crate::component::{Command, Input, InputField, OptionField};
     pub use crate::control::Prepared;
     pub use crate::declaration::estimator::{InletDeclaration, IslandDeclaration};

@@ -3,6 +3,7 @@
 
 mod admission;
 mod backlog;
+mod count;
 mod counters;
 mod entry;
 mod environment;

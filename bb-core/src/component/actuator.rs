@@ -1,9 +1,7 @@
 //! The contract of an actuator.
 
-use super::{ActuatorContext, Fault, Options, Permit};
-use crate::event::Safety;
+use super::{ActuatorContext, Fault, Options};
 use crate::message::{Payload, Stamped};
-use std::fmt;
 
 /// Moves a joint.
 ///
@@ -88,39 +86,4 @@ pub trait Actuator: Sized + Send + 'static {
 
     /// Closes the device before the actuator stops or is restarted; not called after a panic.
     fn terminate(&mut self) {}
-}
-
-/// Why an actuator has not carried out a command.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ActuatorError {
-    /// The robot is not armed.
-    NotArmed(Safety),
-    /// The command that sent this has ended or was cancelled: its handles are dead.
-    Cancelled,
-    /// The command holds a NaN or an infinity.
-    NonFinite,
-    /// The actuator has failed and does not run.
-    Stopped,
-    /// The actuator has failed at this command.
-    Failed(String),
-}
-
-impl fmt::Display for ActuatorError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotArmed(safety) => write!(f, "the robot is not armed ({safety})"),
-            Self::Cancelled => f.write_str("the command that sent this has ended or was cancelled"),
-            Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
-            Self::Stopped => f.write_str("the actuator has failed and does not run"),
-            Self::Failed(message) => write!(f, "the actuator failed: {message}"),
-        }
-    }
-}
-
-impl std::error::Error for ActuatorError {}
-
-/// An actuator that takes commands of type `T`.
-pub(crate) trait Accepts<T>: Send + Sync {
-    fn accept(&self, command: T, permit: &Permit) -> Result<(), ActuatorError>;
 }

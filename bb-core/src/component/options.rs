@@ -1,8 +1,7 @@
 //! Typed options with defaults, ranges, units and docs.
 
-use super::Setting;
-use crate::declaration::{Dimension, Range};
-use std::time::Duration;
+use super::{OptionField, Setting};
+use std::any::Any;
 
 /// The options of a sensor or an estimator: a plain struct, filled from the parentheses in `robot!`.
 ///
@@ -51,23 +50,6 @@ pub trait Options: Clone + std::fmt::Debug + Send + 'static {
     }
 }
 
-/// What is known of one option.
-#[derive(Clone, Copy, Debug)]
-pub struct OptionField {
-    /// Its name.
-    pub name: &'static str,
-    /// Its doc comment.
-    pub doc: &'static str,
-    /// Whether it must be given.
-    pub required: bool,
-    /// Its dimension, where a unit is stated.
-    pub dimension: Option<Dimension>,
-    /// The unit it was stated in.
-    pub unit: &'static str,
-    /// The numbers accepted, in SI.
-    pub range: Option<Range>,
-}
-
 /// For components without options.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoOptions;
@@ -82,71 +64,41 @@ impl Options for NoOptions {
     }
 }
 
-/// What a text given as an option may become: whatever is `From<&'static str>`, as `String` and `PathBuf` are.
-#[diagnostic::on_unimplemented(message = "expected `{Self}`, found a text", label = "a text, not `{Self}`")]
-pub trait FromText {
-    /// It.
-    fn from_text(text: &'static str) -> Self;
+/// The options of one component, whatever its type.
+pub trait AnyOptions: Any + Send {
+    /// See [`Options::FIELDS`].
+    fn fields(&self) -> &'static [OptionField];
+    /// The option number `index` of [`AnyOptions::fields`].
+    fn setting(&mut self, index: usize) -> Option<Box<dyn Setting + '_>>;
+    /// See [`Options::validate`].
+    fn validate(&self) -> Result<(), String>;
+    /// A copy, to be changed and put back by [`AnyOptions::replace`].
+    fn copy(&self) -> Box<dyn AnyOptions>;
+    /// Takes over a copy.
+    fn replace(&mut self, copy: Box<dyn AnyOptions>);
 }
 
-#[diagnostic::do_not_recommend]
-impl<T: From<&'static str>> FromText for T {
-    fn from_text(text: &'static str) -> Self {
-        text.into()
-    }
-}
-
-/// What a number with a unit given as an option may become; a time is a `Duration` as well.
-#[diagnostic::on_unimplemented(
-    message = "a number with a unit cannot be `{Self}`",
-    label = "has a unit",
-    note = "an option with a unit is an `f64`, an `f32`, a `Duration`, or an `Option` of one of these"
-)]
-pub trait FromQuantity {
-    /// From its value in SI.
-    fn from_quantity(value: f64) -> Self;
-    /// Its value in SI, if it has one.
-    fn to_quantity(&self) -> Option<f64>;
-}
-
-impl FromQuantity for f64 {
-    fn from_quantity(value: f64) -> Self {
-        value
+impl<O: Options> AnyOptions for O {
+    fn fields(&self) -> &'static [OptionField] {
+        O::FIELDS
     }
 
-    fn to_quantity(&self) -> Option<f64> {
-        Some(*self)
-    }
-}
-
-impl FromQuantity for f32 {
-    fn from_quantity(value: f64) -> Self {
-        value as Self
+    fn setting(&mut self, index: usize) -> Option<Box<dyn Setting + '_>> {
+        Options::setting(self, index)
     }
 
-    fn to_quantity(&self) -> Option<f64> {
-        Some(f64::from(*self))
-    }
-}
-
-impl FromQuantity for Duration {
-    /// Negative times are 0, and too long ones the longest there is.
-    fn from_quantity(seconds: f64) -> Self {
-        let longest = if seconds > 0.0 { Self::MAX } else { Self::ZERO };
-        Self::try_from_secs_f64(seconds).unwrap_or(longest)
+    fn validate(&self) -> Result<(), String> {
+        Options::validate(self)
     }
 
-    fn to_quantity(&self) -> Option<f64> {
-        Some(self.as_secs_f64())
-    }
-}
-
-impl<T: FromQuantity> FromQuantity for Option<T> {
-    fn from_quantity(value: f64) -> Self {
-        Some(T::from_quantity(value))
+    fn copy(&self) -> Box<dyn AnyOptions> {
+        Box::new(self.clone())
     }
 
-    fn to_quantity(&self) -> Option<f64> {
-        self.as_ref().and_then(T::to_quantity)
+    fn replace(&mut self, copy: Box<dyn AnyOptions>) {
+        let copy: Box<dyn Any> = copy;
+        if let Ok(copy) = copy.downcast() {
+            *self = *copy;
+        }
     }
 }

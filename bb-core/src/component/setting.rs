@@ -3,52 +3,12 @@
 //! An option can be of any type. Which of its values can be written in a file is found out by its type, at compile time: a
 //! quantity with a unit, a value with a JSON form ([`Field`]), or a text.
 
-use super::{FromQuantity, OptionField, Options};
+use super::{FromQuantity, OptionField};
 use crate::declaration::unit::{Quantity, dimension_name, si_unit};
 use crate::message::Field;
 use crate::message::codec::{Shape, from_json, to_json};
-use std::any::Any;
 use std::ffi::OsStr;
 use std::marker::PhantomData;
-
-/// The options of one component, whatever its type.
-pub trait AnyOptions: Any + Send {
-    /// See [`Options::FIELDS`].
-    fn fields(&self) -> &'static [OptionField];
-    /// The option number `index` of [`AnyOptions::fields`].
-    fn setting(&mut self, index: usize) -> Option<Box<dyn Setting + '_>>;
-    /// See [`Options::validate`].
-    fn validate(&self) -> Result<(), String>;
-    /// A copy, to be changed and put back by [`AnyOptions::replace`].
-    fn copy(&self) -> Box<dyn AnyOptions>;
-    /// Takes over a copy.
-    fn replace(&mut self, copy: Box<dyn AnyOptions>);
-}
-
-impl<O: Options> AnyOptions for O {
-    fn fields(&self) -> &'static [OptionField] {
-        O::FIELDS
-    }
-
-    fn setting(&mut self, index: usize) -> Option<Box<dyn Setting + '_>> {
-        Options::setting(self, index)
-    }
-
-    fn validate(&self) -> Result<(), String> {
-        Options::validate(self)
-    }
-
-    fn copy(&self) -> Box<dyn AnyOptions> {
-        Box::new(self.clone())
-    }
-
-    fn replace(&mut self, copy: Box<dyn AnyOptions>) {
-        let copy: Box<dyn Any> = copy;
-        if let Ok(copy) = copy.downcast() {
-            *self = *copy;
-        }
-    }
-}
 
 /// One option of a component.
 pub trait Setting {

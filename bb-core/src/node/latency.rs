@@ -3,7 +3,7 @@
 //! Buckets of an eighth of a power of two: a quantile is right within 12.5 %. A count is a load and a store, since
 //! whoever holds the estimator is the only writer; ready-made histograms need a lock for that.
 
-use super::counters::Count;
+use super::count::Count;
 use std::fmt;
 use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! The bounded queue between a topic and one subscriber.
 
-use super::SubscriberStatistics;
+use super::statistics::SubscriberStatistics;
 use super::wakers::{Wakers, discard, wake};
 use crate::message::{Payload, Stamped};
 use std::collections::VecDeque;

@@ -1,7 +1,7 @@
 //! The subscriber's end.
 
 use super::queue::Queue;
-use super::topic::{Subscribers, leave};
+use super::subscribers::{Subscribers, leave};
 use crate::message::Stamped;
 use std::fmt;
 use std::future::Future;

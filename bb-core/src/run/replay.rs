@@ -387,7 +387,7 @@ impl<R: Robot> Replay<R> {
         let topics = registry.topics();
         let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
             (Some(topic), _) => Arc::clone(topic),
-            (None, Recorded::Message(message)) => message.topic(registry).map_err(|error| error.to_string())?,
+            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string())?,
             (None, Recorded::Bytes(_)) => {
                 return Err(format!(
                     "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
