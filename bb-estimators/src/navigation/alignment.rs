@@ -5,8 +5,9 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::eskf::{ImuMean, Refusal, Start};
+use super::eskf::{ImuMean, Start};
 use super::math::{atan2, sqrt};
+use super::refusal::Refusal;
 use crate::attitude::initial::initial_orientation;
 use crate::params::params;
 

@@ -2,12 +2,11 @@
 
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 
-use super::super::estimate::Estimate;
 use super::super::propagation::Transition;
-use super::super::states::{NAVIGATION, Optional, States};
 use super::sample;
 use crate::navigation::math::{rotation, sqrt};
 use crate::navigation::noise::Noise;
+use crate::navigation::state::{Estimate, NAVIGATION, Optional, States};
 use crate::navigation::{
     Eskf, EskfParams, GaussMarkov, GnssHeading, GnssPosition, GnssVelocity, ImuMean, RelativePose, Start, Stream,
     StreamParams, nees,
