@@ -186,7 +186,10 @@ fn single_input_tolerance() {
     ));
     wrong(
         &sensing("estimator h: H() { input a: sensor::base::imu; sync_tolerance: 1 s; }"),
-        &[("sync_tolerance", "there is a single input, and nothing for it to be in step with; leave this out")],
+        &[(
+            "sync_tolerance",
+            "there is a single input, and nothing for it to be in step with; add the other input, or leave this out",
+        )],
     );
 }
 
