@@ -45,6 +45,24 @@ pub trait FromQuantity {
     fn from_quantity(value: f64) -> Self;
     /// Its value in SI, if it has one.
     fn to_quantity(&self) -> Option<f64>;
+    /// What stands for no value, where that can be.
+    fn none() -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+    /// From a text in the SI unit, where an `f64` would be less exact.
+    fn from_exact(_text: &str) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+    /// Its value in SI as decimal digits, where an `f64` would be less exact.
+    fn to_exact(&self) -> Option<String> {
+        None
+    }
 }
 
 impl FromQuantity for f64 {
@@ -77,6 +95,22 @@ impl FromQuantity for Duration {
     fn to_quantity(&self) -> Option<f64> {
         Some(self.as_secs_f64())
     }
+
+    /// Of seconds with up to nine decimal places.
+    fn from_exact(text: &str) -> Option<Self> {
+        let (seconds, fraction) = text.split_once('.').unwrap_or((text, ""));
+        let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+        if fraction.len() > 9 || !are_digits(seconds) || !are_digits(fraction) {
+            return None;
+        }
+        let nanos = format!("{fraction:0<9}").parse().ok()?;
+        Some(Self::new(seconds.parse().ok()?, nanos))
+    }
+
+    fn to_exact(&self) -> Option<String> {
+        let text = format!("{}.{:09}", self.as_secs(), self.subsec_nanos());
+        Some(text.trim_end_matches('0').trim_end_matches('.').to_owned())
+    }
 }
 
 impl<T: FromQuantity> FromQuantity for Option<T> {
@@ -86,5 +120,17 @@ impl<T: FromQuantity> FromQuantity for Option<T> {
 
     fn to_quantity(&self) -> Option<f64> {
         self.as_ref().and_then(T::to_quantity)
+    }
+
+    fn none() -> Option<Self> {
+        Some(None)
+    }
+
+    fn from_exact(text: &str) -> Option<Self> {
+        T::from_exact(text).map(Some)
+    }
+
+    fn to_exact(&self) -> Option<String> {
+        self.as_ref().and_then(T::to_exact)
     }
 }

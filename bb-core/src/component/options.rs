@@ -23,6 +23,9 @@ use std::any::Any;
 ///     /// Readings beyond it are dropped. Unit: m.
 ///     #[option(default = 4.0, range = 0.1..=30.0, unit = "m")]
 ///     pub maximum_range: f64,
+///     /// How long a reading may take. In `robot!` it is written with a unit, `timeout = 20 ms`; here it is a value of Rust.
+///     #[option(default = Duration::from_millis(50))]
+///     pub timeout: Duration,
 /// }
 ///
 /// assert_eq!(RangeFinderOptions::defaults().maximum_range, 4.0);

@@ -116,12 +116,20 @@ struct QuantitySlot<'a, T> {
 impl<T: FromQuantity> Setting for QuantitySlot<'_, T> {
     fn set(&mut self, json: &str) -> Result<(), String> {
         let Some(dimension) = self.field.dimension else { return Err("states no unit".to_owned()) };
+        if json == "null"
+            && let Some(none) = T::none()
+        {
+            *self.slot = none;
+            return Ok(());
+        }
         let value = quantity(json, dimension.exponents)?;
-        let slot = T::from_quantity(value);
+        let text = text_of(json);
+        let number = text.trim().strip_suffix(&si_unit(dimension.exponents)).map(str::trim_end);
+        let slot = number.and_then(T::from_exact).unwrap_or_else(|| T::from_quantity(value));
         // A `Duration` is not negative, and neither endless nor finer than a nanosecond.
         let held = slot.to_quantity().unwrap_or(f64::NAN);
         if (held - value).abs() > 1e-6 * value.abs() {
-            return Err(format!("cannot be {}", text_of(json)));
+            return Err(format!("cannot be {text}"));
         }
         *self.slot = slot;
         Ok(())
@@ -129,10 +137,11 @@ impl<T: FromQuantity> Setting for QuantitySlot<'_, T> {
 
     fn value(&self) -> Option<String> {
         let unit = si_unit(self.field.dimension?.exponents);
-        match self.slot.to_quantity() {
-            Some(value) if value.is_finite() => Some(format!("\"{value} {unit}\"")),
-            Some(_) => None,
-            None => Some("null".to_owned()),
+        match (self.slot.to_quantity(), self.slot.to_exact()) {
+            (Some(_), Some(digits)) => Some(format!("\"{digits} {unit}\"")),
+            (Some(value), None) if value.is_finite() => Some(format!("\"{value} {unit}\"")),
+            (Some(_), None) => None,
+            (None, _) => Some("null".to_owned()),
         }
     }
 

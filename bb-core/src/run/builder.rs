@@ -4,6 +4,7 @@ use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
 use super::machine::Machine;
+use super::settings::refused_by_bound;
 use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
 use crate::component::{Fault, Host};
@@ -72,13 +73,17 @@ impl<R: Robot> Builder<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
+        let Some(declared) = R::PARAMETERS.get(parameter.number()) else { return Ok(()) };
         let value = value.into_value();
-        if let Some(declared) = R::PARAMETERS.get(parameter.number()) {
-            declared.check(&value)?;
-        }
-        if let Some(slot) = self.parameters.get_mut(parameter.number()) {
+        declared.check(&value)?;
+        let mut parameters = self.parameters.clone();
+        if let Some(slot) = parameters.get_mut(parameter.number()) {
             *slot = value;
         }
+        if let Some(message) = refused_by_bound::<R>(&mut self.options, &parameters, declared.path) {
+            return Err(ParameterError { path: declared.path.to_owned(), message });
+        }
+        self.parameters = parameters;
         Ok(())
     }
 

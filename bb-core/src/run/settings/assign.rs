@@ -9,6 +9,12 @@ use crate::message::nearest::{nearest, nearest_path};
 use crate::run::{Builder, Robot};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// How a file says that an option which may be `None` is.
+pub(super) const NULL_TEXT: &str = "\"null\"";
+
+/// How many of the names that there are not are held against all there are.
+const HINTS: usize = 32;
+
 /// A setting as written.
 pub(super) struct Assignment {
     pub(super) place: Place,
@@ -71,6 +77,7 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
     let names = names(builder);
     let paths = component_paths::<R>();
     let mut problems = Vec::new();
+    let mut unknown_names = 0;
     let mut parameters = builder.parameters.clone();
     // The changed options of a component, and what changed them.
     let mut changed: BTreeMap<usize, (Box<dyn AnyOptions>, Vec<&Assignment>)> = BTreeMap::new();
@@ -91,7 +98,11 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
                     None => Err("has no options".to_owned()),
                 },
             },
-            None => Err(unknown(&names, &paths, &assignment.path)),
+            None if unknown_names < HINTS => {
+                unknown_names += 1;
+                Err(unknown(&names, &paths, &assignment.path))
+            }
+            None => Err("there is no such setting".to_owned()),
         };
         if let Err(message) = result {
             problems.push(assignment.problem(message));
@@ -107,7 +118,7 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
             }
         }
         for assignment in assignments {
-            if let Some(message) = refused_by_bound::<R>(builder, &paths, &parameters, &assignment.path) {
+            if let Some(message) = refused_by_bound::<R>(&mut builder.options, &parameters, &assignment.path) {
                 problems.push(assignment.problem(message));
             }
         }
@@ -147,12 +158,12 @@ pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'stati
 }
 
 /// Why an option that is bound to this parameter would refuse its new value.
-fn refused_by_bound<R: Robot>(
-    builder: &mut Builder<R>,
-    paths: &[&str],
+pub(crate) fn refused_by_bound<R: Robot>(
+    options: &mut R::Options,
     parameters: &[ParameterValue],
     path: &str,
 ) -> Option<String> {
+    let paths = component_paths::<R>();
     let number = R::PARAMETERS.iter().position(|declared| declared.path == path)?;
     let value = match parameters.get(number)? {
         ParameterValue::Float(value) => *value,
@@ -160,7 +171,7 @@ fn refused_by_bound<R: Robot>(
         ParameterValue::Bool(_) | ParameterValue::Text(_) => return None,
     };
     R::BOUND_OPTIONS.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
-        let fields = fields::<R>(&mut builder.options, *component).iter();
+        let fields = fields::<R>(options, *component).iter();
         let range = fields.filter(|field| field.name == *name).find_map(|field| field.range)?;
         let path = paths.get(*component)?;
         let is_inside = (range.start..=range.end).contains(&value);
@@ -193,6 +204,8 @@ fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -
     let set = setting.set(&assignment.json);
     match (&set, &assignment.text) {
         (Err(_), Some(text)) if setting.set(text).is_ok() => Ok(()),
+        // TOML has no null: the text stands for it, unless it is a text that is wanted.
+        (Err(_), None) if assignment.json == NULL_TEXT && setting.set("null").is_ok() => Ok(()),
         _ => set,
     }
 }
