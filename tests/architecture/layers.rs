@@ -95,7 +95,7 @@ fn folders_of_the_runtime_import_only_from_below() {
 }
 
 /// The modules of the algorithms, from the bottom up.
-const ALGORITHMS: [&str; 5] = ["params", "attitude", "navigation", "calibration", "simulation"];
+const ALGORITHMS: [&str; 6] = ["params", "moments", "attitude", "navigation", "calibration", "simulation"];
 
 #[test]
 fn algorithms_import_only_from_below() {

@@ -38,7 +38,7 @@ fn fly(seed: u64) -> Flown {
         gnss_lever_arm: GaussMarkov::constant(0.2),
         ..EskfParams::default()
     };
-    let mut noise = Noise(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut noise = Noise::new(seed);
     let mut filter = Eskf::<Drone, N>::new(params).unwrap();
     let level = UnitQuaternion::from_euler_angles(0.1, -0.1, 1.0);
     let velocity = Vector3::new(8.0, 2.0, 0.0);
