@@ -2,6 +2,7 @@
 //! caller ([`Simulation`]), or from a journal ([`Replay`]).
 
 pub(crate) mod actuator;
+mod bound;
 mod builder;
 mod describe;
 mod error;

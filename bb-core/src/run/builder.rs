@@ -1,10 +1,10 @@
 //! A robot before it starts.
 
+use super::bound::refused_by_bound;
 use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
 use super::machine::Machine;
-use super::settings::refused_by_bound;
 use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
 use crate::component::{Fault, Host};

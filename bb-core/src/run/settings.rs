@@ -20,7 +20,6 @@ mod file;
 mod list;
 mod schema;
 
-pub(super) use assign::refused_by_bound;
 pub use error::{SettingProblem, SettingsError};
 pub use list::SettingsList;
 pub(super) use schema::settings_schema;

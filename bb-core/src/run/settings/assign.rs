@@ -1,11 +1,12 @@
 //! Settings to options and parameters: all of them, or none.
 
 use super::error::{Place, SettingProblem, SettingsError};
-use crate::component::{AnyOptions, OptionField, quantity};
+use crate::component::{AnyOptions, quantity};
 use crate::declaration::{ParameterDeclaration, ParameterDefault, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::{from_json, to_json};
 use crate::message::nearest::{nearest, nearest_path};
+use crate::run::bound::{bound_to, component_paths, fields, refused_by_bound};
 use crate::run::{Builder, Robot};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -39,21 +40,6 @@ impl Assignment {
     fn problem(&self, message: impl Into<String>) -> SettingProblem {
         SettingProblem::new(self.place.clone(), &self.path, message)
     }
-}
-
-/// The paths of a robot's components, as their options are listed.
-pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
-    let sensors = R::SENSORS.iter().map(|declared| declared.path);
-    let estimators = R::ESTIMATORS.iter().map(|declared| declared.path);
-    let actuators = R::ACTUATORS.iter().map(|declared| declared.path);
-    let services = R::SERVICES.iter().map(|declared| declared.path);
-    let commands = R::COMMANDS.iter().map(|declared| declared.path);
-    sensors.chain(estimators).chain(actuators).chain(services).chain(commands).collect()
-}
-
-/// The options of a component.
-fn fields<R: Robot>(options: &mut R::Options, component: usize) -> &'static [OptionField] {
-    R::options_of(options, component).map_or(&[], |options| options.fields())
 }
 
 /// The paths of all settings.
@@ -150,36 +136,6 @@ fn target<R: Robot>(paths: &[&str], options: &mut R::Options, path: &str) -> Opt
     Some(Target::Option { component, field })
 }
 
-/// The path of the parameter that an option is bound to.
-pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'static str> {
-    let is_bound = |bound: &&(usize, &str, usize)| bound.0 == component && bound.1 == last(path);
-    let (_, _, parameter) = R::BOUND_OPTIONS.iter().find(is_bound)?;
-    Some(R::PARAMETERS.get(*parameter)?.path)
-}
-
-/// Why an option that is bound to this parameter would refuse its new value.
-pub(crate) fn refused_by_bound<R: Robot>(
-    options: &mut R::Options,
-    parameters: &[ParameterValue],
-    path: &str,
-) -> Option<String> {
-    let paths = component_paths::<R>();
-    let number = R::PARAMETERS.iter().position(|declared| declared.path == path)?;
-    let value = match parameters.get(number)? {
-        ParameterValue::Float(value) => *value,
-        ParameterValue::Integer(value) => *value as f64,
-        ParameterValue::Bool(_) | ParameterValue::Text(_) => return None,
-    };
-    R::BOUND_OPTIONS.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
-        let fields = fields::<R>(options, *component).iter();
-        let range = fields.filter(|field| field.name == *name).find_map(|field| field.range)?;
-        let path = paths.get(*component)?;
-        let is_inside = (range.start..=range.end).contains(&value);
-        (!is_inside)
-            .then(|| format!("{path}/{name} is bound to it, and must be in {}, found `{value}`", range.text))
-    })
-}
-
 /// Whether an option that is a number keeps its range.
 fn in_range(options: &mut dyn AnyOptions, field: usize) -> Result<(), String> {
     let Some(declared) = options.fields().get(field).copied() else { return Ok(()) };
@@ -191,10 +147,6 @@ fn in_range(options: &mut dyn AnyOptions, field: usize) -> Result<(), String> {
         }
         _ => Ok(()),
     }
-}
-
-fn last(path: &str) -> &str {
-    path.rsplit('/').next().unwrap_or(path)
 }
 
 fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -> Result<(), String> {

@@ -1,10 +1,11 @@
 //! All settings of a robot, as a TOML file.
 
-use super::assign::{NULL_TEXT, bound_to, component_paths, names};
+use super::assign::{NULL_TEXT, names};
 use crate::component::{OptionField, SettingKind};
 use crate::declaration::{Range, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::to_json;
+use crate::run::bound::{bound_to, component_paths};
 use crate::run::{Builder, Robot};
 use std::fmt;
 

@@ -1,11 +1,11 @@
 //! The JSON Schema of a robot's settings: for editors, and for programs that write them.
 
-use super::assign::{bound_to, component_paths};
 use crate::component::{OptionField, Setting, SettingKind};
 use crate::declaration::unit::si_unit;
 use crate::declaration::{ParameterDeclaration, ParameterDefault, Range};
 use crate::message::codec::{Definitions, Shape, document, member, to_json};
 use crate::run::Robot;
+use crate::run::bound::{bound_to, component_paths};
 use std::collections::BTreeMap;
 
 pub(crate) fn settings_schema<R: Robot>() -> String {
