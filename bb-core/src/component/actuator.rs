@@ -7,7 +7,7 @@ use crate::message::{Payload, Stamped};
 ///
 /// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. Simulation, motion
 /// and kinematics are later work of this framework; what is here starts and stops an actuator with the robot, makes it
-/// safe when the robot is disarmed, and lets everybody see what it was told, at its path.
+/// safe when the robot is disarmed, and publishes the commands it was given, at its path.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -53,7 +53,7 @@ use crate::message::{Payload, Stamped};
 pub trait Actuator: Sized + Send + 'static {
     /// What `Name(…)` in `robot!` fills.
     type Options: Options;
-    /// What it is told.
+    /// The commands it takes.
     type Command: Payload;
 
     /// Opens the device, without moving anything.
@@ -62,7 +62,7 @@ pub trait Actuator: Sized + Send + 'static {
     /// What keeps it from starting; the robot then does not start.
     fn init(options: Self::Options, context: &ActuatorContext) -> Result<Self, Fault>;
 
-    /// Does what it is told.
+    /// Carries out a command.
     ///
     /// # Errors
     /// Why it cannot go on; the fault is reported, and the actuator is made safe and restarted.

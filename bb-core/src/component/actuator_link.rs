@@ -1,4 +1,4 @@
-//! Commands to an actuator of which the caller knows the path.
+//! Commands to an actuator by path.
 
 use super::Permit;
 use crate::event::Safety;

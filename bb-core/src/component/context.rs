@@ -87,7 +87,7 @@ impl Context {
     /// The identity where both are the same frame, and where the input has no frame (a robot-level sensor).
     ///
     /// # Errors
-    /// No input of that name is declared, or a moving joint lies between, whose position nobody computes yet. (Only an
+    /// No input of that name is declared, or there is a moving joint between them, whose position nothing computes yet. (Only an
     /// estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span one.)
     ///
     /// [`Estimator::HANDLES_MOVING_JOINTS`]: super::Estimator::HANDLES_MOVING_JOINTS
@@ -130,7 +130,7 @@ impl Context {
     /// The same for the driver, or for the only input.
     ///
     /// # Errors
-    /// A moving joint lies between.
+    /// There is a moving joint between them.
     pub fn frame_from_driver(&self) -> Result<Isometry3<f64>, Fault> {
         let driver = self.declaration.inputs.iter().find(|declared| declared.driver);
         driver.map_or_else(|| Ok(Isometry3::identity()), transform_of)
@@ -141,7 +141,7 @@ fn transform_of(input: &InputDeclaration) -> Result<Isometry3<f64>, Fault> {
     let transform = input.frame_from_input.ok_or_else(|| {
         let name = input.name;
         Fault::new(format!(
-            "a moving joint lies between the input `{name}` and the output, and its position is not known"
+            "there is a moving joint between the input `{name}` and the output, and its position is not known"
         ))
     })?;
     Ok(transform.isometry())
@@ -243,8 +243,8 @@ impl SensorContext {
         period_s(self.declaration)
     }
 
-    /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; none if a
-    /// moving joint lies between, or the sensor has no frame.
+    /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; `None` if
+    /// one of the joints moves, or the sensor has no frame.
     pub fn root_from_frame(&self) -> Option<Isometry3<f64>> {
         self.declaration.root_from_frame.map(|transform| transform.isometry())
     }

@@ -1,4 +1,4 @@
-//! Commands as those see them who know their paths alone.
+//! Commands by path, for callers that do not know their types.
 
 use super::Fault;
 use crate::message::codec::Shape;

@@ -1,4 +1,4 @@
-//! What is known of one option, and what its literals may become.
+//! Descriptions of options, and conversions from their literals.
 
 use crate::declaration::{Dimension, Range};
 use std::time::Duration;
@@ -45,7 +45,7 @@ pub trait FromQuantity {
     fn from_quantity(value: f64) -> Self;
     /// Its value in SI, if it has one.
     fn to_quantity(&self) -> Option<f64>;
-    /// What stands for no value, where that can be.
+    /// The value for `null`, if the type has one.
     fn none() -> Option<Self>
     where
         Self: Sized,

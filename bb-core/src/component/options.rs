@@ -5,7 +5,7 @@ use std::any::Any;
 
 /// The options of a sensor or an estimator: a plain struct, filled from the parentheses in `robot!`.
 ///
-/// Derive it. Every field has either a default or is `required` (its type is then `Default`, which stands in until it is
+/// Derive it. Every field has either a default or is `required` (its type then implements `Default`, whose value is used until one is
 /// given). A field may be of any type. An `f64`, an `f32`, a `Duration` or an `Option` of one of these may state a unit:
 /// a literal in `robot!` must then carry one of that dimension, and arrives in SI; a `Duration` is a time without saying
 /// so. A number may state a range, which a literal must keep. Values that are no literals, a constant say, are

@@ -46,7 +46,7 @@ pub trait Periodic: Component {
     fn starts_at(&self) -> Option<MonotonicTime>;
 }
 
-/// What contexts are made with.
+/// The robot, as contexts hold it.
 #[derive(Clone, Debug)]
 pub struct HostHandle(pub(crate) std::sync::Arc<dyn crate::component::Host>);
 

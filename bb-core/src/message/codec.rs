@@ -57,7 +57,7 @@ use super::Finite;
 ///
 /// Numbers, `bool`, `char`, text, `Option`, `Vec`, arrays, `Arc`, times and nalgebra's fixed and dynamic matrices,
 /// quaternions and isometries are fields; `#[derive(Payload)]` makes structs and enums of fields fields. A type that
-/// contains itself is none, since its shape would have no end.
+/// contains itself cannot be one, since its shape would be infinite.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be written to a recording and read back",
     label = "cannot be a field of a payload",

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A count with one writer at a time (whoever holds its estimator) and any number of readers.
+/// A count with one writer at a time (the thread that holds its estimator) and any number of readers.
 ///
 /// A plain load and store instead of an atomic addition: the writers exclude each other already.
 #[derive(Debug, Default)]

@@ -52,7 +52,7 @@ impl DropReason {
 pub(super) struct InputCounters {
     pub(super) received: Count,
     pub(super) dropped: [Count; REASONS],
-    /// Messages that did not fit in the inbox. Those who published them count, whoever holds the estimator meanwhile; they
+    /// Messages that did not fit in the inbox. Their publishers count them, while another thread may hold the estimator; they
     /// are not among the other two.
     overflowed: AtomicU64,
     /// How old messages of the driver were when the callback that they led to returned, in nanoseconds.

@@ -23,7 +23,7 @@ use crate::time::MonotonicTime;
 use std::fmt;
 use std::sync::Arc;
 
-/// One estimator with its fan-in, its health and its timers. Its island sees to it that one thread at a time is in here.
+/// One estimator with its fan-in, its health and its timers. Its island lets one thread at a time run it.
 pub struct Node<E: Estimator> {
     declaration: &'static EstimatorDeclaration,
     template: Stamp,

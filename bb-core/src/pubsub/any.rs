@@ -1,4 +1,4 @@
-//! Messages and topics of which the payload's type is not known.
+//! Messages and topics whose payload type is erased.
 
 use super::queue::Queue;
 use super::statistics::{SubscriberStatistics, TopicStatistics};
@@ -8,7 +8,7 @@ use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 
-/// A message whose payload's type is known only to whoever asks for it. Clones are the same message.
+/// A message whose payload's type is erased; [`downcast`](Self::downcast) gives it back. Clones are the same message.
 #[derive(Clone)]
 pub struct DynamicMessage {
     path: &'static str,
@@ -77,7 +77,7 @@ impl DynamicMessage {
         self.message.schema()
     }
 
-    /// Appends the message as ROS writes it; false, and nothing, if ROS has no message for its payload. The monotonic
+    /// Appends the message as ROS writes it; returns `false` and appends nothing if ROS has no message for its payload. The monotonic
     /// time and the origin are not in it.
     pub fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool {
         self.message.encode_as_ros(bytes)
@@ -88,7 +88,7 @@ impl DynamicMessage {
         self.message.ros_schema()
     }
 
-    /// Appends the second message of ROS; false, and nothing, if there is none.
+    /// Appends the second message of ROS; returns `false` and appends nothing if there is none.
     pub fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool {
         self.message.encode_companion(bytes)
     }
@@ -140,7 +140,7 @@ pub trait AnyTopic: Any + Send + Sync {
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
     /// Publishes a message if its payload is this topic's; else does nothing and returns `false`.
     fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
-    /// Itself, for whoever knows the payload.
+    /// Itself, to be downcast to its type.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
     /// What it has counted.

@@ -8,8 +8,8 @@ use crate::message::Schema;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The messages of all selected publishers, in the order in which they were published: also of those that begin to publish
-/// later, at paths made at run time. Dropping it unsubscribes.
+/// The messages of all selected publishers, in the order in which they were published, including publishers created later
+/// at paths made at run time. Dropping it unsubscribes.
 #[derive(Debug)]
 pub struct DynamicSubscription {
     queue: Arc<Queue<DynamicMessage>>,
@@ -76,7 +76,7 @@ impl DynamicSubscription {
         self.paths.iter().zip(&self.schemas).map(|(path, schemas)| (*path, schemas()))
     }
 
-    /// What it asked for and matched nothing when it was made, with the nearest name for each.
+    /// The parts of its selection that matched nothing when it was made, each with the nearest name.
     pub fn unmatched(&self) -> &[Unmatched] {
         &self.unmatched
     }

@@ -44,7 +44,7 @@ impl Overflow {
     /// The largest capacity of a subscription, in messages.
     pub const MAX_CAPACITY: usize = 1 << 20;
 
-    /// Bytes that the messages of a subscription may have together, if it does not say otherwise: 64 MiB.
+    /// Bytes that the messages of a subscription may have together, unless it says otherwise: 64 MiB.
     pub const DEFAULT_BYTES: usize = 64 << 20;
 
     fn bound(self) -> Bound {

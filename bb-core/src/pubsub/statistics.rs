@@ -1,6 +1,6 @@
 //! What topics and subscriptions have counted.
 
-/// One who listens to a topic.
+/// One subscriber of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SubscriberStatistics {
@@ -12,7 +12,7 @@ pub struct SubscriberStatistics {
     pub capacity: usize,
     /// Bytes of the messages that wait, as far as they count towards the bound: see [`Overflow`](super::Overflow).
     pub bytes: usize,
-    /// Messages it has lost because it was slow.
+    /// Messages it lost because it was slow.
     pub lost: u64,
 }
 

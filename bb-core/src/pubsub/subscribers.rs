@@ -1,11 +1,11 @@
-//! Those who listen to one topic.
+//! The subscribers of one topic.
 
 use super::any::DynamicMessage;
 use super::queue::Queue;
 use crate::message::Stamped;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// The list of a topic.
+/// The list that a topic holds.
 pub(super) struct Subscribers<T> {
     /// Replaced as a whole, so that a publisher takes a list along and holds no lock while it wakes subscribers, who may
     /// subscribe and unsubscribe on that thread. A queue that is dropped with its list is abandoned, and so runs no

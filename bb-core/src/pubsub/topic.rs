@@ -38,7 +38,7 @@ impl<T> Topic<T> {
         }
     }
 
-    /// Listens from now on, until the subscription is dropped.
+    /// Subscribes from now on, until the subscription is dropped.
     pub fn subscribe(&self, overflow: Overflow) -> Subscription<T> {
         let queue = Arc::new(Queue::new(overflow));
         let mut subscribers = lock(&self.subscribers);

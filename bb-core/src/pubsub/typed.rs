@@ -1,4 +1,4 @@
-//! What messages and topics of a known payload do for those who do not know it.
+//! Messages and topics of a known payload as implementations of the interfaces of erased ones.
 
 use super::any::{AnyMessage, AnyTopic, DynamicMessage, Tap};
 use super::statistics::{SubscriberStatistics, TopicStatistics};

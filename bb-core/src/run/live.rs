@@ -1,4 +1,4 @@
-//! What can be asked and told of a robot that runs, whoever drives it.
+//! The interface of a running robot: the same in real time, in a simulation and in a replay.
 
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::machine::Machine;
@@ -142,13 +142,13 @@ impl<R: Robot> Live<R> {
         self.settled(|machine| machine.control.arm(&Permit::UNLIMITED))
     }
 
-    /// Disarms the robot: commands are cancelled, and whoever owns hardware makes it safe, within 5 s. True if all could;
+    /// Disarms the robot: commands are cancelled, and the owners of hardware make it safe, within 5 s. True if all could;
     /// else the safety state is `error`.
     pub fn disarm(&self) -> bool {
         self.settled(|machine| machine.control.disarm(false))
     }
 
-    /// Leads out of the safety state `error`, even if something still cannot be made safe: whoever calls it has seen to
+    /// Leads out of the safety state `error`, even if something still cannot be made safe: the caller has seen to
     /// that.
     pub fn force_disarm(&self) -> bool {
         self.settled(|machine| machine.control.disarm(true))

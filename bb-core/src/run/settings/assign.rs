@@ -156,7 +156,7 @@ fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -
     let set = setting.set(&assignment.json);
     match (&set, &assignment.text) {
         (Err(_), Some(text)) if setting.set(text).is_ok() => Ok(()),
-        // TOML has no null: the text stands for it, unless it is a text that is wanted.
+        // TOML has no null: the text means it, unless the option is a text.
         (Err(_), None) if assignment.json == NULL_TEXT && setting.set("null").is_ok() => Ok(()),
         _ => set,
     }

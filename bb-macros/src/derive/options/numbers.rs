@@ -22,7 +22,7 @@ pub(super) fn check_number(number: &Expr, kind: &Type, diagnostics: &mut Diagnos
             format!("this option is {article} `{kind}`; write a whole number, as in `{whole}`")
         }
         Lit::Int(_) | Lit::Float(_) if kind == "Duration" => {
-            "this option is a `Duration`, and a number is none; write `Duration::from_millis(100)`".to_owned()
+            "this option is a `Duration`, not a number; write `Duration::from_millis(100)`".to_owned()
         }
         Lit::Str(_) if is_float || is_integer => {
             let example = if is_float { "1.0" } else { "1" };
