@@ -5,9 +5,9 @@ use crate::message::{Payload, Stamped};
 
 /// Moves a joint.
 ///
-/// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. Simulation, motion
-/// and kinematics are later work of this framework; what is here starts and stops an actuator with the robot, makes it
-/// safe when the robot is disarmed, and publishes the commands it was given, at its path.
+/// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. The
+/// framework starts and stops it with the robot, makes it safe when the robot is disarmed, and publishes the commands it was
+/// given at its path. There is no motion planning yet.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -51,7 +51,7 @@ use crate::message::{Payload, Stamped};
     note = "implement `bb_core::Actuator` for it"
 )]
 pub trait Actuator: Sized + Send + 'static {
-    /// What `Name(…)` in `robot!` fills.
+    /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// The commands it takes.
     type Command: Payload;
@@ -59,13 +59,13 @@ pub trait Actuator: Sized + Send + 'static {
     /// Opens the device, without moving anything.
     ///
     /// # Errors
-    /// What keeps it from starting; the robot then does not start.
+    /// Any error keeps the robot from starting.
     fn init(options: Self::Options, context: &ActuatorContext) -> Result<Self, Fault>;
 
     /// Carries out a command.
     ///
     /// # Errors
-    /// Why it cannot go on; the fault is reported, and the actuator is made safe and restarted.
+    /// Any error: it is reported, and the actuator is made safe and restarted.
     fn handle_command(&mut self, command: &Stamped<Self::Command>) -> Result<(), Fault>;
 
     /// Makes it safe. Called whenever the robot is disarmed, and before a restart; it must return within 5 s.

@@ -29,7 +29,7 @@ impl Bus {
     /// Subscribes to what is published at `path`.
     ///
     /// # Errors
-    /// Nothing is published there, or another payload; the nearest path is named.
+    /// Nothing is published there, or another payload is; the error names the nearest path.
     pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
         let subscribed = self.with_topics(|topics| {
             let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
@@ -58,15 +58,15 @@ impl Bus {
         subscribed.unwrap_or_else(|| DynamicSubscription::new([], select, payloads, overflow))
     }
 
-    /// A publisher at a path of the caller's own, such as `mission/progress`: names of letters, digits, `_`, `-` and `.` with
-    /// `/` between them. Those who subscribed to everything, or to a subtree with this path, receive what it publishes
-    /// without doing anything. A second publisher at the same path shares it.
+    /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits, `_`, `-` and `.` with
+    /// `/` between them. Existing subscriptions to everything, or to a subtree with this path, receive what it
+    /// publishes. A second publisher at the same path shares it.
     ///
-    /// Paths are for names that recur: a robot has at most 1024 of them, of which those that nobody uses any more make room.
+    /// A robot has at most 1024 such paths; the oldest that is no longer used makes room for a new one.
     ///
     /// # Errors
     /// The path is that of a declared publisher or of a topic that every robot has, it has another payload already, it is
-    /// malformed, too many are in use, the robot has stopped, or the command whose bus this is has ended.
+    /// malformed, too many are in use, the robot has stopped, or the command that this bus belongs to has ended.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
         self.check_permit()?;
         let topic = self.host.registry().topic(path)?;
@@ -115,7 +115,7 @@ impl Bus {
     /// Sets the parameter at `path`.
     ///
     /// # Errors
-    /// What was expected, or that the command whose bus this is has been cancelled.
+    /// The value is not accepted, or the command that this bus belongs to has been cancelled.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
         self.host.set_parameter(path, value.into(), &self.permit)
     }
@@ -179,7 +179,7 @@ impl Bus {
     }
 }
 
-/// Publishing at a path of one's own.
+/// Publishes at a path of the caller's choice.
 struct OwnPath {
     host: Arc<dyn Host>,
     permit: Permit,

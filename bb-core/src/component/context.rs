@@ -102,7 +102,7 @@ impl Context {
         self.now
     }
 
-    /// Registers what makes hardware safe when the robot is disarmed; see [`SafetyLink::on_disarm`].
+    /// Registers a callback that makes hardware safe when the robot is disarmed; see [`SafetyLink::on_disarm`].
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.safety.on_disarm(hook);
     }
@@ -112,7 +112,7 @@ impl Context {
         self.safety.hardware_error(message);
     }
 
-    /// The same for later, from any callback: keep it.
+    /// The same for use in later callbacks: keep it.
     pub fn safety(&self) -> SafetyLink {
         self.safety.clone()
     }
@@ -174,12 +174,12 @@ impl ComponentContext {
         self.host.clock()
     }
 
-    /// Whether the robot has been told to stop: a component that waits for its device gives up its wait then.
+    /// Whether the robot is stopping: a component that waits for its device should then stop waiting.
     pub fn is_stopping(&self) -> bool {
         self.host.is_stopping()
     }
 
-    /// Registers what makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches a laser off. All
+    /// Registers a callback that makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches a laser off. All
     /// callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that fails or takes longer
     /// leads to the safety state `error`. A restart of the component replaces what it registered before.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {

@@ -5,17 +5,17 @@ use crate::message::codec::Shape;
 use std::fmt;
 use std::time::Duration;
 
-/// A command as tools see it.
+/// A description of a command, for tools.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct CommandInfo {
     /// Its path: `command/go`.
     pub path: &'static str,
-    /// What its arguments are made of.
+    /// The shape of its arguments.
     pub arguments: Shape,
-    /// What its result is made of.
+    /// The shape of its result.
     pub output: Shape,
-    /// The states in which it may start; none: as its role has it.
+    /// The states in which it may start; `None` means those of its role.
     pub allowed_states: Option<&'static [&'static str]>,
     /// Its category.
     pub category: &'static str,
@@ -38,12 +38,12 @@ impl DynamicExecution {
         Self(Box::new(execution))
     }
 
-    /// The result as JSON, if the command has ended and nobody has taken it yet.
+    /// The result as JSON, if the command has ended and the result has not been taken yet.
     pub fn try_result(&self) -> Option<Result<String, Fault>> {
         self.0.try_result()
     }
 
-    /// Waits for the result as JSON, `timeout` at most; none after that.
+    /// Waits for the result as JSON, at most `timeout`; `None` after that.
     pub fn wait_timeout(&self, timeout: Duration) -> Option<Result<String, Fault>> {
         self.0.wait_timeout(timeout)
     }

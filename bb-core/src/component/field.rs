@@ -20,10 +20,10 @@ pub struct OptionField {
     pub range: Option<Range>,
 }
 
-/// What a text given as an option may become: whatever is `From<&'static str>`, as `String` and `PathBuf` are.
+/// A type that an option given as a text can have: any that is `From<&'static str>`, as `String` and `PathBuf` are.
 #[diagnostic::on_unimplemented(message = "expected `{Self}`, found a text", label = "a text, not `{Self}`")]
 pub trait FromText {
-    /// It.
+    /// Converts the text.
     fn from_text(text: &'static str) -> Self;
 }
 
@@ -34,7 +34,7 @@ impl<T: From<&'static str>> FromText for T {
     }
 }
 
-/// What a number with a unit given as an option may become; a time is a `Duration` as well.
+/// A type that an option given as a number with a unit can have; a time may also be a `Duration`.
 #[diagnostic::on_unimplemented(
     message = "a number with a unit cannot be `{Self}`",
     label = "has a unit",

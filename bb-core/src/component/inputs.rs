@@ -45,7 +45,7 @@ pub trait Inputs: 'static {
     /// The last known message of each input.
     #[doc(hidden)]
     type Cache: Default + Send + 'static;
-    /// The field that a nested estimator's sensor feeds: the only one that the estimator cannot do without.
+    /// The field that a nested estimator's sensor feeds: the only required one.
     #[doc(hidden)]
     type Nested: TakenAt<Self>;
     /// The inputs by name; none if the input is a single payload.

@@ -7,9 +7,8 @@ use std::any::Any;
 ///
 /// Derive it. Every field has either a default or is `required` (its type then implements `Default`, whose value is used until one is
 /// given). A field may be of any type. An `f64`, an `f32`, a `Duration` or an `Option` of one of these may state a unit:
-/// a literal in `robot!` must then carry one of that dimension, and arrives in SI; a `Duration` is a time without saying
-/// so. A number may state a range, which a literal must keep. Values that are no literals, a constant say, are
-/// taken as they are and validated at the start.
+/// a literal in `robot!` must then carry one of that dimension, and arrives in SI; a `Duration` is always a time. A number may state a range, which a literal must be in. Other values, such as constants, are taken as they
+/// are and validated at the start.
 ///
 /// ```
 /// use bb_core::prelude::*;

@@ -83,8 +83,8 @@ impl Clock {
         matches!(self.kind, Kind::Virtual(_))
     }
 
-    /// Measures the offset of a real clock again. The new offset, if it differs from the current one by more than 1 ms:
-    /// the machine's date was set. One caller gets it.
+    /// Measures the offset of a real clock again. Returns the new offset if it differs from the current one by more than 1 ms,
+    /// because the machine's date was set. Only one caller gets it.
     // The thread of the timers calls it, at most once a second.
     pub(crate) fn refresh_wall(&self) -> Option<i64> {
         match self.kind {
