@@ -3,6 +3,7 @@
 
 mod admission;
 mod backlog;
+mod count;
 mod counters;
 mod entry;
 mod environment;
@@ -16,20 +17,17 @@ mod timers;
 mod turn;
 
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
-pub use entry::NodeEntry;
-pub(crate) use entry::{HealthReport, Report};
+pub(crate) use entry::{HealthReport, NodeEntry, Report};
 pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Mode, Overseer};
-pub(crate) use island::CallError;
-pub(crate) use island::take_turn;
 pub use island::{
-    Act, AnyIsland, Island, IslandState, IslandWiring, Key, Member, Replayed, act, alone, enter, feed,
-    island as island_of, receive, start,
+    Act, Island, IslandOf, IslandState, IslandWiring, Key, Member, act, alone, enter, feed, island as island_of,
+    receive, start,
 };
+pub(crate) use island::{AnyIsland, CallError, Replayed, take_turn};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
-pub use running::{Next, Node};
+pub(crate) use running::Next;
+pub use running::Node;
 pub(crate) use shared::SharedNode;
 pub use turn::Turn;
-
-pub use crate::event::{HealthReason, HealthState, HealthTransition};

@@ -27,6 +27,7 @@ extern crate alloc;
 
 pub mod attitude;
 pub mod calibration;
+mod moments;
 pub mod navigation;
 pub mod params;
 #[cfg(feature = "simulation")]

@@ -21,6 +21,7 @@ mod consistency;
 pub mod eskf;
 #[cfg(feature = "runtime")]
 mod estimator;
+mod fused;
 mod geodesy;
 mod history;
 mod math;
@@ -28,22 +29,22 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
+mod refusal;
 #[cfg(feature = "smoother")]
 pub mod smoother;
+mod state;
 mod stream;
 
 pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
 pub use consistency::{Consistency, nees};
-pub use eskf::{
-    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuDensities, ImuMean, Keyframe,
-    NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
-};
+pub use eskf::{Eskf, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
 #[cfg(feature = "runtime")]
 pub use estimator::{
     EskfEstimator, NavigationInputs, NavigationOptions, NavigationOutput, NavigationOutputs, NavigationStatus,
     Verdicts,
 };
+pub use fused::Fused;
 pub use geodesy::{Geodetic, LocalFrame};
 pub use history::{Arrivals, History, Placed, Replayed};
 pub use measurement::{
@@ -52,8 +53,13 @@ pub use measurement::{
     ZeroVelocity,
 };
 pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
+pub use refusal::Refusal;
 #[cfg(feature = "smoother")]
 pub use smoother::{
     Factor, FixedLagSmoother, Kernel, NavigationFactor, Preintegration, Rows, SmootherParams, Updated,
 };
-pub use stream::{Counts, Fused, Stream, StreamParams};
+pub use state::{
+    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
+    States, VELOCITY, offset,
+};
+pub use stream::{Counts, Stream, StreamParams};

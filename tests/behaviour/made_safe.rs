@@ -364,7 +364,10 @@ fn each_disarm_reports_its_own_callbacks() {
     });
 }
 
-static SAID: Mutex<Vec<(Result<(), DisarmError>, Result<(), ArmError>)>> = Mutex::new(Vec::new());
+/// What `disarm` and `arm` return to a callback.
+type Said = (Result<(), DisarmError>, Result<(), ArmError>);
+
+static SAID: Mutex<Vec<Said>> = Mutex::new(Vec::new());
 
 /// The robot that is called.
 static ROBOT: Mutex<Option<Live<Calling>>> = Mutex::new(None);

@@ -14,7 +14,7 @@ pub(crate) trait Guardian: Send + Sync {
     fn hardware_error(&self, path: &'static str, message: String);
 }
 
-/// Registers disarm callbacks and reports hardware errors, for a component whose later calls are given no context: an
+/// Registers disarm callbacks and reports hardware errors, for a component whose later calls get no context: an
 /// estimator keeps the one that [`Context::safety`](super::Context::safety) gives. Clones are the same.
 #[derive(Clone)]
 pub struct SafetyLink {
@@ -28,7 +28,7 @@ impl SafetyLink {
         Self { path, guardian }
     }
 
-    /// Registers what makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
+    /// Registers a callback that makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
     /// own, and must return within 5 s; one that fails or takes longer leads to the safety state `error`. A restart of the
     /// component replaces what it registered before.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {

@@ -1,8 +1,7 @@
 //! The robot as its components see it.
 
 use super::guardian::Guardian;
-use super::{Fault, Permit};
-use crate::component::bus::{CommandInfo, DynamicExecution};
+use super::{CommandInfo, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::message::Origin;

@@ -15,7 +15,7 @@ use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// A robot that is run again from its journal, on the caller's thread. Subscribers get what was published then.
+/// A robot that is run again from its journal, on the caller's thread. Subscribers get what was published in that run.
 pub struct Replay<R: Robot> {
     live: Live<R>,
     /// Lines that were not played yet: the line of a measured turn waits for the one that says how long its callbacks took.
@@ -334,7 +334,7 @@ impl<R: Robot> Replay<R> {
         self.island(declared.island, time, Replayed::Node(estimator, NodeEntry::Cast { request, handle: None }))
     }
 
-    /// Holds an output against what it was.
+    /// Compares an output with the recorded one.
     fn compare(&self, island: usize, publisher: usize, checksum: u64) -> Result<(), String> {
         let path = self.path_of(publisher);
         match self.live.0.environment.replayed().take(island) {
@@ -385,7 +385,7 @@ impl<R: Robot> Replay<R> {
         let topics = registry.topics();
         let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
             (Some(topic), _) => Arc::clone(topic),
-            (None, Recorded::Message(message)) => message.topic(registry).map_err(|error| error.to_string())?,
+            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string())?,
             (None, Recorded::Bytes(_)) => {
                 return Err(format!(
                     "something was published at `{path}`, a path made at run time, and the payload is not known: make a \

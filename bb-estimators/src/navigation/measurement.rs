@@ -47,7 +47,8 @@ pub use wheels::{BodyVelocity, NonHolonomic, WheelSpeed};
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use crate::navigation::eskf::{Estimate, Refusal, States};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, States};
 
 /// A measurement of `D` numbers.
 pub trait Measurement<const D: usize> {

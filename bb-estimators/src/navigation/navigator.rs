@@ -3,9 +3,12 @@
 use nalgebra::SMatrix;
 
 use super::bank::Bank;
-use super::eskf::{Eskf, EskfParams, Estimate, GaussMarkov, ImuMean, Optional, Refusal, Start, States};
+use super::eskf::{Eskf, EskfParams, GaussMarkov, ImuMean, Start};
+use super::fused::Fused;
 use super::measurement::{AbsolutePose, GnssPosition, RelativePose};
-use super::stream::{Fused, Stream, StreamParams};
+use super::refusal::Refusal;
+use super::state::{Estimate, Optional, States};
+use super::stream::{Stream, StreamParams};
 use crate::attitude::ParamsError;
 
 /// How many filters the bank has room for.

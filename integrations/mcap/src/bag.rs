@@ -9,10 +9,10 @@ mod sqlite;
 mod summary;
 mod truth;
 
-pub use imu::{BagImu, BagImuOptions, IMU, MAGNETIC_FIELD};
+pub use imu::{BagImu, BagImuOptions};
 pub use message::BagMessage;
 pub use messages::BagMessages;
-pub use samples::MargSamples;
+pub use samples::{IMU, MAGNETIC_FIELD, MargSamples};
 pub use truth::{Bool, MOVING, ODOMETRY, POSE, Truth};
 
 use crate::definition::MessageDefinition;

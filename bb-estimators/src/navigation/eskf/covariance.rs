@@ -4,8 +4,8 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-use super::states::ROTATION;
 use crate::navigation::math::{ln, sqrt};
+use crate::navigation::state::ROTATION;
 
 /// One update never takes more than this ratio of variance out of a direction: what rounding adds, 1e-16 of what was
 /// there, stays far below what is left.

@@ -3,18 +3,18 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::covariance::{Covariance, Innovation};
-use super::estimate::{Estimate, Keyframe};
 use super::params::{EskfParams, ImuDensities};
 use super::propagation::Transition;
-use super::refusal::Refusal;
-use super::states::{
-    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
-    distinct, offset,
-};
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE, ParamsError};
+use crate::navigation::fused::Fused;
 use crate::navigation::math::{Integrals, exp};
 use crate::navigation::measurement::{Linearised, Measurement};
-use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
+    States, VELOCITY, distinct, offset,
+};
+use crate::navigation::stream::{Gate, Stream, Verdict};
 use crate::params::Params as _;
 
 /// A correction of the rotation below this squared angle, rad², leaves the covariance as it is: to rounding, the same.

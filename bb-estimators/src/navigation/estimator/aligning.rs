@@ -4,8 +4,9 @@ use super::input::{Mounting, NavigationInputs};
 use super::options::NavigationOptions;
 use super::world::{World, geodetic_of, position_of};
 use crate::navigation::alignment::{Alignment, AlignmentParams};
-use crate::navigation::eskf::{ImuMean, Refusal, Start};
+use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::refusal::Refusal;
 use nalgebra::{Matrix3, Vector3};
 
 /// How long a start may take, ns, before that is reported.

@@ -2,10 +2,13 @@
 
 use super::options::NavigationOptions;
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{Eskf, Estimate, ImuMean, NAVIGATION, POSITION, Refusal, Start};
+use crate::navigation::eskf::{Eskf, ImuMean, Start};
+use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
 use crate::navigation::measurement::{AbsolutePose, BodyVelocity, GnssPosition};
-use crate::navigation::stream::{Counts, Fused, Stream, StreamParams};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, NAVIGATION, POSITION};
+use crate::navigation::stream::{Counts, Stream, StreamParams};
 use bb_core::Fault;
 use nalgebra::{Isometry3, Vector3};
 

@@ -3,8 +3,8 @@
 use super::filter::Filter;
 use super::input::Mounting;
 use super::world::World;
-use crate::navigation::eskf::{GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 use crate::navigation::math::skew;
+use crate::navigation::state::{GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 use bb_core::payload::{Odometry, Pose, Twist};
 use bb_core::{Outputs, Payload};
 use nalgebra::{Matrix3, Matrix6, Vector3};

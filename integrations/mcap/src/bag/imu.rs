@@ -1,13 +1,9 @@
 //! A sensor that plays back the IMU and the magnetometer of a ROS 2 bag.
 
-use super::{Bag, MargSamples};
+use super::Bag;
+use super::samples::{IMU, MargSamples};
 use bb_core::prelude::*;
 use std::path::PathBuf;
-
-/// The type of an IMU's topic.
-pub const IMU: &str = "sensor_msgs/msg/Imu";
-/// The type of a magnetometer's topic.
-pub const MAGNETIC_FIELD: &str = "sensor_msgs/msg/MagneticField";
 
 /// Options of [`BagImu`].
 #[derive(Clone, Debug, Options)]

@@ -1,8 +1,13 @@
 //! The samples of a recorded IMU, each with the reading of the magnetometer that belongs to it.
 
-use super::{Bag, BagMessage, BagMessages, IMU};
+use super::{Bag, BagMessage, BagMessages};
 use crate::RecordingError;
 use bb_core::prelude::*;
+
+/// The type of an IMU's topic.
+pub const IMU: &str = "sensor_msgs/msg/Imu";
+/// The type of a magnetometer's topic.
+pub const MAGNETIC_FIELD: &str = "sensor_msgs/msg/MagneticField";
 
 /// The samples of a recorded IMU at the stamps of their headers, in the order of the file.
 ///

@@ -2,12 +2,11 @@
 
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 
-use super::super::estimate::Estimate;
 use super::super::propagation::Transition;
-use super::super::states::{NAVIGATION, Optional, States};
 use super::sample;
 use crate::navigation::math::{rotation, sqrt};
 use crate::navigation::noise::Noise;
+use crate::navigation::state::{Estimate, NAVIGATION, Optional, States};
 use crate::navigation::{
     Eskf, EskfParams, GaussMarkov, GnssHeading, GnssPosition, GnssVelocity, ImuMean, RelativePose, Start, Stream,
     StreamParams, nees,
@@ -39,7 +38,7 @@ fn fly(seed: u64) -> Flown {
         gnss_lever_arm: GaussMarkov::constant(0.2),
         ..EskfParams::default()
     };
-    let mut noise = Noise(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut noise = Noise::new(seed);
     let mut filter = Eskf::<Drone, N>::new(params).unwrap();
     let level = UnitQuaternion::from_euler_angles(0.1, -0.1, 1.0);
     let velocity = Vector3::new(8.0, 2.0, 0.0);

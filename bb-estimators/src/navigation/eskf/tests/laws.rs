@@ -4,8 +4,10 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
-use super::super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset};
 use super::{All, Estimate, estimate, orientation, sample, started, vector};
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset,
+};
 use crate::navigation::{
     AbsolutePose, Eskf, EskfParams, Fused, GnssPosition, GnssVelocity, History, ImuMean, Refusal, RelativePose,
     Replayed, Start, Stream, StreamParams,

@@ -72,7 +72,7 @@ pub trait States: Copy + Debug + PartialEq {
     /// In the order of the error vector, each at most once.
     const OPTIONAL: &'static [Optional];
 
-    /// The number of errors that are estimated: the second parameter of [`Eskf`](super::Eskf).
+    /// The number of errors that are estimated: the second parameter of [`Eskf`](crate::navigation::Eskf).
     const DIMENSION: usize = NAVIGATION + dimension(Self::OPTIONAL);
 }
 
