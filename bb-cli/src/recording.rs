@@ -193,7 +193,7 @@ fn is_break(error: &RecordingError) -> bool {
 }
 
 /// What is wrong, with the option that chooses another topic.
-fn said(error: &RecordingError, option: &str) -> String {
+pub(crate) fn said(error: &RecordingError, option: &str) -> String {
     let kind = error.kind();
     match kind {
         RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),
