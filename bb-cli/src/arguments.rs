@@ -4,6 +4,7 @@ use crate::calibrate::Calibrate;
 use crate::evaluate::Evaluator;
 use crate::filters::{Axes, Chosen, Setting};
 use crate::navigation::{self, NavigationArguments};
+use crate::noise::{self, NoiseArguments};
 use crate::plot::Picture;
 use crate::recording::{MovingTopic, Topics};
 use crate::variants::{Field, Offset, Starts, Variants};
@@ -46,6 +47,9 @@ enum Eval {
     /// Plays drives and flights through navigation filters and prints their errors against the truth.
     #[command(after_help = navigation::EXAMPLES)]
     Navigation(Box<NavigationArguments>),
+    /// Finds the noise of an IMU from recordings at rest, by its Allan deviation.
+    #[command(after_help = noise::EXAMPLES)]
+    Noise(Box<NoiseArguments>),
 }
 
 const EXAMPLES: &str =
@@ -121,6 +125,7 @@ struct AttitudeArguments {
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
     Navigation(Box<NavigationArguments>),
+    Noise(Box<NoiseArguments>),
     Calibrate(Calibrate),
     /// Prints this.
     Print(String),
@@ -146,6 +151,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,
         Eval::Navigation(arguments) => return Ok(Job::Navigation(arguments)),
+        Eval::Noise(arguments) => return Ok(Job::Noise(arguments)),
     };
     arguments.check().map_err(|(kind, fault)| {
         let mut bb = Bb::command();

@@ -21,6 +21,7 @@ mod evaluate;
 mod files;
 mod filters;
 mod navigation;
+mod noise;
 mod periods;
 mod plot;
 mod progress;
@@ -64,6 +65,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let done = match &job {
         Job::Attitude(attitude) => eval_attitude(attitude),
         Job::Navigation(navigation) => navigation.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
+        Job::Noise(noise) => noise.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
         Job::Print(text) => say(text),
         Job::Other(command) => command.run(),
         Job::Calibrate(calibrate) => calibrate.run().and_then(|(text, is_any)| Ok(say(&text)? && is_any)),

@@ -20,3 +20,4 @@ pub use evaluate::{NavigationScore, evaluate_navigation};
 pub use filters::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
 
 pub(crate) use command::{EXAMPLES, NavigationArguments};
+pub(crate) use csv::inertial;

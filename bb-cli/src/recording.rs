@@ -92,6 +92,18 @@ impl Recording {
         Ok(Self { truth, note, samples, magnetometer, start_ns, expected: imu.messages.unwrap_or(0) })
     }
 
+    /// Opens a recording of which the IMU alone counts.
+    ///
+    /// # Errors
+    /// It is no recording, or has not the topic, or not one; in words.
+    pub(crate) fn inertial(file: &Path, topics: &Topics) -> Result<Self, String> {
+        let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
+        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let samples = MargSamples::read(&bag, &imu.name, None).map_err(|error| error.kind().to_string())?;
+        let (truth, expected) = (Truth::default(), imu.messages.unwrap_or(0));
+        Ok(Self { truth, note: None, samples, magnetometer: false, start_ns: i64::MIN, expected })
+    }
+
     /// Leaves out the samples before this time, nanoseconds.
     pub(crate) fn start_at(&mut self, time_ns: i64) {
         self.start_ns = self.start_ns.max(time_ns);

@@ -92,6 +92,22 @@ impl DataSet {
     }
 }
 
+/// Time, angular velocity and specific force.
+pub(crate) type Inertial = (f64, Vector3<f64>, Vector3<f64>);
+
+/// The samples of a file as `_imu`: s, rad/s, m/s².
+///
+/// # Errors
+///
+/// It cannot be read, or in which line what is wrong.
+pub(crate) fn inertial(file: &Path) -> Result<Vec<Inertial>, String> {
+    let rows = Rows::of_file(file.to_owned(), 7)?;
+    if rows.rows.is_empty() {
+        return Err(format!("{}: there is no such file, or it has no row", file.display()));
+    }
+    rows.map(|row| Ok((row.0[0], row.vector(1), row.vector(4))))
+}
+
 /// The numbers of a file, a header row left out.
 struct Rows {
     file: PathBuf,
@@ -112,7 +128,10 @@ impl Rows {
     fn read_if_there(prefix: &Path, what: &str, columns: usize) -> Result<Self, String> {
         let mut file = prefix.as_os_str().to_owned();
         file.push(format!("_{what}.csv"));
-        let file = PathBuf::from(file);
+        Self::of_file(PathBuf::from(file), columns)
+    }
+
+    fn of_file(file: PathBuf, columns: usize) -> Result<Self, String> {
         let text = match std::fs::read_to_string(&file) {
             Ok(text) => text,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Self { file, rows: Vec::new() }),
