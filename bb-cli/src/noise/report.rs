@@ -205,7 +205,6 @@ pub(super) fn picture(found: &[Noise]) -> Sheet {
                     lines.push(Line::path(format!("{name}, walk"), FITTED, 1, &walk));
                 }
                 lines.push(Line::path(name, *colour, 1, &curve));
-                lines.push(Line::path("", *colour, 3, &curve));
             }
             let plane = Plane {
                 title: format!("{}, {sensor}", noise.file.display()),
