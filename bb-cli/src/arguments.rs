@@ -3,7 +3,8 @@
 use crate::calibrate::Calibrate;
 use crate::evaluate::Evaluator;
 use crate::filters::{Axes, Chosen, Setting};
-use crate::navigation::{self, NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
+use crate::navigation::{self, NavigationArguments};
+use crate::noise::{self, NoiseArguments};
 use crate::plot::Picture;
 use crate::recording::{MovingTopic, Topics};
 use crate::variants::{Field, Offset, Starts, Variants};
@@ -44,8 +45,11 @@ enum Eval {
     #[command(after_help = EXAMPLES)]
     Attitude(Box<AttitudeArguments>),
     /// Runs navigation filters on drives and flights and prints their errors against the truth.
-    #[command(after_help = NAVIGATION_EXAMPLES)]
-    Navigation(NavigationArguments),
+    #[command(after_help = navigation::EXAMPLES)]
+    Navigation(Box<NavigationArguments>),
+    /// Finds the noise of an IMU from recordings at rest, by its Allan deviation.
+    #[command(after_help = noise::EXAMPLES)]
+    Noise(Box<NoiseArguments>),
 }
 
 const EXAMPLES: &str =
@@ -56,38 +60,6 @@ Examples:
   bb eval attitude recordings/ --filter mekf,madgwick --axes 6 --plot errors.svg
   bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json
   bb eval attitude walk.mcap --filter mekf,vqf --start random:8 --offset 30uT:4";
-
-const NAVIGATION_EXAMPLES: &str = "Exit code: 0; 1 if a data set could not be evaluated; 2 for a wrong use.
-
-Examples:
-  bb eval navigation drives/kitti_s2
-  bb eval navigation drives/kitti_s2 drives/kitti_s5 --filter eskf --json
-  bb eval navigation flights/one --filter eskf-single --set gyroscope_noise=1e-3
-  bb eval navigation flights/one --filter smoother,eskf --window 10 --json";
-
-#[derive(Debug, Args)]
-struct NavigationArguments {
-    /// Prefixes of data sets: `folder/name` for `folder/name_imu.csv`, `folder/name_keyframes.csv` and the others.
-    #[arg(value_name = "DATA", required_unless_present = "list")]
-    data: Vec<PathBuf>,
-    /// The filters, separated by commas.
-    #[arg(long = "filter", value_name = "NAME", value_delimiter = ',', default_value = NAVIGATION_FILTERS[0].name,
-          value_parser = navigation_filter, long_help = navigation_filters_in_words())]
-    filters: Vec<NavigationFilter>,
-    /// The number of keyframes in a smoother's window.
-    #[arg(long, value_name = "KEYFRAMES", default_value_t = 20,
-          value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..=1000))]
-    window: usize,
-    /// Sets a parameter, in SI or with a unit; overrides the data set.
-    #[arg(long = "set", value_name = "NAME=VALUE")]
-    settings: Vec<NavigationSetting>,
-    /// Only prints the parameters, with defaults, ranges and units.
-    #[arg(long)]
-    list: bool,
-    /// Prints an array of objects instead of the table.
-    #[arg(long)]
-    json: bool,
-}
 
 #[derive(Debug, Args)]
 struct AttitudeArguments {
@@ -152,21 +124,12 @@ struct AttitudeArguments {
 #[derive(Debug)]
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
-    Navigation(Navigation),
+    Navigation(Box<NavigationArguments>),
+    Noise(Box<NoiseArguments>),
     Calibrate(Calibrate),
     /// Prints this.
     Print(String),
     Other(commands::Command),
-}
-
-/// `bb eval navigation`.
-#[derive(Debug)]
-pub(crate) struct Navigation {
-    pub(crate) data: Vec<PathBuf>,
-    pub(crate) filters: Vec<NavigationFilter>,
-    pub(crate) settings: Vec<NavigationSetting>,
-    pub(crate) window: usize,
-    pub(crate) json: bool,
 }
 
 /// `bb eval attitude`.
@@ -187,12 +150,8 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
     };
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,
-        Eval::Navigation(NavigationArguments { list: true, .. }) => {
-            return Ok(Job::Print(navigation::listed()));
-        }
-        Eval::Navigation(NavigationArguments { data, filters, window, settings, json, .. }) => {
-            return Ok(Job::Navigation(Navigation { data, filters, settings, window, json }));
-        }
+        Eval::Navigation(arguments) => return Ok(Job::Navigation(arguments)),
+        Eval::Noise(arguments) => return Ok(Job::Noise(arguments)),
     };
     arguments.check().map_err(|(kind, fault)| {
         let mut bb = Bb::command();
@@ -280,18 +239,4 @@ impl AttitudeArguments {
         };
         Ok(filters().filter(is_chosen).collect())
     }
-}
-
-fn navigation_filter(name: &str) -> Result<NavigationFilter, String> {
-    let known = NAVIGATION_FILTERS.map(|filter| filter.name);
-    let found = NAVIGATION_FILTERS.into_iter().find(|filter| filter.name == name);
-    found.ok_or_else(|| format!("no filter `{name}`; {}", filters::near(name, &known)))
-}
-
-fn navigation_filters_in_words() -> String {
-    let mut text = String::from("The filters; several with commas. Those there are:\n");
-    for filter in NAVIGATION_FILTERS {
-        text += &format!("\n{}: {}", filter.name, filter.about);
-    }
-    text
 }

@@ -6,7 +6,7 @@
 //! figures, [`evaluate`](fn@evaluate) computes them for one recording, and [`Picture`] plots
 //! lines over time.
 //!
-//! `bb eval navigation DATA…` does the same for navigation filters on data sets of CSV files; [`evaluate_navigation`] is its
+//! `bb eval navigation DATA…` does the same for navigation filters on bags and CSV files; [`evaluate_navigation`] is its
 //! library.
 
 // A robot must not stop because of an unexpected value.
@@ -21,6 +21,7 @@ mod evaluate;
 mod files;
 mod filters;
 mod navigation;
+mod noise;
 mod periods;
 mod plot;
 mod progress;
@@ -38,15 +39,16 @@ pub use averages::Averages;
 pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_variant};
 pub use filters::{Axes, Chosen, Refused, Running, Setting};
 pub use navigation::{
-    DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
+    BagOptions, BiasDeviation, DataSet, FromBag, Mount, NAVIGATION_FILTERS, NavigationBag, NavigationFilter,
+    NavigationScore, NavigationSetting, Origin, Place, RelativeDeviation, StartFrom, evaluate_navigation,
 };
-pub use plot::{Colour, Line, PALETTE, Panel, Picture, Point};
+pub use plot::{Colour, Line, PALETTE, Panel, Part, Picture, Plane, Point, Scale, Sheet};
 pub use progress::Progress;
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
 pub use variants::{Field, Offset, Starts, Variants};
 
-use arguments::{Attitude, Job, Navigation};
+use arguments::{Attitude, Job};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -64,7 +66,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let done = match &job {
         Job::Attitude(attitude) => eval_attitude(attitude),
-        Job::Navigation(navigation) => eval_navigation(navigation),
+        Job::Navigation(navigation) => navigation.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
+        Job::Noise(noise) => noise.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
         Job::Print(text) => say(text),
         Job::Other(command) => command.run(),
         Job::Calibrate(calibrate) => calibrate.run().and_then(|(text, is_any)| Ok(say(&text)? && is_any)),
@@ -77,34 +80,6 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-/// Whether every data set could be evaluated.
-fn eval_navigation(job: &Navigation) -> Result<bool, String> {
-    let Navigation { data, filters, settings, window, json } = job;
-    let (mut scores, mut faults) = (Vec::new(), Vec::new());
-    for prefix in data {
-        let data = match DataSet::read(prefix) {
-            Ok(data) => data,
-            Err(fault) => {
-                faults.push(fault);
-                continue;
-            }
-        };
-        let progress = Progress::new("evaluating", (data.keyframes.len() * filters.len()) as u64);
-        for filter in filters {
-            match evaluate_navigation(&data, filter, settings, *window, || progress.add(1)) {
-                Ok(score) => scores.push((prefix.clone(), filter.name, score)),
-                Err(fault) => faults.push(format!("{}: {}: {fault}", prefix.display(), filter.name)),
-            }
-        }
-        progress.finish();
-    }
-    say(&if *json { navigation::json(&scores)? } else { navigation::table(&scores) })?;
-    for fault in &faults {
-        eprintln!("error: {fault}");
-    }
-    Ok(faults.is_empty())
 }
 
 /// Whether every recording could be evaluated to its end.

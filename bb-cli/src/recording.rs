@@ -108,6 +108,27 @@ impl Recording {
         })
     }
 
+    /// Opens a recording of which the IMU alone counts.
+    ///
+    /// # Errors
+    /// It is no recording, or has not the topic, or not one; in words.
+    pub(crate) fn inertial(file: &Path, topics: &Topics) -> Result<Self, String> {
+        let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
+        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let samples = MargSamples::read(&bag, &imu.name, None).map_err(|error| error.kind().to_string())?;
+        Ok(Self {
+            truth: Truth::default(),
+            note: None,
+            axes: Axes::Six,
+            imu_topic: imu.name.to_string(),
+            magnetometer_topic: None,
+            truth_topic: None,
+            samples,
+            start_ns: i64::MIN,
+            expected: imu.messages.unwrap_or(0),
+        })
+    }
+
     /// Leaves out the samples before this time, nanoseconds.
     pub(crate) fn start_at(&mut self, time_ns: i64) {
         self.start_ns = self.start_ns.max(time_ns);
@@ -220,7 +241,7 @@ fn is_break(error: &RecordingError) -> bool {
 }
 
 /// What is wrong, with the option that chooses another topic.
-fn said(error: &RecordingError, option: &str) -> String {
+pub(crate) fn said(error: &RecordingError, option: &str) -> String {
     let kind = error.kind();
     match kind {
         RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),

@@ -44,6 +44,14 @@ impl Line {
         }
     }
 
+    /// A line from point to point, in their order; of points too many to show, one in so many stays.
+    pub fn path(label: impl Into<String>, colour: Colour, width: u32, points: &[(f64, f64)]) -> Self {
+        let points: Vec<Point> =
+            points.iter().map(|(x, y)| (*x, Some(*y).filter(|_| x.abs() <= LARGEST))).collect();
+        let thinned = thin(&points, MOST_POINTS, |points, thinned| thinned.push(points[0]));
+        Self { label: label.into(), colour, width, runs: runs(&thinned, |_, _| false) }
+    }
+
     /// A line through errors: of points too many to show, the largest stay.
     pub fn peaks(label: impl Into<String>, colour: Colour, width: u32, points: &[Point]) -> Self {
         let thinned =

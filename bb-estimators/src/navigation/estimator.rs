@@ -4,6 +4,7 @@ mod aligning;
 mod filter;
 mod health;
 mod input;
+mod measured;
 mod options;
 mod output;
 mod world;
@@ -19,6 +20,7 @@ use self::input::Mounting;
 use self::world::World;
 use super::eskf::ImuMean;
 use super::history::History;
+use super::measurement::BodyVelocity;
 use super::refusal::Refusal;
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
@@ -151,7 +153,7 @@ impl Running {
             self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
         }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
-            let measured = mounting.velocity(&odometry.payload, options);
+            let measured = BodyVelocity::of_odometry(&odometry.payload, &mounting.odometry(), options);
             self.fuse(odometry.monotonic_time.as_nanos(), Measured::Odometry(measured));
         }
         if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {

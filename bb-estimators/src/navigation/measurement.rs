@@ -123,6 +123,6 @@ impl<const D: usize, const N: usize> Linearised<D, N> {
 
 /// Covariance of noise that is alike along all axes.
 #[inline]
-fn isotropic(deviation: f64) -> Matrix3<f64> {
+pub(in crate::navigation) fn isotropic(deviation: f64) -> Matrix3<f64> {
     Matrix3::identity() * (deviation * deviation)
 }

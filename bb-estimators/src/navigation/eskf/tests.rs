@@ -29,6 +29,44 @@ impl States for All {
     ];
 }
 
+/// Wheels that wear, and an antenna on a mast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rover;
+
+impl States for Rover {
+    const OPTIONAL: &'static [Optional] = &[Optional::WheelScale, Optional::GnssLeverArm, Optional::GnssDelay];
+}
+
+/// Poses from a camera, relative to keyframes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Drone;
+
+impl States for Drone {
+    const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale];
+}
+
+/// A compass and a barometer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Boat;
+
+impl States for Boat {
+    const OPTIONAL: &'static [Optional] = &[Optional::BarometerBias, Optional::HardIron];
+}
+
+/// Calls a macro with every configuration whose laws are tested.
+macro_rules! configurations {
+    ($macro:ident) => {
+        $macro! {
+            plain: Navigation;
+            rover: Rover;
+            drone: Drone;
+            boat: Boat;
+            all: All;
+        }
+    };
+}
+use configurations;
+
 const ALL: usize = All::DIMENSION;
 
 fn vector(limit: f64) -> impl Strategy<Value = Vector3<f64>> {

@@ -2,10 +2,11 @@
 
 use super::input::{Mounting, NavigationInputs};
 use super::options::NavigationOptions;
-use super::world::{World, geodetic_of, position_of};
+use super::world::World;
 use crate::navigation::alignment::{Alignment, AlignmentParams};
 use crate::navigation::eskf::{ImuMean, Start};
-use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::geodesy::{Geodetic, LocalFrame};
+use crate::navigation::measurement::GnssPosition;
 use crate::navigation::refusal::Refusal;
 use nalgebra::{Matrix3, Vector3};
 
@@ -75,10 +76,11 @@ impl Aligning {
         self.first_ns = self.first_ns.or(Some(sample.time_ns));
         self.last_ns = sample.time_ns;
         if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new()) {
-            let origin = geodetic_of(&fix.payload, 0.0);
+            let origin = Geodetic::of_fix(&fix.payload, 0.0);
             self.frame = self.frame.or_else(|| origin.map(LocalFrame::new));
             if let Some(frame) = &self.frame
-                && let Some((position, covariance)) = position_of(&fix.payload, frame, options)
+                && let Some(GnssPosition { position, covariance, .. }) =
+                    GnssPosition::of_fix(&fix.payload, frame, mounting.antenna(), options)
             {
                 self.see(Fix { time_ns: fix.monotonic_time.as_nanos(), position, covariance });
             }

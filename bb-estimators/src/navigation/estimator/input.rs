@@ -1,8 +1,6 @@
 //! What the declared filter takes, and where its sensors are.
 
-use super::options::NavigationOptions;
 use crate::navigation::eskf::ImuMean;
-use crate::navigation::measurement::BodyVelocity;
 use bb_core::message::Stamped;
 use bb_core::payload::{GnssFix, Imu, Odometry, Pose};
 use bb_core::{Context, Fault, Input, Inputs};
@@ -74,23 +72,19 @@ impl Mounting {
         -self.link_from_imu.translation.vector
     }
 
-    /// The velocity that an odometry has counted.
-    pub(super) fn velocity(&self, odometry: &Odometry, options: &NavigationOptions) -> BodyVelocity {
-        let covariance = odometry.twist.covariance;
-        // One number stands for all axes: the mean of their variances.
-        let variance = covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).trace() / 3.0);
-        let deviation = variance.filter(|variance| *variance > 0.0).map_or(options.odometry_deviation, f64::sqrt);
-        BodyVelocity {
-            velocity: odometry.twist.linear,
-            deviation,
-            body_from_sensor: rotation(self.link_from_odometry.as_ref()),
-            lever_arm: self.in_body(self.link_from_odometry.as_ref()),
-        }
+    /// The sensor of the odometry in the body.
+    pub(super) fn odometry(&self) -> Isometry3<f64> {
+        self.sensor(self.link_from_odometry.as_ref())
     }
 
-    /// What turns the sensor of poses in the body, and where it is there.
-    pub(super) fn of_pose(&self) -> (UnitQuaternion<f64>, Vector3<f64>) {
-        (rotation(self.link_from_pose.as_ref()), self.in_body(self.link_from_pose.as_ref()))
+    /// The sensor of poses in the body.
+    pub(super) fn pose(&self) -> Isometry3<f64> {
+        self.sensor(self.link_from_pose.as_ref())
+    }
+
+    fn sensor(&self, link_from_sensor: Option<&Isometry3<f64>>) -> Isometry3<f64> {
+        let rotation = link_from_sensor.map_or(UnitQuaternion::identity(), |sensor| sensor.rotation);
+        Isometry3::from_parts(self.in_body(link_from_sensor).into(), rotation)
     }
 
     /// Where a sensor is in the body, m.
@@ -98,8 +92,4 @@ impl Mounting {
         let sensor = link_from_sensor.map_or(Vector3::zeros(), |sensor| sensor.translation.vector);
         sensor - self.link_from_imu.translation.vector
     }
-}
-
-fn rotation(link_from_sensor: Option<&Isometry3<f64>>) -> UnitQuaternion<f64> {
-    link_from_sensor.map_or(UnitQuaternion::identity(), |sensor| sensor.rotation)
 }
