@@ -18,9 +18,11 @@ mod alignment;
 mod bank;
 pub mod chi_square;
 mod consistency;
+mod covariance;
 pub mod eskf;
 #[cfg(feature = "runtime")]
 mod estimator;
+mod fusion;
 mod geodesy;
 mod history;
 mod math;

@@ -17,7 +17,6 @@
 //! the last bit. The noise of a scalar is taken as at least 1e-10 of its predicted variance, which bounds what rounding
 //! can do; a Cholesky decomposition every 1024 updates checks it, and [`Eskf::repairs`] counts what it found.
 
-mod covariance;
 mod estimate;
 mod filter;
 mod params;
@@ -29,7 +28,6 @@ mod tests;
 
 pub use estimate::{Estimate, Keyframe};
 pub use filter::{Eskf, ImuMean, Start};
-#[cfg(feature = "smoother")]
 pub(super) use filter::{LONGEST_GAP_S, seconds_between};
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;

@@ -1,12 +1,13 @@
 //! The error-state Kalman filter as an estimator to declare in `robot!`.
 
 mod aligning;
+pub(super) mod course;
 mod filter;
-mod health;
+pub(super) mod health;
 mod input;
 mod options;
 mod output;
-mod world;
+pub(super) mod world;
 
 pub use input::NavigationInputs;
 pub use options::NavigationOptions;
@@ -14,7 +15,7 @@ pub use output::{NavigationOutput, NavigationOutputs, NavigationStatus, Verdicts
 
 use self::aligning::Aligning;
 use self::filter::{Filter, Measured};
-use self::health::Watch;
+use self::health::{Limits, Watch};
 use self::input::Mounting;
 use self::world::World;
 use super::eskf::{ImuMean, Refusal};
@@ -96,7 +97,7 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
     fn init(options: NavigationOptions, context: &Context) -> Result<Self, Fault> {
         options.params().check()?;
         let mounting = Mounting::of(context)?;
-        let phase = Phase::Aligning(Box::new(Aligning::new(&options)));
+        let phase = Phase::Aligning(Box::new(Aligning::new(&options, None)));
         Ok(Self { options, mounting, phase, output: PhantomData })
     }
 
@@ -114,16 +115,17 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
                     let filter = Filter::new(&self.options, &start)?;
                     let past =
                         Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
-                    let watch = Watch::new(&self.mounting);
+                    let watch = Watch::new(self.limits());
                     self.phase = Phase::Running(Box::new(Running { past, world, watch }));
                 }
                 Ok(reply)
             }
             Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
-                Ok(()) => Ok(running.reply(&self.options, &self.mounting)),
+                Ok(()) => Ok(running.reply(&self.mounting)),
                 Err(Refusal::Gap { .. }) => {
                     tracing::info!("no sample for too long: it starts again");
-                    self.phase = Phase::Aligning(Box::new(Aligning::new(&self.options)));
+                    let frame = running.world.first();
+                    self.phase = Phase::Aligning(Box::new(Aligning::new(&self.options, frame)));
                     Ok(Reply::none().diverged("no sample of the IMU for too long"))
                 }
                 Err(refusal) => {
@@ -131,6 +133,16 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
                     Ok(Reply::none())
                 }
             },
+        }
+    }
+}
+
+impl<O> EskfEstimator<O> {
+    fn limits(&self) -> Limits {
+        let longest_s = self.options.longest_dead_reckoning;
+        Limits {
+            dead_reckoning_s: self.mounting.has_positions().then_some(longest_s),
+            deviation: self.options.largest_deviation,
         }
     }
 }
@@ -172,10 +184,11 @@ impl Running {
         }
     }
 
-    fn reply<O: NavigationOutput>(&mut self, options: &NavigationOptions, mounting: &Mounting) -> Reply<O> {
+    fn reply<O: NavigationOutput>(&mut self, mounting: &Mounting) -> Reply<O> {
         let filter = self.past.now();
         let reply: Reply<O> = O::of(filter, &self.world, mounting).into();
-        match self.watch.look(filter, options) {
+        let counts = filter.counts();
+        match filter.sight(&counts).and_then(|sight| self.watch.look(&sight)) {
             Some(reason) => reply.diverged(reason),
             None => reply,
         }

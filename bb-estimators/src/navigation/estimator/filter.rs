@@ -1,5 +1,6 @@
 //! The filter with a stream for each sensor.
 
+use super::health::{Sight, largest_deviation};
 use super::options::NavigationOptions;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Eskf, Estimate, ImuMean, NAVIGATION, POSITION, Refusal, Start};
@@ -59,15 +60,23 @@ impl Filter {
     /// Standard deviation of the horizontal position, in the direction where it is least known, m.
     pub(super) fn horizontal_deviation(&self) -> f64 {
         let covariance = self.eskf.covariance();
-        let (xx, yy) = (covariance[(POSITION, POSITION)], covariance[(POSITION + 1, POSITION + 1)]);
-        let xy = covariance[(POSITION, POSITION + 1)];
-        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        (mean + half.hypot(xy)).sqrt()
+        let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
+        largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
     /// What became of the measurements: satellites, odometry, poses.
     pub(super) fn counts(&self) -> [&Counts; 3] {
         [self.gnss.counts(), self.odometry.counts(), self.pose.counts()]
+    }
+
+    /// What its health is judged by.
+    pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
+        Some(Sight {
+            now_ns: self.time_ns()?,
+            counts,
+            dead_reckoning_s: self.eskf.dead_reckoning_s(),
+            deviation: self.horizontal_deviation(),
+        })
     }
 
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {

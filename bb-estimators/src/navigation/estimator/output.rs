@@ -5,6 +5,7 @@ use super::input::Mounting;
 use super::world::World;
 use crate::navigation::eskf::{GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 use crate::navigation::math::skew;
+use crate::navigation::stream::Counts;
 use bb_core::payload::{Odometry, Pose, Twist};
 use bb_core::{Outputs, Payload};
 use nalgebra::{Matrix3, Matrix6, Vector3};
@@ -52,6 +53,16 @@ pub struct Verdicts {
     pub refused: u64,
     /// They were not finite, or came too late or from the future.
     pub invalid: u64,
+}
+
+impl From<&Counts> for Verdicts {
+    fn from(counts: &Counts) -> Self {
+        Self {
+            fused: counts.fused + counts.weighed_down,
+            refused: counts.gate,
+            invalid: counts.invalid + counts.late + counts.future,
+        }
+    }
 }
 
 /// The outputs of `Eskf<NavigationOutputs>`: `output odometry;`, `output status;`.
@@ -120,11 +131,7 @@ impl NavigationOutput for Odometry {
 impl NavigationOutput for NavigationOutputs {
     fn of(filter: &Filter, world: &World, mounting: &Mounting) -> Option<Self> {
         let estimate = filter.estimate()?;
-        let [gnss, odometry, pose] = filter.counts().map(|counts| Verdicts {
-            fused: counts.fused + counts.weighed_down,
-            refused: counts.gate,
-            invalid: counts.invalid + counts.late + counts.future,
-        });
+        let [gnss, odometry, pose] = filter.counts().map(Verdicts::from);
         let status = NavigationStatus {
             accelerometer_bias: estimate.accelerometer_bias,
             gyroscope_bias: estimate.gyroscope_bias,

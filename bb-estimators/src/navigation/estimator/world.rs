@@ -21,12 +21,19 @@ const UNKNOWN_HEIGHT: f64 = 1e4;
 pub(super) struct World {
     /// On the Earth; none without satellites.
     frame: Option<LocalFrame>,
+    /// Where it was at the start.
+    first: Option<LocalFrame>,
     first_from_frame: Isometry3<f64>,
 }
 
 impl World {
     pub(super) fn new(frame: Option<LocalFrame>) -> Self {
-        Self { frame, first_from_frame: Isometry3::identity() }
+        Self { frame, first: frame, first_from_frame: Isometry3::identity() }
+    }
+
+    /// The frame that outputs are in.
+    pub(super) fn first(&self) -> Option<LocalFrame> {
+        self.first
     }
 
     /// Takes coordinates of the filter's world to the one that outputs are in.
@@ -42,7 +49,7 @@ impl World {
         mounting: &Mounting,
     ) -> Option<GnssPosition> {
         let frame = self.frame?;
-        let (position, covariance) = position_of(fix, &frame, options)?;
+        let (position, covariance) = position_of(fix, &frame, options.gnss_deviation)?;
         Some(GnssPosition { position, covariance, lever_arm: mounting.antenna() })
     }
 
@@ -82,14 +89,15 @@ impl World {
     }
 }
 
-/// The position of a fix in a frame, and its covariance; none if it has no position.
-pub(super) fn position_of(
+/// The position of a fix in a frame, and its covariance; none if it has no position. `deviation` is that of a fix that says
+/// nothing about its own, horizontal, m; vertical it is twice as much.
+pub(in crate::navigation) fn position_of(
     fix: &GnssFix,
     frame: &LocalFrame,
-    options: &NavigationOptions,
+    deviation: f64,
 ) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let geodetic = geodetic_of(fix, frame.origin().height)?;
-    let deviations = Vector3::new(1.0, 1.0, 2.0) * options.gnss_deviation;
+    let deviations = Vector3::new(1.0, 1.0, 2.0) * deviation;
     let mut covariance =
         fix.position_covariance.unwrap_or_else(|| Matrix3::from_diagonal(&deviations.component_mul(&deviations)));
     if fix.position.is_some_and(|position| position.altitude.is_none()) {
@@ -99,7 +107,7 @@ pub(super) fn position_of(
 }
 
 /// Where a fix is, at `height` if it does not tell; none if it has no position.
-pub(super) fn geodetic_of(fix: &GnssFix, height: f64) -> Option<Geodetic> {
+pub(in crate::navigation) fn geodetic_of(fix: &GnssFix, height: f64) -> Option<Geodetic> {
     let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
     Some(Geodetic {
         latitude: position.latitude_rad,

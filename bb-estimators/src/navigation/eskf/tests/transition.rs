@@ -3,12 +3,12 @@
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
-use super::super::covariance::Covariance;
 use super::super::estimate::Estimate;
 use super::super::params::ImuDensities;
 use super::super::propagation::Transition;
 use super::super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 use super::{ALL, All, estimate};
+use crate::navigation::covariance::Covariance;
 use crate::navigation::math::rotation_vector;
 
 const DENSITIES: ImuDensities =
