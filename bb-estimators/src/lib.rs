@@ -15,6 +15,8 @@
 //!
 //! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry` and `input pose` | `Odometry` of the link |
 //! | `Eskf<NavigationOutputs>(…)` | as before | `output odometry`, and `output status`: biases, dead reckoning, refusals |
+//! | `PlanarEkf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input orientation` | `Odometry` of the link, on a plane |
+//! | `PlanarEkf<PlanarOutputs>(…)` | as before | `output odometry`, and `output status`: bias, scale of the wheels, refusals |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
@@ -47,6 +49,10 @@ pub use simulation::SimulatedImu;
 /// The error-state Kalman filter of position, velocity and attitude as an estimator.
 #[cfg(feature = "runtime")]
 pub type Eskf<O = Odometry> = navigation::EskfEstimator<O>;
+
+/// The filter of a robot that drives on a plane as an estimator.
+#[cfg(feature = "runtime")]
+pub type PlanarEkf<O = Odometry> = navigation::planar::PlanarEstimator<O>;
 
 /// The estimator of each attitude filter.
 #[cfg(feature = "runtime")]

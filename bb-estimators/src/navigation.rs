@@ -11,7 +11,8 @@
 //! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
 //! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
 //! counts and statistics. [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several
-//! filters and finds which fits; [`Navigator`] is one that is ready for use. `FixedLagSmoother`, with the feature `smoother`,
+//! filters and finds which fits; [`Navigator`] is one that is ready for use. [`planar`] has the filter of a robot that drives on
+//! a plane. `FixedLagSmoother`, with the feature `smoother`,
 //! holds the last keyframes and corrects them in hindsight.
 
 mod alignment;
@@ -30,6 +31,7 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
+pub mod planar;
 #[cfg(feature = "smoother")]
 pub mod smoother;
 mod stream;

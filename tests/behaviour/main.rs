@@ -27,6 +27,7 @@ mod order;
 mod outputs;
 mod own_paths;
 mod parameters;
+mod planar;
 mod real_time;
 mod replay;
 mod restarts;
