@@ -21,6 +21,10 @@ struct Calibrate;
 struct Navigation;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/planar.md")]
+struct Planar;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/runtime.md")]
 struct Runtime;
 
