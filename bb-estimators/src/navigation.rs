@@ -41,7 +41,7 @@ pub use bank::Bank;
 pub use consistency::{Consistency, nees};
 pub use eskf::{
     ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuDensities, ImuMean, Keyframe,
-    NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
+    NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, Wheeled, offset,
 };
 #[cfg(feature = "runtime")]
 pub use estimator::{

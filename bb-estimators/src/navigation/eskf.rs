@@ -39,5 +39,5 @@ pub use refusal::Refusal;
 pub(super) use states::distinct;
 pub use states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
-    offset,
+    Wheeled, offset,
 };

@@ -4,9 +4,11 @@ mod aligning;
 pub(super) mod course;
 mod filter;
 pub(super) mod health;
+mod height;
 mod input;
 mod options;
 mod output;
+mod states;
 pub(super) mod world;
 
 pub use input::NavigationInputs;
@@ -16,9 +18,10 @@ pub use output::{NavigationOutput, NavigationOutputs, NavigationStatus, Verdicts
 use self::aligning::Aligning;
 use self::filter::{Filter, Measured};
 use self::health::{Limits, Watch};
+use self::height::Heights;
 use self::input::Mounting;
 use self::world::World;
-use super::eskf::{ImuMean, Refusal};
+use super::eskf::{ImuMean, NAVIGATION, Navigation, Optional, Refusal, States, offset};
 use super::history::History;
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
@@ -27,9 +30,9 @@ use std::marker::PhantomData;
 
 /// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
 const SAMPLES: usize = 512;
-const MEASUREMENTS: usize = 64;
+const MEASUREMENTS: usize = 128;
 const STATES: usize = 16;
-type Past = History<Filter, SAMPLES, MEASUREMENTS, STATES>;
+type Past<S, const N: usize> = History<Filter<S, N>, SAMPLES, MEASUREMENTS, STATES>;
 
 /// How far ahead of the IMU a measurement may be stamped, ns.
 const LONGEST_LEAD_NS: i64 = 500_000_000;
@@ -69,34 +72,42 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 /// it has refused is in the status. The health of the estimator says when the position was dead-reckoned for too long, is less
 /// certain than the options allow, or does not agree with what is measured.
 #[derive(Debug)]
-pub struct EskfEstimator<O = Odometry> {
+pub struct EskfEstimator<O = Odometry, S: States = Navigation, const N: usize = NAVIGATION> {
     options: NavigationOptions,
     mounting: Mounting,
-    phase: Phase,
+    phase: Phase<S, N>,
     output: PhantomData<fn() -> O>,
 }
 
 #[derive(Debug)]
-enum Phase {
+enum Phase<S: States, const N: usize> {
     Aligning(Box<Aligning>),
-    Running(Box<Running>),
+    Running(Box<Running<S, N>>),
 }
 
 #[derive(Debug)]
-struct Running {
-    past: Past,
+struct Running<S: States, const N: usize> {
+    past: Past<S, N>,
     world: World,
+    heights: Heights,
     watch: Watch,
 }
 
-impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
+impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator for EskfEstimator<O, S, N> {
     type Options = NavigationOptions;
     type Input = NavigationInputs<'static>;
     type Output = O;
 
     fn init(options: NavigationOptions, context: &Context) -> Result<Self, Fault> {
         options.params().check()?;
+        const {
+            assert!(
+                states::is_possible::<S>(),
+                "`Optional::RelativeScale` needs `Optional::Keyframe`: the scale is that of poses relative to it"
+            );
+        }
         let mounting = Mounting::of(context)?;
+        states::check::<S>(&mounting)?;
         let phase = Phase::Aligning(Box::new(Aligning::new(&options, None)));
         Ok(Self { options, mounting, phase, output: PhantomData })
     }
@@ -116,7 +127,8 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
                     let past =
                         Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
                     let watch = Watch::new(self.limits());
-                    self.phase = Phase::Running(Box::new(Running { past, world, watch }));
+                    self.phase =
+                        Phase::Running(Box::new(Running { past, world, heights: Heights::default(), watch }));
                 }
                 Ok(reply)
             }
@@ -137,7 +149,7 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
     }
 }
 
-impl<O> EskfEstimator<O> {
+impl<O, S: States, const N: usize> EskfEstimator<O, S, N> {
     fn limits(&self) -> Limits {
         let longest_s = self.options.longest_dead_reckoning;
         Limits {
@@ -147,7 +159,7 @@ impl<O> EskfEstimator<O> {
     }
 }
 
-impl Running {
+impl<S: States, const N: usize> Running<S, N> {
     fn take(
         &mut self,
         sample: &ImuMean,
@@ -162,13 +174,29 @@ impl Running {
             self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
         }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
-            let measured = mounting.velocity(&odometry.payload, options);
-            self.fuse(odometry.monotonic_time.as_nanos(), Measured::Odometry(measured));
+            let time_ns = odometry.monotonic_time.as_nanos();
+            if offset::<S>(Optional::WheelScale).is_some() {
+                let (speed, sideways) = mounting.wheels(&odometry.payload, options);
+                self.fuse(time_ns, Measured::Wheels(speed));
+                self.fuse(time_ns, Measured::Sideways(sideways));
+            } else {
+                self.fuse(time_ns, Measured::Odometry(mounting.velocity(&odometry.payload, options)));
+            }
         }
         if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
             let measured = self.world.pose(&pose.payload, options, mounting);
             self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
         }
+        if let Some(relative) = inputs.relative.filter(|relative| relative.is_new()) {
+            let end_ns = relative.end.as_nanos();
+            let measured = mounting.relative_pose(&relative.payload, options);
+            self.fuse(end_ns, Measured::Relative(measured, end_ns));
+        }
+        if let Some(field) = inputs.magnetic_field.filter(|field| field.is_new()) {
+            let measured = mounting.magnetic_heading(&field.payload, options);
+            self.fuse(field.monotonic_time.as_nanos(), Measured::MagneticField(measured));
+        }
+        self.take_heights(inputs, options, mounting);
         if let Some(new_from_old) = self.past.now().position().and_then(|position| self.world.moves_on(&position)) {
             // What is in the history belongs to the world that is left.
             let mut filter = self.past.now().clone();
@@ -176,6 +204,26 @@ impl Running {
             self.past = Past::new(filter, LONGEST_LEAD_NS)?;
         }
         Ok(())
+    }
+
+    fn take_heights(&mut self, inputs: &NavigationInputs<'_>, options: &NavigationOptions, mounting: &Mounting) {
+        let pressure = inputs.pressure.filter(|pressure| pressure.is_new());
+        let range = inputs.range.filter(|range| range.is_new());
+        if pressure.is_none() && range.is_none() {
+            return;
+        }
+        let Some(at) = self.past.now().estimate().copied() else { return };
+        let drop = self.world.drop(&at.position);
+        if let Some(pressure) = pressure
+            && let Some(height) = self.heights.of_pressure(&pressure.payload, &at, drop, options, mounting)
+        {
+            self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
+        }
+        if let Some(range) = range
+            && let Some(height) = self.heights.of_range(&range.payload, &at, drop, options, mounting)
+        {
+            self.fuse(range.monotonic_time.as_nanos(), Measured::Range(height));
+        }
     }
 
     fn fuse(&mut self, time_ns: i64, measured: Measured) {

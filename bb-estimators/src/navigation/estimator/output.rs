@@ -3,7 +3,7 @@
 use super::filter::Filter;
 use super::input::Mounting;
 use super::world::World;
-use crate::navigation::eskf::{GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
+use crate::navigation::eskf::{GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::math::skew;
 use crate::navigation::stream::Counts;
 use bb_core::payload::{Odometry, Pose, Twist};
@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 pub trait NavigationOutput: Outputs + Sized {
     /// What there is to emit.
     #[doc(hidden)]
-    fn of(filter: &Filter, world: &World, mounting: &Mounting) -> Option<Self>;
+    fn of<S: States, const N: usize>(filter: &Filter<S, N>, world: &World, mounting: &Mounting) -> Option<Self>;
 }
 
 /// What the filter knows beside the odometry.
@@ -40,6 +40,26 @@ pub struct NavigationStatus {
     pub odometry: Verdicts,
     /// The same for poses.
     pub pose: Verdicts,
+    /// The same for relative poses.
+    pub relative: Verdicts,
+    /// The same for the magnetic field.
+    pub magnetic_field: Verdicts,
+    /// The same for pressures.
+    pub pressure: Verdicts,
+    /// The same for distances to the ground.
+    pub range: Verdicts,
+    /// Scale of the wheels, less 1; 0 where it is no state.
+    pub wheel_scale: f64,
+    /// Scale of relative poses, less 1; 0 where it is no state.
+    pub relative_scale: f64,
+    /// How far the GNSS antenna is from where it is declared, axes of the link, m; 0 where it is no state.
+    pub gnss_lever_arm: Vector3<f64>,
+    /// How late fixes are beyond their stamps, s; 0 where it is no state.
+    pub gnss_delay: f64,
+    /// Magnetic field of the robot itself, axes of the link, T; 0 where it is no state.
+    pub hard_iron: Vector3<f64>,
+    /// What the barometric height reads more than the height, m; 0 where it is no state.
+    pub barometer_bias: f64,
     /// How often samples of the IMU were missing for longer than a sample may take.
     pub gaps: u32,
 }
@@ -76,7 +96,7 @@ pub struct NavigationOutputs {
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for Odometry {
-    fn of(filter: &Filter, world: &World, mounting: &Mounting) -> Option<Self> {
+    fn of<S: States, const N: usize>(filter: &Filter<S, N>, world: &World, mounting: &Mounting) -> Option<Self> {
         let estimate = filter.estimate()?;
         let covariance = filter.eskf().covariance();
         let block = |row: usize, column: usize| covariance.fixed_view::<3, 3>(row, column).into_owned();
@@ -129,9 +149,10 @@ impl NavigationOutput for Odometry {
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for NavigationOutputs {
-    fn of(filter: &Filter, world: &World, mounting: &Mounting) -> Option<Self> {
+    fn of<S: States, const N: usize>(filter: &Filter<S, N>, world: &World, mounting: &Mounting) -> Option<Self> {
         let estimate = filter.estimate()?;
-        let [gnss, odometry, pose] = filter.counts().map(Verdicts::from);
+        let [gnss, odometry, _, pose, relative, magnetic_field, pressure, range] =
+            filter.counts().map(Verdicts::from);
         let status = NavigationStatus {
             accelerometer_bias: estimate.accelerometer_bias,
             gyroscope_bias: estimate.gyroscope_bias,
@@ -140,6 +161,16 @@ impl NavigationOutput for NavigationOutputs {
             gnss,
             odometry,
             pose,
+            relative,
+            magnetic_field,
+            pressure,
+            range,
+            wheel_scale: estimate.scalar::<S>(Optional::WheelScale),
+            relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
+            gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),
+            gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),
+            hard_iron: estimate.vector::<S>(Optional::HardIron),
+            barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
             gaps: filter.eskf().gaps(),
         };
         Some(Self { odometry: Some(Odometry::of(filter, world, mounting)?), status: Some(status) })

@@ -78,6 +78,11 @@ impl World {
         }
     }
 
+    /// How far the world's z is below the height above the ellipsoid that it began at, at `position`, m: its plane is no sphere.
+    pub(super) fn drop(&self, position: &Vector3<f64>) -> f64 {
+        self.frame.map_or(0.0, |frame| frame.geodetic(position).height - frame.origin().height - position.z)
+    }
+
     /// The filter is at `position`: if that is far out, its world moves on, and what takes coordinates there is returned.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
         let frame = self.frame.as_mut().filter(|_| position.xy().norm() > FARTHEST)?;

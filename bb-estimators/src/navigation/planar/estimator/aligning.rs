@@ -8,6 +8,7 @@ use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::planar::estimate::left;
 use crate::navigation::planar::filter::PlanarStart;
 use nalgebra::{Matrix2, Rotation2, Vector2};
+use std::f64::consts::PI;
 
 /// How long a start may take, ns, before that is reported.
 const LONGEST_NS: i64 = 10_000_000_000;
@@ -63,10 +64,14 @@ impl Aligning {
             self.velocity = Some(mounting.wheels(&odometry.payload, options).0.velocity);
         }
         sample.check().ok()?;
-        let heading = self.heading_of(options, mounting)?;
+        let (heading, velocity) = match options.heading_from_course {
+            true => self.in_motion()?,
+            false => (self.heading_of(options, mounting), (Vector2::zeros(), SPEED)),
+        };
+        // Of the wheels, if there are any.
         let velocity = match self.velocity.filter(|velocity| velocity.iter().all(|x| x.is_finite())) {
             Some(velocity) => (velocity, SPEED.min(0.1 + 0.1 * velocity.norm())),
-            None => (Vector2::zeros(), SPEED),
+            None => velocity,
         };
         let start = PlanarStart::at(sample.time_ns, (Vector2::zeros(), ORIGIN), heading, velocity);
         let turn = Rotation2::new(heading.0);
@@ -84,19 +89,25 @@ impl Aligning {
         Some((PlanarStart { position, position_covariance, ..start }, self.course.frame()))
     }
 
-    /// Of the body, with its standard deviation: of the course, of an orientation, or of the options.
-    fn heading_of(&self, options: &PlanarOptions, mounting: &Mounting) -> Option<(f64, f64)> {
-        if options.heading_from_course {
-            let (velocity, deviation) = self.course.velocity()?;
-            let speed = velocity.xy().norm();
-            // Nor if it is not a number. Wheels that turn backwards go against the course.
-            let is_clear = speed > CLEARLY * deviation;
-            let back = self.velocity.is_some_and(|velocity| velocity.x < 0.0);
-            let turned = if back { std::f64::consts::PI } else { 0.0 };
-            return is_clear.then(|| (velocity.y.atan2(velocity.x) + turned, (deviation / speed).hypot(SLIP)));
+    /// Heading and velocity of the body that the course of the fixes shows, each with its standard deviation.
+    fn in_motion(&self) -> Option<((f64, f64), (Vector2<f64>, f64))> {
+        let (velocity, deviation) = self.course.velocity()?;
+        let speed = velocity.xy().norm();
+        // Nor if it is not a number.
+        if speed.is_nan() || speed <= CLEARLY * deviation {
+            return None;
         }
+        // Wheels that turn backwards go against the course.
+        let goes_back = self.velocity.is_some_and(|velocity| velocity.x < 0.0);
+        let (turned, along) = if goes_back { (PI, -speed) } else { (0.0, speed) };
+        let heading = (velocity.y.atan2(velocity.x) + turned, (deviation / speed).hypot(SLIP));
+        Some((heading, (Vector2::new(along, 0.0), deviation)))
+    }
+
+    /// Of the body, with its standard deviation: of an orientation, or of the options.
+    fn heading_of(&self, options: &PlanarOptions, mounting: &Mounting) -> (f64, f64) {
         // That of the options is the link's.
         let of_body = options.heading - heading(&mounting.body_from_link.rotation);
-        Some(self.heading.unwrap_or((of_body, options.heading_deviation)))
+        self.heading.unwrap_or((of_body, options.heading_deviation))
     }
 }
