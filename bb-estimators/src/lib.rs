@@ -13,9 +13,9 @@
 //! | `Calibrated<Marg>(…)` in a sensor | the sensor's `Imu` or `Marg` | the same, calibrated |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
-//! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose`, `input magnetic_field`, `input pressure` and `input range` | `Odometry` of the link |
+//! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input magnetic_field` | `Odometry` of the link |
 //! | `Eskf<NavigationOutputs>(…)` | as before | `output odometry`, and `output status`: biases, dead reckoning, refusals |
-//! | `WheeledEskf(…)`, `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, and what tells the [states](navigation::States) `S` | as before |
+//! | `WheeledEskf(…)`, `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, and `input relative` and `input pressure` for [states](navigation::States) `S` that have them | as before |
 //! | `PlanarEkf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input orientation` | `Odometry` of the link, on a plane |
 //! | `PlanarEkf<PlanarOutputs>(…)` | as before | `output odometry`, and `output status`: bias, scale of the wheels, refusals |
 //!

@@ -32,6 +32,7 @@ mod real_time;
 mod replay;
 mod restarts;
 mod safety;
+mod sensor_failures;
 mod settings;
 mod simulation;
 mod subscriptions;

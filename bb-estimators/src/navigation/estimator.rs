@@ -31,14 +31,16 @@ use std::marker::PhantomData;
 /// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
 const SAMPLES: usize = 512;
 const MEASUREMENTS: usize = 128;
-const STATES: usize = 16;
+/// Each is a filter with all its states: more would be many hundred kilobytes.
+const STATES: usize = 8;
 type Past<S, const N: usize> = History<Filter<S, N>, SAMPLES, MEASUREMENTS, STATES>;
 
 /// How far ahead of the IMU a measurement may be stamped, ns.
 const LONGEST_LEAD_NS: i64 = 500_000_000;
 
 /// Position, velocity and attitude of the link where it is declared, from an IMU and any of satellite navigation, wheels or
-/// another odometry, and poses in the world. It emits [`Odometry`] with every sample of the IMU, or [`NavigationOutputs`].
+/// another odometry, poses in the world or relative to each other, a magnetometer and a barometer. It emits [`Odometry`] with every
+/// sample of the IMU, or [`NavigationOutputs`].
 ///
 /// ```
 /// # fn main() {}
@@ -61,6 +63,96 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 ///             input odometry: sensor::base::wheels, optional;
 ///         }
 ///     }
+/// }
+/// ```
+///
+/// `S` are its optional [states](States), and `N` is [`States::DIMENSION`]. Inputs and states that belong together are declared
+/// together: without [`Optional::Keyframe`] there are no relative poses, without [`Optional::BarometerBias`] no pressures, and a state
+/// needs the input that tells it. With [`Optional::WheelScale`], wheels are taken not to move sideways.
+///
+/// ```
+/// # fn main() {}
+/// use bb_core::payload::{FluidPressure, RelativePose};
+/// use bb_core::prelude::*;
+/// use bb_estimators::Eskf;
+/// use bb_estimators::navigation::{Optional, States};
+///
+/// #[derive(Clone, Copy, Debug, PartialEq)]
+/// pub struct Drone;
+///
+/// impl States for Drone {
+///     const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale, Optional::BarometerBias];
+/// }
+///
+/// robot! {
+///     robot Quadrotor;
+///
+///     link body {
+///         sensor imu: External<Imu>();
+///         sensor camera: External<RelativePose>();
+///         sensor barometer: External<FluidPressure>();
+///         estimator navigation: Eskf<Odometry, Drone, { Drone::DIMENSION }>() {
+///             input imu: sensor::body::imu, driver;
+///             input relative: sensor::body::camera, optional;
+///             input pressure: sensor::body::barometer, optional;
+///         }
+///     }
+/// }
+/// ```
+///
+/// Another number, a state that is listed twice, and a scale of relative poses without their keyframe do not compile:
+///
+/// ```compile_fail
+/// use bb_core::prelude::*;
+/// use bb_estimators::Eskf;
+/// use bb_estimators::navigation::Wheeled;
+///
+/// robot! {
+///     robot Rover;
+///
+///     link base {
+///         sensor imu: External<Imu>();
+///         sensor wheels: External<Odometry>();
+///         estimator navigation: Eskf<Odometry, Wheeled, 17>() {
+///             input imu: sensor::base::imu, driver;
+///             input odometry: sensor::base::wheels, optional;
+///         }
+///     }
+/// }
+///
+/// fn main() -> Result<(), StartError> {
+///     Rover::builder().simulate().map(drop)
+/// }
+/// ```
+///
+/// ```compile_fail
+/// use bb_core::payload::RelativePose;
+/// use bb_core::prelude::*;
+/// use bb_estimators::Eskf;
+/// use bb_estimators::navigation::{Optional, States};
+///
+/// #[derive(Clone, Copy, Debug, PartialEq)]
+/// pub struct Scaled;
+///
+/// impl States for Scaled {
+///     const OPTIONAL: &'static [Optional] = &[Optional::RelativeScale];
+/// }
+///
+/// robot! {
+///     robot Drone;
+///
+///     link body {
+///         sensor imu: External<Imu>();
+///         sensor camera: External<RelativePose>();
+///         estimator navigation: Eskf<Odometry, Scaled, { Scaled::DIMENSION }>() {
+///             input imu: sensor::body::imu, driver;
+///             input relative: sensor::body::camera, optional;
+///         }
+///     }
+/// }
+///
+/// fn main() -> Result<(), StartError> {
+///     Drone::builder().simulate().map(drop)
 /// }
 /// ```
 ///
@@ -196,7 +288,14 @@ impl<S: States, const N: usize> Running<S, N> {
             let measured = mounting.magnetic_heading(&field.payload, options);
             self.fuse(field.monotonic_time.as_nanos(), Measured::MagneticField(measured));
         }
-        self.take_heights(inputs, options, mounting);
+        if let Some(pressure) = inputs.pressure.filter(|pressure| pressure.is_new())
+            && let Some(at) = self.past.now().estimate()
+        {
+            let drop = self.world.drop(&at.position);
+            if let Some(height) = self.heights.of_pressure(&pressure.payload, at, drop, options, mounting) {
+                self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
+            }
+        }
         if let Some(new_from_old) = self.past.now().position().and_then(|position| self.world.moves_on(&position)) {
             // What is in the history belongs to the world that is left.
             let mut filter = self.past.now().clone();
@@ -204,26 +303,6 @@ impl<S: States, const N: usize> Running<S, N> {
             self.past = Past::new(filter, LONGEST_LEAD_NS)?;
         }
         Ok(())
-    }
-
-    fn take_heights(&mut self, inputs: &NavigationInputs<'_>, options: &NavigationOptions, mounting: &Mounting) {
-        let pressure = inputs.pressure.filter(|pressure| pressure.is_new());
-        let range = inputs.range.filter(|range| range.is_new());
-        if pressure.is_none() && range.is_none() {
-            return;
-        }
-        let Some(at) = self.past.now().estimate().copied() else { return };
-        let drop = self.world.drop(&at.position);
-        if let Some(pressure) = pressure
-            && let Some(height) = self.heights.of_pressure(&pressure.payload, &at, drop, options, mounting)
-        {
-            self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
-        }
-        if let Some(range) = range
-            && let Some(height) = self.heights.of_range(&range.payload, &at, drop, options, mounting)
-        {
-            self.fuse(range.monotonic_time.as_nanos(), Measured::Range(height));
-        }
     }
 
     fn fuse(&mut self, time_ns: i64, measured: Measured) {

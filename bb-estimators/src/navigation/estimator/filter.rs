@@ -6,8 +6,8 @@ use super::options::NavigationOptions;
 use crate::navigation::eskf::{Eskf, Estimate, ImuMean, POSITION, Refusal, Start, States};
 use crate::navigation::history::Replayed;
 use crate::navigation::measurement::{
-    AbsolutePose, BarometricHeight, BodyVelocity, GnssPosition, Height, MagneticHeading, NonHolonomic,
-    RelativePose, WheelSpeed,
+    AbsolutePose, BarometricHeight, BodyVelocity, GnssPosition, MagneticHeading, NonHolonomic, RelativePose,
+    WheelSpeed,
 };
 use crate::navigation::stream::{Counts, Fused, Stream, StreamParams};
 use bb_core::Fault;
@@ -33,13 +33,12 @@ pub(super) enum Measured {
     Relative(RelativePose, i64),
     MagneticField(MagneticHeading),
     Pressure(BarometricHeight),
-    Range(Height),
 }
 
 /// The streams of sensors: wheels have a second one, for what they do not do.
-const SENSORS: usize = 8;
+const SENSORS: usize = 7;
 const NAMES: [&str; SENSORS] =
-    ["gnss", "odometry", "odometry, sideways", "pose", "relative", "magnetic_field", "pressure", "range"];
+    ["gnss", "odometry", "odometry, sideways", "pose", "relative", "magnetic_field", "pressure"];
 
 impl Measured {
     fn sensor(&self) -> usize {
@@ -51,7 +50,6 @@ impl Measured {
             Self::Relative(..) => 4,
             Self::MagneticField(_) => 5,
             Self::Pressure(_) => 6,
-            Self::Range(_) => 7,
         }
     }
 
@@ -87,8 +85,7 @@ impl<S: States, const N: usize> Filter<S, N> {
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
-    /// What became of the measurements: satellites, odometry, what wheels do not do, poses, relative poses, magnetic field, pressure,
-    /// range.
+    /// What became of the measurements: satellites, odometry, what wheels do not do, poses, relative poses, magnetic field, pressure.
     pub(super) fn counts(&self) -> [&Counts; SENSORS] {
         self.streams.each_ref().map(Stream::counts)
     }
@@ -136,7 +133,6 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
             }
             Measured::MagneticField(heading) => eskf.update(stream, heading),
             Measured::Pressure(height) => eskf.update(stream, height),
-            Measured::Range(height) => eskf.update(stream, height),
         }
     }
 }

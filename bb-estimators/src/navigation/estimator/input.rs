@@ -4,7 +4,7 @@ use super::options::NavigationOptions;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::measurement::{BodyVelocity, MagneticHeading, NonHolonomic, RelativePose, WheelSpeed};
 use bb_core::message::Stamped;
-use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Pose, Range};
+use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Pose};
 use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
@@ -25,8 +25,6 @@ pub struct NavigationInputs<'a> {
     pub magnetic_field: Option<Input<'a, MagneticField>>,
     /// A barometer: changes of height since its first reading.
     pub pressure: Option<Input<'a, FluidPressure>>,
-    /// The distance to flat ground along the sensor's x axis: changes of height since its first reading.
-    pub range: Option<Input<'a, Range>>,
 }
 
 /// Where the sensors are; none where the robot does not declare an input.
@@ -41,7 +39,6 @@ pub(super) struct Mounting {
     pub(super) relative: Option<Isometry3<f64>>,
     pub(super) magnetic_field: Option<Isometry3<f64>>,
     pub(super) pressure: Option<Isometry3<f64>>,
-    pub(super) range: Option<Isometry3<f64>>,
 }
 
 impl Mounting {
@@ -62,7 +59,6 @@ impl Mounting {
             relative: optional("relative"),
             magnetic_field: optional("magnetic_field"),
             pressure: optional("pressure"),
-            range: optional("range"),
         })
     }
 

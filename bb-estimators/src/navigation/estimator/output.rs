@@ -46,8 +46,6 @@ pub struct NavigationStatus {
     pub magnetic_field: Verdicts,
     /// The same for pressures.
     pub pressure: Verdicts,
-    /// The same for distances to the ground.
-    pub range: Verdicts,
     /// Scale of the wheels, less 1; 0 where it is no state.
     pub wheel_scale: f64,
     /// Scale of relative poses, less 1; 0 where it is no state.
@@ -151,8 +149,7 @@ impl NavigationOutput for Odometry {
 impl NavigationOutput for NavigationOutputs {
     fn of<S: States, const N: usize>(filter: &Filter<S, N>, world: &World, mounting: &Mounting) -> Option<Self> {
         let estimate = filter.estimate()?;
-        let [gnss, odometry, _, pose, relative, magnetic_field, pressure, range] =
-            filter.counts().map(Verdicts::from);
+        let [gnss, odometry, _, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
         let status = NavigationStatus {
             accelerometer_bias: estimate.accelerometer_bias,
             gyroscope_bias: estimate.gyroscope_bias,
@@ -164,7 +161,6 @@ impl NavigationOutput for NavigationOutputs {
             relative,
             magnetic_field,
             pressure,
-            range,
             wheel_scale: estimate.scalar::<S>(Optional::WheelScale),
             relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
             gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),

@@ -25,11 +25,18 @@ pub(super) fn check<S: States>(mounting: &Mounting) -> Result<(), Fault> {
             )));
         }
     }
-    if mounting.relative.is_some() && offset::<S>(Optional::Keyframe).is_none() {
-        return Err(Fault::new(
-            "the input `relative` needs the state `Optional::Keyframe`: declare `Eskf<Odometry, S, { S::DIMENSION }>` with \
-             states S that have it",
-        ));
+    // A pressure without its bias would be as sure of the height as the first reading was by chance.
+    let needed = [
+        ("relative", mounting.relative, Optional::Keyframe),
+        ("pressure", mounting.pressure, Optional::BarometerBias),
+    ];
+    for (input, sensor, state) in needed {
+        if sensor.is_some() && offset::<S>(state).is_none() {
+            return Err(Fault::new(format!(
+                "the input `{input}` needs the state `Optional::{state:?}`: declare `Eskf<Odometry, S, {{ S::DIMENSION }}>` with \
+                 states S that have it"
+            )));
+        }
     }
     Ok(())
 }
