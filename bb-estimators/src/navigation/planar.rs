@@ -1,7 +1,7 @@
 //! An extended Kalman filter for robots that drive on a plane.
 //!
 //! Position, heading and velocity from a gyroscope and wheels, corrected by satellites, headings and poses; the bias of the
-//! gyroscope and the scale of the wheels are estimated with them. It is a seventh of the work of [`Eskf`](super::Eskf), needs no
+//! gyroscope and the scale of the wheels are estimated with them. It is a quarter of the work of [`Eskf`](super::Eskf), needs no
 //! accelerometer, and starts while the robot moves. What it cannot do is a slope: the world is flat, and the body upright.
 //!
 //! S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics", 2005, section 5.3 (motion on an arc); P. D. Groves, "Principles of GNSS,

@@ -76,7 +76,7 @@ pub struct PlanarEstimator<O = Odometry> {
 
 #[derive(Debug)]
 enum Phase {
-    Aligning(Aligning),
+    Aligning(Box<Aligning>),
     Running(Box<Running>),
 }
 
@@ -99,7 +99,7 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
         if options.heading_from_course && !mounting.has_gnss() {
             return Err(Fault::new("`heading_from_course` needs the input `gnss`"));
         }
-        Ok(Self { options, mounting, phase: Phase::Aligning(Aligning::new(None)), output: PhantomData })
+        Ok(Self { options, mounting, phase: Phase::Aligning(Box::new(Aligning::new(None))), output: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: PlanarInputs<'_>) -> Result<Reply<O>, Fault> {
@@ -126,7 +126,7 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
                 Ok(()) => Ok(running.reply(&self.mounting)),
                 Err(Refusal::Gap { .. }) => {
                     tracing::info!("no sample for too long: it starts again");
-                    self.phase = Phase::Aligning(Aligning::new(running.frame));
+                    self.phase = Phase::Aligning(Box::new(Aligning::new(running.frame)));
                     Ok(Reply::none().diverged("no sample of the IMU for too long"))
                 }
                 Err(refusal) => {

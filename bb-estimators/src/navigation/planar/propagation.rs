@@ -10,7 +10,13 @@
 //! * `δp⁺ = δp + J d δψ + R V dt δv - R ∂V/∂φ v dt² δb`
 //! * `δψ⁺ = δψ - dt δb`
 
-use nalgebra::{Matrix2, SMatrix, Vector2};
+#![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
+use core::f64::consts::PI;
+
+#[cfg(test)]
+use nalgebra::SMatrix;
+use nalgebra::{Matrix2, Vector2};
 
 use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, left};
 use super::params::Densities;
@@ -19,15 +25,16 @@ use crate::navigation::math::{cos, sin, wrapped};
 /// Below this angle, rad, the integral over an arc is a series.
 const SERIES: f64 = 1e-2;
 
-/// What a sample does to the errors.
+/// The errors from [`HEADING`] on that the position integrates: heading, velocity and the gyroscope's bias.
+const SOURCES: usize = GYROSCOPE_BIAS + 1 - HEADING;
+
+/// What a sample does to the errors: the blocks of the transition that are neither zero nor the identity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Transition {
-    /// Of the errors: the identity, but for what is above.
-    pub(super) matrix: SMatrix<f64, STATES, STATES>,
+    /// Of the position error by heading, velocity and bias, row by row; its first column is J d.
+    position: [[f64; SOURCES]; 2],
     /// R in the middle of the sample, where noise comes in on average.
     rotation: Matrix2<f64>,
-    /// J d, m.
-    sideways: Vector2<f64>,
     dt: f64,
 }
 
@@ -42,51 +49,82 @@ impl Transition {
         let way = by_velocity * estimate.velocity;
         let sideways = left(&way);
         let by_bias = world_from_body * by_turn * estimate.velocity * (-dt * dt);
-        estimate.position += way;
         let rotation = PlanarEstimate { heading: estimate.heading + 0.5 * turn, ..*estimate }.world_from_body();
-        estimate.heading = wrapped(estimate.heading + turn);
-        let mut matrix = SMatrix::<f64, STATES, STATES>::identity();
-        matrix.fixed_view_mut::<2, 1>(POSITION, HEADING).copy_from(&sideways);
-        matrix.fixed_view_mut::<2, 2>(POSITION, VELOCITY).copy_from(&by_velocity);
-        matrix.fixed_view_mut::<2, 1>(POSITION, GYROSCOPE_BIAS).copy_from(&by_bias);
-        matrix[(HEADING, GYROSCOPE_BIAS)] = -dt;
-        Self { matrix, rotation, sideways, dt }
+        estimate.position += way;
+        estimate.heading += turn;
+        if !(-PI..=PI).contains(&estimate.heading) {
+            estimate.heading = wrapped(estimate.heading);
+        }
+        let row = |i: usize| [sideways[i], by_velocity[(i, 0)], by_velocity[(i, 1)], by_bias[i]];
+        Self { position: [row(0), row(1)], rotation, dt }
     }
 
     /// `P ← Φ P Φᵀ + Q`, symmetric to the last bit.
     #[inline]
     pub(super) fn apply(&self, p: &mut [[f64; STATES]; STATES], densities: &Densities) {
-        // Rows are columns.
-        let moved = self.matrix * SMatrix::from(*p) * self.matrix.transpose() + self.noise(densities);
+        // Φ P: what a row takes from are rows below it, which are not yet changed.
+        for i in 0..2 {
+            for (k, factor) in self.position[i].iter().enumerate() {
+                for j in 0..STATES {
+                    p[POSITION + i][j] += factor * p[HEADING + k][j];
+                }
+            }
+        }
+        for j in 0..STATES {
+            p[HEADING][j] -= self.dt * p[GYROSCOPE_BIAS][j];
+        }
+        // (Φ P) Φᵀ: of the columns only the first three change.
+        for row in p.iter_mut() {
+            for i in 0..2 {
+                for (k, factor) in self.position[i].iter().enumerate() {
+                    row[POSITION + i] += factor * row[HEADING + k];
+                }
+            }
+            row[HEADING] -= self.dt * row[GYROSCOPE_BIAS];
+        }
+        self.add_noise(p, densities);
         for i in 0..STATES {
-            for j in 0..=i {
-                p[i][j] = moved[(i, j)];
-                p[j][i] = moved[(i, j)];
+            for j in i + 1..STATES {
+                p[j][i] = p[i][j];
             }
         }
     }
 
-    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on what integrates it.
-    fn noise(&self, densities: &Densities) -> SMatrix<f64, STATES, STATES> {
+    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on what integrates it. The upper triangle alone.
+    #[inline]
+    fn add_noise(&self, p: &mut [[f64; STATES]; STATES], densities: &Densities) {
         let dt = self.dt;
-        let mut noise = SMatrix::<f64, STATES, STATES>::zeros();
-        let [forward, lateral] = densities.acceleration;
-        let of_velocity = Matrix2::new(forward, 0.0, 0.0, lateral) * dt;
+        let acceleration = densities.acceleration.map(|density| density * dt);
         // The heading errs by half of it on average over the sample, and so does the way.
-        let of_heading = densities.gyroscope * dt;
-        let position = self.rotation * of_velocity * self.rotation.transpose() * (dt * dt / 3.0)
-            + self.sideways * self.sideways.transpose() * (of_heading / 3.0);
-        noise.fixed_view_mut::<2, 2>(POSITION, POSITION).copy_from(&position);
-        noise.fixed_view_mut::<2, 2>(VELOCITY, VELOCITY).copy_from(&of_velocity);
-        let between = self.rotation * of_velocity * (0.5 * dt);
-        noise.fixed_view_mut::<2, 2>(POSITION, VELOCITY).copy_from(&between);
-        noise.fixed_view_mut::<2, 2>(VELOCITY, POSITION).copy_from(&between.transpose());
-        let between = self.sideways * (0.5 * of_heading);
-        noise.fixed_view_mut::<2, 1>(POSITION, HEADING).copy_from(&between);
-        noise.fixed_view_mut::<1, 2>(HEADING, POSITION).copy_from(&between.transpose());
-        noise[(HEADING, HEADING)] = of_heading;
-        noise[(GYROSCOPE_BIAS, GYROSCOPE_BIAS)] = densities.bias * dt;
-        noise
+        let heading = densities.gyroscope * dt;
+        let sideways = Vector2::new(self.position[0][0], self.position[1][0]);
+        let (forward, left) = (self.rotation.column(0), self.rotation.column(1));
+        for i in 0..2 {
+            for j in i..2 {
+                let turned = forward[i] * forward[j] * acceleration[0] + left[i] * left[j] * acceleration[1];
+                p[POSITION + i][POSITION + j] +=
+                    turned * (dt * dt / 3.0) + sideways[i] * sideways[j] * (heading / 3.0);
+            }
+            p[POSITION + i][HEADING] += sideways[i] * (0.5 * heading);
+            p[POSITION + i][VELOCITY] += forward[i] * acceleration[0] * (0.5 * dt);
+            p[POSITION + i][VELOCITY + 1] += left[i] * acceleration[1] * (0.5 * dt);
+            p[VELOCITY + i][VELOCITY + i] += acceleration[i];
+        }
+        p[HEADING][HEADING] += heading;
+        p[GYROSCOPE_BIAS][GYROSCOPE_BIAS] += densities.bias * dt;
+    }
+
+    /// The whole transition.
+    #[cfg(test)]
+    pub(super) fn matrix(&self) -> SMatrix<f64, STATES, STATES> {
+        let mut matrix = SMatrix::<f64, STATES, STATES>::identity();
+        for i in 0..2 {
+            for k in 0..SOURCES {
+                matrix[(POSITION + i, HEADING + k)] = self.position[i][k];
+            }
+        }
+        matrix[(HEADING, GYROSCOPE_BIAS)] = -self.dt;
+        matrix
     }
 }
 

@@ -34,6 +34,9 @@ pub(super) struct Aligning {
     last_ns: i64,
 }
 
+/// Heading, rad, and velocity in the body, m/s, each with its standard deviation.
+type Moving = ((f64, f64), (Vector2<f64>, f64));
+
 impl Aligning {
     /// `frame` is that of the world, if there is one already.
     pub(super) fn new(frame: Option<LocalFrame>) -> Self {
@@ -89,8 +92,8 @@ impl Aligning {
         Some((PlanarStart { position, position_covariance, ..start }, self.course.frame()))
     }
 
-    /// Heading and velocity of the body that the course of the fixes shows, each with its standard deviation.
-    fn in_motion(&self) -> Option<((f64, f64), (Vector2<f64>, f64))> {
+    /// What the course of the fixes shows.
+    fn in_motion(&self) -> Option<Moving> {
         let (velocity, deviation) = self.course.velocity()?;
         let speed = velocity.xy().norm();
         // Nor if it is not a number.

@@ -61,7 +61,7 @@ proptest! {
             Transition::advance(&mut other, dt);
             moved.error_to(&other)
         });
-        prop_assert!((numeric - transition.matrix).amax() < 1e-6, "{} is not {}", transition.matrix, numeric);
+        prop_assert!((numeric - transition.matrix()).amax() < 1e-6, "{} is not {}", transition.matrix(), numeric);
     }
 
     #[test]
@@ -73,6 +73,24 @@ proptest! {
         check(&PlanarHeading { heading: at.heading + angle, deviation: 0.1 }, &at)?;
         let position = at.position + off;
         check(&PlanarPose { position, heading: at.heading + angle, covariance: Matrix3::identity() }, &at)?;
+    }
+
+    #[test]
+    fn moves_the_covariance_as_the_whole_matrix_does(
+        at in estimate(), dt in 1e-3..0.1, numbers in proptest::collection::vec(-1.0..1.0, STATES * STATES),
+    ) {
+        let root = SMatrix::<f64, STATES, STATES>::from_iterator(numbers);
+        let dense = root * root.transpose();
+        let mut rows: [[f64; STATES]; STATES] = core::array::from_fn(|i| core::array::from_fn(|j| dense[(i, j)]));
+        let none = PlanarParams { gyroscope_noise: 0.0, forward_acceleration: 0.0, ..PlanarParams::default() };
+        let none = PlanarParams { gyroscope_bias_walk: 0.0, lateral_acceleration: 0.0, ..none };
+        let mut moved = at;
+        let transition = Transition::advance(&mut moved, dt);
+        transition.apply(&mut rows, &none.densities());
+        let expected = transition.matrix() * dense * transition.matrix().transpose();
+        let moved = SMatrix::<f64, STATES, STATES>::from_fn(|i, j| rows[i][j]);
+        prop_assert!((moved - expected).amax() < 1e-12 * (1.0 + expected.amax()), "{} is not {}", moved, expected);
+        prop_assert_eq!(moved, moved.transpose());
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! What holds for the filter, whatever comes.
 
+use core::f64::consts::{PI, TAU};
+
 use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -35,12 +37,7 @@ fn drive(turn: f64, shift: Vector2<f64>) -> PlanarEkf {
             let position = to_world(Vector2::new(2.0 * t, 0.3 * t * t));
             let fix = PlanarPosition { position, covariance, lever_arm: Vector2::new(-0.5, 0.2) };
             filter.update(&mut stream, &fix).unwrap();
-            filter
-                .update(
-                    &mut stream,
-                    &PlanarHeading { heading: turn + 0.3 + 7.0 * 6.283_185_307_179_586, deviation: 0.2 },
-                )
-                .unwrap();
+            filter.update(&mut stream, &PlanarHeading { heading: turn + 0.3 + 7.0 * TAU, deviation: 0.2 }).unwrap();
             let mut covariance = nalgebra::Matrix3::identity();
             covariance[(2, 2)] = 0.1;
             filter.update(&mut stream, &PlanarPose { position, heading: turn + 0.4, covariance }).unwrap();
@@ -107,7 +104,7 @@ proptest! {
         prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &rate).is_ok()));
         let estimate = filter.estimate().unwrap();
         prop_assert!(estimate.position.iter().all(|x| x.is_finite()) && filter.is_consistent());
-        prop_assert!((-3.1416..=3.1416).contains(&estimate.heading));
+        prop_assert!((-PI..=PI).contains(&estimate.heading));
         prop_assert_eq!(filter.covariance(), &filter.covariance().transpose());
         let counts = stream.counts();
         prop_assert_eq!(counts.fused + counts.gate + counts.invalid, updates);
