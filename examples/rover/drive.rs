@@ -1,7 +1,7 @@
 //! What the sensors of a drive say, and what is true.
 
 use bb_core::nalgebra::Vector3;
-use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
+use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus, Twist};
 use bb_core::prelude::*;
 use bb_estimators::navigation::{Geodetic, LocalFrame};
 use std::ops::Range;
@@ -22,7 +22,8 @@ pub(crate) struct Drive {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Event {
     Imu(Imu),
-    Wheels(Odometry),
+    /// Velocity and yaw rate, and their covariance.
+    Wheels(Twist),
     Fix(GnssFix),
 }
 

@@ -6,6 +6,8 @@ use crate::outcome::Outcome;
 use crate::robot::{Car, FILTER, Rover, car, rover};
 use crate::{plot, recorded, simulated};
 use bb_cli::Picture;
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
+use bb_core::payload::Twist;
 use bb_core::prelude::*;
 use clap::Parser;
 use std::error::Error;
@@ -56,11 +58,17 @@ pub(crate) fn simulated(drive: &Drive) -> Result<Outcome, StartError> {
     for (time, event) in &drive.events {
         match *event {
             Event::Imu(imu) => simulation.publish(rover::sensor::base::bracket::board::imu, *time, imu),
-            Event::Wheels(wheels) => simulation.publish(rover::sensor::base::wheels, *time, wheels),
+            Event::Wheels(twist) => simulation.publish(rover::sensor::base::wheels, *time, counted(twist)),
             Event::Fix(fix) => simulation.publish(rover::sensor::base::mast::antenna::gnss, *time, fix),
         }
     }
     Ok(Outcome::new(FILTER, drive, &odometry.drain().collect::<Vec<_>>(), &health.drain().collect::<Vec<_>>()))
+}
+
+/// An odometry whose pose nobody reads.
+fn counted(twist: Twist) -> Odometry {
+    let pose = Pose { position: Vector3::zeros(), world_from_body: UnitQuaternion::identity(), covariance: None };
+    Odometry { pose, twist }
 }
 
 /// Drives the car.

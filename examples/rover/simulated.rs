@@ -92,24 +92,20 @@ pub(crate) fn drive() -> Drive {
     for millis in 0..DURATION_S * 1000 {
         let time_s = millis as f64 * 1e-3;
         let time = MonotonicTime::ZERO + Duration::from_millis(millis);
-        if millis % 100 == 0 {
+        if millis.is_multiple_of(100) {
             drive.truth.push((time, now.position));
         }
-        if millis % 50 == 0 {
+        if millis.is_multiple_of(50) {
             let linear = Vector3::x() * (now.speed * (1.0 + WHEEL_SCALE)) + WHEELS * noise.vector();
             let angular = Vector3::z() * (yaw_rate(time_s) + WHEELS * noise.next());
             let covariance = Some(Matrix6::from_diagonal_element(WHEELS * WHEELS));
-            let pose =
-                Pose { position: Vector3::zeros(), world_from_body: UnitQuaternion::identity(), covariance: None };
-            drive
-                .events
-                .push((time, Event::Wheels(Odometry { pose, twist: Twist { linear, angular, covariance } })));
+            drive.events.push((time, Event::Wheels(Twist { linear, angular, covariance })));
         }
-        if millis % 200 == 0 && !drive.outage.contains(&time_s) {
+        if millis.is_multiple_of(200) && !drive.outage.contains(&time_s) {
             let antenna = now.position + now.world_from_base() * ANTENNA + FIX * noise.vector();
             drive.events.push((time, fix(&frame, &antenna, &Vector3::repeat(FIX))));
         }
-        if millis % 10 == 0 {
+        if millis.is_multiple_of(10) {
             // The means over the interval that ends now.
             let turning = Vector3::z() * ((now.heading - before.heading) * 100.0);
             let change = now.velocity(time_s, &IMU) - before.velocity(time_s - 0.01, &IMU);

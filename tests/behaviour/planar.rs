@@ -98,7 +98,7 @@ fn drive(failures: &Failures, seconds: f64) -> Result<Seen, StartError> {
         let Truth { position, heading, speed, rate, acceleration } = truth(now);
         let world_from_base = UnitQuaternion::from_euler_angles(0.0, 0.0, heading);
         let up = Vector3::z();
-        if millis % 50 == 0 {
+        if millis.is_multiple_of(50) {
             let spin = if failures.spinning_wheels.contains(&now) { 3.0 } else { 0.0 };
             let at_axle = Vector3::new(speed + spin, 0.0, 0.0) + (up * rate).cross(&AXLE);
             let linear = wheels_from_base * at_axle * (1.0 + SCALE) + 0.05 * noise.vector();
@@ -108,13 +108,13 @@ fn drive(failures: &Failures, seconds: f64) -> Result<Seen, StartError> {
             let twist = Twist { linear, angular, covariance: Some(covariance) };
             simulation.publish(cart::sensor::base::axle::wheels::odometry, time, Odometry { pose, twist });
         }
-        if failures.compass && millis % 100 == 0 {
+        if failures.compass && millis.is_multiple_of(100) {
             let off = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.05 * noise.next());
             let covariance = Some(Matrix3::identity() * 0.0025);
             let orientation = Orientation { world_from_body: world_from_base * off, covariance };
             simulation.publish(cart::sensor::base::compass, time, orientation);
         }
-        if millis % 200 == 0 && !failures.no_fixes.contains(&now) {
+        if millis.is_multiple_of(200) && !failures.no_fixes.contains(&now) {
             let off = if failures.wrong_fixes.contains(&now) { 80.0 } else { 0.0 };
             let antenna = position + world_from_base * ANTENNA;
             let measured = antenna + 0.5 * noise.vector() + Vector3::new(off, 0.0, 0.0);
@@ -338,7 +338,7 @@ fn without_satellites_the_world_begins_at_the_start() -> Result<(), StartError> 
     for millis in (0..40_000_u64).step_by(10) {
         let (now, time) = (millis as f64 * 1e-3, MonotonicTime::ZERO + Duration::from_millis(millis));
         let Truth { speed, rate, .. } = truth(now);
-        if millis % 50 == 0 {
+        if millis.is_multiple_of(50) {
             let pose =
                 Pose { position: Vector3::zeros(), world_from_body: UnitQuaternion::identity(), covariance: None };
             let (linear, angular) = (Vector3::new(speed, 0.0, 0.0), Vector3::new(0.0, 0.0, rate));

@@ -127,7 +127,7 @@ impl Sensors {
         let Truth { position, heading, speed, rate, .. } = truth(now);
         let world_from_base = UnitQuaternion::from_euler_angles(0.0, 0.0, heading);
         let noise = &mut self.noise;
-        if millis % 60 == 0 && !fails(NoWheels, now) {
+        if millis.is_multiple_of(60) && !fails(NoWheels, now) {
             let spin = if fails(SpinningWheels, now) { 3.0 } else { 0.0 };
             let linear = Vector3::x() * ((speed + spin) * (1.0 + WHEEL_SCALE)) + 0.05 * noise.vector();
             let covariance = Some(Matrix6::from_diagonal_element(0.0025));
@@ -135,7 +135,7 @@ impl Sensors {
             let twist = Twist { linear, angular: Vector3::z() * rate, covariance };
             simulation.publish(ranger::sensor::base::wheels, time, Odometry { pose, twist });
         }
-        if millis % 100 == 0 {
+        if millis.is_multiple_of(100) {
             let turned = if fails(Magnet, now) { 1.0 } else { 0.0 };
             let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, turned);
             let field = turn * (world_from_base.inverse() * Vector3::new(0.0, 20e-6, -40e-6));
@@ -146,10 +146,10 @@ impl Sensors {
             let (fluid_pressure, variance) = (pressure + wind + 4.0 * noise.next(), Some(16.0));
             simulation.publish(ranger::sensor::base::barometer, time, FluidPressure { fluid_pressure, variance });
         }
-        if millis % 200 == 0 {
+        if millis.is_multiple_of(200) {
             self.look(simulation, time, now);
         }
-        if millis % 200 == 0 && !fails(NoFixes, now) {
+        if millis.is_multiple_of(200) && !fails(NoFixes, now) {
             let off = if fails(WrongFixes, now) { 80.0 } else { 0.0 };
             let antenna = position + world_from_base * ANTENNA;
             let measured = antenna + 0.5 * self.noise.vector() + Vector3::new(off, 0.0, 0.0);
@@ -209,8 +209,10 @@ struct Seen {
     status: NavigationStatus,
 }
 
-/// The table, and what was seen, by the tenth of a second.
-fn drive() -> Result<(String, Vec<(f64, Seen)>), Box<dyn std::error::Error>> {
+/// The table, and what was seen, every tenth of a second.
+type Driven = (String, Vec<(f64, Seen)>);
+
+fn drive() -> Result<Driven, Box<dyn std::error::Error>> {
     let builder = Ranger::builder();
     let odometry = builder.subscribe_with(ranger::estimator::base::navigation::odometry, Overflow::KeepLatest);
     let status = builder.subscribe_with(ranger::estimator::base::navigation::status, Overflow::KeepLatest);
