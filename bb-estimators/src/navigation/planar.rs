@@ -27,7 +27,7 @@
 //!
 //! let mut filter = PlanarEkf::new(PlanarParams::default())?;
 //! let (mut wheels, mut gnss) = (Stream::default(), Stream::default());
-//! filter.start(&PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.0, 0.1), (Vector2::zeros(), 0.1)))?;
+//! filter.start(&PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.0, 0.1), (Vector2::new(1.0, 0.0), 0.1)))?;
 //! for i in 1..=500 {
 //!     // Of a sample, the rotation about z counts.
 //!     let (angular_velocity, specific_force) = (Vector3::zeros(), Vector3::zeros());
