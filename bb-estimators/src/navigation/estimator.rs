@@ -8,6 +8,7 @@ mod height;
 mod input;
 mod options;
 mod output;
+mod running;
 mod states;
 pub(super) mod world;
 
@@ -16,27 +17,14 @@ pub use options::NavigationOptions;
 pub use output::{NavigationOutput, NavigationOutputs, NavigationStatus, Verdicts};
 
 use self::aligning::Aligning;
-use self::filter::{Filter, Measured};
-use self::health::{Limits, Watch};
-use self::height::Heights;
+use self::health::Limits;
 use self::input::Mounting;
-use self::world::World;
-use super::eskf::{ImuMean, NAVIGATION, Navigation, Optional, Refusal, States, offset};
-use super::history::History;
+use self::running::Core;
+use super::eskf::{NAVIGATION, Navigation, Refusal, States};
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
 use bb_core::{Context, Estimator, Fault, Reply};
 use std::marker::PhantomData;
-
-/// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
-const SAMPLES: usize = 512;
-const MEASUREMENTS: usize = 128;
-/// Each is a filter with all its states: more would be many hundred kilobytes.
-const STATES: usize = 8;
-type Past<S, const N: usize> = History<Filter<S, N>, SAMPLES, MEASUREMENTS, STATES>;
-
-/// How far ahead of the IMU a measurement may be stamped, ns.
-const LONGEST_LEAD_NS: i64 = 500_000_000;
 
 /// Position, velocity and attitude of the link where it is declared, from an IMU and any of satellite navigation, wheels or
 /// another odometry, poses in the world or relative to each other, a magnetometer and a barometer. It emits [`Odometry`] with every
@@ -167,22 +155,14 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 pub struct EskfEstimator<O = Odometry, S: States = Navigation, const N: usize = NAVIGATION> {
     options: NavigationOptions,
     mounting: Mounting,
-    phase: Phase<S, N>,
-    output: PhantomData<fn() -> O>,
+    phase: Phase,
+    types: PhantomData<fn(S) -> O>,
 }
 
 #[derive(Debug)]
-enum Phase<S: States, const N: usize> {
+enum Phase {
     Aligning(Box<Aligning>),
-    Running(Box<Running<S, N>>),
-}
-
-#[derive(Debug)]
-struct Running<S: States, const N: usize> {
-    past: Past<S, N>,
-    world: World,
-    heights: Heights,
-    watch: Watch,
+    Running(Box<dyn Core>),
 }
 
 impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator for EskfEstimator<O, S, N> {
@@ -201,7 +181,7 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
         let mounting = Mounting::of(context)?;
         states::check::<S>(&mounting)?;
         let phase = Phase::Aligning(Box::new(Aligning::new(&options, None)));
-        Ok(Self { options, mounting, phase, output: PhantomData })
+        Ok(Self { options, mounting, phase, types: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
@@ -215,20 +195,22 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
                     Reply::none()
                 };
                 if let Some((start, world)) = start {
-                    let filter = Filter::new(&self.options, &start)?;
-                    let past =
-                        Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
-                    let watch = Watch::new(self.limits());
-                    self.phase =
-                        Phase::Running(Box::new(Running { past, world, heights: Heights::default(), watch }));
+                    let limits = self.limits();
+                    self.phase = Phase::Running(running::started::<S, N>(&self.options, &start, world, limits)?);
                 }
                 Ok(reply)
             }
             Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
-                Ok(()) => Ok(running.reply(&self.mounting)),
+                Ok(()) => {
+                    let reply: Reply<O> = O::of(running.as_ref(), &self.mounting).into();
+                    Ok(match running.divergence() {
+                        Some(reason) => reply.diverged(reason),
+                        None => reply,
+                    })
+                }
                 Err(Refusal::Gap { .. }) => {
                     tracing::info!("no sample for too long: it starts again");
-                    let frame = running.world.first();
+                    let frame = running.frame();
                     self.phase = Phase::Aligning(Box::new(Aligning::new(&self.options, frame)));
                     Ok(Reply::none().diverged("no sample of the IMU for too long"))
                 }
@@ -247,77 +229,6 @@ impl<O, S: States, const N: usize> EskfEstimator<O, S, N> {
         Limits {
             dead_reckoning_s: self.mounting.has_positions().then_some(longest_s),
             deviation: self.options.largest_deviation,
-        }
-    }
-}
-
-impl<S: States, const N: usize> Running<S, N> {
-    fn take(
-        &mut self,
-        sample: &ImuMean,
-        inputs: &NavigationInputs<'_>,
-        options: &NavigationOptions,
-        mounting: &Mounting,
-    ) -> Result<(), Refusal> {
-        self.past.propagate(sample)?;
-        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
-            && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
-        {
-            self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
-        }
-        if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
-            let time_ns = odometry.monotonic_time.as_nanos();
-            if offset::<S>(Optional::WheelScale).is_some() {
-                let (speed, sideways) = mounting.wheels(&odometry.payload, options);
-                self.fuse(time_ns, Measured::Wheels(speed));
-                self.fuse(time_ns, Measured::Sideways(sideways));
-            } else {
-                self.fuse(time_ns, Measured::Odometry(mounting.velocity(&odometry.payload, options)));
-            }
-        }
-        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
-            let measured = self.world.pose(&pose.payload, options, mounting);
-            self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
-        }
-        if let Some(relative) = inputs.relative.filter(|relative| relative.is_new()) {
-            let end_ns = relative.end.as_nanos();
-            let measured = mounting.relative_pose(&relative.payload, options);
-            self.fuse(end_ns, Measured::Relative(measured, end_ns));
-        }
-        if let Some(field) = inputs.magnetic_field.filter(|field| field.is_new()) {
-            let measured = mounting.magnetic_heading(&field.payload, options);
-            self.fuse(field.monotonic_time.as_nanos(), Measured::MagneticField(measured));
-        }
-        if let Some(pressure) = inputs.pressure.filter(|pressure| pressure.is_new())
-            && let Some(at) = self.past.now().estimate()
-        {
-            let drop = self.world.drop(&at.position);
-            if let Some(height) = self.heights.of_pressure(&pressure.payload, at, drop, options, mounting) {
-                self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
-            }
-        }
-        if let Some(new_from_old) = self.past.now().position().and_then(|position| self.world.moves_on(&position)) {
-            // What is in the history belongs to the world that is left.
-            let mut filter = self.past.now().clone();
-            filter.move_world(&new_from_old)?;
-            self.past = Past::new(filter, LONGEST_LEAD_NS)?;
-        }
-        Ok(())
-    }
-
-    fn fuse(&mut self, time_ns: i64, measured: Measured) {
-        if let Err(refusal) = self.past.update(time_ns, &measured) {
-            tracing::debug!(%refusal, sensor = measured.name(), "measurement refused");
-        }
-    }
-
-    fn reply<O: NavigationOutput>(&mut self, mounting: &Mounting) -> Reply<O> {
-        let filter = self.past.now();
-        let reply: Reply<O> = O::of(filter, &self.world, mounting).into();
-        let counts = filter.counts();
-        match filter.sight(&counts).and_then(|sight| self.watch.look(&sight)) {
-            Some(reason) => reply.diverged(reason),
-            None => reply,
         }
     }
 }

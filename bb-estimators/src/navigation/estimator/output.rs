@@ -2,6 +2,7 @@
 
 use super::filter::Filter;
 use super::input::Mounting;
+use super::running::Core;
 use super::world::World;
 use crate::navigation::eskf::{GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::math::skew;
@@ -20,7 +21,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 pub trait NavigationOutput: Outputs + Sized {
     /// What there is to emit.
     #[doc(hidden)]
-    fn of<S: States, const N: usize>(filter: &Filter<S, N>, world: &World, mounting: &Mounting) -> Option<Self>;
+    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self>;
 }
 
 /// What the filter knows beside the odometry.
@@ -94,83 +95,96 @@ pub struct NavigationOutputs {
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for Odometry {
-    fn of<S: States, const N: usize>(filter: &Filter<S, N>, world: &World, mounting: &Mounting) -> Option<Self> {
-        let estimate = filter.estimate()?;
-        let covariance = filter.eskf().covariance();
-        let block = |row: usize, column: usize| covariance.fixed_view::<3, 3>(row, column).into_owned();
-        let rotation = estimate.rotation();
-        let link = mounting.link();
-        let arm = rotation * link;
-        // The link's origin: errors of the body's, and of where the rotation takes it, θ × R l.
-        let from_rotation = -skew(&arm);
-        let position = block(POSITION, POSITION)
-            + block(POSITION, ROTATION) * from_rotation.transpose()
-            + from_rotation * block(ROTATION, POSITION)
-            + from_rotation * block(ROTATION, ROTATION) * from_rotation.transpose();
-        let position_rotation = block(POSITION, ROTATION) + from_rotation * block(ROTATION, ROTATION);
-        let first_from_frame = world.first_from_frame();
-        let turned = first_from_frame.rotation.to_rotation_matrix().into_inner();
-        // Rotations of the body, as a pose has them.
-        let to_body = rotation.transpose();
-        let pose = Pose {
-            position: first_from_frame.transform_point(&(estimate.position + arm).into()).coords,
-            world_from_body: first_from_frame.rotation * estimate.world_from_body,
-            covariance: Some(symmetric(
-                turned * position * turned.transpose(),
-                turned * position_rotation * to_body.transpose(),
-                to_body * block(ROTATION, ROTATION) * to_body.transpose(),
-            )),
-        };
-        // Rᵀ v + ω × l: errors of v, of R by Rᵀ [v]ₓ, and of the gyroscope's bias by [l]ₓ.
-        let of_rotation = to_body * skew(&estimate.velocity);
-        let of_bias = skew(&link);
-        let linear = to_body * block(VELOCITY, VELOCITY) * to_body.transpose()
-            + to_body * block(VELOCITY, ROTATION) * of_rotation.transpose()
-            + of_rotation * block(ROTATION, VELOCITY) * to_body.transpose()
-            + of_rotation * block(ROTATION, ROTATION) * of_rotation.transpose()
-            + to_body * block(VELOCITY, GYROSCOPE_BIAS) * of_bias.transpose()
-            + of_bias * block(GYROSCOPE_BIAS, VELOCITY) * to_body.transpose()
-            + of_rotation * block(ROTATION, GYROSCOPE_BIAS) * of_bias.transpose()
-            + of_bias * block(GYROSCOPE_BIAS, ROTATION) * of_rotation.transpose()
-            + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS) * of_bias.transpose();
-        let linear_angular = -(to_body * block(VELOCITY, GYROSCOPE_BIAS)
-            + of_rotation * block(ROTATION, GYROSCOPE_BIAS)
-            + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS));
-        let twist = Twist {
-            linear: to_body * estimate.velocity + estimate.angular_velocity.cross(&link),
-            angular: estimate.angular_velocity,
-            covariance: Some(symmetric(linear, linear_angular, block(GYROSCOPE_BIAS, GYROSCOPE_BIAS))),
-        };
-        Some(Self { pose, twist })
+    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self> {
+        core.odometry(mounting)
     }
 }
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for NavigationOutputs {
-    fn of<S: States, const N: usize>(filter: &Filter<S, N>, world: &World, mounting: &Mounting) -> Option<Self> {
-        let estimate = filter.estimate()?;
-        let [gnss, odometry, _, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
-        let status = NavigationStatus {
-            accelerometer_bias: estimate.accelerometer_bias,
-            gyroscope_bias: estimate.gyroscope_bias,
-            dead_reckoning_s: filter.eskf().dead_reckoning_s(),
-            horizontal_deviation: filter.horizontal_deviation(),
-            gnss,
-            odometry,
-            pose,
-            relative,
-            magnetic_field,
-            pressure,
-            wheel_scale: estimate.scalar::<S>(Optional::WheelScale),
-            relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
-            gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),
-            gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),
-            hard_iron: estimate.vector::<S>(Optional::HardIron),
-            barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
-            gaps: filter.eskf().gaps(),
-        };
-        Some(Self { odometry: Some(Odometry::of(filter, world, mounting)?), status: Some(status) })
+    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self> {
+        Some(Self { odometry: Some(core.odometry(mounting)?), status: Some(core.status()?) })
     }
+}
+
+/// Pose and motion of the link.
+pub(super) fn odometry_of<S: States, const N: usize>(
+    filter: &Filter<S, N>,
+    world: &World,
+    mounting: &Mounting,
+) -> Option<Odometry> {
+    let estimate = filter.estimate()?;
+    let covariance = filter.eskf().covariance();
+    let block = |row: usize, column: usize| covariance.fixed_view::<3, 3>(row, column).into_owned();
+    let rotation = estimate.rotation();
+    let link = mounting.link();
+    let arm = rotation * link;
+    // The link's origin: errors of the body's, and of where the rotation takes it, θ × R l.
+    let from_rotation = -skew(&arm);
+    let position = block(POSITION, POSITION)
+        + block(POSITION, ROTATION) * from_rotation.transpose()
+        + from_rotation * block(ROTATION, POSITION)
+        + from_rotation * block(ROTATION, ROTATION) * from_rotation.transpose();
+    let position_rotation = block(POSITION, ROTATION) + from_rotation * block(ROTATION, ROTATION);
+    let first_from_frame = world.first_from_frame();
+    let turned = first_from_frame.rotation.to_rotation_matrix().into_inner();
+    // Rotations of the body, as a pose has them.
+    let to_body = rotation.transpose();
+    let pose = Pose {
+        position: first_from_frame.transform_point(&(estimate.position + arm).into()).coords,
+        world_from_body: first_from_frame.rotation * estimate.world_from_body,
+        covariance: Some(symmetric(
+            turned * position * turned.transpose(),
+            turned * position_rotation * to_body.transpose(),
+            to_body * block(ROTATION, ROTATION) * to_body.transpose(),
+        )),
+    };
+    // Rᵀ v + ω × l: errors of v, of R by Rᵀ [v]ₓ, and of the gyroscope's bias by [l]ₓ.
+    let of_rotation = to_body * skew(&estimate.velocity);
+    let of_bias = skew(&link);
+    let linear = to_body * block(VELOCITY, VELOCITY) * to_body.transpose()
+        + to_body * block(VELOCITY, ROTATION) * of_rotation.transpose()
+        + of_rotation * block(ROTATION, VELOCITY) * to_body.transpose()
+        + of_rotation * block(ROTATION, ROTATION) * of_rotation.transpose()
+        + to_body * block(VELOCITY, GYROSCOPE_BIAS) * of_bias.transpose()
+        + of_bias * block(GYROSCOPE_BIAS, VELOCITY) * to_body.transpose()
+        + of_rotation * block(ROTATION, GYROSCOPE_BIAS) * of_bias.transpose()
+        + of_bias * block(GYROSCOPE_BIAS, ROTATION) * of_rotation.transpose()
+        + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS) * of_bias.transpose();
+    let linear_angular = -(to_body * block(VELOCITY, GYROSCOPE_BIAS)
+        + of_rotation * block(ROTATION, GYROSCOPE_BIAS)
+        + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS));
+    let twist = Twist {
+        linear: to_body * estimate.velocity + estimate.angular_velocity.cross(&link),
+        angular: estimate.angular_velocity,
+        covariance: Some(symmetric(linear, linear_angular, block(GYROSCOPE_BIAS, GYROSCOPE_BIAS))),
+    };
+    Some(Odometry { pose, twist })
+}
+
+/// What else the filter knows.
+pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Option<NavigationStatus> {
+    let estimate = filter.estimate()?;
+    let [gnss, odometry, _, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
+    Some(NavigationStatus {
+        accelerometer_bias: estimate.accelerometer_bias,
+        gyroscope_bias: estimate.gyroscope_bias,
+        dead_reckoning_s: filter.eskf().dead_reckoning_s(),
+        horizontal_deviation: filter.horizontal_deviation(),
+        gnss,
+        odometry,
+        pose,
+        relative,
+        magnetic_field,
+        pressure,
+        wheel_scale: estimate.scalar::<S>(Optional::WheelScale),
+        relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
+        gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),
+        gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),
+        hard_iron: estimate.vector::<S>(Optional::HardIron),
+        barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
+        gaps: filter.eskf().gaps(),
+    })
 }
 
 /// The matrix of these blocks and the transpose of the second, symmetric to the last bit.
