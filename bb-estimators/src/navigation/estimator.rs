@@ -8,13 +8,15 @@ mod height;
 mod input;
 mod options;
 mod output;
+mod report;
 mod running;
 mod states;
 pub(super) mod world;
 
 pub use input::NavigationInputs;
 pub use options::NavigationOptions;
-pub use output::{NavigationOutput, NavigationOutputs, NavigationStatus, Verdicts};
+pub use output::{NavigationOutput, NavigationOutputs};
+pub use report::{NavigationStatus, Verdicts};
 
 use self::aligning::Aligning;
 use self::health::Limits;

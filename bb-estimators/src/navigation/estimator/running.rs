@@ -5,7 +5,7 @@ use super::health::{Limits, Watch};
 use super::height::Heights;
 use super::input::{Mounting, NavigationInputs};
 use super::options::NavigationOptions;
-use super::output::{NavigationStatus, odometry_of, status_of};
+use super::report::{NavigationStatus, odometry_of, status_of};
 use super::world::World;
 use crate::navigation::eskf::{ImuMean, NAVIGATION, Navigation, Optional, Refusal, Start, States, Wheeled, offset};
 use crate::navigation::geodesy::LocalFrame;
