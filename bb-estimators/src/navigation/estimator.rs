@@ -57,8 +57,8 @@ use std::marker::PhantomData;
 /// ```
 ///
 /// `S` are its optional [states](States), and `N` is [`States::DIMENSION`]. Inputs and states that belong together are declared
-/// together: without [`Optional::Keyframe`] there are no relative poses, without [`Optional::BarometerBias`] no pressures, and a state
-/// needs the input that tells it. With [`Optional::WheelScale`], wheels are taken not to move sideways.
+/// together: without `Optional::Keyframe` there are no relative poses, without `Optional::BarometerBias` no pressures, and a state
+/// needs the input that tells it. With `Optional::WheelScale`, wheels are taken not to move sideways.
 ///
 /// ```
 /// # fn main() {}
