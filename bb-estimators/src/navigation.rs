@@ -11,17 +11,20 @@
 //! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
 //! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
 //! counts and statistics. [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several
-//! filters and finds which fits; [`Navigator`] is one that is ready for use. `FixedLagSmoother`, with the feature `smoother`,
+//! filters and finds which fits; [`Navigator`] is one that is ready for use. [`planar`] has the filter of a robot that drives on
+//! a plane. `FixedLagSmoother`, with the feature `smoother`,
 //! holds the last keyframes and corrects them in hindsight.
 
 mod alignment;
 mod bank;
 pub mod chi_square;
 mod consistency;
+mod covariance;
 pub mod eskf;
 #[cfg(feature = "runtime")]
 mod estimator;
 mod fused;
+mod fusion;
 mod geodesy;
 mod history;
 mod math;
@@ -29,6 +32,7 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
+pub mod planar;
 mod refusal;
 #[cfg(feature = "smoother")]
 pub mod smoother;
@@ -60,6 +64,6 @@ pub use smoother::{
 };
 pub use state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
-    States, VELOCITY, offset,
+    States, VELOCITY, Wheeled, offset,
 };
 pub use stream::{Counts, Stream, StreamParams};

@@ -17,7 +17,6 @@
 //! the last bit. The noise of a scalar is taken as at least 1e-10 of its predicted variance, which bounds what rounding
 //! can do; a Cholesky decomposition every 1024 updates checks it, and [`Eskf::repairs`] counts what it found.
 
-mod covariance;
 mod filter;
 mod params;
 mod propagation;
@@ -25,7 +24,6 @@ mod propagation;
 mod tests;
 
 pub use filter::{Eskf, ImuMean, Start};
-#[cfg(feature = "smoother")]
 pub(super) use filter::{LONGEST_GAP_S, seconds_between};
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;

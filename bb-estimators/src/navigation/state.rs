@@ -7,5 +7,5 @@ pub use estimate::{Estimate, Keyframe};
 pub(super) use states::distinct;
 pub use states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
-    offset,
+    Wheeled, offset,
 };

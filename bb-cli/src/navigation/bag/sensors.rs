@@ -64,19 +64,20 @@ impl NavigationBag {
         let (camera, map) = (imu_from(&topics.relative)?, imu_from(&topics.pose)?);
         let (start, truth) = (imu_from(&topics.start)?, imu_from(&topics.truth)?);
         let frame = self.world(notes);
-        let fix = |fix| GnssPosition::of_fix(fix, frame.as_ref()?, antenna.translation.vector, options);
+        let fix =
+            |fix| GnssPosition::of_fix(fix, frame.as_ref()?, antenna.translation.vector, options.gnss_deviation);
         let fixes: Vec<_> = messages.gnss.iter().filter_map(|(time, of)| Some((*time, fix(of)?))).collect();
         let without = messages.gnss.len() - fixes.len();
         if without > 0 {
             notes.push(format!("{without} of {} fixes have no position", messages.gnss.len()));
         }
-        let velocity = |of: &Odometry| BodyVelocity::of_odometry(of, &wheels, options);
-        let pose = |of: &_| AbsolutePose::of_pose(of, &map, options);
+        let velocity = |of: &Odometry| BodyVelocity::of_odometry(of, &wheels, options.odometry_deviation);
+        let pose = |of: &_| AbsolutePose::of_pose(of, &map, options.pose_deviation);
         let start = messages.start.as_ref().map(|(time, of, twist)| {
-            let pose = AbsolutePose::of_pose(of, &start, options);
+            let pose = AbsolutePose::of_pose(of, &start, options.pose_deviation);
             let velocity = twist.map(|twist| {
                 let twist = Odometry { pose: *of, twist };
-                let measured = BodyVelocity::of_odometry(&twist, &start, options);
+                let measured = BodyVelocity::of_odometry(&twist, &start, options.odometry_deviation);
                 let swing = twist.twist.angular.cross(&start.inverse().translation.vector);
                 (of.world_from_body * (measured.velocity + swing), measured.deviation)
             });

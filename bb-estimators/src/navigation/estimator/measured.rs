@@ -1,6 +1,5 @@
 //! Payloads as measurements, with where their sensor is in the body.
 
-use super::options::NavigationOptions;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::skew;
 use crate::navigation::measurement::{AbsolutePose, BodyVelocity, GnssPosition, isotropic};
@@ -20,16 +19,11 @@ impl Geodetic {
 }
 
 impl GnssPosition {
-    /// A fix in a frame, of an antenna at `lever_arm` in the body (m), with the noise of the options if it tells none; none if it
-    /// has no position.
-    pub fn of_fix(
-        fix: &GnssFix,
-        frame: &LocalFrame,
-        lever_arm: Vector3<f64>,
-        options: &NavigationOptions,
-    ) -> Option<Self> {
+    /// A fix in a frame, of an antenna at `lever_arm` in the body (m), none if it has no position. `deviation` is that of a fix that tells none,
+    /// horizontal, m; vertical it is twice as much.
+    pub fn of_fix(fix: &GnssFix, frame: &LocalFrame, lever_arm: Vector3<f64>, deviation: f64) -> Option<Self> {
         let geodetic = Geodetic::of_fix(fix, frame.origin().height)?;
-        let deviations = Vector3::new(1.0, 1.0, 2.0) * options.gnss_deviation;
+        let deviations = Vector3::new(1.0, 1.0, 2.0) * deviation;
         let unknown = || Matrix3::from_diagonal(&deviations.component_mul(&deviations));
         let mut covariance = fix.position_covariance.unwrap_or_else(unknown);
         if fix.position.is_some_and(|position| position.altitude.is_none()) {
@@ -40,16 +34,12 @@ impl GnssPosition {
 }
 
 impl BodyVelocity {
-    /// The velocity that an odometry has counted in its own frame, with the noise of the options if it tells none.
-    pub fn of_odometry(
-        odometry: &Odometry,
-        body_from_sensor: &Isometry3<f64>,
-        options: &NavigationOptions,
-    ) -> Self {
+    /// The velocity that an odometry has counted in its own frame. `deviation` is that of one that tells none, m/s.
+    pub fn of_odometry(odometry: &Odometry, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
         // One number stands for all axes: the mean of their variances.
         let covariance = odometry.twist.covariance;
         let variance = covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).trace() / 3.0);
-        let deviation = variance.filter(|variance| *variance > 0.0).map_or(options.odometry_deviation, f64::sqrt);
+        let deviation = variance.filter(|variance| *variance > 0.0).map_or(deviation, f64::sqrt);
         Self {
             velocity: odometry.twist.linear,
             deviation,
@@ -60,8 +50,9 @@ impl BodyVelocity {
 }
 
 impl AbsolutePose {
-    /// The pose of the body, from that of a sensor in it, with the noise of the options if it tells none.
-    pub fn of_pose(pose: &Pose, body_from_sensor: &Isometry3<f64>, options: &NavigationOptions) -> Self {
+    /// The pose of the body, from that of a sensor in it. `deviation` is that of the position of one that tells none, m; of its
+    /// orientation it is a tenth, in rad.
+    pub fn of_pose(pose: &Pose, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
         let world_from_body = pose.world_from_body * body_from_sensor.rotation.inverse();
         let arm = world_from_body * body_from_sensor.translation.vector;
         let (position, rotation) = match pose.covariance {
@@ -71,7 +62,7 @@ impl AbsolutePose {
                 let of_sensor = pose.world_from_body.to_rotation_matrix().into_inner();
                 (block(0), of_sensor * block(3) * of_sensor.transpose())
             }
-            None => (isotropic(options.pose_deviation), isotropic(0.1 * options.pose_deviation)),
+            None => (isotropic(deviation), isotropic(0.1 * deviation)),
         };
         Self {
             position: pose.position - arm,

@@ -17,12 +17,19 @@ const FARTHEST: f64 = 5000.0;
 pub(super) struct World {
     /// On the Earth; none without satellites.
     frame: Option<LocalFrame>,
+    /// Where it was at the start.
+    first: Option<LocalFrame>,
     first_from_frame: Isometry3<f64>,
 }
 
 impl World {
     pub(super) fn new(frame: Option<LocalFrame>) -> Self {
-        Self { frame, first_from_frame: Isometry3::identity() }
+        Self { frame, first: frame, first_from_frame: Isometry3::identity() }
+    }
+
+    /// The frame that outputs are in.
+    pub(super) fn first(&self) -> Option<LocalFrame> {
+        self.first
     }
 
     /// Takes coordinates of the filter's world to the one that outputs are in.
@@ -37,12 +44,19 @@ impl World {
         options: &NavigationOptions,
         mounting: &Mounting,
     ) -> Option<GnssPosition> {
-        GnssPosition::of_fix(fix, &self.frame?, mounting.antenna(), options)
+        GnssPosition::of_fix(fix, &self.frame?, mounting.antenna(), options.gnss_deviation)
     }
 
     /// A pose in the outputs' world as a measurement.
     pub(super) fn pose(&self, pose: &Pose, options: &NavigationOptions, mounting: &Mounting) -> AbsolutePose {
-        AbsolutePose::of_pose(pose, &mounting.pose(), options).moved(&self.first_from_frame.inverse())
+        let body_from_sensor = mounting.pose.unwrap_or_else(Isometry3::identity);
+        AbsolutePose::of_pose(pose, &body_from_sensor, options.pose_deviation)
+            .moved(&self.first_from_frame.inverse())
+    }
+
+    /// How far the world's z is below the height above the ellipsoid that it began at, at `position`, m: its plane is no sphere.
+    pub(super) fn drop(&self, position: &Vector3<f64>) -> f64 {
+        self.frame.map_or(0.0, |frame| frame.geodetic(position).height - frame.origin().height - position.z)
     }
 
     /// The filter is at `position`: if that is far out, its world moves on, and what takes coordinates there is returned.

@@ -84,6 +84,14 @@ impl States for Navigation {
     const OPTIONAL: &'static [Optional] = &[];
 }
 
+/// Navigation states and the scale of wheels, which depends on the pressure of the tyres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wheeled;
+
+impl States for Wheeled {
+    const OPTIONAL: &'static [Optional] = &[Optional::WheelScale];
+}
+
 /// Where the errors of an optional state begin, if the filter estimates it.
 pub const fn offset<S: States>(state: Optional) -> Option<usize> {
     let mut index = NAVIGATION;

@@ -3,10 +3,10 @@
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
-use super::super::covariance::Covariance;
 use super::super::params::ImuDensities;
 use super::super::propagation::Transition;
 use super::{ALL, All, estimate};
+use crate::navigation::covariance::Covariance;
 use crate::navigation::math::rotation_vector;
 use crate::navigation::state::{ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 
