@@ -4,6 +4,7 @@ mod bag;
 mod command;
 mod csv;
 mod data;
+mod errors;
 mod evaluate;
 mod filters;
 mod measured;

@@ -1,7 +1,7 @@
 //! What happens while a data set is played, for a plot.
 
 use super::data::{DataSet, Keyframe, Truth};
-use super::evaluate::Errors;
+use super::errors::Errors;
 use super::measured::{Answers, Sensor};
 use super::player::Known;
 use bb_core::nalgebra::Vector3;
