@@ -15,6 +15,7 @@
 //!
 //! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry` and `input pose` | `Odometry` of the link |
 //! | `Eskf<NavigationOutputs>(…)` | as before | `output odometry`, and `output status`: biases, dead reckoning, refusals |
+//! | `StateEstimator(…)` on a link | `input imu`, driver, and any of `input vio`, `anchor`, `gnss` and `gps_health` | `output estimate`, `output health` and `output events` |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
@@ -22,7 +23,7 @@
 // What a sensor gives never panics; a test may.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-#[cfg(feature = "smoother")]
+#[cfg(any(feature = "smoother", feature = "eskf"))]
 extern crate alloc;
 
 pub mod attitude;
@@ -47,6 +48,10 @@ pub use simulation::SimulatedImu;
 /// The error-state Kalman filter of position, velocity and attitude as an estimator.
 #[cfg(feature = "runtime")]
 pub type Eskf<O = Odometry> = navigation::EskfEstimator<O>;
+
+/// The estimator of a flight without satellite navigation.
+#[cfg(all(feature = "runtime", any(feature = "smoother", feature = "eskf")))]
+pub type StateEstimator = navigation::state_estimator::FlightEstimator;
 
 /// The estimator of each attitude filter.
 #[cfg(feature = "runtime")]

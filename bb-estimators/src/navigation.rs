@@ -28,8 +28,10 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
-#[cfg(feature = "smoother")]
+#[cfg(any(feature = "smoother", feature = "eskf"))]
 pub mod smoother;
+#[cfg(any(feature = "smoother", feature = "eskf"))]
+pub mod state_estimator;
 mod stream;
 
 pub use alignment::{Alignment, AlignmentParams};
@@ -52,8 +54,8 @@ pub use measurement::{
     ZeroVelocity,
 };
 pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
+#[cfg(any(feature = "smoother", feature = "eskf"))]
+pub use smoother::{Factor, Kernel, NavigationFactor, Rows};
 #[cfg(feature = "smoother")]
-pub use smoother::{
-    Factor, FixedLagSmoother, Kernel, NavigationFactor, Preintegration, Rows, SmootherParams, Updated,
-};
+pub use smoother::{FixedLagSmoother, Preintegration, SmootherParams, Updated};
 pub use stream::{Counts, Fused, Stream, StreamParams};

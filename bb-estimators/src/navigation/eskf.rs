@@ -28,9 +28,11 @@ mod states;
 mod tests;
 
 pub use estimate::{Estimate, Keyframe};
-pub use filter::{Eskf, ImuMean, Start};
+#[cfg(any(feature = "smoother", feature = "eskf"))]
+pub(super) use filter::LONGEST_GAP_S;
 #[cfg(feature = "smoother")]
-pub(super) use filter::{LONGEST_GAP_S, seconds_between};
+pub(super) use filter::seconds_between;
+pub use filter::{Eskf, ImuMean, Start};
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};
