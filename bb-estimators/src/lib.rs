@@ -18,6 +18,7 @@
 //! | `WheeledEskf(…)`, `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, and `input relative` and `input pressure` for [states](navigation::States) `S` that have them | as before |
 //! | `PlanarEkf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input orientation` | `Odometry` of the link, on a plane |
 //! | `PlanarEkf<PlanarOutputs>(…)` | as before | `output odometry`, and `output status`: bias, scale of the wheels, refusals |
+//! | `StateEstimator(…)` on a link | `input imu`, driver, and any of `input vio`, `anchor`, `gnss` and `gps_health` | `output estimate`, `output health` and `output events` |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
@@ -25,7 +26,7 @@
 // What a sensor gives never panics; a test may.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-#[cfg(feature = "smoother")]
+#[cfg(any(feature = "smoother", feature = "eskf"))]
 extern crate alloc;
 
 pub mod attitude;
@@ -62,6 +63,10 @@ pub type WheeledEskf<O = Odometry> =
 /// The filter of a robot that drives on a plane as an estimator.
 #[cfg(feature = "runtime")]
 pub type PlanarEkf<O = Odometry> = navigation::planar::PlanarEstimator<O>;
+
+/// The estimator of a flight without satellite navigation.
+#[cfg(all(feature = "runtime", any(feature = "smoother", feature = "eskf")))]
+pub type StateEstimator = navigation::state_estimator::FlightEstimator;
 
 /// The estimator of each attitude filter.
 #[cfg(feature = "runtime")]

@@ -34,9 +34,11 @@ mod navigator;
 mod noise;
 pub mod planar;
 mod refusal;
-#[cfg(feature = "smoother")]
+#[cfg(any(feature = "smoother", feature = "eskf"))]
 pub mod smoother;
 mod state;
+#[cfg(any(feature = "smoother", feature = "eskf"))]
+pub mod state_estimator;
 mod stream;
 
 pub use alignment::{Alignment, AlignmentParams};
@@ -58,10 +60,10 @@ pub use measurement::{
 };
 pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
 pub use refusal::Refusal;
+#[cfg(any(feature = "smoother", feature = "eskf"))]
+pub use smoother::{Factor, Kernel, NavigationFactor, Rows};
 #[cfg(feature = "smoother")]
-pub use smoother::{
-    Factor, FixedLagSmoother, Kernel, NavigationFactor, Preintegration, Rows, SmootherParams, Updated,
-};
+pub use smoother::{FixedLagSmoother, Preintegration, SmootherParams, Updated};
 pub use state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
     States, VELOCITY, Wheeled, offset,

@@ -22,27 +22,41 @@
 //! Nothing is inverted that may be singular, and no system is refused as indeterminate: what is not known has a variance that
 //! says so.
 
+#[cfg(feature = "smoother")]
 mod elimination;
+#[cfg(feature = "smoother")]
 mod estimates;
 mod factor;
+#[cfg(feature = "smoother")]
 mod filter;
+#[cfg(feature = "smoother")]
 mod fusion;
 mod kernel;
+#[cfg(feature = "smoother")]
 mod keyframe;
+#[cfg(feature = "smoother")]
 mod link;
+#[cfg_attr(not(feature = "smoother"), expect(dead_code, reason = "a filter needs none of it but the check"))]
 mod matrix;
+#[cfg(feature = "smoother")]
 mod params;
+#[cfg(feature = "smoother")]
 mod preintegration;
 mod relative;
 mod rows;
+#[cfg(feature = "smoother")]
 mod solution;
-#[cfg(test)]
+#[cfg(all(test, feature = "smoother"))]
 mod tests;
 
 pub use factor::{Factor, NavigationFactor};
+#[cfg(feature = "smoother")]
 pub use filter::FixedLagSmoother;
 pub use kernel::Kernel;
+#[cfg(feature = "smoother")]
 pub use params::SmootherParams;
+#[cfg(feature = "smoother")]
 pub use preintegration::Preintegration;
 pub use rows::{MOST_ROWS, Rows};
+#[cfg(feature = "smoother")]
 pub use solution::Updated;

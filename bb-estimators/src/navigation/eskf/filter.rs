@@ -404,6 +404,66 @@ impl<S: States, const N: usize> Eskf<S, N> {
         }
     }
 
+    /// Starts afresh from what another estimator of the same robot estimates, with the correlations of all that both estimate:
+    /// a prediction beside it, or another noise. Optional states that the other has not are zero, with the deviations of the
+    /// parameters.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if the covariance is not positive definite. The
+    /// filter is then as it was.
+    pub fn adopt<T: States, const M: usize>(
+        &mut self,
+        other: &Estimate<M>,
+        covariance: &SMatrix<f64, M, M>,
+    ) -> Result<(), Refusal> {
+        let mut adopted = Covariance::new();
+        let mut estimate = Estimate {
+            time_ns: other.time_ns,
+            position: other.position,
+            velocity: other.velocity,
+            world_from_body: other.world_from_body,
+            accelerometer_bias: other.accelerometer_bias,
+            gyroscope_bias: other.gyroscope_bias,
+            angular_velocity: other.angular_velocity,
+            specific_force: other.specific_force,
+            keyframe: None,
+            optional: SVector::zeros(),
+        };
+        // Where each error is in the other's; none if it has it not.
+        let mut places: [Option<usize>; N] = core::array::from_fn(|i| (i < NAVIGATION).then_some(i));
+        for state in S::OPTIONAL.iter().filter(|state| **state != Optional::Keyframe) {
+            let (Some(first), Some(theirs)) = (offset::<S>(*state), offset::<T>(*state)) else { continue };
+            for i in 0..state.dimension() {
+                places[first + i] = Some(theirs + i);
+                estimate.optional[first + i] = other.optional[theirs + i];
+            }
+        }
+        for state in S::OPTIONAL {
+            let variance = self.params.process(*state).map_or(1.0, |process| process.deviation * process.deviation);
+            let Some(first) = offset::<S>(*state) else { continue };
+            (first..first + state.dimension()).for_each(|i| adopted.forget(i, variance.max(1e-24)));
+        }
+        for i in 0..N {
+            for j in 0..N {
+                if let (Some(row), Some(column)) = (places[i], places[j]) {
+                    adopted.rows_mut()[i][j] = 0.5 * (covariance[(row, column)] + covariance[(column, row)]);
+                }
+            }
+        }
+        if !estimate.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
+            return Err(Refusal::NonFinite);
+        }
+        if !adopted.is_positive_definite() {
+            return Err(Refusal::Noise);
+        }
+        self.resets = self.resets.wrapping_add(1);
+        self.fixed_ns = estimate.time_ns;
+        self.estimate = Some(estimate);
+        self.covariance = adopted;
+        Ok(())
+    }
+
     /// Makes the present pose the keyframe that relative poses refer to. A filter without [`Optional::Keyframe`] ignores
     /// it.
     pub fn set_keyframe(&mut self, id: u64) {

@@ -103,7 +103,15 @@ impl<const N: usize> Rows<N> {
         self.set(model.residual, None, &model.jacobian, &model.noise)
     }
 
+    /// The residual and the rows of the keyframe, divided by the noise; none if the factor concerns the keyframe before too.
+    #[cfg(feature = "eskf")]
+    pub(in crate::navigation) fn alone(&self) -> Option<(&[f64], &[[f64; N]])> {
+        let is_alone = self.previous[..self.count].iter().flatten().all(|x| *x == 0.0);
+        is_alone.then(|| (&self.residual[..self.count], &self.at[..self.count]))
+    }
+
     /// Multiplies the weight: the square of what the rows are multiplied by.
+    #[cfg(feature = "smoother")]
     pub(super) fn weigh(&mut self, weight: f64) {
         let factor = sqrt(weight);
         (0..self.count).for_each(|row| self.scale(row, factor));

@@ -1,0 +1,101 @@
+//! Position, velocity and attitude of a flight without satellite navigation.
+//!
+//! [`StateEstimator`] takes samples of the flight controller's IMU, relative poses of a camera, poses from satellite images,
+//! and, while it can be trusted, the flight controller's receiver of satellite navigation. One of two strategies does the
+//! work, which the configuration chooses: the fixed-lag smoother (feature `smoother`, the default), or the error-state Kalman
+//! filter (feature `eskf`). Either can be built without the other.
+//!
+//! ```
+//! # #[cfg(feature = "std")]
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! use bb_estimators::navigation::state_estimator::{
+//!     AttitudeReading, Event, StateEstimator, StateEstimatorConfig, TakeoffOrigin,
+//! };
+//! use bb_estimators::navigation::{Geodetic, ImuMean};
+//! use nalgebra::{UnitQuaternion, Vector3};
+//!
+//! let log = |event: &Event| println!("{}: {}", event.level().name(), event.kind.name());
+//! let mut estimator: StateEstimator<_> = StateEstimator::new(StateEstimatorConfig::default(), log)?;
+//! estimator.set_takeoff_origin(TakeoffOrigin::new(Geodetic::from_degrees(48.0, 11.0, 500.0)))?;
+//! estimator.add_attitude(AttitudeReading {
+//!     time_ns: 5_000_000,
+//!     world_from_body: UnitQuaternion::identity(),
+//!     tilt_deviation: 0.01,
+//!     heading_deviation: 0.1,
+//! })?;
+//! for i in 1..=200 {
+//!     let (angular_velocity, specific_force) = (Vector3::zeros(), Vector3::new(0.0, 0.0, 9.80665));
+//!     estimator.add_imu(&ImuMean { time_ns: i * 5_000_000, angular_velocity, specific_force })?;
+//!     if let Some(output) = estimator.tick(i * 5_000_000) {
+//!         println!("{}: {:?}, {}", output.frame_id, output.position, output.label);
+//!     }
+//! }
+//! assert!(estimator.predicted(1_000_000_000).is_some());
+//! # Ok(())
+//! # }
+//! # #[cfg(not(feature = "std"))]
+//! # fn main() {}
+//! ```
+//!
+//! # One writer, one queue
+//!
+//! All inputs pass through one queue in the order of their stamps; what arrives late, up to
+//! [`lateness`](StateEstimatorParams::lateness), is put in its place and what follows is computed again. The result is that
+//! of inputs that arrive in order, to the last bit (`tests/order.rs`). What is older is refused and counted.
+//!
+//! # Errors
+//!
+//! *Degraded*: the input is not in the estimate, or was taken in with the covariance raised; there is an estimate.
+//! *Fatal*: there is none for this tick; the input that broke it is left out from then on. Each success and each failure is an
+//! [`Event`], with its reason. Without an estimate for three seconds there is exactly one event that says so, and one when
+//! there is one again.
+//!
+//! # Conventions
+//!
+//! As in [`navigation`](super). Positions are WGS 84, orientations and covariances in the tangent frame at the position. The
+//! world of the strategies moves on where the robot is more than 5 km from its origin.
+
+#[cfg(feature = "runtime")]
+mod declared;
+mod emission;
+mod engine;
+mod entry;
+mod error;
+mod estimator;
+mod event;
+mod factor;
+mod fallback;
+mod gate;
+mod input;
+mod label;
+mod output;
+mod params;
+mod queue;
+mod start;
+mod status_text;
+mod strategy;
+#[cfg(test)]
+mod tests;
+mod world;
+
+#[cfg(feature = "runtime")]
+pub use declared::{
+    AnchorReading, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents, FlightHealth, FlightInputs,
+    FlightOptions, FlightOutputs, GpsReport, RelativePoseReading, TracingSink,
+};
+pub use error::{EstimatorError, OriginError, Reason};
+pub use estimator::{Added, StateEstimator};
+pub use event::{Both, Event, EventKind, EventSink, InputKind, Level, StartedFrom};
+pub use factor::ProvidedFactor;
+#[cfg(feature = "smoother")]
+pub use factor::{SMOOTHED, Smoothed};
+pub use gate::{GateState, Rejection};
+pub use input::{
+    AttitudeReading, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealth, GpsHealthReading,
+    ImuBias, PoseAnchor, TakeoffOrigin, VioOutput,
+};
+pub use label::SourceLabel;
+pub use output::{EstimatorHealth, EstimatorOutput, HealthState, Quality};
+pub use params::{StateEstimatorConfig, StateEstimatorParams, StrategyKind};
+pub use queue::QueueCounts;
+pub use status_text::StatusText;

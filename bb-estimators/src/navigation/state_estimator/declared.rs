@@ -1,0 +1,179 @@
+//! The state estimator to declare in `robot!`.
+
+mod input;
+mod log;
+mod options;
+mod output;
+
+pub use input::{AnchorReading, FlightInputs, GpsReport, RelativePoseReading};
+pub use log::TracingSink;
+pub use options::FlightOptions;
+pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOutputs};
+
+use super::{EstimatorOutput, Event, EventKind, EventSink, HealthState, Level, StateEstimator};
+use bb_core::component::{Info, Request};
+use bb_core::{Context, Estimator, Fault, Reply};
+use nalgebra::Isometry3;
+use std::time::Duration;
+
+/// Position, velocity and attitude of a flight as an estimator of a robot: [`StateEstimator`] with an IMU, relative poses, poses
+/// from satellite images, and the flight controller's receiver of satellite navigation.
+///
+/// ```
+/// # fn main() {}
+/// use bb_core::prelude::*;
+/// use bb_estimators::StateEstimator;
+/// use bb_estimators::navigation::state_estimator::{AnchorReading, GpsReport, RelativePoseReading};
+///
+/// robot! {
+///     robot Drone;
+///
+///     link base {
+///         sensor imu: External<Imu>();
+///         sensor camera: External<RelativePoseReading>();
+///         sensor matcher: External<AnchorReading>();
+///         sensor gps: External<GnssFix>();
+///         sensor gps_report: External<GpsReport>();
+///         // The smoother takes a millisecond now and then: on a worker it holds up no sample of the IMU.
+///         estimator navigation: StateEstimator(strategy = "smoother") {
+///             input imu: sensor::base::imu, driver;
+///             input vio: sensor::base::camera, optional;
+///             input anchor: sensor::base::matcher, optional;
+///             input gnss: sensor::base::gps, optional;
+///             input gps_health: sensor::base::gps_report, optional;
+///             output estimate;
+///             output health;
+///             output events;
+///             runs_on: worker;
+///         }
+///         // Its twin answers with each sample.
+///         estimator twin: StateEstimator(strategy = "eskf", output_rate = 200 Hz) {
+///             input imu: sensor::base::imu, driver;
+///             input vio: sensor::base::camera, optional;
+///             input anchor: sensor::base::matcher, optional;
+///             output estimate;
+///             output health;
+///             output events;
+///         }
+///     }
+/// }
+/// ```
+///
+/// It starts at the origin of the options once it was at rest for a second, or at the first anchor where they name none. The
+/// body is the IMU, with the axes of the link.
+///
+/// Estimates are emitted at the output's rate, with the health; events at the levels error, warn and info, and keyframes that
+/// leave the window, whenever there are any: record `events` for a flight-data recorder. All events go to `tracing` as well,
+/// as structured fields.
+#[derive(Debug)]
+pub struct FlightEstimator {
+    estimator: StateEstimator<Sink>,
+    link_from_imu: Isometry3<f64>,
+    period_ns: i64,
+    /// The last sample of the IMU, and ticks since.
+    last_ns: i64,
+    ticks: i64,
+    health: Option<FlightHealth>,
+}
+
+/// The most events that one output holds.
+const EVENTS: usize = 256;
+
+/// Logs events, and keeps those that are published.
+#[derive(Debug, Default)]
+struct Sink {
+    log: TracingSink,
+    events: FlightEvents,
+}
+
+impl EventSink for Sink {
+    fn event(&mut self, event: &Event) {
+        self.log.event(event);
+        if event.level() > Level::Info && !matches!(event.kind, EventKind::Keyframe { .. }) {
+            return;
+        }
+        if self.events.events.len() < EVENTS {
+            self.events.events.push(FlightEvent::of(event));
+        } else {
+            self.events.lost += 1;
+        }
+    }
+}
+
+impl FlightEstimator {
+    fn reply(&mut self, now_ns: i64) -> Reply<FlightOutputs> {
+        let emitted: Option<EstimatorOutput> = self.estimator.tick(now_ns);
+        let health = FlightHealth::of(&self.estimator.health());
+        let changed = self.health.is_none_or(|before| before.differs(&health));
+        let events = std::mem::take(&mut self.estimator.sink_mut().events);
+        let outputs = FlightOutputs {
+            estimate: emitted.as_ref().map(FlightEstimate::of),
+            health: (emitted.is_some() || changed).then_some(health),
+            events: (!events.events.is_empty()).then_some(events),
+        };
+        self.health = outputs.health.or(self.health);
+        let is_empty = outputs.estimate.is_none() && outputs.health.is_none() && outputs.events.is_none();
+        let reply = if is_empty { Reply::none() } else { Reply::emit(outputs) };
+        match health.state {
+            HealthState::Lost => reply.diverged("it has no estimate"),
+            HealthState::Degraded => reply.diverged("something does not fit, or is missing"),
+            HealthState::Init | HealthState::Tracking => reply,
+        }
+    }
+}
+
+impl Estimator for FlightEstimator {
+    type Options = FlightOptions;
+    type Input = FlightInputs<'static>;
+    type Output = FlightOutputs;
+
+    fn init(options: FlightOptions, context: &Context) -> Result<Self, Fault> {
+        let config = options.config()?;
+        let mut estimator = StateEstimator::new(config, Sink::default())?;
+        if let Some(origin) = options.origin() {
+            estimator.set_takeoff_origin(origin).map_err(|error| Fault::new(error.to_string()))?;
+        }
+        let period = Duration::from_secs_f64(1.0 / options.output_rate);
+        // The IMU may fall silent; what follows from that must not wait for it.
+        context.request(Request::Tick(period.max(SLOWEST_LOOK)));
+        let period_ns = period.max(SLOWEST_LOOK).as_nanos() as i64;
+        let link_from_imu = context.frame_from_driver()?;
+        Ok(Self { estimator, link_from_imu, period_ns, last_ns: context.now().as_nanos(), ticks: 0, health: None })
+    }
+
+    /// What is refused is told by events.
+    fn handle_input(&mut self, inputs: FlightInputs<'_>) -> Result<Reply<FlightOutputs>, Fault> {
+        let sample = input::sample(inputs.imu.message(), &self.link_from_imu);
+        (self.last_ns, self.ticks) = (sample.time_ns, 0);
+        let _ = self.estimator.add_imu(&sample);
+        if let Some(report) = inputs.gps_health.filter(|report| report.is_new()) {
+            let _ = self.estimator.add_gps_health(input::health(report.message()));
+        }
+        if let Some(vio) = inputs.vio.filter(|vio| vio.is_new()) {
+            let _ = self.estimator.add_vio(input::vio(vio.message()));
+        }
+        if let Some(anchor) = inputs.anchor.filter(|anchor| anchor.is_new())
+            && let Some(anchor) = input::anchor(anchor.message())
+        {
+            let _ = self.estimator.add_pose_anchor(anchor);
+        }
+        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
+            && let Some(fix) = input::fix(fix.message())
+        {
+            let _ = self.estimator.add_gnss(fix);
+        }
+        Ok(self.reply(sample.time_ns))
+    }
+
+    fn handle_info(&mut self, _: Info) -> Result<Reply<FlightOutputs>, Fault> {
+        self.ticks += 1;
+        if self.ticks < 2 {
+            // The IMU is there, and has seen to it.
+            return Ok(Reply::none());
+        }
+        Ok(self.reply(self.last_ns.saturating_add(self.ticks.saturating_mul(self.period_ns))))
+    }
+}
+
+/// How often it looks whether the IMU is silent, at most.
+const SLOWEST_LOOK: Duration = Duration::from_millis(50);

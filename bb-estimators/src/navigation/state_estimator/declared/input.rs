@@ -1,0 +1,121 @@
+//! What the declared state estimator takes.
+
+use crate::navigation::eskf::ImuMean;
+use crate::navigation::geodesy::Geodetic;
+use crate::navigation::state_estimator::{
+    GnssReading, GpsHealth, GpsHealthReading, ImuBias, PoseAnchor, VioOutput,
+};
+use bb_core::message::Stamped;
+use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Imu};
+use bb_core::time::MonotonicTime;
+use bb_core::{Input, Inputs, Payload};
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
+
+/// The inputs of [`FlightEstimator`](super::FlightEstimator).
+#[derive(Clone, Copy, Debug, Inputs)]
+pub struct FlightInputs<'a> {
+    /// The inertial sensor: the driver.
+    pub imu: Input<'a, Imu>,
+    /// Visual-inertial odometry.
+    pub vio: Option<Input<'a, RelativePoseReading>>,
+    /// Poses from satellite images.
+    pub anchor: Option<Input<'a, AnchorReading>>,
+    /// The flight controller's receiver of satellite navigation.
+    pub gnss: Option<Input<'a, GnssFix>>,
+    /// What the flight controller says of that.
+    pub gps_health: Option<Input<'a, GpsReport>>,
+}
+
+/// The pose of the body at a camera frame relative to an earlier one; it is stamped with the time of the later frame.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct RelativePoseReading {
+    /// When the earlier frame was taken.
+    pub from: MonotonicTime,
+    /// Of the body's origin at the later frame, in the axes of the body at the earlier one, m.
+    pub translation: Vector3<f64>,
+    /// Takes body coordinates at the later frame to those at the earlier one.
+    pub from_to: UnitQuaternion<f64>,
+    /// Covariance of translation, m², and of the rotation vector of the error, rad², both in body axes at the later frame.
+    pub covariance: Matrix6<f64>,
+    /// Its estimate of the accelerometer's bias, body axes, m/s².
+    pub accelerometer_bias: Option<Vector3<f64>>,
+    /// Its estimate of the gyroscope's bias, body axes, rad/s.
+    pub gyroscope_bias: Option<Vector3<f64>>,
+}
+
+/// The pose of the body from a satellite image; it is stamped with the time of the image.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct AnchorReading {
+    /// Which provider it is from, if there are several.
+    pub provider: u32,
+    /// Of the body's origin. One without a height is not used.
+    pub position: GeodeticPosition,
+    /// Takes body coordinates to the tangent frame at the position.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// Covariance of the position, m², and of the rotation vector of the error, rad², both in the tangent frame.
+    pub covariance: Matrix6<f64>,
+    /// The provider has saved time over its covariance.
+    pub is_covariance_degraded: bool,
+}
+
+/// What the flight controller says of its receiver of satellite navigation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+pub struct GpsReport {
+    /// How it is.
+    pub health: GpsHealth,
+}
+
+pub(super) fn sample(imu: &Stamped<Imu>, link_from_imu: &Isometry3<f64>) -> ImuMean {
+    ImuMean {
+        time_ns: imu.monotonic_time.as_nanos(),
+        angular_velocity: link_from_imu.rotation * imu.angular_velocity,
+        specific_force: link_from_imu.rotation * imu.linear_acceleration,
+    }
+}
+
+pub(super) fn vio(reading: &Stamped<RelativePoseReading>) -> VioOutput {
+    let bias = reading.accelerometer_bias.zip(reading.gyroscope_bias);
+    VioOutput {
+        from_ns: reading.from.as_nanos(),
+        to_ns: reading.monotonic_time.as_nanos(),
+        translation: reading.translation,
+        from_to: reading.from_to,
+        covariance: reading.covariance,
+        bias: bias.map(|(accelerometer, gyroscope)| ImuBias { accelerometer, gyroscope }),
+    }
+}
+
+fn geodetic(position: &GeodeticPosition) -> Option<Geodetic> {
+    let GeodeticPosition { latitude_rad, longitude_rad, altitude } = *position;
+    Some(Geodetic { latitude: latitude_rad, longitude: longitude_rad, height: altitude? })
+}
+
+pub(super) fn anchor(reading: &Stamped<AnchorReading>) -> Option<PoseAnchor> {
+    Some(PoseAnchor {
+        time_ns: reading.monotonic_time.as_nanos(),
+        provider: reading.provider,
+        position: geodetic(&reading.position)?,
+        world_from_body: reading.world_from_body,
+        covariance: reading.covariance,
+        is_covariance_degraded: reading.is_covariance_degraded,
+    })
+}
+
+/// Standard deviation of a fix that says nothing about its own, m; of its height it is twice as much.
+const FIX: f64 = 5.0;
+
+pub(super) fn fix(fix: &Stamped<GnssFix>) -> Option<GnssReading> {
+    let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
+    let usual = Vector3::new(FIX * FIX, FIX * FIX, 4.0 * FIX * FIX);
+    Some(GnssReading {
+        time_ns: fix.monotonic_time.as_nanos(),
+        position: geodetic(&position)?,
+        covariance: fix.position_covariance.unwrap_or_else(|| Matrix3::from_diagonal(&usual)),
+        velocity: None,
+        lever_arm: Vector3::zeros(),
+    })
+}
+
+pub(super) fn health(report: &Stamped<GpsReport>) -> GpsHealthReading {
+    GpsHealthReading { time_ns: report.monotonic_time.as_nanos(), health: report.health }
+}

@@ -1,0 +1,201 @@
+//! What leaves, when, and what is seen of it: the covariance that grows, ticks without an estimate.
+
+use super::engine::Engine;
+use super::event::EventKind;
+use super::factor::ProvidedFactor;
+use super::fallback::{Fallback, Watchdog};
+use super::label::{SourceLabel, Sources};
+use super::output::{EstimatorOutput, FrameIds, Quality};
+use super::params::{StateEstimatorConfig, StateEstimatorParams, ns};
+use super::strategy::Pose;
+use super::world::turned_pose;
+use crate::navigation::math::sqrt;
+use nalgebra::Matrix6;
+use uuid::Uuid;
+
+/// How fast the steady norm of the covariance follows, per output.
+const STEADY: f64 = 0.05;
+
+/// A warning is given again once the norm was below this part of its limit.
+const REARMED: f64 = 0.75;
+
+/// See the module.
+#[derive(Debug)]
+pub(super) struct Emission {
+    period_ns: i64,
+    next_ns: Option<i64>,
+    ids: FrameIds,
+    watchdog: Watchdog,
+    is_silent: bool,
+    last: Option<Norm>,
+    growing_since_ns: Option<i64>,
+    steady: Option<f64>,
+    is_warned: bool,
+}
+
+/// What was emitted last.
+#[derive(Clone, Copy, Debug)]
+struct Norm {
+    time_ns: i64,
+    norm: f64,
+    /// Sums of the variances of position and rotation.
+    traces: [f64; 2],
+    label: SourceLabel,
+}
+
+impl Norm {
+    fn of(output: &EstimatorOutput) -> Self {
+        let norm = output.covariance.norm();
+        Self { time_ns: output.emitted_ns, norm, traces: traces(&output.covariance), label: output.label }
+    }
+}
+
+fn traces(covariance: &Matrix6<f64>) -> [f64; 2] {
+    [0, 3].map(|first| (first..first + 3).map(|i| covariance[(i, i)]).sum())
+}
+
+impl Emission {
+    pub(super) fn new(config: &StateEstimatorConfig) -> Self {
+        Self {
+            period_ns: ns(1.0 / config.params.output_rate).max(1),
+            next_ns: None,
+            ids: FrameIds::new(config.flight),
+            watchdog: Watchdog::default(),
+            is_silent: false,
+            last: None,
+            growing_since_ns: None,
+            steady: None,
+            is_warned: false,
+        }
+    }
+
+    /// Whether it is time for an output; if so, it is not again before the next.
+    pub(super) fn is_due(&mut self, now_ns: i64) -> bool {
+        let next_ns = match self.next_ns {
+            // A clock that was set back must not silence it.
+            Some(next_ns) if next_ns.saturating_sub(now_ns) <= self.period_ns => next_ns,
+            _ => now_ns,
+        };
+        if now_ns < next_ns {
+            return false;
+        }
+        let following_ns = next_ns.saturating_add(self.period_ns);
+        self.next_ns =
+            Some(if following_ns > now_ns { following_ns } else { now_ns.saturating_add(self.period_ns) });
+        true
+    }
+
+    /// An estimate for users; its name comes when it is emitted.
+    pub(super) fn describe<F: ProvidedFactor>(
+        &self,
+        pose: &Pose,
+        sources: &Sources,
+        smoothed: bool,
+        engine: &Engine<F>,
+        params: &StateEstimatorParams,
+    ) -> Option<EstimatorOutput> {
+        let (position, turn) = engine.world()?.local(&pose.position);
+        let covariance = turned_pose(&turn, &pose.covariance);
+        let label = sources.label(pose.time_ns, params);
+        let anchor_age_ms = sources.age_ns(pose.time_ns).map(|age_ns| age_ns.unsigned_abs() / 1_000_000);
+        let quality = Quality {
+            label,
+            covariance_norm: covariance.norm(),
+            anchor_age_ms,
+            nis: engine.nis(),
+            is_anchor_degraded: engine.is_anchor_degraded(),
+        };
+        Some(EstimatorOutput {
+            frame_id: Uuid::nil(),
+            emitted_ns: pose.time_ns,
+            time_ns: pose.time_ns,
+            position,
+            world_from_body: turn * pose.world_from_body,
+            velocity: turn * pose.velocity,
+            covariance,
+            label,
+            anchor_age_ms,
+            smoothed,
+            degraded: engine.is_degraded(pose.time_ns),
+            quality,
+        })
+    }
+
+    /// Makes an output of an estimate; by how much the covariance has grown, if that is worth a warning.
+    pub(super) fn emitted(
+        &mut self,
+        now_ns: i64,
+        estimate: EstimatorOutput,
+        params: &StateEstimatorParams,
+    ) -> (EstimatorOutput, Option<f64>) {
+        let mut output = EstimatorOutput { frame_id: self.ids.next(), emitted_ns: now_ns, ..estimate };
+        if let Some(last) = self.last
+            && output.label == SourceLabel::DeadReckoned
+            && last.label == SourceLabel::DeadReckoned
+        {
+            raise(&mut output.covariance, &last);
+        }
+        output.quality.covariance_norm = output.covariance.norm();
+        let norm = Norm::of(&output);
+        self.growing_since_ns = match (self.last, self.growing_since_ns) {
+            (Some(last), since_ns) if norm.norm > last.norm => since_ns.or(Some(last.time_ns)),
+            _ => None,
+        };
+        self.last = Some(norm);
+        if norm.label == SourceLabel::SatelliteAnchored {
+            let steady = self.steady.get_or_insert(norm.norm);
+            *steady += STEADY * (norm.norm - *steady);
+        }
+        let ratio = self.steady.filter(|steady| *steady > 0.0).map_or(1.0, |steady| norm.norm / steady);
+        let is_large = ratio > params.growing_covariance;
+        let warning = (is_large && !self.is_warned).then_some(ratio);
+        self.is_warned = is_large || (self.is_warned && ratio > REARMED * params.growing_covariance);
+        (output, warning)
+    }
+
+    /// Counts a tick with or without an estimate.
+    pub(super) fn watch(
+        &mut self,
+        now_ns: i64,
+        has_estimate: bool,
+        params: &StateEstimatorParams,
+    ) -> Option<EventKind> {
+        self.is_silent = !has_estimate;
+        Some(match self.watchdog.tick(now_ns, has_estimate, params)? {
+            Fallback::Imminent => EventKind::FallbackImminent,
+            Fallback::Engaged => EventKind::FallbackEngaged,
+            Fallback::Recovered => EventKind::FallbackRecovered,
+        })
+    }
+
+    /// For how long the norm of the covariance has been growing, s.
+    pub(super) fn growing_s(&self) -> f64 {
+        let since = self.last.zip(self.growing_since_ns);
+        since.map_or(0.0, |(last, since_ns)| last.time_ns.saturating_sub(since_ns) as f64 * 1e-9)
+    }
+
+    /// Whether the last tick had no estimate.
+    pub(super) fn is_silent(&self) -> bool {
+        self.is_silent
+    }
+
+    pub(super) fn is_fallback_engaged(&self) -> bool {
+        self.watchdog.is_engaged()
+    }
+}
+
+/// So that rounding takes nothing away.
+const ABOVE: f64 = 1.0 + 1e-12;
+
+/// While nothing tells where it is, nobody may believe that it is known better than before: what a relative pose or the
+/// correlation with the velocity took away stays. `D P D` with a diagonal D is a covariance if P is one.
+fn raise(covariance: &mut Matrix6<f64>, last: &Norm) {
+    let now = traces(covariance);
+    let factor = |i: usize| if now[i] < last.traces[i] { sqrt(last.traces[i] / now[i]) * ABOVE } else { 1.0 };
+    let factors = [factor(0), factor(1)];
+    *covariance = Matrix6::from_fn(|i, j| covariance[(i, j)] * factors[i / 3] * factors[j / 3]);
+    let norm = covariance.norm();
+    if norm < last.norm {
+        *covariance *= last.norm / norm * ABOVE;
+    }
+}

@@ -1,0 +1,439 @@
+//! All that follows from the inputs in their order, and from nothing else: estimate, label, gate. It can be stored and run
+//! again, so that what arrives late is as if it had not.
+
+use alloc::collections::VecDeque;
+
+use nalgebra::Vector3;
+
+use super::entry::{Entry, Key, Outcome, Payload};
+use super::error::Reason;
+use super::event::StartedFrom;
+use super::factor::ProvidedFactor;
+use super::gate::{Rejection, SpoofGate};
+use super::input::{GnssReading, ImuBias, PoseAnchor, TakeoffOrigin, VioOutput, blocks};
+use super::label::Sources;
+use super::params::{StateEstimatorConfig, ns};
+use super::start::{Starter, at_anchor, warm};
+use super::strategy::{Failure, Measured, Pose, Predictor, Strategy, id_of};
+use super::world::World;
+use crate::attitude::ParamsError;
+use crate::navigation::eskf::{ImuMean, Start};
+use crate::navigation::fused::Fused;
+use crate::navigation::measurement::RelativePose;
+use crate::navigation::refusal::Refusal;
+
+/// For how long an estimate is distrusted after something that does not fit, s.
+const DISTRUST: f64 = 1.0;
+
+/// Farther from the origin nothing is, m.
+const FARTHEST: f64 = 1e7;
+
+/// Refusals in a row that are more than outliers.
+const STORM: u64 = 3;
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(super) struct Engine<F: ProvidedFactor> {
+    /// The last input it took.
+    key: Key,
+    /// The time of the IMU that it has reached.
+    now_ns: Option<i64>,
+    world: Option<World>,
+    origin: Option<TakeoffOrigin>,
+    phase: Phase,
+    strategy: Strategy<F>,
+    started: Option<(i64, StartedFrom)>,
+    gate: SpoofGate,
+    sources: Sources,
+    /// What the estimate of each keyframe rests on.
+    marks: VecDeque<(i64, Sources)>,
+    bias: Option<ImuBias>,
+    nis: Option<f64>,
+    is_anchor_degraded: bool,
+    /// From when to when the estimate is distrusted.
+    degraded_ns: Option<(i64, i64)>,
+    left: Option<(Pose, Sources)>,
+}
+
+#[expect(clippy::large_enum_variant, reason = "there is one of it in an engine")]
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    Starting(Starter),
+    Running,
+    /// Nobody knows where it is, until an anchor or the flight controller tells.
+    Lost,
+}
+
+/// How the engine is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Condition {
+    Starting,
+    Running,
+    Lost,
+}
+
+impl<F: ProvidedFactor> Engine<F> {
+    pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
+        Ok(Self {
+            key: Key::FIRST,
+            now_ns: None,
+            world: None,
+            origin: None,
+            phase: Phase::Starting(Starter::new(config)),
+            strategy: Strategy::new(config)?,
+            started: None,
+            gate: SpoofGate::default(),
+            sources: Sources::default(),
+            marks: VecDeque::with_capacity(config.params.window as usize + 2),
+            bias: None,
+            nis: None,
+            is_anchor_degraded: false,
+            degraded_ns: None,
+            left: None,
+        })
+    }
+
+    pub(super) fn set_origin(&mut self, origin: &TakeoffOrigin) {
+        self.origin = Some(*origin);
+        self.world = Some(World::new(origin.position));
+    }
+
+    pub(super) fn key(&self) -> Key {
+        self.key
+    }
+
+    pub(super) fn now_ns(&self) -> Option<i64> {
+        self.now_ns
+    }
+
+    pub(super) fn condition(&self) -> Condition {
+        match self.phase {
+            Phase::Starting(_) => Condition::Starting,
+            Phase::Running => Condition::Running,
+            Phase::Lost => Condition::Lost,
+        }
+    }
+
+    pub(super) fn started(&self) -> Option<(i64, StartedFrom)> {
+        self.started
+    }
+
+    pub(super) fn world(&self) -> Option<&World> {
+        self.world.as_ref()
+    }
+
+    pub(super) fn gate(&self) -> &SpoofGate {
+        &self.gate
+    }
+
+    pub(super) fn sources(&self) -> &Sources {
+        &self.sources
+    }
+
+    pub(super) fn nis(&self) -> Option<f64> {
+        self.nis
+    }
+
+    pub(super) fn is_anchor_degraded(&self) -> bool {
+        self.is_anchor_degraded
+    }
+
+    pub(super) fn is_degraded(&self, time_ns: i64) -> bool {
+        self.degraded_ns.is_some_and(|(from_ns, until_ns)| (from_ns..=until_ns).contains(&time_ns))
+    }
+
+    pub(super) fn predictor(&self) -> Option<Predictor> {
+        matches!(self.phase, Phase::Running).then(|| self.strategy.predictor()).flatten()
+    }
+
+    /// The newest keyframe, and what it rests on.
+    pub(super) fn newest(&self) -> Option<(Pose, Sources)> {
+        let pose = matches!(self.phase, Phase::Running).then(|| self.strategy.newest()).flatten()?;
+        Some((pose, self.sources_at(pose.time_ns)))
+    }
+
+    /// Keyframes before that, and whether they are smoothed.
+    pub(super) fn history(&mut self, most: usize) -> (impl Iterator<Item = (Pose, Sources)> + use<'_, F>, bool) {
+        let (poses, is_smoothed) = self.strategy.history(most);
+        let this = &*self;
+        (poses.into_iter().map(|pose| (pose, this.sources_at(pose.time_ns))), is_smoothed)
+    }
+
+    pub(super) fn keyframe_ns(&self) -> i64 {
+        self.strategy.keyframe_ns()
+    }
+
+    pub(super) fn keyframes(&self) -> usize {
+        if matches!(self.phase, Phase::Running) { self.strategy.keyframes() } else { 0 }
+    }
+
+    pub(super) fn take_left(&mut self) -> Option<(Pose, Sources)> {
+        self.left.take()
+    }
+
+    fn sources_at(&self, time_ns: i64) -> Sources {
+        let mark = self.marks.iter().rev().find(|(at_ns, _)| *at_ns <= time_ns);
+        mark.map_or(self.sources, |(_, sources)| *sources)
+    }
+
+    /// Moves on by one sample of the IMU, or a part of one.
+    pub(super) fn advance(
+        &mut self,
+        key: Key,
+        sample: &ImuMean,
+        config: &StateEstimatorConfig,
+    ) -> Result<(), Reason> {
+        self.key = key;
+        let is_first = self.now_ns.is_none();
+        self.now_ns = Some(sample.time_ns);
+        match &mut self.phase {
+            Phase::Starting(starter) => {
+                starter.sample(sample);
+                // A sample is a mean since the one before: the first has none.
+                if let (false, Some(origin)) = (is_first, &self.origin)
+                    && let Some(start) = starter.at_origin(sample.time_ns, origin, config, self.bias.as_ref())
+                {
+                    self.start(&start, StartedFrom::Origin)?;
+                }
+                Ok(())
+            }
+            Phase::Lost => Ok(()),
+            Phase::Running => {
+                let gaps = self.strategy.gaps();
+                let result = self.strategy.propagate(sample);
+                if self.strategy.gaps() != gaps {
+                    self.distrust(sample.time_ns);
+                }
+                match result {
+                    Ok(()) => self.after(config),
+                    Err(Failure::Refused(Refusal::Gap { seconds })) => {
+                        self.phase = Phase::Lost;
+                        return Err(Refusal::Gap { seconds }.into());
+                    }
+                    Err(Failure::Fatal(refusal)) => {
+                        self.phase = Phase::Lost;
+                        return Err(refusal.into());
+                    }
+                    Err(Failure::Refused(refusal)) => return Err(refusal.into()),
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes an input of the present. `Fatal`: this engine is of no use any more.
+    pub(super) fn apply(
+        &mut self,
+        entry: &Entry<F>,
+        config: &StateEstimatorConfig,
+    ) -> (Outcome, Option<Rejection>) {
+        self.key = entry.key;
+        if matches!(entry.payload, Payload::Warm(_)) {
+            // It is the first that is known; the first sample goes on from there.
+            self.now_ns = self.now_ns.or(Some(entry.key.time_ns));
+        }
+        let Some(now_ns) = self.now_ns else {
+            return (Outcome::Degraded(Refusal::NotStarted.into()), None);
+        };
+        let mut rejection = None;
+        let result = match &entry.payload {
+            Payload::Warm(state) => {
+                if matches!(self.phase, Phase::Running) {
+                    // Only what does not know better takes it.
+                    Err(Reason::Duplicate.into())
+                } else {
+                    let world = *self.world.get_or_insert_with(|| World::new(state.position));
+                    let start = warm(now_ns, state, &world, config, self.bias.as_ref());
+                    self.start(&start, StartedFrom::FlightController).map(|()| None).map_err(Trouble::from)
+                }
+            }
+            Payload::Attitude(attitude) => {
+                if let Phase::Starting(starter) = &mut self.phase {
+                    starter.attitude(attitude);
+                }
+                Ok(None)
+            }
+            Payload::Health(health) => {
+                self.gate.health(entry.key.time_ns, *health, &config.params);
+                Ok(None)
+            }
+            Payload::Frame => match self.phase {
+                Phase::Running => self.strategy.frame().map(|()| None).map_err(Trouble::from),
+                _ => Ok(None),
+            },
+            Payload::Vio(vio) => self.vio(vio, config),
+            Payload::Anchor(anchor) => self.anchor(now_ns, anchor, config, &mut rejection),
+            Payload::Gnss(fix) => self.fix(fix, config, &mut rejection),
+            Payload::Provided(_, factor) => self.measure(&Measured::Provided(factor)).map(Some),
+        };
+        self.after(config);
+        let outcome = match result {
+            Ok(Some(fused)) => {
+                let nis = fused.nis / fused.dimension.max(1) as f64;
+                self.nis = Some(nis);
+                if fused.raised > 1.0 {
+                    self.distrust(now_ns);
+                    Outcome::Degraded(Reason::Raised { factor: fused.raised })
+                } else {
+                    Outcome::Added { nis: Some(nis) }
+                }
+            }
+            Ok(None) => Outcome::Added { nis: None },
+            Err(Trouble::Degraded(reason)) => Outcome::Degraded(reason),
+            Err(Trouble::Fatal(reason)) => Outcome::Fatal(reason),
+        };
+        (outcome, rejection)
+    }
+
+    fn start(&mut self, start: &Start, from: StartedFrom) -> Result<(), Reason> {
+        self.strategy.start(start)?;
+        self.phase = Phase::Running;
+        self.started = Some((start.time_ns, from));
+        self.marks.clear();
+        Ok(())
+    }
+
+    fn distrust(&mut self, now_ns: i64) {
+        let goes_on = self.degraded_ns.filter(|(_, until_ns)| now_ns <= *until_ns);
+        let from_ns = goes_on.map_or(now_ns, |(from_ns, _)| from_ns);
+        self.degraded_ns = Some((from_ns, now_ns.saturating_add(ns(DISTRUST))));
+    }
+
+    /// What follows from anything that moved the strategy.
+    fn after(&mut self, config: &StateEstimatorConfig) {
+        if !matches!(self.phase, Phase::Running) {
+            return;
+        }
+        if let Some(pose) = self.strategy.take_left() {
+            self.left = Some((pose, self.sources_at(pose.time_ns)));
+        }
+        let keyframe_ns = self.strategy.keyframe_ns();
+        match self.marks.back_mut() {
+            Some((at_ns, sources)) if *at_ns == keyframe_ns => *sources = self.sources,
+            _ => {
+                if self.marks.len() > config.params.window as usize {
+                    self.marks.pop_front();
+                }
+                self.marks.push_back((keyframe_ns, self.sources));
+            }
+        }
+        if let (Some(world), Some(position)) = (&mut self.world, self.strategy.position()) {
+            let mut moved = *world;
+            // What cannot be moved stays where it is, and is tried again.
+            if let Some(new_from_old) = moved.moves_on(&position)
+                && self.strategy.move_world(&new_from_old).is_ok()
+            {
+                *world = moved;
+            }
+        }
+    }
+
+    fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Trouble> {
+        if !matches!(self.phase, Phase::Running) {
+            return Err(Refusal::NotStarted.into());
+        }
+        let result = self.strategy.measure(measured);
+        if let (true, Some(now_ns)) = (self.strategy.refused_in_a_row() >= STORM, self.now_ns) {
+            self.distrust(now_ns);
+        }
+        let fused = result?;
+        // Finite, but nowhere on the Earth.
+        if !self.strategy.position().is_some_and(|position| position.norm() < FARTHEST) {
+            return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
+        }
+        Ok(fused)
+    }
+
+    fn vio(&mut self, vio: &VioOutput, config: &StateEstimatorConfig) -> Result<Option<Fused>, Trouble> {
+        self.bias = vio.bias.or(self.bias);
+        let [translation_covariance, rotation_covariance] = blocks(&vio.covariance);
+        let fused = self.measure(&Measured::Relative(RelativePose {
+            keyframe: id_of(vio.from_ns),
+            translation: vio.translation,
+            keyframe_from_body: vio.from_to,
+            translation_covariance,
+            rotation_covariance,
+        }))?;
+        self.sources.seen(vio.to_ns, &config.params);
+        Ok(Some(fused))
+    }
+
+    fn anchor(
+        &mut self,
+        now_ns: i64,
+        anchor: &PoseAnchor,
+        config: &StateEstimatorConfig,
+        rejection: &mut Option<Rejection>,
+    ) -> Result<Option<Fused>, Trouble> {
+        let can_start = match self.phase {
+            Phase::Lost => true,
+            Phase::Starting(_) => self.origin.is_none(),
+            Phase::Running => false,
+        };
+        if can_start {
+            let world = *self.world.get_or_insert_with(|| World::new(anchor.position));
+            self.start(&at_anchor(now_ns, anchor, &world, config, self.bias.as_ref()), StartedFrom::Anchor)?;
+            self.sources.anchored(anchor.time_ns, &config.params);
+            self.is_anchor_degraded = anchor.is_covariance_degraded;
+            return Ok(None);
+        }
+        let world = self.world.ok_or(Refusal::NotStarted)?;
+        let measured = world.anchor(anchor);
+        let fused = self.measure(&Measured::Anchor(measured))?;
+        self.sources.anchored(anchor.time_ns, &config.params);
+        self.is_anchor_degraded = anchor.is_covariance_degraded;
+        if let Some(position) = self.strategy.position() {
+            let offset = measured.position - position;
+            *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
+        }
+        Ok(Some(fused))
+    }
+
+    fn fix(
+        &mut self,
+        fix: &GnssReading,
+        config: &StateEstimatorConfig,
+        rejection: &mut Option<Rejection>,
+    ) -> Result<Option<Fused>, Trouble> {
+        let position = self.strategy.position().filter(|_| matches!(self.phase, Phase::Running));
+        let (Some(world), Some(position)) = (self.world, position) else {
+            return Err(Refusal::NotStarted.into());
+        };
+        let (measured, velocity) = world.fix(fix);
+        let offset: Vector3<f64> = measured.position - position;
+        if let Err(rejected) = self.gate.fix(fix.time_ns, &offset, &config.params) {
+            *rejection = Some(rejected);
+            return Err(Trouble::Degraded(Reason::Gate(rejected)));
+        }
+        let fused = self.measure(&Measured::Gnss(measured, velocity))?;
+        self.sources.anchored(fix.time_ns, &config.params);
+        Ok(Some(fused))
+    }
+}
+
+/// Why an input is not in the estimate.
+enum Trouble {
+    Degraded(Reason),
+    Fatal(Reason),
+}
+
+impl From<Failure> for Trouble {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Refused(refusal) => Self::Degraded(refusal.into()),
+            Failure::Fatal(refusal) => Self::Fatal(refusal.into()),
+        }
+    }
+}
+
+impl From<Refusal> for Trouble {
+    fn from(refusal: Refusal) -> Self {
+        Self::Degraded(refusal.into())
+    }
+}
+
+impl From<Reason> for Trouble {
+    fn from(reason: Reason) -> Self {
+        Self::Degraded(reason)
+    }
+}

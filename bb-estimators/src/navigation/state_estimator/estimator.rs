@@ -1,0 +1,447 @@
+//! The state estimator.
+
+use alloc::vec::Vec;
+
+use super::emission::Emission;
+use super::engine::Condition;
+use super::entry::{Key, Outcome, Payload};
+use super::error::{EstimatorError, OriginError, Reason};
+use super::event::{Event, EventKind, EventSink, InputKind};
+use super::factor::ProvidedFactor;
+use super::gate::GateState;
+use super::input::{
+    AttitudeReading, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealthReading, PoseAnchor,
+    TakeoffOrigin, VioOutput,
+};
+use super::label::{SourceLabel, Sources};
+use super::output::{EstimatorHealth, EstimatorOutput, HealthState};
+use super::params::StateEstimatorConfig;
+use super::queue::{Queue, QueueCounts, Told};
+use super::strategy::Pose;
+use crate::attitude::ParamsError;
+use crate::navigation::eskf::ImuMean;
+use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::smoother::NavigationFactor;
+
+/// What became of an input that was taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Added {
+    /// It is in the estimate.
+    Taken {
+        /// Normalised innovation squared over its dimension, if it was measured.
+        nis: Option<f64>,
+    },
+    /// It is newer than the last sample of the IMU, and waits for the next.
+    Waits,
+}
+
+/// Position, velocity and attitude without satellite navigation, or with it while it can be trusted; see the
+/// [module](super).
+///
+/// `K` takes the events, `F` is the type of factors that outside providers add.
+#[derive(Debug)]
+pub struct StateEstimator<K = (), F: ProvidedFactor = NavigationFactor> {
+    config: StateEstimatorConfig,
+    queue: Queue<F>,
+    emission: Emission,
+    sink: K,
+    label: SourceLabel,
+    gate: GateState,
+    has_failed: bool,
+}
+
+impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
+    /// Makes one that has not started. This is when most of its memory is taken.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    pub fn new(config: StateEstimatorConfig, sink: K) -> Result<Self, ParamsError> {
+        config.check()?;
+        let mut this = Self {
+            config,
+            queue: Queue::new(&config)?,
+            emission: Emission::new(&config),
+            sink,
+            label: SourceLabel::default(),
+            gate: GateState::default(),
+            has_failed: false,
+        };
+        this.tell(0, EventKind::Ready { strategy: config.strategy, window: config.params.window });
+        Ok(this)
+    }
+
+    /// What it was made with.
+    pub fn config(&self) -> &StateEstimatorConfig {
+        &self.config
+    }
+
+    /// Where events go.
+    pub fn sink(&self) -> &K {
+        &self.sink
+    }
+
+    /// Where events go.
+    pub fn sink_mut(&mut self) -> &mut K {
+        &mut self.sink
+    }
+
+    /// Sets where the robot takes off. The start is levelled by the attitude of the flight controller, or at rest.
+    ///
+    /// # Errors
+    ///
+    /// [`OriginError`] after the first measurement, or if it is no position. The estimator is then as it was.
+    pub fn set_takeoff_origin(&mut self, origin: TakeoffOrigin) -> Result<(), OriginError> {
+        if !self.queue.is_empty() {
+            return Err(OriginError::AfterMeasurement);
+        }
+        origin.check().map_err(OriginError::Refused)?;
+        self.queue.set_origin(&origin);
+        Ok(())
+    }
+
+    /// Starts in the air, from what the flight controller knew last, with its deviations multiplied by
+    /// [`warm_inflation`](super::StateEstimatorParams::warm_inflation). One that runs is refused as [`Reason::Duplicate`].
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError`]; the estimator is then as it was.
+    pub fn warm_start(&mut self, state: FlightControllerState) -> Result<Added, EstimatorError> {
+        let checked = state.check();
+        self.add(InputKind::WarmStart, state.attitude.time_ns, checked, Payload::Warm(state), &[])
+    }
+
+    /// Adds a relative pose between two frames of a camera.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError::Degraded`] if it is not in the estimate, or does not fit; [`EstimatorError::Fatal`] if it broke the
+    /// estimate, which goes on without it at the next tick.
+    pub fn add_vio(&mut self, vio: VioOutput) -> Result<Added, EstimatorError> {
+        let frames = [vio.from_ns, vio.to_ns];
+        self.add(InputKind::Vio, vio.to_ns, vio.check(), Payload::Vio(vio), &frames)
+    }
+
+    /// Adds a pose from a satellite image.
+    ///
+    /// # Errors
+    ///
+    /// As [`add_vio`](Self::add_vio).
+    pub fn add_pose_anchor(&mut self, anchor: PoseAnchor) -> Result<Added, EstimatorError> {
+        self.add(InputKind::Anchor, anchor.time_ns, anchor.check(), Payload::Anchor(anchor), &[])
+    }
+
+    /// Adds a factor of an outside provider to the window itself, at a time. With several providers, each has a number.
+    ///
+    /// # Errors
+    ///
+    /// As [`add_vio`](Self::add_vio).
+    pub fn add_factor(&mut self, time_ns: i64, provider: u32, factor: F) -> Result<Added, EstimatorError> {
+        self.add(InputKind::Factor, time_ns, Ok(()), Payload::Provided(provider, factor), &[])
+    }
+
+    /// Adds what the flight controller has sent: samples of its IMU, attitudes, health of its receiver, fixes of that. All
+    /// are taken, whatever becomes of the others.
+    ///
+    /// # Errors
+    ///
+    /// That of the first which is not in the estimate.
+    pub fn add_fc_imu(&mut self, window: &FlightControllerWindow<'_>) -> Result<(), EstimatorError> {
+        let mut first = Ok(());
+        let mut note = |result: Result<(), EstimatorError>| first = first.and(result);
+        if !window.imu.is_empty() {
+            note(self.add_samples(window.imu));
+        }
+        window.attitudes.iter().for_each(|attitude| note(self.add_attitude(*attitude).map(drop)));
+        window.health.iter().for_each(|health| note(self.add_gps_health(*health).map(drop)));
+        window.fixes.iter().for_each(|fix| note(self.add_gnss(*fix).map(drop)));
+        first
+    }
+
+    /// Adds one sample of the IMU.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError::Degraded`] if it is refused, or follows a gap; [`EstimatorError::Fatal`] if there is no room for it.
+    pub fn add_imu(&mut self, sample: &ImuMean) -> Result<(), EstimatorError> {
+        self.add_samples(core::slice::from_ref(sample))
+    }
+
+    fn add_samples(&mut self, samples: &[ImuMean]) -> Result<(), EstimatorError> {
+        let mut first = Ok(());
+        for sample in samples {
+            let result = match self.queue.add_sample(sample, &self.config) {
+                Ok(false) => Ok(()),
+                Ok(true) => Err(EstimatorError::Degraded(Reason::Bridged)),
+                Err(reason) => Err(failed(reason)),
+            };
+            self.drain();
+            if let Err(error) = result {
+                self.fail(sample.time_ns, InputKind::Imu, error);
+            }
+            first = first.and(result);
+        }
+        if let (Ok(()), Some(last)) = (first, samples.last()) {
+            self.tell(last.time_ns, EventKind::Added { input: InputKind::Imu, nis: None, waits: false });
+        }
+        first
+    }
+
+    /// Adds an attitude of the flight controller. It levels the start.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError::Degraded`] if it is refused.
+    pub fn add_attitude(&mut self, attitude: AttitudeReading) -> Result<Added, EstimatorError> {
+        self.add(InputKind::Attitude, attitude.time_ns, attitude.check(), Payload::Attitude(attitude), &[])
+    }
+
+    /// Adds what the flight controller says of its receiver of satellite navigation.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError::Degraded`] if it is refused.
+    pub fn add_gps_health(&mut self, reading: GpsHealthReading) -> Result<Added, EstimatorError> {
+        self.add(InputKind::Health, reading.time_ns, Ok(()), Payload::Health(reading.health), &[])
+    }
+
+    /// Adds a fix of the flight controller's receiver.
+    ///
+    /// # Errors
+    ///
+    /// As [`add_vio`](Self::add_vio); [`Reason::Gate`] if the receiver is not trusted.
+    pub fn add_gnss(&mut self, fix: GnssReading) -> Result<Added, EstimatorError> {
+        self.add(InputKind::Gnss, fix.time_ns, fix.check(), Payload::Gnss(fix), &[])
+    }
+
+    fn add(
+        &mut self,
+        input: InputKind,
+        time_ns: i64,
+        checked: Result<(), Refusal>,
+        payload: Payload<F>,
+        frames: &[i64],
+    ) -> Result<Added, EstimatorError> {
+        let placed = match checked {
+            Ok(()) => self.queue.add(time_ns, payload, frames, &self.config),
+            Err(refusal) => Err(self.queue.refuse(refusal)),
+        };
+        self.drain();
+        match placed {
+            Ok(key) => self.became(key, input),
+            Err(reason) => {
+                let error = failed(reason);
+                self.fail(time_ns, input, error);
+                Err(error)
+            }
+        }
+    }
+
+    /// What became of an input that has its place.
+    fn became(&mut self, key: Key, input: InputKind) -> Result<Added, EstimatorError> {
+        match self.queue.outcome(key) {
+            Some(Outcome::Added { nis }) => Ok(Added::Taken { nis }),
+            Some(Outcome::Degraded(reason)) => Err(EstimatorError::Degraded(reason)),
+            Some(Outcome::Fatal(reason)) => Err(EstimatorError::Fatal(reason)),
+            None => {
+                self.tell(key.time_ns, EventKind::Added { input, nis: None, waits: true });
+                Ok(Added::Waits)
+            }
+        }
+    }
+
+    fn fail(&mut self, time_ns: i64, input: InputKind, error: EstimatorError) {
+        let reason = error.reason();
+        self.has_failed |= error.is_fatal();
+        self.tell(
+            time_ns,
+            if error.is_fatal() {
+                EventKind::Fatal { input, reason }
+            } else {
+                EventKind::Degraded { input, reason }
+            },
+        );
+    }
+
+    fn tell(&mut self, time_ns: i64, kind: EventKind) {
+        self.sink.event(&Event { time_ns, kind });
+    }
+
+    /// Passes on what the queue has to tell.
+    fn drain(&mut self) {
+        let mut told = core::mem::take(&mut self.queue.told);
+        for told in told.drain(..) {
+            match told {
+                Told::Taken(key, input, Outcome::Added { nis }) => {
+                    self.tell(key.time_ns, EventKind::Added { input, nis, waits: false });
+                }
+                // The rejection tells it.
+                Told::Taken(_, _, Outcome::Degraded(Reason::Gate(_))) => {}
+                Told::Taken(key, input, Outcome::Degraded(reason)) => {
+                    self.fail(key.time_ns, input, EstimatorError::Degraded(reason));
+                }
+                Told::Taken(key, input, Outcome::Fatal(reason)) => {
+                    self.fail(key.time_ns, input, EstimatorError::Fatal(reason));
+                }
+                Told::Revised(key, input, outcome) => {
+                    self.has_failed |= matches!(outcome, Outcome::Fatal(_));
+                    self.tell(key.time_ns, EventKind::Revised { input, reason: outcome.reason() });
+                }
+                Told::Rejected(time_ns, rejection) => self.tell(time_ns, EventKind::Rejected { rejection }),
+                Told::Started(time_ns, from) => self.tell(time_ns, EventKind::Started { from }),
+                Told::Broken(time_ns, reason) => {
+                    self.fail(time_ns, InputKind::Imu, EstimatorError::Fatal(reason));
+                }
+                Told::Left(pose, sources) => {
+                    let is_smoothed = self.is_smoothing();
+                    if let Some(estimate) = self.describe_past(&pose, &sources, is_smoothed) {
+                        self.tell(pose.time_ns, EventKind::Keyframe { estimate });
+                    }
+                }
+            }
+        }
+        self.queue.told = told;
+        self.look();
+    }
+
+    fn is_smoothing(&self) -> bool {
+        self.config.strategy.is_smoothing()
+    }
+
+    /// Tells changes of label and gate.
+    fn look(&mut self) {
+        let Some(now_ns) = self.queue.newest().map(|newest| newest.time_ns) else { return };
+        let gate = self.queue.engine().gate().state();
+        if core::mem::discriminant(&gate) != core::mem::discriminant(&self.gate) {
+            let from = core::mem::replace(&mut self.gate, gate);
+            self.tell(now_ns, EventKind::Gate { from, to: gate });
+        }
+        let label = self.queue.engine().sources().label(now_ns, &self.config.params);
+        if label != self.label {
+            let from = core::mem::replace(&mut self.label, label);
+            self.tell(now_ns, EventKind::Label { from, to: label });
+        }
+    }
+
+    /// Emits an estimate at the output's rate: call it as often as you like, at least as often as that. None if it is not
+    /// time yet, or if there is no estimate.
+    pub fn tick(&mut self, now_ns: i64) -> Option<EstimatorOutput> {
+        if !self.emission.is_due(now_ns) {
+            return None;
+        }
+        let pose = if core::mem::take(&mut self.has_failed) { None } else { self.pose_at(now_ns) };
+        let described = pose.and_then(|pose| {
+            let sources = *self.queue.engine().sources();
+            self.describe(&pose, &sources, false)
+        });
+        let output = described.map(|estimate| {
+            let (output, warning) = self.emission.emitted(now_ns, estimate, &self.config.params);
+            if let Some(ratio) = warning {
+                self.tell(now_ns, EventKind::CovarianceGrowing { ratio });
+            }
+            output
+        });
+        if let Some(kind) = self.emission.watch(now_ns, output.is_some(), &self.config.params) {
+            self.tell(now_ns, kind);
+        }
+        output
+    }
+
+    /// The estimate at a time, predicted; none if there is none, or the last sample of the IMU is too old. It changes nothing.
+    pub fn predicted(&self, time_ns: i64) -> Option<EstimatorOutput> {
+        let pose = self.pose_at(time_ns)?;
+        self.describe(&pose, self.queue.engine().sources(), false)
+    }
+
+    fn pose_at(&self, time_ns: i64) -> Option<Pose> {
+        let newest = self.queue.newest()?;
+        let ahead_ns = time_ns.saturating_sub(newest.time_ns);
+        if ahead_ns > super::params::ns(self.config.params.longest_prediction) {
+            return None;
+        }
+        let predictor = self.queue.predictor()?;
+        let pose = if ahead_ns > 0 {
+            // It goes on as it was.
+            let mut ahead = *predictor;
+            ahead.propagate(&ImuMean { time_ns, ..*newest }).ok()?;
+            ahead.pose()
+        } else {
+            predictor.pose()
+        };
+        pose.filter(Pose::is_finite)
+    }
+
+    /// The newest keyframe: what is measured after it is not in it. None before the start, and while it is lost.
+    pub fn current_estimate(&self) -> Option<EstimatorOutput> {
+        let (pose, sources) = self.queue.engine().newest()?;
+        self.describe(&pose, &sources, false)
+    }
+
+    /// Up to `n` keyframes before the newest, the newest of them first. The smoother's are corrected by what was measured
+    /// later; the filter's are as they were, and say so: `smoothed` is false. They are for recorders: only the forward
+    /// estimate may leave.
+    pub fn smoothed_history(&mut self, n: usize) -> Vec<EstimatorOutput> {
+        let most = n.min(self.config.params.window as usize);
+        let (history, is_smoothed) = self.queue.engine_mut().history(most);
+        let poses: Vec<(Pose, Sources)> = history.collect();
+        poses.iter().filter_map(|(pose, sources)| self.describe_past(pose, sources, is_smoothed)).collect()
+    }
+
+    /// The last innovation is not one of the past.
+    fn describe_past(&self, pose: &Pose, sources: &Sources, smoothed: bool) -> Option<EstimatorOutput> {
+        let mut estimate = self.describe(pose, sources, smoothed)?;
+        estimate.quality.nis = None;
+        Some(estimate)
+    }
+
+    fn describe(&self, pose: &Pose, sources: &Sources, smoothed: bool) -> Option<EstimatorOutput> {
+        let engine = self.queue.engine();
+        self.emission.describe(pose, sources, smoothed, engine, &self.config.params)
+    }
+
+    /// How it is.
+    pub fn health(&self) -> EstimatorHealth {
+        let engine = self.queue.engine();
+        let now_ns = self.queue.newest().map_or(i64::MIN, |newest| newest.time_ns);
+        let state = match engine.condition() {
+            Condition::Starting => HealthState::Init,
+            Condition::Lost => HealthState::Lost,
+            Condition::Running if self.emission.is_silent() => HealthState::Lost,
+            Condition::Running if engine.is_degraded(now_ns) => HealthState::Degraded,
+            Condition::Running => HealthState::Tracking,
+        };
+        EstimatorHealth {
+            state,
+            keyframes: engine.keyframes(),
+            covariance_growing_s: self.emission.growing_s(),
+            gate: engine.gate().state(),
+            is_fallback_engaged: self.emission.is_fallback_engaged(),
+        }
+    }
+
+    /// What the estimate rests on, at the newest sample of the IMU.
+    pub fn label(&self) -> SourceLabel {
+        self.label
+    }
+
+    /// The world of factors that outside providers add; none before the origin is known. It moves on where the robot is
+    /// farther than 5 km from its origin.
+    pub fn frame(&self) -> Option<&LocalFrame> {
+        self.queue.engine().world().map(|world| world.frame())
+    }
+
+    /// How inputs arrived.
+    pub fn counts(&self) -> &QueueCounts {
+        self.queue.counts()
+    }
+
+    #[cfg(test)]
+    pub(super) fn held(&self) -> [usize; 3] {
+        self.queue.held()
+    }
+}
+
+fn failed(reason: Reason) -> EstimatorError {
+    if reason == Reason::Overflow { EstimatorError::Fatal(reason) } else { EstimatorError::Degraded(reason) }
+}

@@ -1,0 +1,42 @@
+//! What outside providers add to the window themselves.
+
+#[cfg(feature = "eskf")]
+use crate::navigation::navigator::{NAVIGATED, Navigated};
+use crate::navigation::smoother::Factor;
+use core::fmt::Debug;
+
+#[cfg(feature = "smoother")]
+use crate::navigation::state::{Optional, States};
+
+/// States of the smoother: the scale of relative poses besides those of navigation.
+#[cfg(feature = "smoother")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Smoothed;
+
+#[cfg(feature = "smoother")]
+impl States for Smoothed {
+    const OPTIONAL: &'static [Optional] = &[Optional::RelativeScale];
+}
+
+/// The number of errors of [`Smoothed`].
+#[cfg(feature = "smoother")]
+pub const SMOOTHED: usize = Smoothed::DIMENSION;
+
+macro_rules! provided {
+    ($($factor:path),*) => {
+        /// A factor that an outside provider adds itself: the window is shared. Every type that is a [`Factor`] of any
+        /// states, as [`NavigationFactor`](crate::navigation::NavigationFactor), is one.
+        ///
+        /// Its world is that of [`StateEstimator::frame`](super::StateEstimator::frame). The filter takes those that
+        /// concern one keyframe.
+        pub trait ProvidedFactor: Clone + Debug $(+ $factor)* {}
+        impl<F: Clone + Debug $(+ $factor)*> ProvidedFactor for F {}
+    };
+}
+
+#[cfg(all(feature = "smoother", feature = "eskf"))]
+provided!(Factor<Smoothed, SMOOTHED>, Factor<Navigated, NAVIGATED>);
+#[cfg(all(feature = "smoother", not(feature = "eskf")))]
+provided!(Factor<Smoothed, SMOOTHED>);
+#[cfg(all(feature = "eskf", not(feature = "smoother")))]
+provided!(Factor<Navigated, NAVIGATED>);

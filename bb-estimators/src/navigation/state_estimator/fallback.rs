@@ -1,0 +1,54 @@
+//! When there is no estimate for too long.
+
+use super::params::{StateEstimatorParams, ns};
+
+/// What a tick with or without an estimate leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fallback {
+    /// Two thirds of the time have passed.
+    Imminent,
+    /// The flight controller's own IMU has to do.
+    Engaged,
+    /// There is an estimate again.
+    Recovered,
+}
+
+/// Counts the time without an estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Watchdog {
+    /// The last tick with an estimate; before the first, the first tick.
+    last_ns: Option<i64>,
+    is_warned: bool,
+    is_engaged: bool,
+}
+
+impl Watchdog {
+    pub(super) fn is_engaged(&self) -> bool {
+        self.is_engaged
+    }
+
+    /// Takes a tick. Each change is told once.
+    pub(super) fn tick(
+        &mut self,
+        now_ns: i64,
+        has_estimate: bool,
+        params: &StateEstimatorParams,
+    ) -> Option<Fallback> {
+        if has_estimate {
+            let was_engaged = self.is_engaged;
+            *self = Self { last_ns: Some(now_ns), ..Self::default() };
+            return was_engaged.then_some(Fallback::Recovered);
+        }
+        let last_ns = *self.last_ns.get_or_insert(now_ns);
+        let without_ns = now_ns.saturating_sub(last_ns);
+        if !self.is_engaged && without_ns >= ns(params.fallback_after) {
+            (self.is_engaged, self.is_warned) = (true, true);
+            return Some(Fallback::Engaged);
+        }
+        if !self.is_warned && without_ns >= ns(params.fallback_after * 2.0 / 3.0) {
+            self.is_warned = true;
+            return Some(Fallback::Imminent);
+        }
+        None
+    }
+}

@@ -1,0 +1,265 @@
+//! What the state estimator takes. Orientations and covariances in the world are in the local tangent frame at the position
+//! they come with: x east, y north, z up.
+
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
+
+use crate::navigation::eskf::ImuMean;
+use crate::navigation::geodesy::Geodetic;
+use crate::navigation::refusal::Refusal;
+
+/// Biases of an IMU, as a visual-inertial odometry estimates them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuBias {
+    /// What the accelerometer reads more than the specific force, body axes, m/s².
+    pub accelerometer: Vector3<f64>,
+    /// What the gyroscope reads more than the angular velocity, body axes, rad/s.
+    pub gyroscope: Vector3<f64>,
+}
+
+/// The pose of the body at one camera frame relative to an earlier one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VioOutput {
+    /// When the earlier frame was taken, ns.
+    pub from_ns: i64,
+    /// When the later frame was taken, ns.
+    pub to_ns: i64,
+    /// Of the body's origin at the later frame, in the axes of the body at the earlier one, m.
+    pub translation: Vector3<f64>,
+    /// Takes body coordinates at the later frame to those at the earlier one.
+    pub from_to: UnitQuaternion<f64>,
+    /// Covariance of translation, m², and of the rotation vector of the error, rad², both in body axes at the later frame.
+    /// What correlates the two is left out.
+    pub covariance: Matrix6<f64>,
+    /// Its estimate of the biases. It was made of the same samples of the IMU, so it is no measurement: where the estimator
+    /// starts, or starts again, it starts with these.
+    pub bias: Option<ImuBias>,
+}
+
+/// The pose of the body, from satellite images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseAnchor {
+    /// When the image was taken, ns.
+    pub time_ns: i64,
+    /// Which provider it is from, if there are several.
+    pub provider: u32,
+    /// Of the body's origin.
+    pub position: Geodetic,
+    /// Takes body coordinates to the tangent frame at the position.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// Covariance of the position, m², and of the rotation vector of the error, rad², both in the tangent frame. What
+    /// correlates the two is left out.
+    pub covariance: Matrix6<f64>,
+    /// The provider has saved time over its covariance, when it was too hot for one. It is used as it is, and the quality of
+    /// the estimate says so.
+    pub is_covariance_degraded: bool,
+}
+
+/// Where the robot takes off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TakeoffOrigin {
+    /// Of the body's origin.
+    pub position: Geodetic,
+    /// Standard deviation of each horizontal coordinate, m.
+    pub horizontal_deviation: f64,
+    /// Standard deviation of the height, m.
+    pub vertical_deviation: f64,
+}
+
+impl TakeoffOrigin {
+    /// An origin that is known to 5 m, and to 10 m of height.
+    pub const fn new(position: Geodetic) -> Self {
+        Self { position, horizontal_deviation: 5.0, vertical_deviation: 10.0 }
+    }
+}
+
+/// The attitude that the flight controller estimates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AttitudeReading {
+    /// When, ns.
+    pub time_ns: i64,
+    /// Takes body coordinates to the tangent frame.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// Standard deviation of roll and pitch, rad.
+    pub tilt_deviation: f64,
+    /// Standard deviation of the heading, rad.
+    pub heading_deviation: f64,
+}
+
+/// What the flight controller knew last: where a warm start begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlightControllerState {
+    /// Its attitude, and when.
+    pub attitude: AttitudeReading,
+    /// Of the body's origin.
+    pub position: Geodetic,
+    /// Covariance of the position, in the tangent frame, m².
+    pub position_covariance: Matrix3<f64>,
+    /// In the tangent frame, m/s.
+    pub velocity: Vector3<f64>,
+    /// Covariance of the velocity, m²/s².
+    pub velocity_covariance: Matrix3<f64>,
+}
+
+/// What the flight controller says of its receiver of satellite navigation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
+pub enum GpsHealth {
+    /// It has no fix.
+    NoFix,
+    /// It has one that comes and goes, or is jammed.
+    Unstable,
+    /// It is stable and shows no sign of spoofing.
+    Stable,
+    /// It is being spoofed.
+    Spoofed,
+}
+
+/// A report of that health.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GpsHealthReading {
+    /// When, ns.
+    pub time_ns: i64,
+    /// What is reported.
+    pub health: GpsHealth,
+}
+
+/// A fix of the flight controller's receiver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GnssReading {
+    /// When, ns.
+    pub time_ns: i64,
+    /// Of the antenna.
+    pub position: Geodetic,
+    /// Covariance of the position, in the tangent frame, m².
+    pub covariance: Matrix3<f64>,
+    /// Of the antenna, in the tangent frame, m/s, with its covariance, m²/s².
+    pub velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
+    /// Where the antenna is in the body, m.
+    pub lever_arm: Vector3<f64>,
+}
+
+/// What the flight controller has sent since the last time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlightControllerWindow<'a> {
+    /// Samples of the IMU, each a mean since the one before.
+    pub imu: &'a [ImuMean],
+    /// Its attitudes.
+    pub attitudes: &'a [AttitudeReading],
+    /// How its receiver of satellite navigation is.
+    pub health: &'a [GpsHealthReading],
+    /// The fixes of that.
+    pub fixes: &'a [GnssReading],
+}
+
+/// Standard deviations from a thousandth of a millimetre to a million kilometres, and the like of rotations.
+const LEAST_VARIANCE: f64 = 1e-18;
+const MOST_VARIANCE: f64 = 1e18;
+
+pub(super) fn check_covariance(covariance: &Matrix3<f64>) -> Result<(), Refusal> {
+    if !covariance.iter().all(|x| x.is_finite()) {
+        return Err(Refusal::NonFinite);
+    }
+    let is_usual = covariance.diagonal().iter().all(|x| (LEAST_VARIANCE..=MOST_VARIANCE).contains(x));
+    if is_usual && nalgebra::linalg::Cholesky::new(*covariance).is_some() { Ok(()) } else { Err(Refusal::Noise) }
+}
+
+/// The blocks of the diagonal.
+pub(super) fn blocks(covariance: &Matrix6<f64>) -> [Matrix3<f64>; 2] {
+    [0, 3].map(|first| covariance.fixed_view::<3, 3>(first, first).into_owned())
+}
+
+pub(super) fn check_vector(vector: &Vector3<f64>, limit: f64) -> Result<(), Refusal> {
+    if !vector.iter().all(|x| x.is_finite()) {
+        return Err(Refusal::NonFinite);
+    }
+    if vector.iter().all(|x| x.abs() <= limit) { Ok(()) } else { Err(Refusal::OutOfRange) }
+}
+
+pub(super) fn check_rotation(rotation: &UnitQuaternion<f64>) -> Result<(), Refusal> {
+    // NaN is in no range.
+    if (0.99..1.01).contains(&rotation.norm()) { Ok(()) } else { Err(Refusal::NonFinite) }
+}
+
+pub(super) fn check_position(position: &Geodetic) -> Result<(), Refusal> {
+    let Geodetic { latitude, longitude, height } = *position;
+    if !(latitude.is_finite() && longitude.is_finite() && height.is_finite()) {
+        return Err(Refusal::NonFinite);
+    }
+    let is_there = latitude.abs() <= 0.5 * core::f64::consts::PI
+        && longitude.abs() <= 2.0 * core::f64::consts::PI
+        && (-1e4..=1e6).contains(&height);
+    if is_there { Ok(()) } else { Err(Refusal::OutOfRange) }
+}
+
+/// Faster than anything that flies in the air, m/s.
+const MOST_VELOCITY: f64 = 1e4;
+/// The longest way between two frames, m.
+const LONGEST_WAY: f64 = 1e5;
+
+impl VioOutput {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        if self.to_ns <= self.from_ns {
+            return Err(Refusal::TimeNotIncreasing { previous_ns: self.from_ns, time_ns: self.to_ns });
+        }
+        check_vector(&self.translation, LONGEST_WAY)?;
+        check_rotation(&self.from_to)?;
+        if let Some(bias) = &self.bias {
+            check_vector(&bias.accelerometer, 10.0)?;
+            check_vector(&bias.gyroscope, 10.0)?;
+        }
+        blocks(&self.covariance).iter().try_for_each(check_covariance)
+    }
+}
+
+impl PoseAnchor {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        check_position(&self.position)?;
+        check_rotation(&self.world_from_body)?;
+        blocks(&self.covariance).iter().try_for_each(check_covariance)
+    }
+}
+
+impl TakeoffOrigin {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        check_position(&self.position)?;
+        let is_known =
+            [self.horizontal_deviation, self.vertical_deviation].iter().all(|x| (1e-3..=1e6).contains(x));
+        if is_known { Ok(()) } else { Err(Refusal::Noise) }
+    }
+}
+
+impl AttitudeReading {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        check_rotation(&self.world_from_body)?;
+        let is_known = [self.tilt_deviation, self.heading_deviation].iter().all(|x| (1e-6..=10.0).contains(x));
+        if is_known { Ok(()) } else { Err(Refusal::Noise) }
+    }
+
+    pub(super) fn covariance(&self) -> Matrix3<f64> {
+        let (tilt, heading) = (self.tilt_deviation, self.heading_deviation);
+        Matrix3::from_diagonal(&Vector3::new(tilt * tilt, tilt * tilt, heading * heading))
+    }
+}
+
+impl FlightControllerState {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        self.attitude.check()?;
+        check_position(&self.position)?;
+        check_vector(&self.velocity, MOST_VELOCITY)?;
+        check_covariance(&self.position_covariance)?;
+        check_covariance(&self.velocity_covariance)
+    }
+}
+
+impl GnssReading {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        check_position(&self.position)?;
+        check_covariance(&self.covariance)?;
+        check_vector(&self.lever_arm, 100.0)?;
+        if let Some((velocity, covariance)) = &self.velocity {
+            check_vector(velocity, MOST_VELOCITY)?;
+            check_covariance(covariance)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,120 @@
+//! What the estimate rests on.
+//!
+//! ```text
+//! dead_reckoned ──► satellite_anchored ◄──► visual_propagated
+//!       ▲                   │                       │
+//!       └───────────────────┴───── visual loss ─────┘
+//! ```
+
+use core::fmt;
+
+use super::params::{StateEstimatorParams, ns};
+
+/// What the estimate rests on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
+pub enum SourceLabel {
+    /// On the IMU alone, or on a camera that has not seen where it is since it was last lost. The covariance grows.
+    #[default]
+    DeadReckoned,
+    /// On a recent anchor, or on a recent fix of a receiver that is trusted.
+    SatelliteAnchored,
+    /// On a camera, since the last anchor.
+    VisualPropagated,
+}
+
+impl SourceLabel {
+    /// The name in logs and recordings.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::DeadReckoned => "dead_reckoned",
+            Self::SatelliteAnchored => "satellite_anchored",
+            Self::VisualPropagated => "visual_propagated",
+        }
+    }
+}
+
+impl fmt::Display for SourceLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The state machine of the label. It is asked at any time, and so keeps times instead of a label.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Sources {
+    /// The newest pose or position in the world.
+    anchored_ns: Option<i64>,
+    /// The newest measurement of any of these and of relative poses.
+    seen_ns: Option<i64>,
+    /// Whether there was an anchor since the camera was last lost.
+    is_grounded: bool,
+}
+
+impl Sources {
+    /// A pose or a position in the world was fused.
+    pub(super) fn anchored(&mut self, time_ns: i64, params: &StateEstimatorParams) {
+        self.lose(time_ns, params);
+        self.anchored_ns = self.anchored_ns.max(Some(time_ns));
+        self.seen_ns = self.seen_ns.max(Some(time_ns));
+        self.is_grounded = true;
+    }
+
+    /// A relative pose was fused.
+    pub(super) fn seen(&mut self, time_ns: i64, params: &StateEstimatorParams) {
+        self.lose(time_ns, params);
+        self.seen_ns = self.seen_ns.max(Some(time_ns));
+    }
+
+    fn lose(&mut self, time_ns: i64, params: &StateEstimatorParams) {
+        self.is_grounded &= self.is_seen(time_ns, params);
+    }
+
+    fn is_seen(&self, time_ns: i64, params: &StateEstimatorParams) -> bool {
+        self.seen_ns.is_some_and(|seen_ns| time_ns.saturating_sub(seen_ns) <= ns(params.visual_loss))
+    }
+
+    /// The label at a time.
+    pub(super) fn label(&self, time_ns: i64, params: &StateEstimatorParams) -> SourceLabel {
+        let is_recent = self.age_ns(time_ns).is_some_and(|age_ns| age_ns <= ns(params.anchor_age));
+        match self.is_grounded && self.is_seen(time_ns, params) {
+            false => SourceLabel::DeadReckoned,
+            true if is_recent => SourceLabel::SatelliteAnchored,
+            true => SourceLabel::VisualPropagated,
+        }
+    }
+
+    /// Time since the last anchor; none before the first.
+    pub(super) fn age_ns(&self, time_ns: i64) -> Option<i64> {
+        self.anchored_ns.map(|anchored_ns| time_ns.saturating_sub(anchored_ns).max(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    #[test]
+    fn arrows_of_the_label() {
+        let params = StateEstimatorParams::default();
+        let mut sources = Sources::default();
+        let label = |sources: &Sources, second: i64| sources.label(second * SECOND, &params);
+        sources.seen(0, &params);
+        assert_eq!(label(&sources, 0), SourceLabel::DeadReckoned, "a camera alone does not know where it is");
+        sources.anchored(SECOND, &params);
+        assert_eq!(label(&sources, 1), SourceLabel::SatelliteAnchored);
+        (2..=5).for_each(|second| sources.seen(second * SECOND, &params));
+        assert_eq!(label(&sources, 4), SourceLabel::SatelliteAnchored, "3 s old is not older than 3 s");
+        assert_eq!(label(&sources, 5), SourceLabel::VisualPropagated);
+        sources.anchored(6 * SECOND, &params);
+        assert_eq!(label(&sources, 6), SourceLabel::SatelliteAnchored, "and back");
+        assert_eq!(label(&sources, 8), SourceLabel::DeadReckoned, "visual loss, though the anchor is recent");
+        sources.seen(9 * SECOND, &params);
+        assert_eq!(label(&sources, 9), SourceLabel::DeadReckoned, "only an anchor leads out");
+        sources.anchored(10 * SECOND, &params);
+        assert_eq!(label(&sources, 10), SourceLabel::SatelliteAnchored);
+        assert_eq!(sources.age_ns(12 * SECOND), Some(2 * SECOND));
+    }
+}

@@ -1,0 +1,141 @@
+//! How the state estimator is set up.
+
+use crate::navigation::eskf::EskfParams;
+use crate::params::{Params as _, ParamsError, params};
+
+/// Which estimator does the work. Each is there if the crate was built with the feature of its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum StrategyKind {
+    /// [`FixedLagSmoother`](crate::navigation::FixedLagSmoother), with the feature `smoother`: the default.
+    #[cfg(feature = "smoother")]
+    FixedLagSmoother,
+    /// [`Eskf`](crate::navigation::Eskf), with the feature `eskf`: the simple baseline.
+    #[cfg(feature = "eskf")]
+    Eskf,
+}
+
+impl StrategyKind {
+    /// Those that were built.
+    pub const ALL: &'static [Self] = &[
+        #[cfg(feature = "smoother")]
+        Self::FixedLagSmoother,
+        #[cfg(feature = "eskf")]
+        Self::Eskf,
+    ];
+
+    /// Its name: `smoother` or `eskf`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            #[cfg(feature = "smoother")]
+            Self::FixedLagSmoother => "smoother",
+            #[cfg(feature = "eskf")]
+            Self::Eskf => "eskf",
+        }
+    }
+
+    /// Whether its keyframes are corrected by what is measured later.
+    pub(super) const fn is_smoothing(self) -> bool {
+        match self {
+            #[cfg(feature = "smoother")]
+            Self::FixedLagSmoother => true,
+            #[cfg(feature = "eskf")]
+            Self::Eskf => false,
+        }
+    }
+
+    /// The strategy of that name, if it was built.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|strategy| strategy.name() == name)
+    }
+}
+
+impl Default for StrategyKind {
+    fn default() -> Self {
+        Self::ALL[0]
+    }
+}
+
+params! {
+    /// Times and limits of [`StateEstimator`](super::StateEstimator).
+    pub struct StateEstimatorParams {
+        /// How many keyframes are held, in the smoother's window or in the filter's history: from 2 to 100.
+        window: u32 = 15;
+        /// How late an input may be, behind the newest sample of the IMU, and still be placed where it belongs.
+        ///
+        /// Small: what takes longer to compute is refused. Large: costs memory, and time where something is late.
+        ///
+        /// Source: two seconds of keyframes at 10 Hz, and the time that a satellite image takes.
+        lateness: f64 = 2.0, in 0.05..=10.0, unit "s";
+        /// How far ahead of the newest sample of the IMU an input may be stamped.
+        lead: f64 = 0.5, in 0.0..=10.0, unit "s";
+        /// Without camera frames, a keyframe is made after this time. It must be longer than the time between two frames.
+        keyframe_interval: f64 = 1.0, in 0.05..=10.0, unit "s";
+        /// Estimates a second.
+        output_rate: f64 = 5.0, in 0.1..=1000.0, unit "Hz";
+        /// How long after the last sample of the IMU there is still an estimate.
+        longest_prediction: f64 = 0.2, in 0.0..=1.0, unit "s";
+        /// How long there may be no estimate before the flight controller's own IMU has to do.
+        fallback_after: f64 = 3.0, in 0.1..=60.0, unit "s";
+        /// An anchor older than this demotes to `visual_propagated`.
+        anchor_age: f64 = 3.0, in 0.1..=600.0, unit "s";
+        /// Without a camera's, or a satellite's, measurement for this time it is dead reckoning.
+        visual_loss: f64 = 1.0, in 0.05..=60.0, unit "s";
+        /// How long a receiver that was spoofed must be healthy before it may be let in again.
+        dwell: f64 = 10.0, in 0.0..=600.0, unit "s";
+        /// Reports of its health that are farther apart break the dwell.
+        health_gap: f64 = 2.0, in 0.05..=60.0, unit "s";
+        /// How far from the next anchor its fix may be to be let in again.
+        anchor_tolerance: f64 = 25.0, in 0.1..=1e4, unit "m";
+        /// How far from the estimate its fix may be to be let in again.
+        bounded_distance: f64 = 200.0, in 1.0..=1e6, unit "m";
+        /// What the standard deviations of the flight controller are multiplied by at a warm start.
+        warm_inflation: f64 = 2.0, in 1.0..=100.0;
+        /// Standard deviation of each component of the velocity at take-off.
+        takeoff_velocity: f64 = 0.5, in 1e-3..=100.0, unit "m/s";
+        /// Heading of the body's x axis at take-off, from east counter-clockwise, where no attitude tells it.
+        takeoff_heading: f64 = 0.0, in -7.0..=7.0, unit "rad";
+        /// How well that is known, standard deviation.
+        takeoff_heading_deviation: f64 = 0.5, in 1e-6..=4.0, unit "rad";
+        /// Standard deviation of the accelerometer's bias at the start.
+        accelerometer_bias: f64 = 0.2, in 1e-6..=10.0, unit "m/s^2";
+        /// Standard deviation of the gyroscope's bias at the start.
+        gyroscope_bias: f64 = 0.02, in 1e-9..=1.0, unit "rad/s";
+        /// A covariance that is larger than the steady one by this factor is warned of.
+        growing_covariance: f64 = 2.0, in 1.1..=1e3;
+        /// Whether keyframes that leave the window are events, for a recorder. It costs the smoother the covariance of its oldest
+        /// keyframe.
+        record_keyframes: bool = true;
+    }
+}
+
+/// All that a [`StateEstimator`](super::StateEstimator) is made with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StateEstimatorConfig {
+    /// Which estimator does the work.
+    pub strategy: StrategyKind,
+    /// Times and limits.
+    pub params: StateEstimatorParams,
+    /// The noise of the IMU, gravity and gaps.
+    pub sensors: EskfParams,
+    /// What the ids of frames begin with: another in each flight, for ids that are unique.
+    pub flight: u64,
+}
+
+impl StateEstimatorConfig {
+    pub(super) fn check(&self) -> Result<(), ParamsError> {
+        self.params.check()?;
+        self.sensors.check()?;
+        let (window, min, max) = (self.params.window, 2, 100);
+        if (min..=max).contains(&window) {
+            return Ok(());
+        }
+        let [value, min, max] = [window, min, max].map(f64::from);
+        Err(ParamsError { parameter: "window", value, min, max, unit: "" })
+    }
+}
+
+/// Seconds as nanoseconds.
+pub(super) fn ns(seconds: f64) -> i64 {
+    // A float is cast to the nearest there is.
+    (seconds * 1e9) as i64
+}

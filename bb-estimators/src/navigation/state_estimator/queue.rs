@@ -1,0 +1,490 @@
+//! The one queue of all inputs, in the order of their stamps, and the one writer behind it.
+//!
+//! The engine is run up to the newest input that is no sample of the IMU; what the IMU says since is for the predictor. What
+//! arrives late is put in its place, and the engine is run again from the last copy of it that is older: the result is
+//! that of inputs that arrive in order, to the last bit.
+
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+
+use super::engine::{Condition, Engine};
+use super::entry::{Entry, Key, Outcome, Payload};
+use super::error::Reason;
+use super::event::{InputKind, StartedFrom};
+use super::factor::ProvidedFactor;
+use super::gate::Rejection;
+use super::input::TakeoffOrigin;
+use super::label::Sources;
+use super::params::{StateEstimatorConfig, ns};
+use super::strategy::{Pose, Predictor};
+use crate::attitude::ParamsError;
+use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S};
+use crate::navigation::refusal::Refusal;
+
+/// Room for samples of the IMU: twice the longest lateness at 400 Hz.
+const SAMPLES: usize = 8192;
+/// Room for other inputs.
+const INPUTS: usize = 512;
+/// Copies of the engine.
+const COPIES: usize = 8;
+/// How far the engine may be behind the IMU, ns.
+const LONGEST_TAIL_NS: i64 = 250_000_000;
+/// Two samples that agree on a leap of time are no more than this apart, ns.
+const AGREED_NS: i64 = 1_000_000_000;
+
+/// How inputs arrived.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct QueueCounts {
+    /// Put in a place before others.
+    pub late: u64,
+    /// Older than the window, and refused.
+    pub too_old: u64,
+    /// Stamped in the future, and refused.
+    pub in_the_future: u64,
+    /// There already, and refused.
+    pub duplicates: u64,
+    /// Refused since there was no room.
+    pub overflows: u64,
+    /// Not finite or otherwise no measurement, and refused.
+    pub invalid: u64,
+    /// How often the engine was run again from an earlier copy.
+    pub reruns: u64,
+}
+
+#[expect(clippy::large_enum_variant, reason = "its room is taken once")]
+/// What the queue has to tell.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Told {
+    /// It was an input's turn for the first time.
+    Taken(Key, InputKind, Outcome),
+    /// It was again, and came out otherwise.
+    Revised(Key, InputKind, Outcome),
+    /// The gate of the receiver rejected something.
+    Rejected(i64, Rejection),
+    /// It has started.
+    Started(i64, StartedFrom),
+    /// A keyframe has left the window.
+    Left(Pose, Sources),
+    /// The IMU broke the estimate.
+    Broken(i64, Reason),
+}
+
+/// See the module.
+#[derive(Debug)]
+pub(super) struct Queue<F: ProvidedFactor> {
+    samples: VecDeque<ImuMean>,
+    inputs: VecDeque<Entry<F>>,
+    engine: Engine<F>,
+    copies: VecDeque<Engine<F>>,
+    predictor: Option<Predictor>,
+    newest: Option<ImuMean>,
+    /// A sample that is too far ahead to be believed alone.
+    leap_ns: Option<i64>,
+    counts: QueueCounts,
+    started: Option<(i64, StartedFrom)>,
+    left_ns: i64,
+    pub(super) told: Vec<Told>,
+}
+
+impl<F: ProvidedFactor> Queue<F> {
+    pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
+        let engine = Engine::new(config)?;
+        let mut copies = VecDeque::with_capacity(COPIES + 1);
+        copies.push_back(engine.clone());
+        Ok(Self {
+            samples: VecDeque::with_capacity(SAMPLES),
+            inputs: VecDeque::with_capacity(INPUTS),
+            engine,
+            copies,
+            predictor: None,
+            newest: None,
+            leap_ns: None,
+            counts: QueueCounts::default(),
+            started: None,
+            left_ns: i64::MIN,
+            told: Vec::new(),
+        })
+    }
+
+    /// Whether nothing has come in yet.
+    pub(super) fn is_empty(&self) -> bool {
+        self.newest.is_none() && self.inputs.is_empty()
+    }
+
+    pub(super) fn set_origin(&mut self, origin: &TakeoffOrigin) {
+        self.engine.set_origin(origin);
+        self.copies.iter_mut().for_each(|copy| copy.set_origin(origin));
+    }
+
+    pub(super) fn engine(&self) -> &Engine<F> {
+        &self.engine
+    }
+
+    pub(super) fn engine_mut(&mut self) -> &mut Engine<F> {
+        &mut self.engine
+    }
+
+    pub(super) fn predictor(&self) -> Option<&Predictor> {
+        self.predictor.as_ref()
+    }
+
+    /// The newest sample of the IMU.
+    pub(super) fn newest(&self) -> Option<&ImuMean> {
+        self.newest.as_ref()
+    }
+
+    pub(super) fn counts(&self) -> &QueueCounts {
+        &self.counts
+    }
+
+    /// What became of an input; none if it waits.
+    pub(super) fn outcome(&self, key: Key) -> Option<Outcome> {
+        let index = self.inputs.binary_search_by(|entry| entry.key.cmp(&key)).ok()?;
+        self.inputs.get(index)?.outcome
+    }
+
+    /// How much is held: samples, inputs, copies.
+    #[cfg(test)]
+    pub(super) fn held(&self) -> [usize; 3] {
+        [self.samples.len(), self.inputs.len(), self.copies.len()]
+    }
+
+    fn count(&mut self, reason: Reason) -> Reason {
+        let counts = &mut self.counts;
+        match reason {
+            Reason::Duplicate => counts.duplicates += 1,
+            Reason::Overflow => counts.overflows += 1,
+            Reason::Refused(Refusal::TooOld { .. }) => counts.too_old += 1,
+            Reason::Refused(Refusal::InTheFuture { .. }) => counts.in_the_future += 1,
+            Reason::Refused(_) => counts.invalid += 1,
+            Reason::Gate(_) | Reason::Raised { .. } | Reason::Bridged => {}
+        }
+        reason
+    }
+
+    /// Counts an input that was refused before it came here.
+    pub(super) fn refuse(&mut self, refusal: Refusal) -> Reason {
+        self.count(refusal.into())
+    }
+
+    /// Takes a sample of the IMU; whether it follows a gap.
+    pub(super) fn add_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
+        let result = self.place_sample(sample, config);
+        result.map_err(|reason| self.count(reason))
+    }
+
+    fn place_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
+        sample.check()?;
+        let time_ns = sample.time_ns;
+        let Some(newest) = self.newest else {
+            self.newest = Some(*sample);
+            self.samples.push_back(*sample);
+            self.drop_strangers(time_ns, config);
+            self.settle(time_ns, config);
+            return Ok(false);
+        };
+        let ahead_ns = time_ns.saturating_sub(newest.time_ns);
+        if ahead_ns <= 0 {
+            self.place_late_sample(sample, &newest, config)?;
+            return Ok(false);
+        }
+        if ahead_ns > ns(LONGEST_GAP_S) {
+            // One alone may have a broken stamp, which would make all that follow too old.
+            let is_agreed =
+                self.leap_ns.is_some_and(|leap_ns| (1..=AGREED_NS).contains(&time_ns.saturating_sub(leap_ns)));
+            self.leap_ns = (!is_agreed).then_some(time_ns);
+            if !is_agreed {
+                return Err(Refusal::InTheFuture { time_ns }.into());
+            }
+        }
+        if self.samples.len() >= SAMPLES {
+            return Err(Reason::Overflow);
+        }
+        self.newest = Some(*sample);
+        self.samples.push_back(*sample);
+        if self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample).is_err()) {
+            self.predictor = None;
+        }
+        let waits = |entry: &Entry<F>| entry.key > self.engine.key() && entry.key.time_ns <= time_ns;
+        let behind_ns = self.engine.now_ns().map_or(i64::MAX, |now_ns| time_ns.saturating_sub(now_ns));
+        let is_running = self.engine.condition() == Condition::Running;
+        if !is_running || behind_ns > LONGEST_TAIL_NS {
+            self.settle(time_ns, config);
+        } else if let Some(last) = self.inputs.iter().rev().find(|entry| waits(entry)).map(|entry| entry.key) {
+            self.settle(last.time_ns, config);
+        }
+        Ok(ahead_ns > ns(config.sensors.longest_sample))
+    }
+
+    fn place_late_sample(
+        &mut self,
+        sample: &ImuMean,
+        newest: &ImuMean,
+        config: &StateEstimatorConfig,
+    ) -> Result<(), Reason> {
+        let time_ns = sample.time_ns;
+        if newest.time_ns.saturating_sub(time_ns) > ns(config.params.lateness) {
+            return Err(Refusal::TooOld { time_ns }.into());
+        }
+        if self.samples.len() >= SAMPLES {
+            return Err(Reason::Overflow);
+        }
+        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
+        if self.samples.get(index).is_some_and(|other| other.time_ns == time_ns) {
+            return Err(Reason::Duplicate);
+        }
+        self.samples.insert(index, *sample);
+        self.counts.late += 1;
+        let engine_ns = self.engine.now_ns().unwrap_or(i64::MIN);
+        if Key::of_sample(time_ns) < self.engine.key() {
+            self.run_again(Key::of_sample(time_ns), engine_ns, config);
+        } else {
+            self.predict();
+        }
+        Ok(())
+    }
+
+    /// Inputs that came before the IMU and are not of its time.
+    fn drop_strangers(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
+        let (lateness, lead) = (ns(config.params.lateness), ns(config.params.lead));
+        let mut index = 0;
+        while let Some(entry) = self.inputs.get(index) {
+            let (key, kind) = (entry.key, entry.payload.kind());
+            let refusal = if key.time_ns < time_ns.saturating_sub(lateness) {
+                Refusal::TooOld { time_ns: key.time_ns }
+            } else if key.time_ns > time_ns.saturating_add(lead) {
+                Refusal::InTheFuture { time_ns: key.time_ns }
+            } else {
+                index += 1;
+                continue;
+            };
+            self.inputs.remove(index);
+            if let Some(kind) = kind {
+                let reason = self.count(refusal.into());
+                self.told.push(Told::Taken(key, kind, Outcome::Degraded(reason)));
+            }
+        }
+    }
+
+    /// Takes an input that is no sample of the IMU; where it is.
+    pub(super) fn add(
+        &mut self,
+        time_ns: i64,
+        payload: Payload<F>,
+        frames: &[i64],
+        config: &StateEstimatorConfig,
+    ) -> Result<Key, Reason> {
+        let result = self.place(time_ns, payload, frames, config);
+        result.map_err(|reason| self.count(reason))
+    }
+
+    fn place(
+        &mut self,
+        time_ns: i64,
+        payload: Payload<F>,
+        frames: &[i64],
+        config: &StateEstimatorConfig,
+    ) -> Result<Key, Reason> {
+        let newest_ns = self.newest.map(|newest| newest.time_ns);
+        let oldest_ns =
+            newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(ns(config.params.lateness)));
+        if time_ns < oldest_ns {
+            return Err(Refusal::TooOld { time_ns }.into());
+        }
+        if newest_ns.is_some_and(|newest_ns| time_ns > newest_ns.saturating_add(ns(config.params.lead))) {
+            return Err(Refusal::InTheFuture { time_ns }.into());
+        }
+        let key = payload.key(time_ns);
+        if self.inputs.binary_search_by(|entry| entry.key.cmp(&key)).is_ok() {
+            return Err(Reason::Duplicate);
+        }
+        if self.inputs.len() + 1 + frames.len() > INPUTS {
+            return Err(Reason::Overflow);
+        }
+        let mut first = key;
+        self.insert(key, payload);
+        for frame_ns in frames.iter().filter(|frame_ns| **frame_ns >= oldest_ns) {
+            let frame = Payload::<F>::Frame.key(*frame_ns);
+            if self.inputs.binary_search_by(|entry| entry.key.cmp(&frame)).is_err() {
+                self.insert(frame, Payload::Frame);
+                first = first.min(frame);
+            }
+        }
+        if newest_ns.is_none_or(|newest_ns| time_ns > newest_ns) {
+            return Ok(key);
+        }
+        if first < self.engine.key() {
+            self.counts.late += 1;
+            let until_ns = self.engine.now_ns().map_or(time_ns, |now_ns| now_ns.max(time_ns));
+            self.run_again(first, until_ns, config);
+        } else {
+            self.settle(time_ns, config);
+        }
+        Ok(key)
+    }
+
+    fn insert(&mut self, key: Key, payload: Payload<F>) {
+        let index = self.inputs.partition_point(|entry| entry.key < key);
+        self.inputs.insert(index, Entry { key, payload, outcome: None, rejection: None });
+    }
+
+    /// Runs the engine on, to the end of all that is stamped up to a time.
+    fn settle(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
+        self.run(until_ns, config);
+        self.keep_copy(config);
+        self.predict();
+    }
+
+    /// Runs the engine again from before an input.
+    fn run_again(&mut self, from: Key, until_ns: i64, config: &StateEstimatorConfig) {
+        self.take_back(from);
+        self.settle(until_ns, config);
+    }
+
+    fn take_back(&mut self, from: Key) {
+        while self.copies.len() > 1 && self.copies.back().is_some_and(|copy| copy.key() >= from) {
+            self.copies.pop_back();
+        }
+        if let Some(copy) = self.copies.back() {
+            self.engine = copy.clone();
+            self.counts.reruns += 1;
+        }
+    }
+
+    fn run(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
+        let until = Key::end_of(until_ns);
+        // Every input breaks the engine at most once.
+        while let Err(broken) = self.run_until(until, config) {
+            self.take_back(broken);
+        }
+    }
+
+    /// Runs the engine on; an input that breaks it is marked, and the engine has to be taken back.
+    fn run_until(&mut self, until: Key, config: &StateEstimatorConfig) -> Result<(), Key> {
+        let key = self.engine.key();
+        let mut sample_index = self.samples.partition_point(|sample| Key::of_sample(sample.time_ns) <= key);
+        let mut input_index = self.inputs.partition_point(|entry| entry.key <= key);
+        loop {
+            let sample = self.samples.get(sample_index).copied();
+            let sample_key = sample.map(|sample| Key::of_sample(sample.time_ns));
+            let input_key = self.inputs.get(input_index).map(|entry| entry.key);
+            let is_input = match (sample_key, input_key) {
+                (Some(sample), Some(input)) => input < sample,
+                // Beyond the newest sample nothing is known.
+                (None, Some(input)) => self.newest.is_some_and(|newest| input.time_ns <= newest.time_ns),
+                _ => false,
+            };
+            let Some(next) = (if is_input { input_key } else { sample_key }) else { break };
+            if next > until {
+                break;
+            }
+            if !is_input {
+                if let Some(sample) = sample {
+                    self.advance(next, &sample, config);
+                }
+                sample_index += 1;
+                continue;
+            }
+            if self.engine.now_ns().is_some_and(|now_ns| now_ns < next.time_ns)
+                && let Some(sample) = sample
+            {
+                // The sample is a mean: each part of it is the same.
+                let part = ImuMean { time_ns: next.time_ns, ..sample };
+                self.advance(Key::of_sample(next.time_ns), &part, config);
+            }
+            self.apply(input_index, config)?;
+            input_index += 1;
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self, key: Key, sample: &ImuMean, config: &StateEstimatorConfig) {
+        let was = self.engine.condition();
+        if let Err(reason) = self.engine.advance(key, sample, config)
+            && self.engine.condition() != was
+        {
+            self.told.push(Told::Broken(sample.time_ns, reason));
+        }
+        self.look();
+    }
+
+    fn apply(&mut self, index: usize, config: &StateEstimatorConfig) -> Result<(), Key> {
+        let Some(entry) = self.inputs.get_mut(index) else { return Ok(()) };
+        if matches!(entry.outcome, Some(Outcome::Fatal(_))) {
+            return Ok(());
+        }
+        let (outcome, rejection) = self.engine.apply(entry, config);
+        let (key, before) = (entry.key, entry.outcome.replace(outcome));
+        if let Some(kind) = entry.payload.kind() {
+            match before {
+                None => self.told.push(Told::Taken(key, kind, outcome)),
+                Some(before) if before.reason().is_some() != outcome.reason().is_some() => {
+                    self.told.push(Told::Revised(key, kind, outcome));
+                }
+                Some(_) => {}
+            }
+        }
+        if let (Some(rejection), None) = (rejection, entry.rejection) {
+            self.told.push(Told::Rejected(key.time_ns, rejection));
+        }
+        entry.rejection = rejection;
+        if matches!(outcome, Outcome::Fatal(_)) {
+            return Err(key);
+        }
+        self.look();
+        Ok(())
+    }
+
+    /// What the engine has to tell. What a run tells again is left out.
+    fn look(&mut self) {
+        if let Some((pose, sources)) = self.engine.take_left()
+            && pose.time_ns > self.left_ns
+        {
+            self.left_ns = pose.time_ns;
+            self.told.push(Told::Left(pose, sources));
+        }
+        let started = self.engine.started();
+        if started != self.started
+            && let Some((time_ns, from)) = started
+        {
+            self.started = started;
+            self.told.push(Told::Started(time_ns, from));
+        }
+    }
+
+    fn keep_copy(&mut self, config: &StateEstimatorConfig) {
+        let lateness_ns = ns(config.params.lateness);
+        let (Some(now_ns), Some(newest)) = (self.engine.now_ns(), self.newest) else { return };
+        let last_ns = self.copies.back().and_then(Engine::now_ns).unwrap_or(i64::MIN);
+        if now_ns.saturating_sub(last_ns) >= lateness_ns / (COPIES as i64 - 2) {
+            self.copies.push_back(self.engine.clone());
+        }
+        let oldest_ns = newest.time_ns.saturating_sub(lateness_ns);
+        let is_old = |copy: &Engine<F>| copy.key().time_ns < oldest_ns;
+        while self.copies.len() > COPIES || self.copies.get(1).is_some_and(is_old) {
+            self.copies.pop_front();
+        }
+        let Some(oldest) = self.copies.front() else { return };
+        let key = oldest.key();
+        let kept_ns = oldest.now_ns().unwrap_or(i64::MIN).min(self.engine.keyframe_ns());
+        while self.samples.front().is_some_and(|sample| sample.time_ns <= kept_ns) {
+            self.samples.pop_front();
+        }
+        while self.inputs.front().is_some_and(|entry| entry.key <= key) {
+            self.inputs.pop_front();
+        }
+    }
+
+    /// Begins the prediction again at the newest estimate.
+    fn predict(&mut self) {
+        self.predictor = self.engine.predictor();
+        let Some(predictor) = &mut self.predictor else { return };
+        let first = self.samples.partition_point(|sample| sample.time_ns <= predictor.time_ns());
+        for sample in self.samples.range(first..) {
+            if predictor.propagate(sample).is_err() {
+                self.predictor = None;
+                return;
+            }
+        }
+    }
+}

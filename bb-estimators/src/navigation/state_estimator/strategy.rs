@@ -1,0 +1,221 @@
+//! The two estimators that can do the work, and what both do.
+
+#[cfg(feature = "eskf")]
+mod eskf;
+mod predictor;
+#[cfg(feature = "smoother")]
+mod smoother;
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use nalgebra::{Isometry3, Matrix6, SMatrix, UnitQuaternion, Vector3};
+
+pub(super) use self::predictor::Predictor;
+use super::factor::ProvidedFactor;
+use super::params::{StateEstimatorConfig, StrategyKind, ns};
+use crate::attitude::ParamsError;
+use crate::navigation::eskf::{ImuMean, Start};
+use crate::navigation::fused::Fused;
+use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, RelativePose};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, POSITION, ROTATION};
+use crate::navigation::stream::{Stream, StreamParams};
+
+/// A pose in the world of the engine, and its covariance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pose {
+    pub(super) time_ns: i64,
+    pub(super) position: Vector3<f64>,
+    pub(super) velocity: Vector3<f64>,
+    pub(super) world_from_body: UnitQuaternion<f64>,
+    /// Position error, then rotation error.
+    pub(super) covariance: Matrix6<f64>,
+}
+
+impl Pose {
+    fn of<const N: usize>(estimate: &Estimate<N>, covariance: &SMatrix<f64, N, N>) -> Self {
+        let index = |i: usize| if i < 3 { POSITION + i } else { ROTATION + i - 3 };
+        let Estimate { time_ns, position, velocity, world_from_body, .. } = *estimate;
+        let covariance = Matrix6::from_fn(|i, j| covariance[(index(i), index(j))]);
+        Self { time_ns, position, velocity, world_from_body, covariance }
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        let vectors = [&self.position, &self.velocity];
+        vectors.iter().all(|vector| vector.iter().all(|x| x.is_finite()))
+            && self.world_from_body.coords.iter().all(|x| x.is_finite())
+            && self.covariance.iter().all(|x| x.is_finite())
+            && self.covariance.diagonal().iter().all(|x| *x > 0.0)
+    }
+}
+
+/// What was measured, in the world of the engine.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Measured<'a, F> {
+    Relative(RelativePose),
+    Anchor(AbsolutePose),
+    Gnss(GnssPosition, Option<GnssVelocity>),
+    Provided(&'a F),
+}
+
+/// Why something was not taken in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Failure {
+    /// All is as it was.
+    Refused(Refusal),
+    /// The numbers are no longer any good.
+    Fatal(Refusal),
+}
+
+impl From<Refusal> for Failure {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
+/// A gate for each kind of measurement.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Streams {
+    pub(super) relative: Stream,
+    pub(super) anchors: Stream,
+    pub(super) positions: Stream,
+    pub(super) velocities: Stream,
+    pub(super) provided: Stream,
+}
+
+impl Streams {
+    fn new() -> Self {
+        // A receiver that is spoofed is patient: its fixes never overrule the gate.
+        let firm = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
+        let usual = Stream::default();
+        Self { relative: usual, anchors: usual, positions: firm, velocities: firm, provided: usual }
+    }
+}
+
+/// When keyframes were made.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cadence {
+    interval_ns: i64,
+    keyframe_ns: i64,
+    camera_ns: i64,
+}
+
+impl Cadence {
+    fn new(config: &StateEstimatorConfig) -> Self {
+        Self { interval_ns: ns(config.params.keyframe_interval), keyframe_ns: i64::MIN, camera_ns: i64::MIN }
+    }
+
+    /// Whether a keyframe is due without a camera.
+    fn is_due(&self, now_ns: i64) -> bool {
+        now_ns.saturating_sub(self.keyframe_ns) >= self.interval_ns
+    }
+}
+
+/// A stamp as an id that increases with it.
+pub(super) fn id_of(time_ns: i64) -> u64 {
+    (time_ns as u64) ^ (1 << 63)
+}
+
+/// The one that does the work.
+#[derive(Clone, Debug)]
+pub(super) enum Strategy<F: ProvidedFactor> {
+    #[cfg(feature = "smoother")]
+    Smoother(Box<smoother::SmootherStrategy<F>>),
+    #[cfg(feature = "eskf")]
+    Eskf(Box<eskf::EskfStrategy>, core::marker::PhantomData<fn() -> F>),
+}
+
+macro_rules! each {
+    ($self:expr, $strategy:ident => $do:expr) => {
+        match $self {
+            #[cfg(feature = "smoother")]
+            Strategy::Smoother($strategy) => $do,
+            #[cfg(feature = "eskf")]
+            Strategy::Eskf($strategy, _) => $do,
+        }
+    };
+}
+
+impl<F: ProvidedFactor> Strategy<F> {
+    /// Makes one that has not started.
+    pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
+        Ok(match config.strategy {
+            #[cfg(feature = "smoother")]
+            StrategyKind::FixedLagSmoother => Self::Smoother(Box::new(smoother::SmootherStrategy::new(config)?)),
+            #[cfg(feature = "eskf")]
+            StrategyKind::Eskf => Self::Eskf(Box::new(eskf::EskfStrategy::new(config)?), core::marker::PhantomData),
+        })
+    }
+
+    /// Starts, or starts again.
+    pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+        each!(self, strategy => strategy.start(start))
+    }
+
+    /// Moves on by one sample; makes a keyframe if one is due.
+    pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
+        each!(self, strategy => strategy.propagate(sample))
+    }
+
+    /// Makes the present a keyframe: a camera has taken a frame.
+    pub(super) fn frame(&mut self) -> Result<(), Failure> {
+        each!(self, strategy => strategy.camera_frame())
+    }
+
+    /// Takes in what was measured at present.
+    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
+        each!(self, strategy => strategy.measure(measured))
+    }
+
+    /// Where it is at present.
+    pub(super) fn position(&self) -> Option<Vector3<f64>> {
+        each!(self, strategy => strategy.position())
+    }
+
+    /// How many gaps of the IMU were bridged.
+    pub(super) fn gaps(&self) -> u32 {
+        each!(self, strategy => strategy.gaps())
+    }
+
+    /// What goes on from the newest estimate, and the time of that.
+    pub(super) fn predictor(&self) -> Option<Predictor> {
+        each!(self, strategy => strategy.predictor())
+    }
+
+    /// The newest keyframe.
+    pub(super) fn newest(&self) -> Option<Pose> {
+        each!(self, strategy => strategy.newest())
+    }
+
+    /// Keyframes before the newest, the newest of them first, and whether they are smoothed.
+    pub(super) fn history(&mut self, most: usize) -> (Vec<Pose>, bool) {
+        each!(self, strategy => strategy.history(most))
+    }
+
+    /// The keyframe that has left the window with the last frame, if one has.
+    pub(super) fn take_left(&mut self) -> Option<Pose> {
+        each!(self, strategy => strategy.take_left())
+    }
+
+    /// When the newest keyframe was, ns.
+    pub(super) fn keyframe_ns(&self) -> i64 {
+        each!(self, strategy => strategy.keyframe_ns())
+    }
+
+    /// How many keyframes are held.
+    pub(super) fn keyframes(&self) -> usize {
+        each!(self, strategy => strategy.keyframes())
+    }
+
+    /// How many measurements of one kind the gate has refused since it let one pass; those of receivers do not count.
+    pub(super) fn refused_in_a_row(&self) -> u64 {
+        let Streams { relative, anchors, provided, .. } = each!(self, strategy => strategy.streams());
+        [relative, anchors, provided].iter().map(|stream| stream.counts().gate_in_a_row).max().unwrap_or(0)
+    }
+
+    /// Moves to another world.
+    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+        each!(self, strategy => strategy.move_world(new_from_old))
+    }
+}

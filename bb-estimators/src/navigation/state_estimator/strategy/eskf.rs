@@ -1,0 +1,223 @@
+//! The error-state Kalman filter.
+
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+
+use nalgebra::{Isometry3, SMatrix, Vector3};
+
+use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, id_of};
+use crate::attitude::ParamsError;
+use crate::navigation::eskf::{Eskf, ImuMean, Start};
+use crate::navigation::fused::Fused;
+use crate::navigation::measurement::{Linearised, Measurement};
+use crate::navigation::navigator::{NAVIGATED, Navigated};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::smoother::{Factor, Rows};
+use crate::navigation::state::{Estimate, States};
+use crate::navigation::state_estimator::factor::ProvidedFactor;
+use crate::navigation::state_estimator::params::StateEstimatorConfig;
+use crate::navigation::stream::Stream;
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(in crate::navigation::state_estimator) struct EskfStrategy {
+    filter: Eskf<Navigated, NAVIGATED>,
+    streams: Streams,
+    cadence: Cadence,
+    /// What was estimated at the last keyframes, the newest last. It is never corrected.
+    past: VecDeque<Pose>,
+    window: usize,
+    records: bool,
+    left: Option<Pose>,
+    /// The present is to be what the next relative pose refers to, once all is fused that was measured at it.
+    is_next: bool,
+}
+
+impl EskfStrategy {
+    pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
+        let window = config.params.window as usize;
+        Ok(Self {
+            filter: Eskf::new(config.sensors)?,
+            streams: Streams::new(),
+            cadence: Cadence::new(config),
+            past: VecDeque::with_capacity(window + 1),
+            window,
+            records: config.params.record_keyframes,
+            left: None,
+            is_next: false,
+        })
+    }
+
+    pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+        self.filter.start(start)?;
+        self.filter.set_keyframe(id_of(start.time_ns));
+        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (start.time_ns, start.time_ns);
+        self.is_next = false;
+        self.past.clear();
+        self.past.extend(self.pose());
+        Ok(())
+    }
+
+    pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
+        if self.is_next {
+            self.is_next = false;
+            self.filter.set_keyframe(id_of(self.cadence.camera_ns));
+        }
+        self.filter.propagate(sample)?;
+        if self.cadence.is_due(sample.time_ns) { self.keyframe() } else { Ok(()) }
+    }
+
+    pub(super) fn camera_frame(&mut self) -> Result<(), Failure> {
+        self.keyframe()?;
+        self.cadence.camera_ns = self.cadence.keyframe_ns;
+        self.is_next = true;
+        Ok(())
+    }
+
+    fn keyframe(&mut self) -> Result<(), Failure> {
+        let pose = self.pose().ok_or(Refusal::NotStarted)?;
+        if pose.time_ns == self.cadence.keyframe_ns {
+            return Ok(());
+        }
+        if !pose.is_finite() {
+            return Err(Failure::Fatal(Refusal::NonFinite));
+        }
+        self.cadence.keyframe_ns = pose.time_ns;
+        self.past.push_back(pose);
+        if self.past.len() > self.window {
+            self.left = self.past.pop_front().filter(|_| self.records);
+        }
+        Ok(())
+    }
+
+    pub(super) fn measure<F: ProvidedFactor>(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
+        let Streams { relative, anchors, positions, velocities, provided } = &mut self.streams;
+        let fused = match measured {
+            Measured::Relative(pose) => self.filter.update(relative, pose)?,
+            Measured::Anchor(pose) => self.filter.update(anchors, pose)?,
+            Measured::Gnss(position, velocity) => {
+                let fused = self.filter.update(positions, position)?;
+                if let Some(velocity) = velocity {
+                    // A receiver whose position is good is trusted, whether its velocity is or not.
+                    let _ = self.filter.update(velocities, velocity);
+                }
+                fused
+            }
+            Measured::Provided(factor) => update(&mut self.filter, provided, *factor)?,
+        };
+        let pose = self.pose().filter(Pose::is_finite).ok_or(Failure::Fatal(Refusal::NonFinite))?;
+        // What was measured at a keyframe belongs to it.
+        if let Some(newest) = self.past.back_mut().filter(|newest| newest.time_ns == pose.time_ns) {
+            *newest = pose;
+        }
+        Ok(fused)
+    }
+
+    fn pose(&self) -> Option<Pose> {
+        self.filter.estimate().map(|estimate| Pose::of(estimate, self.filter.covariance()))
+    }
+
+    pub(super) fn position(&self) -> Option<Vector3<f64>> {
+        self.filter.estimate().map(|estimate| estimate.position)
+    }
+
+    pub(super) fn streams(&self) -> &Streams {
+        &self.streams
+    }
+
+    pub(super) fn gaps(&self) -> u32 {
+        self.filter.gaps()
+    }
+
+    pub(super) fn predictor(&self) -> Option<Predictor> {
+        self.filter.estimate()?;
+        Some(Predictor::Copy(self.filter))
+    }
+
+    pub(super) fn newest(&self) -> Option<Pose> {
+        self.past.back().copied()
+    }
+
+    pub(super) fn history(&self, most: usize) -> (Vec<Pose>, bool) {
+        (self.past.iter().rev().skip(1).take(most).copied().collect(), false)
+    }
+
+    pub(super) fn take_left(&mut self) -> Option<Pose> {
+        self.left.take()
+    }
+
+    pub(super) fn keyframe_ns(&self) -> i64 {
+        self.cadence.keyframe_ns
+    }
+
+    pub(super) fn keyframes(&self) -> usize {
+        self.past.len()
+    }
+
+    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+        self.filter.move_world(new_from_old)?;
+        let turn = new_from_old.rotation.to_rotation_matrix().into_inner();
+        for pose in &mut self.past {
+            pose.position = new_from_old.transform_point(&pose.position.into()).coords;
+            pose.velocity = turn * pose.velocity;
+            pose.world_from_body = new_from_old.rotation * pose.world_from_body;
+            let mut block = SMatrix::<f64, 6, 6>::zeros();
+            [0, 3].iter().for_each(|first| block.fixed_view_mut::<3, 3>(*first, *first).copy_from(&turn));
+            pose.covariance = block * pose.covariance * block.transpose();
+        }
+        Ok(())
+    }
+}
+
+/// Fuses a factor that concerns the present alone.
+fn update<F: ProvidedFactor>(
+    filter: &mut Eskf<Navigated, NAVIGATED>,
+    stream: &mut Stream,
+    factor: &F,
+) -> Result<Fused, Refusal> {
+    if let Some(id) = Factor::<Navigated, NAVIGATED>::previous(factor) {
+        return Err(Refusal::NoKeyframe { id });
+    }
+    let at = filter.estimate().ok_or(Refusal::NotStarted)?;
+    let mut rows = Rows::new();
+    Factor::<Navigated, NAVIGATED>::linearise(factor, None, at, &mut rows)?;
+    let (residual, jacobian) = rows.alone().ok_or(Refusal::NotObservable)?;
+    macro_rules! of_dimension {
+        ($($dimension:literal)*) => {
+            match residual.len() {
+                $($dimension => filter.update(stream, &Whitened::<$dimension>::new(residual, jacobian)),)*
+                _ => Err(Refusal::NotObservable),
+            }
+        };
+    }
+    of_dimension!(1 2 3 4 5 6 7 8 9)
+}
+
+/// A factor that was linearised where the filter is: its noise is 1.
+struct Whitened<const D: usize> {
+    residual: [f64; D],
+    jacobian: [[f64; NAVIGATED]; D],
+}
+
+impl<const D: usize> Whitened<D> {
+    fn new(residual: &[f64], jacobian: &[[f64; NAVIGATED]]) -> Self {
+        let at = |i: usize| residual.get(i).copied().unwrap_or(0.0);
+        let row = |i: usize| jacobian.get(i).copied().unwrap_or([0.0; NAVIGATED]);
+        Self { residual: core::array::from_fn(at), jacobian: core::array::from_fn(row) }
+    }
+}
+
+impl<const D: usize> Measurement<D> for Whitened<D> {
+    fn linearise<S: States, const N: usize>(
+        &self,
+        _: &Estimate<N>,
+        model: &mut Linearised<D, N>,
+    ) -> Result<(), Refusal> {
+        model.residual = self.residual;
+        for (row, from) in model.jacobian.iter_mut().zip(&self.jacobian) {
+            row.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        }
+        model.noise = SMatrix::identity();
+        Ok(())
+    }
+}

@@ -1,0 +1,51 @@
+//! The rows of the design, on every strategy that was built.
+
+mod errors;
+mod flight;
+mod gate;
+mod interface;
+mod labels;
+mod order;
+mod records;
+mod soak;
+
+use super::*;
+use flight::{Flight, Sent};
+
+/// All events.
+type Events = Vec<Event>;
+
+impl EventSink for Events {
+    fn event(&mut self, event: &Event) {
+        self.push(*event);
+    }
+}
+
+type Estimator = StateEstimator<Events>;
+
+fn config(strategy: StrategyKind) -> StateEstimatorConfig {
+    StateEstimatorConfig { strategy, flight: 7, ..StateEstimatorConfig::default() }
+}
+
+fn estimator(strategy: StrategyKind) -> Estimator {
+    StateEstimator::new(config(strategy), Events::new()).unwrap()
+}
+
+/// The estimator in flight, after the first sample.
+fn started(flight: &Flight, strategy: StrategyKind) -> Estimator {
+    let mut estimator = estimator(strategy);
+    estimator.warm_start(flight.warm_start(0)).unwrap();
+    estimator.add_imu(&flight.samples[0]).unwrap();
+    estimator
+}
+
+/// For inputs of which something is refused.
+fn ignore<T>(_: Result<T, EstimatorError>) {}
+
+fn kinds<'a>(events: &'a Events, name: &'a str) -> impl Iterator<Item = &'a Event> {
+    events.iter().filter(move |event| event.kind.name() == name)
+}
+
+fn count(events: &Events, name: &str) -> usize {
+    kinds(events, name).count()
+}

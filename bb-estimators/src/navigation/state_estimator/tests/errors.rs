@@ -1,0 +1,192 @@
+//! Each kind of error, and the fallback.
+
+use super::flight::{SECOND, STEP};
+use super::*;
+use crate::navigation::smoother::{Factor, Rows};
+use crate::navigation::{Estimate, POSITION, Refusal, States};
+use nalgebra::{Matrix1, Vector3};
+
+/// A provider that says where it is along x, whatever that is.
+#[derive(Clone, Copy, Debug)]
+struct Along(f64);
+
+impl<S: States, const N: usize> Factor<S, N> for Along {
+    fn linearise(&self, _: Option<&Estimate<N>>, at: &Estimate<N>, rows: &mut Rows<N>) -> Result<(), Refusal> {
+        let mut jacobian = [[0.0; N]];
+        jacobian[0][POSITION] = 1.0;
+        rows.set([self.0 - at.position.x], None, &jacobian, &Matrix1::new(1.0))
+    }
+}
+
+#[test]
+fn degraded_an_outlier_is_refused_and_the_estimate_goes_on() {
+    let flight = Flight::new(8, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let mut outputs = 0;
+        for sent in &flight.sent(true, true, false) {
+            match sent {
+                Sent::Anchor(anchor) if anchor.time_ns > 5 * SECOND => {
+                    let moved = flight.frame.position(&anchor.position) + Vector3::new(80.0, 0.0, 0.0);
+                    let outlier = PoseAnchor { position: flight.frame.geodetic(&moved), ..*anchor };
+                    let error = estimator.add_pose_anchor(outlier).unwrap_err();
+                    assert!(matches!(error, EstimatorError::Degraded(Reason::Refused(Refusal::Gate { .. }))));
+                }
+                sent => sent.to(&mut estimator).unwrap(),
+            }
+            if let Some(output) = estimator.tick(sent.time_ns()) {
+                outputs += 1;
+                assert!(flight.error(&output).0 < 5.0);
+            }
+        }
+        assert_eq!(outputs, 40);
+        // The third in a row is more than an outlier.
+        assert_eq!(estimator.health().state, HealthState::Degraded);
+        let degraded = estimator.predicted(8 * SECOND).unwrap();
+        assert!(degraded.degraded && degraded.label == SourceLabel::VisualPropagated, "it keeps its label");
+    }
+}
+
+#[test]
+fn degraded_what_does_not_fit_again_and_again_raises_the_covariance() {
+    let flight = Flight::new(9, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let mut errors = Vec::new();
+        for sent in &flight.sent(true, true, false) {
+            let result = match sent {
+                Sent::Anchor(anchor) if anchor.time_ns > 4 * SECOND => {
+                    let moved = flight.frame.position(&anchor.position) + Vector3::new(80.0, 0.0, 0.0);
+                    let before = estimator.predicted(sent.time_ns() - 3 * STEP).unwrap().quality.covariance_norm;
+                    let position = flight.frame.geodetic(&moved);
+                    let result = estimator.add_pose_anchor(PoseAnchor { position, ..*anchor }).map(drop);
+                    let after = estimator.current_estimate().unwrap().quality.covariance_norm;
+                    if let Err(EstimatorError::Degraded(Reason::Raised { factor })) = result {
+                        assert!(factor > 1.0 && after > 0.2 * before, "{factor}: {before} to {after}");
+                    }
+                    result
+                }
+                sent => sent.to(&mut estimator),
+            };
+            errors.extend(result.err());
+        }
+        assert_eq!(
+            errors.iter().filter(|error| matches!(error.reason(), Reason::Raised { .. })).count(),
+            1,
+            "{errors:?}"
+        );
+        assert!(errors.iter().all(|error| !error.is_fatal()));
+    }
+}
+
+#[test]
+fn degraded_a_gap_of_the_imu_is_bridged() {
+    let flight = Flight::new(4, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        for sample in
+            flight.samples[1..].iter().filter(|sample| !(2 * SECOND..5 * SECOND / 2).contains(&sample.time_ns))
+        {
+            let result = estimator.add_imu(sample);
+            let is_after = sample.time_ns == 5 * SECOND / 2;
+            assert_eq!(result, if is_after { Err(EstimatorError::Degraded(Reason::Bridged)) } else { Ok(()) });
+        }
+        assert!(estimator.predicted(4 * SECOND).unwrap().covariance[(0, 0)] > 0.1);
+        assert!(kinds(estimator.sink(), "degraded").all(|event| event.level() == Level::Warn));
+    }
+}
+
+#[test]
+fn fatal_a_window_that_overflows_has_no_estimate_for_this_tick() {
+    let flight = Flight::new(3, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        flight.samples[1..].iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        assert!(estimator.tick(3 * SECOND).is_some());
+        let mut overflows = 0;
+        let later = Flight::new(6, 2);
+        for provider in 0..600 {
+            // They wait for the IMU, all of them: a flood.
+            let anchor = PoseAnchor { provider, time_ns: 3 * SECOND + i64::from(provider), ..later.anchors[2] };
+            overflows +=
+                usize::from(estimator.add_pose_anchor(anchor) == Err(EstimatorError::Fatal(Reason::Overflow)));
+        }
+        assert!(overflows >= 88, "{overflows}");
+        assert_eq!(estimator.counts().overflows, overflows as u64);
+        assert!(estimator.tick(3 * SECOND + SECOND / 5).is_none(), "none for this tick");
+        later.samples[600..].iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        assert!(estimator.tick(6 * SECOND).is_some(), "then there is");
+        assert!(estimator.add_pose_anchor(later.anchors[4]).is_ok(), "and there is room again");
+    }
+}
+
+#[test]
+fn fatal_numbers_that_are_no_good_are_taken_back() {
+    let flight = Flight::new(3, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator: StateEstimator<Events, Along> =
+            StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        estimator.warm_start(flight.warm_start(0)).unwrap();
+        flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        let results: Vec<_> = (0..5).map(|i| estimator.add_factor(2 * SECOND + i * STEP, 0, Along(1e12))).collect();
+        // The fourth overrules the gate, and would be on the far side of the sun.
+        assert!(matches!(results[3], Err(EstimatorError::Fatal(Reason::Refused(_)))), "{results:?}");
+        assert!(estimator.tick(3 * SECOND).is_none(), "none for this tick");
+        let after = estimator.tick(3 * SECOND + SECOND / 5).unwrap();
+        assert!(flight.frame.position(&after.position).norm() < 200.0, "{:?}", after.position);
+        let fatal = kinds(estimator.sink(), "fatal").next().unwrap();
+        assert_eq!(fatal.level(), Level::Error);
+    }
+}
+
+#[test]
+fn fatal_after_a_minute_without_the_imu_it_is_lost_until_an_anchor() {
+    let flight = Flight::new(3, 2);
+    let later = Flight::new(80, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        flight.samples[1..].iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        let back = |sample: &&crate::navigation::ImuMean| sample.time_ns > 70 * SECOND;
+        let results: Vec<_> = later.samples.iter().filter(back).map(|sample| estimator.add_imu(sample)).collect();
+        // One sample alone might have a broken stamp.
+        let ahead = Refusal::InTheFuture { time_ns: 70 * SECOND + STEP };
+        assert_eq!(results[0], Err(EstimatorError::Degraded(Reason::Refused(ahead))));
+        assert!(results[2..].iter().all(Result::is_ok));
+        assert_eq!(estimator.health().state, HealthState::Lost);
+        assert_eq!(count(estimator.sink(), "fatal"), 1);
+        assert!(estimator.current_estimate().is_none() && estimator.predicted(80 * SECOND).is_none());
+        estimator.add_pose_anchor(later.anchors[78]).unwrap();
+        assert_eq!(estimator.health().state, HealthState::Tracking);
+        assert!(later.error(&estimator.current_estimate().unwrap()).0 < 5.0);
+    }
+}
+
+#[test]
+fn without_an_estimate_for_three_seconds_the_fallback_engages_once_and_recovers_once() {
+    let flight = Flight::new(20, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        for i in 2..=20 * 200 {
+            let time_ns = i * STEP;
+            // The IMU is silent from 5 s to 12 s.
+            if !(5 * SECOND..12 * SECOND).contains(&time_ns) {
+                let _ = estimator.add_imu(&flight.samples[i as usize - 1]);
+            }
+            estimator.tick(time_ns);
+            let is_silent = (9 * SECOND..12 * SECOND).contains(&time_ns);
+            assert_eq!(estimator.health().is_fallback_engaged && is_silent, is_silent);
+        }
+        let times =
+            |name| kinds(estimator.sink(), name).map(|event| event.time_ns / (SECOND / 10)).collect::<Vec<_>>();
+        // The last estimate was the one of 5.0 s, or of 5.2 s, by prediction.
+        let engaged = times("fallback_engaged");
+        assert!(engaged.len() == 1 && (80..=84).contains(&engaged[0]), "{engaged:?}");
+        assert_eq!(times("fallback_recovered"), [120]);
+        assert_eq!(times("fallback_imminent").len(), 1);
+        let levels: Vec<_> = ["fallback_imminent", "fallback_engaged", "fallback_recovered"]
+            .iter()
+            .flat_map(|name| kinds(estimator.sink(), name).map(Event::level))
+            .collect();
+        assert_eq!(levels, [Level::Error, Level::Error, Level::Info]);
+    }
+}

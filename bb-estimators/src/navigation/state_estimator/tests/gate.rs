@@ -1,0 +1,172 @@
+//! The rows of the spoof gate.
+
+use super::flight::{SECOND, STEP};
+use super::*;
+use nalgebra::Vector3;
+
+/// What the receiver and the anchors do.
+struct Scenario {
+    health: fn(i64) -> GpsHealth,
+    /// What the fixes are off, m.
+    off: fn(i64) -> f64,
+    /// Whether there are anchors.
+    anchors: fn(i64) -> bool,
+}
+
+/// Plays it with a camera; times in ns.
+fn play(strategy: StrategyKind, scenario: &Scenario) -> (Estimator, Vec<EstimatorOutput>) {
+    let flight = Flight::new(40, 5);
+    let mut estimator = started(&flight, strategy);
+    let mut outputs = Vec::new();
+    for sent in &flight.sent(true, true, true) {
+        let time_ns = sent.time_ns();
+        let result = match sent {
+            Sent::Health(reading) => estimator
+                .add_gps_health(GpsHealthReading { health: (scenario.health)(time_ns), ..*reading })
+                .map(drop),
+            Sent::Fix(fix) => {
+                let moved = flight.frame.position(&fix.position) + Vector3::x() * (scenario.off)(time_ns);
+                estimator.add_gnss(GnssReading { position: flight.frame.geodetic(&moved), ..*fix }).map(drop)
+            }
+            Sent::Anchor(_) if !(scenario.anchors)(time_ns) => Ok(()),
+            sent => sent.to(&mut estimator),
+        };
+        assert!(result.is_ok() || matches!(sent, Sent::Fix(_)), "{sent:?}: {result:?}");
+        outputs.extend(estimator.tick(time_ns));
+    }
+    for output in &outputs {
+        assert!(
+            flight.error(output).0 < 5.0,
+            "spoofing moves nothing: {} m at {}",
+            flight.error(output).0,
+            output.time_ns
+        );
+    }
+    (estimator, outputs)
+}
+
+/// Changes of the gate: time in tenths of a second, and to what.
+fn changes(estimator: &Estimator) -> Vec<(i64, &'static str)> {
+    let change = |event: &Event| match event.kind {
+        EventKind::Gate { to, .. } => (event.time_ns / (SECOND / 10), to.name()),
+        _ => unreachable!(),
+    };
+    kinds(estimator.sink(), "gate").map(change).collect()
+}
+
+fn spoofed_from_5_to_10(time_ns: i64) -> GpsHealth {
+    if (5 * SECOND..10 * SECOND).contains(&time_ns) { GpsHealth::Spoofed } else { GpsHealth::Stable }
+}
+
+#[test]
+fn a_spoofed_receiver_is_let_in_after_ten_seconds_and_an_anchor_that_agrees() {
+    let off = |time_ns| if (5 * SECOND..10 * SECOND).contains(&time_ns) { 150.0 } else { 0.0 };
+    let scenario = Scenario { health: spoofed_from_5_to_10, off, anchors: |_| true };
+    for strategy in StrategyKind::ALL {
+        let (estimator, _) = play(*strategy, &scenario);
+        // The anchor of 20 s comes 15 ms after the second.
+        let expected = [(50, "blocked"), (100, "dwelling"), (200, "awaits_anchor"), (200, "open")];
+        assert_eq!(changes(&estimator), expected);
+        let rejected = kinds(estimator.sink(), "rejected").count();
+        assert_eq!(rejected, 76, "every fix from 5 s to 20 s, both included");
+        assert!(kinds(estimator.sink(), "rejected").all(|event| event.level() == Level::Warn));
+        assert!(estimator.health().gate.is_open());
+    }
+}
+
+#[test]
+fn without_an_anchor_it_stays_out() {
+    let scenario = Scenario {
+        health: spoofed_from_5_to_10,
+        off: |_| 0.0,
+        anchors: |time_ns| !(15 * SECOND..=30 * SECOND).contains(&time_ns),
+    };
+    for strategy in StrategyKind::ALL {
+        let (estimator, _) = play(*strategy, &scenario);
+        let expected = [(50, "blocked"), (100, "dwelling"), (200, "awaits_anchor"), (300, "open")];
+        assert_eq!(changes(&estimator), expected);
+    }
+}
+
+#[test]
+fn a_break_of_the_health_begins_the_dwell_again() {
+    let health = |time_ns| match time_ns / SECOND {
+        5..10 => GpsHealth::Spoofed,
+        15 => GpsHealth::Unstable,
+        _ => GpsHealth::Stable,
+    };
+    let scenario = Scenario { health, off: |_| 0.0, anchors: |_| true };
+    for strategy in StrategyKind::ALL {
+        let (estimator, _) = play(*strategy, &scenario);
+        let expected = [
+            (50, "blocked"),
+            (100, "dwelling"),
+            (150, "blocked"),
+            (160, "dwelling"),
+            (260, "awaits_anchor"),
+            (260, "open"),
+        ];
+        assert_eq!(changes(&estimator), expected);
+    }
+}
+
+#[test]
+fn an_anchor_that_disagrees_begins_the_dwell_again() {
+    // Reported stable, but 60 m off until 25 s.
+    let off = |time_ns| if (5 * SECOND..25 * SECOND).contains(&time_ns) { 60.0 } else { 0.0 };
+    let scenario = Scenario { health: spoofed_from_5_to_10, off, anchors: |_| true };
+    for strategy in StrategyKind::ALL {
+        let (estimator, _) = play(*strategy, &scenario);
+        let disagrees: Vec<_> = kinds(estimator.sink(), "rejected")
+            .filter(|event| matches!(event.kind, EventKind::Rejected { rejection: Rejection::Disagrees { .. } }))
+            .collect();
+        assert_eq!(disagrees.len(), 1, "{disagrees:?}");
+        let text = disagrees[0].status_text().unwrap();
+        assert!(text.as_str().starts_with("NAV GPS rejected: anchor "), "{text}");
+        let changes = changes(&estimator);
+        assert_eq!(changes[3..], [(200, "dwelling"), (300, "open")][..], "{changes:?}");
+    }
+}
+
+#[test]
+fn a_fix_beyond_the_bounded_distance_begins_the_dwell_again() {
+    // 250 m off until 18 s: each of these fixes is rejected.
+    let off = |time_ns| if (5 * SECOND..18 * SECOND).contains(&time_ns) { 250.0 } else { 0.0 };
+    let scenario = Scenario { health: spoofed_from_5_to_10, off, anchors: |_| true };
+    for strategy in StrategyKind::ALL {
+        let (estimator, _) = play(*strategy, &scenario);
+        let far =
+            |event: &&Event| matches!(event.kind, EventKind::Rejected { rejection: Rejection::TooFar { .. } });
+        assert_eq!(kinds(estimator.sink(), "rejected").filter(far).count(), 40);
+        let opened = changes(&estimator).last().copied().unwrap();
+        assert!(opened.1 == "open" && (278..=290).contains(&opened.0), "{opened:?}");
+    }
+}
+
+#[test]
+fn every_rejection_is_a_text_that_fits() {
+    let scenario = Scenario { health: spoofed_from_5_to_10, off: |_| 60.0, anchors: |_| true };
+    for strategy in StrategyKind::ALL {
+        let (estimator, _) = play(*strategy, &scenario);
+        for event in kinds(estimator.sink(), "rejected") {
+            let text = event.status_text().unwrap();
+            assert!(text.as_str().len() <= 50 && text.as_str().starts_with("NAV GPS re"), "{text}");
+        }
+        // A receiver that lies while it is reported stable is refused by the filter's own gate.
+        let outliers = kinds(estimator.sink(), "degraded").filter(|event| event.time_ns < 5 * SECOND).count();
+        assert_eq!(outliers, 24);
+        let unhealthy = estimator.sink().iter().filter(|event| event.time_ns < STEP).count();
+        assert!(unhealthy > 0);
+    }
+}
+
+#[test]
+fn a_receiver_of_which_nothing_is_reported_is_not_used() {
+    let flight = Flight::new(2, 5);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        flight.samples[1..].iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        let refused = estimator.add_gnss(flight.fixes[0]);
+        assert_eq!(refused, Err(EstimatorError::Degraded(Reason::Gate(Rejection::Unhealthy))));
+    }
+}

@@ -1,0 +1,110 @@
+//! The rows of the source label.
+
+use super::flight::SECOND;
+use super::*;
+
+/// Labels with their times, s, of a flight whose camera and anchors are only seen at some times.
+fn timeline(
+    strategy: StrategyKind,
+    sees: impl Fn(i64) -> bool,
+    anchors: impl Fn(i64) -> bool,
+) -> (Vec<(i64, SourceLabel)>, Vec<EstimatorOutput>) {
+    let flight = Flight::new(40, 3);
+    let mut estimator = started(&flight, strategy);
+    let mut outputs = Vec::new();
+    for sent in &flight.sent(true, true, false) {
+        let time_ns = sent.time_ns();
+        let second = time_ns / SECOND;
+        match sent {
+            Sent::Vio(_) if !sees(second) => continue,
+            Sent::Anchor(_) if !anchors(second) => continue,
+            // After a loss, the first relative pose has no keyframe, or fits badly.
+            sent => ignore(sent.to(&mut estimator)),
+        }
+        outputs.extend(estimator.tick(time_ns));
+    }
+    let labels = kinds(estimator.sink(), "label").map(|event| match event.kind {
+        EventKind::Label { to, .. } => (event.time_ns / SECOND, to),
+        _ => unreachable!(),
+    });
+    (labels.collect(), outputs)
+}
+
+#[test]
+fn the_label_goes_from_dead_reckoned_to_anchored_to_visual_and_back() {
+    for strategy in StrategyKind::ALL {
+        let (labels, outputs) = timeline(*strategy, |_| true, |second| !(5..15).contains(&second));
+        use SourceLabel::{SatelliteAnchored, VisualPropagated};
+        assert_eq!(labels, [(1, SatelliteAnchored), (7, VisualPropagated), (15, SatelliteAnchored)]);
+        for output in outputs {
+            let Some(age_ms) = output.anchor_age_ms else { continue };
+            assert_eq!(output.label == SatelliteAnchored, age_ms <= 3000, "{output:?}");
+        }
+    }
+}
+
+#[test]
+fn visual_loss_demotes_to_dead_reckoning_until_the_next_anchor() {
+    for strategy in StrategyKind::ALL {
+        let (labels, _) =
+            timeline(*strategy, |second| !(10..20).contains(&second), |second| !(10..25).contains(&second));
+        use SourceLabel::{DeadReckoned, SatelliteAnchored};
+        assert_eq!(labels, [(1, SatelliteAnchored), (10, DeadReckoned), (25, SatelliteAnchored)]);
+    }
+}
+
+#[test]
+fn while_dead_reckoning_the_covariance_grows_monotonically() {
+    for strategy in StrategyKind::ALL {
+        // The camera comes back at 20 s, and says more of the velocity than was known; where it is, only the anchor says.
+        let (_, outputs) =
+            timeline(*strategy, |second| !(10..20).contains(&second), |second| !(10..25).contains(&second));
+        let lost: Vec<_> = outputs
+            .iter()
+            .filter(|output| output.label == SourceLabel::DeadReckoned && output.time_ns > SECOND * 5)
+            .collect();
+        assert!(lost.len() > 65, "{}", lost.len());
+        let trace = |output: &EstimatorOutput, first: usize| {
+            (first..first + 3).map(|i| output.covariance[(i, i)]).sum::<f64>()
+        };
+        for two in lost.windows(2) {
+            assert!(two[1].quality.covariance_norm >= two[0].quality.covariance_norm);
+            for first in [0, 3] {
+                assert!(trace(two[1], first) >= trace(two[0], first));
+            }
+            let decomposed = nalgebra::linalg::Cholesky::new(two[1].covariance);
+            assert!(decomposed.is_some(), "it is still a covariance");
+        }
+        let first = lost[0].quality.covariance_norm;
+        let last = lost[lost.len() - 1].quality.covariance_norm;
+        assert!(last > 20.0 * first, "{first} to {last}");
+        let flight = Flight::new(1, 3);
+        for output in lost {
+            let deviation = trace(output, 0).sqrt();
+            assert!(
+                flight.error(output).0 < 4.0 * deviation,
+                "{} m, deviation {deviation} m",
+                flight.error(output).0
+            );
+        }
+    }
+}
+
+#[test]
+fn growth_of_the_covariance_is_in_the_health_and_warned_of_once() {
+    let flight = Flight::new(30, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        for sent in &flight.sent(true, true, false) {
+            if sent.time_ns() < 15 * SECOND || matches!(sent, Sent::Imu(_)) {
+                sent.to(&mut estimator).unwrap();
+            }
+            estimator.tick(sent.time_ns());
+        }
+        assert!(estimator.health().covariance_growing_s > 10.0);
+        let warnings: Vec<_> =
+            kinds(estimator.sink(), "covariance_growing").filter(|event| event.time_ns > 15 * SECOND).collect();
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        assert_eq!(warnings[0].level(), Level::Warn);
+    }
+}

@@ -1,0 +1,177 @@
+//! The rows of recorder and logs.
+
+use super::flight::{FRAME, SECOND, STEP};
+use super::*;
+use crate::navigation::Refusal;
+use nalgebra::Vector3;
+
+/// A flight with all that can go wrong.
+fn bad_day(strategy: StrategyKind) -> Estimator {
+    let flight = Flight::new(30, 4);
+    let mut estimator = started(&flight, strategy);
+    for sent in &flight.sent(true, true, true) {
+        let time_ns = sent.time_ns();
+        let second = time_ns / SECOND;
+        let _ = match sent {
+            Sent::Imu(_) if (20..24).contains(&second) => Ok(()),
+            Sent::Vio(_) if (10..14).contains(&second) => Ok(()),
+            Sent::Anchor(anchor) if second == 6 => {
+                let moved = flight.frame.position(&anchor.position) + Vector3::new(90.0, 0.0, 0.0);
+                let outlier = PoseAnchor { position: flight.frame.geodetic(&moved), ..*anchor };
+                estimator.add_pose_anchor(outlier).map(drop)
+            }
+            Sent::Health(reading) if second == 8 => {
+                estimator.add_gps_health(GpsHealthReading { health: GpsHealth::Spoofed, ..*reading }).map(drop)
+            }
+            sent => sent.to(&mut estimator),
+        };
+        estimator.tick(time_ns);
+    }
+    estimator
+}
+
+#[test]
+fn every_input_is_an_event() {
+    let flight = Flight::new(5, 4);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        for sent in &flight.sent(true, true, true) {
+            let before = estimator.sink().len();
+            let result = sent.to(&mut estimator);
+            let events = &estimator.sink()[before..];
+            let reasons: Vec<_> = events
+                .iter()
+                .filter_map(|event| match event.kind {
+                    EventKind::Added { .. } => Some(None),
+                    EventKind::Degraded { reason, .. } | EventKind::Fatal { reason, .. } => Some(Some(reason)),
+                    EventKind::Rejected { rejection } => Some(Some(Reason::Gate(rejection))),
+                    _ => None,
+                })
+                .collect();
+            assert!(
+                reasons.contains(&result.err().map(|error| error.reason())),
+                "{sent:?}, {result:?}: {events:?}"
+            );
+        }
+        let added = |input| {
+            let is_it =
+                |event: &&Event| matches!(event.kind, EventKind::Added { input: this, .. } if this == input);
+            estimator.sink().iter().filter(is_it).count()
+        };
+        assert_eq!((added(InputKind::Vio), added(InputKind::Anchor), added(InputKind::Imu)), (50, 4, 1000));
+        let broken = VioOutput { translation: Vector3::repeat(f64::NAN), ..flight.vio[40] };
+        assert_eq!(estimator.add_vio(broken), Err(EstimatorError::Degraded(Reason::Refused(Refusal::NonFinite))));
+        let expected = EventKind::Degraded { input: InputKind::Vio, reason: Reason::Refused(Refusal::NonFinite) };
+        assert_eq!(estimator.sink().last().unwrap().kind, expected);
+    }
+}
+
+#[test]
+fn levels_are_those_of_the_design() {
+    for strategy in StrategyKind::ALL {
+        let estimator = bad_day(*strategy);
+        let expected = |name: &str| match name {
+            "fatal" | "fallback_imminent" | "fallback_engaged" => Level::Error,
+            "degraded" | "rejected" | "covariance_growing" => Level::Warn,
+            "ready" | "started" | "gate" | "label" | "fallback_recovered" => Level::Info,
+            _ => Level::Debug,
+        };
+        for event in estimator.sink() {
+            assert_eq!(event.level(), expected(event.kind.name()), "{event:?}");
+        }
+        let seen = |name: &str| count(estimator.sink(), name) > 0;
+        for name in
+            ["ready", "started", "added", "degraded", "rejected", "label", "gate", "keyframe", "fallback_engaged"]
+        {
+            assert!(seen(name), "{}: no {name}", strategy.name());
+        }
+    }
+}
+
+#[test]
+fn status_texts_have_at_most_fifty_characters() {
+    let huge = f64::MAX;
+    let rejections = [
+        Rejection::Unhealthy,
+        Rejection::Spoofed,
+        Rejection::Dwelling { seconds: huge },
+        Rejection::AwaitsAnchor,
+        Rejection::TooFar { distance_m: huge },
+        Rejection::Disagrees { distance_m: huge },
+    ];
+    let texts = rejections.map(|rejection| EventKind::Rejected { rejection }).into_iter().chain([
+        EventKind::CovarianceGrowing { ratio: huge },
+        EventKind::FallbackImminent,
+        EventKind::FallbackEngaged,
+        EventKind::FallbackRecovered,
+        EventKind::Started { from: StartedFrom::FlightController },
+        EventKind::Label { from: SourceLabel::DeadReckoned, to: SourceLabel::SatelliteAnchored },
+        EventKind::Gate { from: GateState::Open, to: GateState::AwaitsAnchor },
+        EventKind::Fatal { input: InputKind::WarmStart, reason: Reason::Overflow },
+    ]);
+    for kind in texts {
+        let text = Event { time_ns: 0, kind }.status_text().unwrap();
+        assert!((10..=50).contains(&text.as_str().len()) && text.as_str().starts_with("NAV "), "{text}");
+    }
+    // Those of usual numbers are not cut.
+    let usual = EventKind::Rejected { rejection: Rejection::Disagrees { distance_m: 123.4 } };
+    assert_eq!(
+        Event { time_ns: 0, kind: usual }.status_text().unwrap().as_str(),
+        "NAV GPS rejected: anchor 123 m off"
+    );
+}
+
+#[test]
+fn keyframes_that_leave_the_window_go_to_the_recorder_once_and_in_order() {
+    let flight = Flight::new(8, 4);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let sent = flight.sent(true, true, false);
+        for sent in &sent {
+            sent.to(&mut estimator).unwrap();
+            if let Sent::Imu(sample) = sent
+                && let Some(output) = estimator.tick(sample.time_ns)
+            {
+                assert!(!output.smoothed, "only the forward estimate leaves");
+            }
+        }
+        let left: Vec<_> = kinds(estimator.sink(), "keyframe")
+            .map(|event| match event.kind {
+                EventKind::Keyframe { estimate } => estimate,
+                _ => unreachable!(),
+            })
+            .collect();
+        let times: Vec<i64> = left.iter().map(|estimate| estimate.time_ns).collect();
+        // From the start to the fifteenth before the newest.
+        let expected: Vec<i64> = (0..=80 - 15).map(|i| i * FRAME).collect();
+        assert_eq!(times, expected);
+        assert!(left.iter().all(|estimate| estimate.smoothed == strategy.is_smoothing()));
+        assert!(left[20..].iter().all(|estimate| flight.error(estimate).0 < 3.0));
+    }
+}
+
+#[test]
+fn a_recorder_that_is_not_wanted_costs_nothing() {
+    let flight = Flight::new(4, 4);
+    for strategy in StrategyKind::ALL {
+        let mut config = config(*strategy);
+        config.params.record_keyframes = false;
+        let mut estimator = StateEstimator::new(config, Events::new()).unwrap();
+        estimator.warm_start(flight.warm_start(0)).unwrap();
+        flight.sent(true, true, false).iter().for_each(|sent| sent.to(&mut estimator).unwrap());
+        assert_eq!(count(estimator.sink(), "keyframe"), 0);
+        assert_eq!(estimator.current_estimate().unwrap().time_ns, 4 * SECOND);
+    }
+}
+
+#[test]
+fn two_sinks_get_the_same_events() {
+    let flight = Flight::new(1, 4);
+    let sink = Both(Events::new(), Events::new());
+    let mut estimator: StateEstimator<Both<Events, Events>> =
+        StateEstimator::new(config(StrategyKind::default()), sink).unwrap();
+    estimator.warm_start(flight.warm_start(0)).unwrap();
+    estimator.add_imu(&flight.samples[0]).unwrap();
+    let _ = estimator.tick(STEP);
+    assert!(estimator.sink().0.len() >= 3 && estimator.sink().0 == estimator.sink().1);
+}

@@ -1,0 +1,195 @@
+//! Random, broken, late, repeated and absurd inputs: nothing panics, nothing grows, and it recovers.
+
+use super::flight::{SECOND, STEP};
+use super::*;
+use crate::navigation::geodesy::Geodetic;
+use crate::navigation::{GnssPosition, ImuMean};
+use nalgebra::{Matrix3, Matrix6, Quaternion, Unit, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+const ABSURD: [f64; 10] = [0.0, -1.0, 1.0, 1e-300, 1e6, 1e18, f64::MAX, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+const STAMPS: [i64; 6] = [0, 1, -1, i64::MIN, i64::MAX, i64::MAX / 2];
+
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![4 => -100.0..100.0_f64, 1 => prop::sample::select(ABSURD.to_vec())]
+}
+
+fn vector() -> impl Strategy<Value = Vector3<f64>> {
+    [number(), number(), number()].prop_map(Vector3::from)
+}
+
+fn orientation() -> impl Strategy<Value = UnitQuaternion<f64>> {
+    prop_oneof![
+        4 => [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0].prop_map(|axis| UnitQuaternion::from_scaled_axis(Vector3::from(axis))),
+        1 => number().prop_map(|x| Unit::new_unchecked(Quaternion::new(x, 1.0, 0.0, 0.0))),
+    ]
+}
+
+/// A stamp near the present, or none at all.
+#[derive(Clone, Copy, Debug)]
+enum Stamp {
+    Near(i64),
+    Absurd(i64),
+}
+
+fn stamp() -> impl Strategy<Value = Stamp> {
+    prop_oneof![
+        9 => (-3 * SECOND..SECOND).prop_map(|offset| Stamp::Near(offset / STEP * STEP)),
+        1 => prop::sample::select(STAMPS.to_vec()).prop_map(Stamp::Absurd),
+    ]
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Chaos {
+    Imu(Stamp, Vector3<f64>, Vector3<f64>),
+    Vio(Stamp, Stamp, Vector3<f64>, UnitQuaternion<f64>, f64),
+    Anchor(Stamp, u32, [f64; 3], UnitQuaternion<f64>, f64),
+    Fix(Stamp, [f64; 3], f64),
+    Health(Stamp, u8),
+    Attitude(Stamp, UnitQuaternion<f64>, f64),
+    Factor(Stamp, Vector3<f64>, f64),
+    Warm(Stamp),
+    Tick(Stamp),
+}
+
+fn chaos() -> impl Strategy<Value = Chaos> {
+    prop_oneof![
+        (stamp(), vector(), vector()).prop_map(|(at, w, f)| Chaos::Imu(at, w, f)),
+        (stamp(), stamp(), vector(), orientation(), number()).prop_map(|(a, b, t, q, s)| Chaos::Vio(a, b, t, q, s)),
+        (stamp(), 0..3_u32, [number(), number(), number()], orientation(), number())
+            .prop_map(|(at, who, p, q, s)| Chaos::Anchor(at, who, p, q, s)),
+        (stamp(), [number(), number(), number()], number()).prop_map(|(at, p, s)| Chaos::Fix(at, p, s)),
+        (stamp(), 0..4_u8).prop_map(|(at, health)| Chaos::Health(at, health)),
+        (stamp(), orientation(), number()).prop_map(|(at, q, s)| Chaos::Attitude(at, q, s)),
+        (stamp(), vector(), number()).prop_map(|(at, p, s)| Chaos::Factor(at, p, s)),
+        stamp().prop_map(Chaos::Warm),
+        stamp().prop_map(Chaos::Tick),
+    ]
+}
+
+impl Chaos {
+    fn to(self, estimator: &mut Estimator, flight: &Flight, now_ns: i64) {
+        let at = |stamp: Stamp| match stamp {
+            Stamp::Near(offset) => now_ns + offset,
+            Stamp::Absurd(time_ns) => time_ns,
+        };
+        let near =
+            |[x, y, z]: [f64; 3]| Geodetic { latitude: 0.8377 + x * 1e-6, longitude: 0.192 + y * 1e-6, height: z };
+        // Twice, as a broken link would.
+        for _ in 0..2 {
+            match self {
+                Self::Imu(stamp, angular_velocity, specific_force) => {
+                    ignore(estimator.add_imu(&ImuMean { time_ns: at(stamp), angular_velocity, specific_force }));
+                }
+                Self::Vio(from, to, translation, from_to, sigma) => ignore(estimator.add_vio(VioOutput {
+                    from_ns: at(from),
+                    to_ns: at(to),
+                    translation,
+                    from_to,
+                    covariance: Matrix6::identity() * sigma,
+                    bias: Some(ImuBias { accelerometer: translation, gyroscope: translation }),
+                })),
+                Self::Anchor(stamp, provider, position, world_from_body, sigma) => {
+                    ignore(estimator.add_pose_anchor(PoseAnchor {
+                        time_ns: at(stamp),
+                        provider,
+                        position: near(position),
+                        world_from_body,
+                        covariance: Matrix6::identity() * sigma,
+                        is_covariance_degraded: true,
+                    }));
+                }
+                Self::Fix(stamp, position, sigma) => ignore(estimator.add_gnss(GnssReading {
+                    time_ns: at(stamp),
+                    position: near(position),
+                    covariance: Matrix3::identity() * sigma,
+                    velocity: Some((Vector3::from(position), Matrix3::identity() * sigma)),
+                    lever_arm: Vector3::zeros(),
+                })),
+                Self::Health(stamp, health) => {
+                    let all = [GpsHealth::NoFix, GpsHealth::Unstable, GpsHealth::Stable, GpsHealth::Spoofed];
+                    let reading = GpsHealthReading { time_ns: at(stamp), health: all[usize::from(health)] };
+                    ignore(estimator.add_gps_health(reading));
+                }
+                Self::Attitude(stamp, world_from_body, deviation) => {
+                    ignore(estimator.add_attitude(AttitudeReading {
+                        time_ns: at(stamp),
+                        world_from_body,
+                        tilt_deviation: deviation,
+                        heading_deviation: deviation,
+                    }))
+                }
+                Self::Factor(stamp, position, sigma) => {
+                    ignore(estimator.add_factor(at(stamp), 0, GnssPosition::new(position, sigma, sigma).into()));
+                }
+                Self::Warm(stamp) => {
+                    ignore(estimator.warm_start(flight.warm_start(at(stamp).clamp(0, 60 * SECOND))))
+                }
+                Self::Tick(stamp) => {
+                    if let Some(output) = estimator.tick(at(stamp)) {
+                        assert!(output.covariance.iter().all(|x| x.is_finite()));
+                        assert!(output.position.latitude.is_finite() && output.velocity.x.is_finite());
+                    }
+                }
+            }
+        }
+        let _ = (estimator.current_estimate(), estimator.health(), estimator.smoothed_history(3));
+        let [samples, inputs, copies] = estimator.held();
+        assert!(samples <= 8192 && inputs <= 512 && copies <= 8);
+        estimator.sink_mut().clear();
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4))]
+
+    #[test]
+    fn whatever_comes_it_goes_on(chaos in prop::collection::vec(chaos(), 80), seed in 0..1000_u64) {
+        let flight = Flight::new(24, seed);
+        for strategy in StrategyKind::ALL {
+            let mut estimator = estimator(*strategy);
+            let _ = estimator.warm_start(flight.warm_start(0));
+            // Good samples between the bad, so that time goes on.
+            for (i, chaos) in chaos.iter().enumerate() {
+                let sample = &flight.samples[i * 15];
+                let _ = estimator.add_imu(sample);
+                chaos.to(&mut estimator, &flight, sample.time_ns);
+            }
+            // Then all is well again, for long enough that anchors overrule what chaos has made it believe.
+            for sent in &flight.sent(true, true, false) {
+                if sent.time_ns() > 6 * SECOND {
+                    let _ = sent.to(&mut estimator);
+                    let _ = estimator.tick(sent.time_ns());
+                }
+            }
+            let output = estimator.predicted(24 * SECOND);
+            prop_assert!(output.is_some(), "{}: {:?}, {:?}", strategy.name(), estimator.health(), estimator.counts());
+            let error = output.map(|output| flight.error(&output));
+            // Led far astray it takes longer to come back, and says so meanwhile.
+            let is_degraded = output.is_some_and(|output| output.degraded);
+            let is_there = is_degraded || error.is_some_and(|(position, _)| position < 20.0);
+            prop_assert!(is_there, "{}: {error:?}, {output:?}", strategy.name());
+        }
+    }
+}
+
+#[test]
+fn nothing_grows_over_a_long_flight() {
+    for strategy in StrategyKind::ALL {
+        let flight = Flight::new(60, 6);
+        let mut estimator = started(&flight, *strategy);
+        let mut most = [[0; 3]; 2];
+        for sent in &flight.sent(true, true, true) {
+            let _ = sent.to(&mut estimator);
+            let _ = estimator.tick(sent.time_ns());
+            estimator.sink_mut().clear();
+            if sent.time_ns() > 10 * SECOND {
+                let half = usize::from(sent.time_ns() > 35 * SECOND);
+                let held = estimator.held();
+                (0..3).for_each(|i| most[half][i] = most[half][i].max(held[i]));
+            }
+        }
+        assert!((0..3).all(|i| most[1][i] <= most[0][i]), "{most:?}");
+        assert!(most[1][0] < 700 && most[1][1] < 200, "{most:?}");
+    }
+}

@@ -1,0 +1,94 @@
+//! The tangent frame that the strategy works in, and positions on the Earth.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
+
+use super::input::{GnssReading, PoseAnchor, blocks};
+use crate::navigation::geodesy::{Geodetic, LocalFrame};
+use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
+
+/// How far from its origin the strategy works, m: there down differs by 0.8 mrad.
+const FARTHEST: f64 = 5000.0;
+
+/// See the module.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct World {
+    frame: LocalFrame,
+}
+
+impl World {
+    pub(super) fn new(origin: Geodetic) -> Self {
+        Self { frame: LocalFrame::new(origin) }
+    }
+
+    pub(super) fn frame(&self) -> &LocalFrame {
+        &self.frame
+    }
+
+    pub(super) fn position(&self, position: &Geodetic) -> Vector3<f64> {
+        self.frame.position(position)
+    }
+
+    /// Takes vectors of the tangent frame at a position to that of the world.
+    pub(super) fn frame_from_local(&self, position: &Geodetic) -> UnitQuaternion<f64> {
+        LocalFrame::new(*position).other_from_self(&self.frame).rotation
+    }
+
+    pub(super) fn anchor(&self, anchor: &PoseAnchor) -> AbsolutePose {
+        let turn = self.frame_from_local(&anchor.position);
+        let [position, rotation] = blocks(&anchor.covariance).map(|covariance| turned(&turn, &covariance));
+        AbsolutePose {
+            position: self.position(&anchor.position),
+            world_from_body: turn * anchor.world_from_body,
+            position_covariance: position,
+            rotation_covariance: rotation,
+        }
+    }
+
+    pub(super) fn fix(&self, fix: &GnssReading) -> (GnssPosition, Option<GnssVelocity>) {
+        let turn = self.frame_from_local(&fix.position);
+        let lever_arm = fix.lever_arm;
+        let position = GnssPosition {
+            position: self.position(&fix.position),
+            covariance: turned(&turn, &fix.covariance),
+            lever_arm,
+        };
+        let velocity = fix.velocity.map(|(velocity, covariance)| GnssVelocity {
+            velocity: turn * velocity,
+            covariance: turned(&turn, &covariance),
+            lever_arm,
+        });
+        (position, velocity)
+    }
+
+    /// Position on the Earth, and what takes vectors of the world to the tangent frame there.
+    pub(super) fn local(&self, position: &Vector3<f64>) -> (Geodetic, UnitQuaternion<f64>) {
+        let geodetic = self.frame.geodetic(position);
+        (geodetic, self.frame_from_local(&geodetic).inverse())
+    }
+
+    /// If a position is far out, moves on to a frame that is nearer by; what takes coordinates there.
+    pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
+        if position.xy().norm() <= FARTHEST {
+            return None;
+        }
+        let old = self.frame;
+        let height = old.origin().height;
+        self.frame = LocalFrame::new(Geodetic { height, ..old.geodetic(position) });
+        Some(old.other_from_self(&self.frame))
+    }
+}
+
+fn turned(turn: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+    let matrix = turn.to_rotation_matrix().into_inner();
+    let turned = matrix * covariance * matrix.transpose();
+    0.5 * (turned + turned.transpose())
+}
+
+/// Both blocks of a covariance and what correlates them, turned.
+pub(super) fn turned_pose(turn: &UnitQuaternion<f64>, covariance: &Matrix6<f64>) -> Matrix6<f64> {
+    let matrix = turn.to_rotation_matrix().into_inner();
+    let mut both = Matrix6::zeros();
+    [0, 3].iter().for_each(|first| both.fixed_view_mut::<3, 3>(*first, *first).copy_from(&matrix));
+    let turned = both * covariance * both.transpose();
+    0.5 * (turned + turned.transpose())
+}

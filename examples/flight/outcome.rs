@@ -1,0 +1,157 @@
+//! What came of the flight: events, and errors against the truth.
+
+use crate::sensors::frame;
+use crate::timeline::Happened;
+use crate::trajectory::motion;
+use bb_cli::{Line, PALETTE, Panel, Picture};
+use bb_core::prelude::*;
+use bb_estimators::navigation::Geodetic;
+use bb_estimators::navigation::state_estimator::{
+    FlightEstimate, FlightEvent, FlightEvents, FlightHealth, Level, SourceLabel,
+};
+use std::fmt::Write;
+
+/// An estimate beside the truth.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    time_s: f64,
+    error_m: f64,
+    deviation_m: f64,
+    age_s: Option<f64>,
+    label: SourceLabel,
+    covariance_norm: f64,
+}
+
+/// See the module.
+#[derive(Default)]
+pub(crate) struct Outcome {
+    pub(crate) happened: Vec<Happened>,
+    points: Vec<Point>,
+    pub(crate) keyframes: usize,
+    health: Option<FlightHealth>,
+}
+
+impl Outcome {
+    pub(crate) fn take(
+        &mut self,
+        estimates: impl Iterator<Item = Stamped<FlightEstimate>>,
+        health: impl Iterator<Item = Stamped<FlightHealth>>,
+        events: impl Iterator<Item = Stamped<FlightEvents>>,
+    ) {
+        self.points.extend(estimates.filter_map(|estimate| Point::of(&estimate.payload)));
+        self.health = health.last().map(|health| health.payload).or(self.health);
+        for event in events.flat_map(|events| events.payload.events) {
+            self.keyframes += usize::from(event.keyframe.is_some());
+            if event.level <= Level::Info {
+                self.happened.push(Happened { time_s: event.time.as_nanos() as f64 * 1e-9, what: words(&event) });
+            }
+        }
+    }
+
+    /// Lines; of what happens again and again, the first and how often.
+    pub(crate) fn timeline(&self) -> Vec<String> {
+        let mut lines: Vec<(f64, &str, usize)> = Vec::new();
+        for Happened { time_s, what } in &self.happened {
+            // Numbers in it differ.
+            let alike = |other: &str| {
+                other.chars().filter(|c| c.is_alphabetic()).eq(what.chars().filter(|c| c.is_alphabetic()))
+            };
+            match lines.last_mut() {
+                Some((_, last, count)) if alike(last) => *count += 1,
+                _ => lines.push((*time_s, what, 1)),
+            }
+        }
+        let line = |(time_s, what, count): (f64, &str, usize)| match count {
+            1 => format!("{time_s:8.3}  {what}"),
+            _ => format!("{time_s:8.3}  {what}  ({count} times)"),
+        };
+        lines.into_iter().map(line).collect()
+    }
+
+    /// Errors by the age of the anchor.
+    pub(crate) fn errors(&self) -> String {
+        let mut table = String::from("age of the anchor  estimates  error, RMS  within 2σ\n");
+        for (from, to) in [(0.0, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 4.0), (4.0, 8.0), (8.0, 16.0)] {
+            let points =
+                self.points.iter().filter(|point| point.age_s.is_some_and(|age| (from..to).contains(&age)));
+            let points: Vec<_> = points.collect();
+            let count = points.len();
+            if count == 0 {
+                continue;
+            }
+            let squares = points.iter().map(|point| point.error_m.powi(2)).sum::<f64>();
+            let within = points.iter().filter(|point| point.error_m < 2.0 * point.deviation_m).count();
+            let (rms, share) = ((squares / count as f64).sqrt(), 100.0 * within as f64 / count as f64);
+            let _ = writeln!(table, "{from:7.1} to {to:4.1} s  {count:9}  {rms:8.2} m  {share:7.0} %");
+        }
+        table
+    }
+
+    pub(crate) fn picture(&self) -> Picture {
+        let line = |label: &str, colour: usize, value: fn(&Point) -> Option<f64>| {
+            let points: Vec<_> = self.points.iter().map(|point| (point.time_s, value(point))).collect();
+            Line::new(label, PALETTE[colour], 1, &points)
+        };
+        let errors = vec![
+            line("error", 0, |point| Some(point.error_m)),
+            line("standard deviation", 1, |point| Some(point.deviation_m)),
+        ];
+        let ages = vec![line("age of the anchor", 3, |point| point.age_s)];
+        let panel = |axis: &str, lines| Panel { title: String::new(), axis: axis.to_owned(), lines };
+        let panels = vec![panel("position (m)", errors), panel("age (s)", ages)];
+        Picture { title: "flight".into(), panels, panel_size: (1400, 300) }
+    }
+
+    /// The largest error, m.
+    #[cfg(test)]
+    pub(crate) fn worst_m(&self) -> f64 {
+        self.points.iter().map(|point| point.error_m).fold(0.0, f64::max)
+    }
+
+    /// Whether the covariance grew all the time while it was dead reckoning.
+    pub(crate) fn grows_while_dead_reckoning(&self) -> bool {
+        let is_lost = |point: &Point| point.label == SourceLabel::DeadReckoned;
+        let pairs = self.points.windows(2).filter(|two| is_lost(&two[0]) && is_lost(&two[1]));
+        let mut count = 0;
+        let grows = pairs.inspect(|_| count += 1).all(|two| two[1].covariance_norm >= two[0].covariance_norm);
+        grows && count > 40
+    }
+
+    /// Whether the receiver is let in at the end.
+    pub(crate) fn is_gate_open(&self) -> bool {
+        self.health.is_some_and(|health| health.is_gate_open)
+    }
+}
+
+impl Point {
+    fn of(estimate: &FlightEstimate) -> Option<Self> {
+        let time_s = estimate.time.as_nanos() as f64 * 1e-9;
+        let position = estimate.position;
+        let position = Geodetic {
+            latitude: position.latitude_rad,
+            longitude: position.longitude_rad,
+            height: position.altitude?,
+        };
+        let variance: f64 = (0..3).map(|i| estimate.covariance[(i, i)]).sum();
+        Some(Self {
+            time_s,
+            error_m: (frame().position(&position) - motion(time_s).position).norm(),
+            deviation_m: variance.sqrt(),
+            age_s: estimate.anchor_age_ms.map(|age_ms| age_ms as f64 * 1e-3),
+            label: estimate.label,
+            covariance_norm: estimate.covariance_norm,
+        })
+    }
+}
+
+fn words(event: &FlightEvent) -> String {
+    let text = |text: &Option<String>| text.clone().unwrap_or_default();
+    match event.kind.as_str() {
+        "label" | "gate" => format!("{} {}", event.kind, text(&event.to)),
+        "started" => format!("started from {}", text(&event.from)),
+        "ready" => format!("ready: {}", text(&event.to)),
+        "rejected" => format!("rejected {}", text(&event.reason)),
+        "degraded" | "fatal" => format!("{} {}: {}", event.kind, text(&event.input), text(&event.reason)),
+        kind => kind.to_owned(),
+    }
+}

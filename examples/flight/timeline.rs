@@ -1,0 +1,34 @@
+//! What must have happened, in this order; other things may happen between.
+
+/// Something that happened: when, s, and what.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Happened {
+    pub(crate) time_s: f64,
+    pub(crate) what: String,
+}
+
+/// What happens, and from when to when, s.
+const EXPECTED: [(&str, f64, f64); 13] = [
+    ("started from origin", 1.0, 2.0),
+    ("label satellite_anchored", 1.0, 3.0),
+    ("gate blocked", 20.0, 20.3),
+    ("rejected the receiver was spoofed", 20.0, 20.5),
+    ("label visual_propagated", 22.0, 24.0),
+    ("label satellite_anchored", 24.0, 25.0),
+    ("label visual_propagated", 27.0, 28.0),
+    ("covariance_growing", 27.0, 50.0),
+    ("label dead_reckoned", 40.5, 41.5),
+    ("label satellite_anchored", 52.0, 53.0),
+    ("gate dwelling", 60.0, 60.3),
+    ("gate awaits_anchor", 69.9, 70.5),
+    ("gate open", 72.0, 73.0),
+];
+
+/// The first that did not happen in its order.
+pub(crate) fn missing(happened: &[Happened]) -> Option<String> {
+    let mut left = happened.iter();
+    EXPECTED.iter().find_map(|(what, from_s, to_s)| {
+        let is_it = |one: &Happened| one.what.starts_with(what) && (*from_s..=*to_s).contains(&one.time_s);
+        (!left.any(is_it)).then(|| format!("{what}, from {from_s} s to {to_s} s"))
+    })
+}
