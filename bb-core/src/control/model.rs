@@ -88,7 +88,7 @@ fn check<const THREADS: usize>(threads: [Thread; THREADS], prepare: fn(&Control)
     checker.check(move || {
         let control = control();
         let motor = prepare(&control);
-        assert!(control.arm(&Permit::UNLIMITED));
+        assert_eq!(control.arm(&Permit::UNLIMITED), Ok(()));
         let spawned: Vec<_> = threads
             .iter()
             .map(|&run| {
@@ -109,11 +109,11 @@ fn check<const THREADS: usize>(threads: [Thread; THREADS], prepare: fn(&Control)
 
 const DRIVES: Thread = |control, motor| motor.drive(control);
 const DISARMS: Thread = |control, _| {
-    control.disarm(false);
+    let _ = control.disarm(false);
 };
 const STOPS: Thread = |control, _| control.begin_stop();
 const ARMS: Thread = |control, _| {
-    control.arm(&Permit::UNLIMITED);
+    let _ = control.arm(&Permit::UNLIMITED);
 };
 const BURNS: Thread = |control, _| control.hardware_error("motor", "it burns".to_owned());
 /// The first time that the robot is disarmed.
