@@ -19,6 +19,7 @@ mod record;
 mod sensor;
 mod service;
 mod setting;
+mod template;
 
 pub(crate) use crate::fault::Fault;
 pub(crate) use actuator::Accepts;
@@ -43,3 +44,4 @@ pub use sensor::{Next, Reading, Sensor};
 pub use service::Service;
 pub(crate) use setting::quantity;
 pub use setting::{AnyOptions, ByCode, ByText, ByValue, Setting, SettingKind, SettingOf, WithUnit};
+pub(crate) use template::Template;

@@ -13,6 +13,7 @@ mod command;
 mod commands;
 mod effects;
 mod execution;
+mod hanging;
 mod health;
 mod hooks;
 mod machine;
@@ -27,6 +28,7 @@ mod topics;
 
 pub use command::{CommandStatistics, Prepared};
 pub use execution::{CommandError, Execution};
+pub(crate) use hanging::Hanging;
 pub(crate) use system::{ComponentOrder, Control, Declared, Islands, Parts, Summary, Wired};
 pub use topics::SystemTopics;
 

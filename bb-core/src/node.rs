@@ -4,6 +4,7 @@
 mod admission;
 mod backlog;
 mod counters;
+mod emission;
 mod entry;
 mod environment;
 mod health;
@@ -16,16 +17,17 @@ mod timers;
 mod turn;
 
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
+pub(crate) use emission::{Emitting, blame, contained, contained_outside};
 pub use entry::NodeEntry;
 pub(crate) use entry::{HealthReport, Report};
 pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Mode, Overseer};
 pub(crate) use island::CallError;
-pub(crate) use island::take_turn;
 pub use island::{
     Act, AnyIsland, Island, IslandState, IslandWiring, Key, Member, Replayed, act, alone, enter, feed,
     island as island_of, receive, start,
 };
+pub(crate) use island::{publish, take_turn};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
 pub use running::{Next, Node};

@@ -98,7 +98,7 @@ impl Control {
         step.finish();
         match self.0.mode {
             // A callback must not wait for itself.
-            Mode::Real if hooks::is_inside(self.id()) => return Err(DisarmError::Callback),
+            Mode::Real | Mode::Virtual if hooks::is_waited_for(self.id()) => return Err(DisarmError::Callback),
             Mode::Real => drop(self.wait_until(DISARM_WITHIN + MARGIN, |state| !state.is_disarming(generation))),
             Mode::Virtual => while self.run_pending_hooks() {},
             Mode::Replay => {}
