@@ -9,6 +9,9 @@ use bb_estimators::navigation::{
     AbsolutePose, EskfParams, FixedLagSmoother, ImuMean, Optional, Preintegration, Refusal, RelativePose,
     SmootherParams, Start, States, Stream,
 };
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use std::error::Error;
 use std::hint::black_box;
 use std::time::Instant;
@@ -63,7 +66,7 @@ fn line(name: &str, window: usize, times: &[u32]) -> String {
 /// The time of each keyframe, ns: odometry at each, a pose in the world at every tenth.
 fn run(params: SmootherParams, keyframes: usize) -> Result<Vec<u32>, Box<dyn Error>> {
     let mut smoother = Smoother::new(params)?;
-    let mut noise = Noise(12_345);
+    let mut noise = Noise(ChaCha8Rng::seed_from_u64(12_345));
     let (rest, level) = (Vector3::zeros(), UnitQuaternion::identity());
     smoother.start(0, &Start::at(0, (rest, 1.0), (rest, 0.1), (level, 0.03)))?;
     let (mut anchors, mut odometry) = (Stream::default(), Stream::default());
@@ -119,14 +122,10 @@ fn sample_us() -> f64 {
 }
 
 /// Noise that is the same in every run.
-struct Noise(u64);
+struct Noise(ChaCha8Rng);
 
 impl Noise {
     fn vector(&mut self, deviation: f64) -> Vector3<f64> {
-        let mut uniform = || {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        Vector3::from_fn(|_, _| ((0..12).map(|_| uniform()).sum::<f64>() - 6.0) * deviation)
+        Vector3::from_fn(|_, _| deviation * Distribution::<f64>::sample(&StandardNormal, &mut self.0))
     }
 }

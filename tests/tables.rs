@@ -8,6 +8,7 @@ mod known;
 
 use bb_cli::Axes;
 use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample};
+use bb_estimators::navigation::planar::{PlanarOptions, PlanarParams};
 use bb_estimators::navigation::{AlignmentParams, EskfParams, NavigationOptions, StreamParams};
 use bb_estimators::params::{Kind, Params};
 use known::{Errors, Row};
@@ -111,11 +112,14 @@ fn the_parameters() {
     let mut text = String::new();
     let eskf = (EskfParams::default(), NavigationOptions::default());
     let (alignment, stream) = (AlignmentParams::default(), StreamParams::default());
-    let other: [(&str, &dyn Params); 4] = [
+    let planar = (PlanarParams::default(), PlanarOptions::default());
+    let other: [(&str, &dyn Params); 6] = [
         ("`Eskf` in `robot!` (`NavigationOptions`)", &eskf.1),
         ("The navigation filter by itself (`EskfParams`)", &eskf.0),
         ("Its start (`AlignmentParams`)", &alignment),
         ("Its sensors (`StreamParams`)", &stream),
+        ("`PlanarEkf` in `robot!` (`PlanarOptions`)", &planar.1),
+        ("The planar filter by itself (`PlanarParams`)", &planar.0),
     ];
     for filter in filters() {
         section(&mut text, &format!("`{}`", filter.estimator()), &filter);

@@ -3,7 +3,8 @@
 use crate::calibrate::Calibrate;
 use crate::evaluate::Evaluator;
 use crate::filters::{Axes, Chosen, Setting};
-use crate::navigation::{self, NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
+use crate::navigation::{self, NavigationArguments};
+use crate::noise::{self, NoiseArguments};
 use crate::plot::Picture;
 use crate::recording::{MovingTopic, Topics};
 use crate::variants::{Field, Offset, Starts, Variants};
@@ -31,7 +32,7 @@ enum Command {
         #[command(subcommand)]
         what: Eval,
     },
-    /// Finds the errors of sensors from a recording of them.
+    /// Calibrates sensors from a recording.
     Calibrate {
         #[command(subcommand)]
         what: Calibrate,
@@ -40,12 +41,15 @@ enum Command {
 
 #[derive(Debug, Subcommand)]
 enum Eval {
-    /// Plays recordings through attitude filters and prints their errors against the truth.
+    /// Runs attitude filters on recordings and prints their errors against the truth.
     #[command(after_help = EXAMPLES)]
     Attitude(Box<AttitudeArguments>),
-    /// Plays drives and flights through navigation filters and prints their errors against the truth.
-    #[command(after_help = NAVIGATION_EXAMPLES)]
-    Navigation(NavigationArguments),
+    /// Runs navigation filters on drives and flights and prints their errors against the truth.
+    #[command(after_help = navigation::EXAMPLES)]
+    Navigation(Box<NavigationArguments>),
+    /// Finds the noise of an IMU from recordings at rest, by its Allan deviation.
+    #[command(after_help = noise::EXAMPLES)]
+    Noise(Box<NoiseArguments>),
 }
 
 const EXAMPLES: &str =
@@ -57,38 +61,6 @@ Examples:
   bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json
   bb eval attitude walk.mcap --filter mekf,vqf --start random:8 --offset 30uT:4";
 
-const NAVIGATION_EXAMPLES: &str = "Exit code: 0; 1 if a data set could not be evaluated; 2 for a wrong use.
-
-Examples:
-  bb eval navigation drives/kitti_s2
-  bb eval navigation drives/kitti_s2 drives/kitti_s5 --filter eskf --json
-  bb eval navigation flights/one --filter eskf-single --set gyroscope_noise=1e-3
-  bb eval navigation flights/one --filter smoother,eskf --window 10 --json";
-
-#[derive(Debug, Args)]
-struct NavigationArguments {
-    /// Prefixes of data sets: `folder/name` for `folder/name_imu.csv`, `folder/name_keyframes.csv` and the others.
-    #[arg(value_name = "DATA", required_unless_present = "list")]
-    data: Vec<PathBuf>,
-    /// The filters; several with commas.
-    #[arg(long = "filter", value_name = "NAME", value_delimiter = ',', default_value = NAVIGATION_FILTERS[0].name,
-          value_parser = navigation_filter, long_help = navigation_filters_in_words())]
-    filters: Vec<NavigationFilter>,
-    /// How many keyframes a smoother holds.
-    #[arg(long, value_name = "KEYFRAMES", default_value_t = 20,
-          value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..=1000))]
-    window: usize,
-    /// Sets a parameter, in SI or with a unit, in place of what the data set says.
-    #[arg(long = "set", value_name = "NAME=VALUE")]
-    settings: Vec<NavigationSetting>,
-    /// Prints the parameters, with defaults, ranges and units, and does nothing else.
-    #[arg(long)]
-    list: bool,
-    /// Prints an array of objects instead of the table.
-    #[arg(long)]
-    json: bool,
-}
-
 #[derive(Debug, Args)]
 struct AttitudeArguments {
     /// ROS 2 bags in MCAP, or folders of them.
@@ -98,52 +70,52 @@ struct AttitudeArguments {
     #[arg(long = "filter", value_name = "NAME", num_args = 1.., value_delimiter = ',', default_value = "all",
           long_help = filters::described())]
     filters: Vec<String>,
-    /// Gyroscope and accelerometer alone, or the magnetometer as well. With six axes only the inclination counts.
+    /// Gyroscope and accelerometer only, or the magnetometer as well. With six axes only the inclination counts.
     #[arg(long, value_enum, default_value_t = Axes::Nine)]
     axes: Axes,
-    /// Sets a parameter, in SI or with a unit, of all chosen filters that have it; FILTER.NAME=VALUE sets it of one.
+    /// Sets a parameter, in SI or with a unit, for all chosen filters that have it; FILTER.NAME=VALUE for one filter.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<Setting>,
-    /// Prints the parameters of the chosen filters, with defaults, ranges and units, and does nothing else.
+    /// Only prints the parameters of the chosen filters, with defaults, ranges and units.
     #[arg(long)]
     list: bool,
-    /// Starts the filters so many seconds before the first motion, instead of at the first sample.
+    /// Starts the filters this many seconds before the first motion, instead of at the first sample.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     start_before_motion: Option<f64>,
-    /// Starts the filters so many times at random in the first 60 % of the motion: random:COUNT.
+    /// Starts the filters COUNT times at random in the first 60 % of the motion.
     #[arg(long, value_name = "random:COUNT", conflicts_with = "start_before_motion")]
     start: Option<Starts>,
-    /// Adds a constant to the magnetometer, in so many random directions, each by itself: 30uT:4.
+    /// Adds a constant field to the magnetometer, in each of COUNT random directions, as 30uT:4.
     #[arg(long, value_name = "FIELD:COUNT")]
     offset: Option<Offset>,
-    /// Puts a magnet on the body 4 s before the first motion, and takes it off 55 s after it: 30uT.
+    /// Attaches a magnet to the body 4 s before the first motion and removes it 55 s after, as 30uT.
     #[arg(long, value_name = "FIELD")]
     magnet: Option<Field>,
     /// Disturbs the field in the world for 1 to 3 s at a time, 2 to 8 s apart. Needs the truth.
     #[arg(long, value_name = "FIELD")]
     disturb: Option<Field>,
-    /// Lets the field in the world change slowly, as a sine of 60 to 120 s. Needs the truth.
+    /// Varies the field in the world slowly, as a sine with a period of 60 to 120 s. Needs the truth.
     #[arg(long, value_name = "FIELD")]
     drift: Option<Field>,
-    /// What all that is random comes from: the same seed, the same figures.
+    /// The seed of all random numbers; the same seed gives the same figures.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
-    /// The topic of the IMU, where several fit (sensor_msgs/Imu).
+    /// The topic of the IMU, if there are several (sensor_msgs/Imu).
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
-    /// The topic of the magnetometer, where several fit (sensor_msgs/MagneticField).
+    /// The topic of the magnetometer, if there are several (sensor_msgs/MagneticField).
     #[arg(long, value_name = "TOPIC")]
     mag_topic: Option<String>,
-    /// The topic of the true orientation, where several fit (geometry_msgs/PoseStamped); nav_msgs/Odometry by name.
+    /// The topic of the true orientation, if there are several (geometry_msgs/PoseStamped), or if it is nav_msgs/Odometry.
     #[arg(long, value_name = "TOPIC")]
     truth_topic: Option<String>,
-    /// The topic that says when the body moves, where several fit (std_msgs/Bool); `none` scores all of it.
+    /// The topic that says whether the body moves, if there are several (std_msgs/Bool); `none` scores the whole recording.
     #[arg(long, value_name = "TOPIC")]
     moving_topic: Option<String>,
     /// Prints an array of objects instead of the table.
     #[arg(long)]
     json: bool,
-    /// Plots the errors over time into this file, an SVG or a PNG.
+    /// Plots the errors over time to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
@@ -152,21 +124,12 @@ struct AttitudeArguments {
 #[derive(Debug)]
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
-    Navigation(Navigation),
+    Navigation(Box<NavigationArguments>),
+    Noise(Box<NoiseArguments>),
     Calibrate(Calibrate),
     /// Prints this.
     Print(String),
     Other(commands::Command),
-}
-
-/// `bb eval navigation`.
-#[derive(Debug)]
-pub(crate) struct Navigation {
-    pub(crate) data: Vec<PathBuf>,
-    pub(crate) filters: Vec<NavigationFilter>,
-    pub(crate) settings: Vec<NavigationSetting>,
-    pub(crate) window: usize,
-    pub(crate) json: bool,
 }
 
 /// `bb eval attitude`.
@@ -178,7 +141,7 @@ pub(crate) struct Attitude {
     pub(crate) plot: Option<PathBuf>,
 }
 
-/// Reads the command line. An error is what to print, and has the exit code: help, which was asked for, has 0.
+/// Parses the command line. The error contains what to print and the exit code, which is 0 for `--help`.
 pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job, clap::Error> {
     let what = match Bb::try_parse_from(arguments)?.command {
         Command::Eval { what } => what,
@@ -187,12 +150,8 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
     };
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,
-        Eval::Navigation(NavigationArguments { list: true, .. }) => {
-            return Ok(Job::Print(navigation::listed()));
-        }
-        Eval::Navigation(NavigationArguments { data, filters, window, settings, json, .. }) => {
-            return Ok(Job::Navigation(Navigation { data, filters, settings, window, json }));
-        }
+        Eval::Navigation(arguments) => return Ok(Job::Navigation(arguments)),
+        Eval::Noise(arguments) => return Ok(Job::Noise(arguments)),
     };
     arguments.check().map_err(|(kind, fault)| {
         let mut bb = Bb::command();
@@ -254,7 +213,7 @@ impl AttitudeArguments {
         Ok(Job::Attitude(Box::new(attitude)))
     }
 
-    /// The filters that are named, in the order of the table. What follows `--filter` and is a path is a recording.
+    /// The chosen filters, in the order of the table. A path that follows `--filter` is a recording.
     fn filters(&mut self) -> Result<Vec<FilterParams>, String> {
         let is_recording = |name: &str| {
             let path = Path::new(name);
@@ -274,24 +233,10 @@ impl AttitudeArguments {
         }
         let all = named.iter().any(|name| name == "all");
         let is_chosen = |filter: &FilterParams| match all {
-            // Those that have no ninth axis are not asked to.
+            // Filters without a ninth axis are left out.
             true => self.axes.suit(filter),
             false => named.iter().any(|name| name == filter.name()),
         };
         Ok(filters().filter(is_chosen).collect())
     }
-}
-
-fn navigation_filter(name: &str) -> Result<NavigationFilter, String> {
-    let known = NAVIGATION_FILTERS.map(|filter| filter.name);
-    let found = NAVIGATION_FILTERS.into_iter().find(|filter| filter.name == name);
-    found.ok_or_else(|| format!("no filter `{name}`; {}", filters::near(name, &known)))
-}
-
-fn navigation_filters_in_words() -> String {
-    let mut text = String::from("The filters; several with commas. Those there are:\n");
-    for filter in NAVIGATION_FILTERS {
-        text += &format!("\n{}: {}", filter.name, filter.about);
-    }
-    text
 }

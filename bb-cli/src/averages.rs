@@ -1,4 +1,4 @@
-//! Averages over recordings: every recording weighs the same, however long it is.
+//! Averages over recordings, each with the same weight, whatever its length.
 
 use crate::score::Degrees;
 
@@ -26,7 +26,7 @@ impl Averages {
             }
         };
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        // An estimate that broke is the worst.
+        // NaN is the worst.
         let worst = |values: &[f64]| values.iter().copied().fold(0.0, |a: f64, b| if a >= b { a } else { b });
         (!scores.is_empty()).then(|| Self { count: scores.len(), mean: over(mean), worst: over(worst) })
     }

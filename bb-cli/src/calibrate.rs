@@ -20,9 +20,9 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Calibrate {
     /// Finds offsets, scale and misalignment of gyroscope, accelerometer and magnetometer.
     ///
-    /// The gyroscope's offset is what it reads at rest. The accelerometer needs rests of two seconds and more in six
-    /// directions for offset and scale, in nine for misalignment too; they need not be exact. The magnetometer needs free
-    /// motion in all directions, far from iron. One recording may have all of it.
+    /// The gyroscope's offset is its reading at rest. The accelerometer needs rests of at least two seconds in six
+    /// directions for offset and scale, and in nine for misalignment; they need not be exact. The magnetometer needs free
+    /// motion in all directions, far from iron. One recording may contain all of this.
     #[command(after_help = EXAMPLES)]
     Imu(Box<ImuArguments>),
 }
@@ -39,27 +39,27 @@ pub(crate) struct ImuArguments {
     /// A ROS 2 bag in MCAP.
     #[arg(value_name = "BAG")]
     file: PathBuf,
-    /// Gravity where it was recorded, m/s².
+    /// Local gravity, m/s².
     #[arg(long, value_name = "ACCELERATION", default_value_t = 9.80665)]
     gravity: f64,
-    /// The strength of the field where it was recorded, as 48uT; else the calibration leaves the strength as it is.
+    /// Local strength of the magnetic field, as 48uT. By default the calibration keeps the measured strength.
     #[arg(long, value_name = "FIELD")]
     field: Option<crate::Field>,
     /// Sets what counts as rest: window, time, rotation and force, in SI or with a unit.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<String>,
-    /// The topic of the IMU, where several fit (sensor_msgs/Imu).
+    /// The topic of the IMU, if there are several (sensor_msgs/Imu).
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
-    /// The topic of the magnetometer, where several fit (sensor_msgs/MagneticField).
+    /// The topic of the magnetometer, if there are several (sensor_msgs/MagneticField).
     #[arg(long, value_name = "TOPIC")]
     mag_topic: Option<String>,
-    /// Plots the norms of specific force and field, measured and calibrated, into this file, an SVG or a PNG.
+    /// Plots the norms of specific force and field, measured and calibrated, to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
 
-/// What one recording gave: each sensor by itself.
+/// The calibration of each sensor, from one recording.
 #[derive(Debug)]
 struct Calibration {
     rests: Vec<Rest>,
@@ -70,7 +70,7 @@ struct Calibration {
 }
 
 impl Calibrate {
-    /// What to print; whether there is a calibration at all.
+    /// Returns what to print, and whether any sensor was calibrated.
     pub(crate) fn run(&self) -> Result<(String, bool), String> {
         let Self::Imu(arguments) = self;
         arguments.run()
@@ -112,13 +112,13 @@ impl ImuArguments {
     }
 }
 
-/// All samples, with the field where there is one.
+/// Reads all samples, with the field if there is one.
 fn read(file: &Path, topics: Topics) -> Result<Vec<ImuSample>, String> {
     let fault = |error: String| format!("{}: {error}", file.display());
     let wants_field = topics.magnetometer.is_some();
     let mut recording = match Recording::open(file, &topics, Axes::Nine, None) {
         Ok(recording) => recording,
-        // A recording without a magnetometer calibrates the others.
+        // Without a magnetometer, the other sensors are calibrated.
         Err(error) if wants_field => return Err(fault(error)),
         Err(_) => Recording::open(file, &topics, Axes::Six, None).map_err(fault)?,
     };

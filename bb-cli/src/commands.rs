@@ -1,4 +1,4 @@
-//! The commands that are not `bb eval`, one file each.
+//! All commands except `bb eval` and `bb calibrate`, one file each.
 
 mod convert;
 mod echo;
@@ -22,7 +22,7 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    /// Does it; whether all went well. An error is told in words.
+    /// Runs the command, and returns whether all went well.
     pub(crate) fn run(&self) -> Result<bool, String> {
         match self {
             Self::New(arguments) => new::run(arguments),

@@ -1,4 +1,4 @@
-//! Errors over time: a panel a recording, a line a filter.
+//! Plots of errors over time: one panel per recording, one line per filter.
 
 use crate::evaluate::Evaluation;
 use crate::filters::Axes;
@@ -6,17 +6,11 @@ use crate::plot::{Line, PALETTE, Panel, Picture};
 use crate::report::name;
 use std::path::Path;
 
-/// A picture of more is larger than most viewers open.
+/// Most viewers cannot open larger pictures.
 const MOST_PANELS: usize = 40;
 
 pub(crate) fn draw(file: &Path, evaluations: &[Evaluation], axes: Axes) -> Result<(), String> {
-    let angle = match axes {
-        Axes::Six => "inclination error",
-        Axes::Nine => "total error",
-    };
-    let axis = format!("{angle} (deg)");
-    let panels: Vec<_> =
-        evaluations.iter().filter_map(|evaluation| panel(evaluation, evaluations, &axis)).collect();
+    let panels: Vec<_> = evaluations.iter().filter_map(|evaluation| panel(evaluation, evaluations)).collect();
     if panels.is_empty() {
         return Err(format!("{}: not plotted, for no recording has errors", file.display()));
     }
@@ -24,11 +18,18 @@ pub(crate) fn draw(file: &Path, evaluations: &[Evaluation], axes: Axes) -> Resul
         let count = panels.len();
         return Err(format!("--plot draws at most {MOST_PANELS} recordings, and {count} have errors; name fewer"));
     }
-    let title = format!("{angle}, {} axes", axes.name());
+    let title = format!("{}, {} axes", angle(axes), axes.name());
     Picture { title, panels, panel_size: (1400, 260) }.write(file)
 }
 
-fn panel(evaluation: &Evaluation, all: &[Evaluation], axis: &str) -> Option<Panel> {
+fn angle(axes: Axes) -> &'static str {
+    match axes {
+        Axes::Six => "inclination error",
+        Axes::Nine => "total error",
+    }
+}
+
+fn panel(evaluation: &Evaluation, all: &[Evaluation]) -> Option<Panel> {
     let runs = evaluation.runs.as_ref().ok()?;
     let has_errors = runs.iter().any(|run| run.errors.iter().any(|(_, error)| error.is_some()));
     let line = |(index, run): (usize, &crate::Run)| {
@@ -36,5 +37,9 @@ fn panel(evaluation: &Evaluation, all: &[Evaluation], axis: &str) -> Option<Pane
         Line::peaks(run.filter, colour, 1, &run.errors)
     };
     let lines = runs.iter().enumerate().map(line).collect();
-    has_errors.then(|| Panel { title: name(evaluation, all), axis: axis.to_owned(), lines })
+    has_errors.then(|| Panel {
+        title: name(evaluation, all),
+        axis: format!("{} (deg)", angle(evaluation.axes)),
+        lines,
+    })
 }

@@ -1,21 +1,26 @@
-//! Plays recordings through filters.
+//! Runs filters on recordings.
+
+mod doubts;
 
 use crate::filters::{Axes, Chosen, Refused, Running};
 use crate::progress::Progress;
 use crate::recording::{End, Recording, Topics};
 use crate::score::Score;
+use crate::truths::Truths;
+use crate::units::Units;
 use crate::variants::{Variant, Variants, moving_times};
-use bb_estimators::attitude::OrientationError;
+use bb_estimators::attitude::{ImuSample, OrientationError};
+use doubts::{take_units, truth_doubt, unit_doubts};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Samples that are read, then played: enough that the clock costs nothing, few enough to stay in the cache.
+/// Samples per block: enough that reading the clock costs nothing, few enough to stay in the cache.
 const BLOCK: usize = 1024;
 
-/// Whether the heading is within two sigma is asked once in so many samples.
+/// Headings are compared with two sigma, and truths with other conventions, once per this many samples.
 const ASKED: usize = 64;
 
 /// The length of the progress bar for one recording.
@@ -30,26 +35,28 @@ pub struct Evaluator {
     pub axes: Axes,
     /// The topics to take.
     pub topics: Topics,
-    /// Starts the filters so many seconds before the first motion, instead of at the first sample.
+    /// Starts the filters this many seconds before the first motion, instead of at the first sample.
     pub before_motion_s: Option<f64>,
-    /// How the recordings are changed.
+    /// How the recordings are modified.
     pub variants: Variants,
     /// Whether to keep the errors over time.
     pub keep_errors: bool,
 }
 
-/// What one recording gave.
+/// The results of one recording.
 #[derive(Debug)]
 pub struct Evaluation {
     /// The recording.
     pub file: PathBuf,
-    /// Which variant of it, from 0; none if the recording is not changed.
+    /// The number of the variant, from 0; `None` if the recording is not modified.
     pub variant: Option<u32>,
-    /// One run a filter, in the order of the filters; or why there is none.
+    /// The axes of the runs: six, where the magnetometer's topic holds no message.
+    pub axes: Axes,
+    /// One run per filter, in the order of the filters; or the reason why there is none.
     pub runs: Result<Vec<Run>, String>,
-    /// What broke the recording off, if it did; the runs are of what came before.
+    /// Why the recording breaks off, if it does; the runs are of the part before.
     pub broken: Option<String>,
-    /// What to know about the runs.
+    /// Remarks on the runs.
     pub notes: Vec<String>,
 }
 
@@ -60,16 +67,16 @@ pub struct Run {
     pub filter: &'static str,
     /// Its errors.
     pub score: Score,
-    /// Of how many headings it told the standard deviation, and how many were within two of them.
+    /// For how many headings it reported a standard deviation, and how many of them were within two.
     pub within_two_sigma: (u64, u64),
-    /// How long it took for a sample, on average, with reading its orientation; ns.
+    /// Mean time per sample, including reading the orientation, in ns.
     pub ns_per_update: f64,
-    /// Error over time: seconds since the first sample, degrees; none where the truth is unknown. Total with nine axes,
-    /// else inclination.
+    /// Error over time: seconds since the first sample, and degrees, `None` where the truth is unknown. The total error with
+    /// nine axes, else the inclination.
     pub errors: Vec<(f64, Option<f64>)>,
 }
 
-/// Evaluates recordings on all cores, with a progress bar on the terminal; gives them in their order.
+/// Evaluates recordings on all cores, with a progress bar on the terminal, and returns the results in order.
 pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &Evaluator) -> Vec<Evaluation> {
     let variants = evaluator.variants.count() as usize;
     let progress = Progress::new("evaluating", BAR * (files.len() * variants) as u64);
@@ -87,7 +94,7 @@ pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &
                         Ok(()) => evaluate_variant(file, variant, evaluator, &progress),
                         // Once is enough.
                         Err(_) if variant > 0 => continue,
-                        Err(fault) => Evaluation::failed(file, fault.clone()),
+                        Err(fault) => Evaluation::failed(file, fault.clone(), evaluator.axes),
                     };
                     // A thread that panicked leaves the list whole.
                     done.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((index, evaluation));
@@ -101,12 +108,12 @@ pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &
     done.into_iter().map(|(_, evaluation)| evaluation).collect()
 }
 
-/// Plays one recording through the filters, or the first of its variants. Moves the progress by 1,000.
+/// Runs the filters on one recording, or on the first of its variants. Advances the progress by 1,000.
 pub fn evaluate(file: &Path, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
     evaluate_variant(file, 0, evaluator, progress)
 }
 
-/// Plays one variant of a recording through the filters, by its index below [`Variants::count`]. Moves the progress by
+/// Runs the filters on one variant of a recording, by its index below [`Variants::count`]. Advances the progress by
 /// 1,000.
 pub fn evaluate_variant(file: &Path, variant: u32, evaluator: &Evaluator, progress: &Progress) -> Evaluation {
     let mut shown = 0;
@@ -114,21 +121,27 @@ pub fn evaluate_variant(file: &Path, variant: u32, evaluator: &Evaluator, progre
         progress.add(part.min(BAR).saturating_sub(shown));
         shown = shown.max(part.min(BAR));
     };
-    let evaluation =
-        play(file, variant, evaluator, &mut show).unwrap_or_else(|fault| Evaluation::failed(file, fault));
+    let evaluation = play(file, variant, evaluator, &mut show)
+        .unwrap_or_else(|fault| Evaluation::failed(file, fault, evaluator.axes));
     show(BAR);
     evaluation
 }
 
 impl Evaluation {
-    fn failed(file: &Path, fault: String) -> Self {
-        Self { file: file.to_owned(), variant: None, runs: Err(fault), broken: None, notes: Vec::new() }
+    fn failed(file: &Path, fault: String, axes: Axes) -> Self {
+        Self { file: file.to_owned(), variant: None, axes, runs: Err(fault), broken: None, notes: Vec::new() }
     }
 }
 
 fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result<Evaluation, String> {
     let open = || Recording::open(file, &evaluator.topics, evaluator.axes, evaluator.before_motion_s);
     let mut recording = open()?;
+    let magnetometer = recording.magnetometer_topic.clone().unwrap_or_default();
+    if recording.axes != evaluator.axes && evaluator.variants.changes_field() {
+        return Err(format!(
+            "{magnetometer} holds no message, so --offset, --magnet, --disturb and --drift change nothing; leave them out"
+        ));
+    }
     let moving_ns = match evaluator.variants.starts {
         Some(_) => moving_times(&mut open()?)?,
         None => Vec::new(),
@@ -137,18 +150,21 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     if let Some(start_ns) = variant.start_ns {
         recording.start_at(start_ns);
     }
-    let mut players = evaluator.filters.iter().map(Player::new).collect::<Result<Vec<_>, _>>()?;
+    let players = evaluator.filters.iter().map(|chosen| Player::new(&chosen.on(recording.axes)?));
+    let mut players = players.collect::<Result<Vec<_>, _>>()?;
+    let mut units = Units::default();
     let mut samples = Vec::with_capacity(BLOCK);
     let mut start_ns = None;
     let mut played = 0_u64;
     let broken = loop {
         samples.clear();
         let end = recording.read(&mut samples, BLOCK)?;
+        take_units(&mut units, &samples);
         variant.apply(&mut samples, &recording.truth);
         if let Some(first) = samples.first() {
             let start_ns = *start_ns.get_or_insert(first.time_ns);
             for player in &mut players {
-                player.play(&samples, &recording, start_ns, evaluator);
+                player.play(&samples, &recording, start_ns, evaluator.keep_errors);
             }
         }
         played += samples.len() as u64;
@@ -163,6 +179,17 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
         return Err("no sample of the IMU is left to play".into());
     }
     let mut notes: Vec<_> = recording.note.iter().cloned().collect();
+    if recording.axes != evaluator.axes {
+        notes.push(format!("{magnetometer} holds no message, so six axes are scored"));
+    }
+    // Of a recording, and not of each of its variants.
+    if index == 0 {
+        let doubts = unit_doubts(&recording, &units);
+        // Of filters that were misled the errors tell nothing of the truth.
+        let is_misled = !doubts.is_empty() || evaluator.variants.changes_field();
+        notes.extend(doubts);
+        notes.extend(truth_doubt(&recording, &players).filter(|_| !is_misled));
+    }
     notes.extend(players.iter().filter_map(|player| player.refusals(played)));
     if recording.note.is_none() && players.iter().all(|player| player.score.count() == 0) {
         notes.push(
@@ -173,15 +200,16 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     }
     let runs = Ok(players.into_iter().map(|player| player.finish(played)).collect());
     let variant = evaluator.variants.is_changed().then_some(index);
-    Ok(Evaluation { file: file.to_owned(), variant, runs, broken, notes })
+    Ok(Evaluation { file: file.to_owned(), variant, axes: recording.axes, runs, broken, notes })
 }
 
-/// A filter under way.
+/// A running filter and its errors.
 struct Player {
     name: &'static str,
     filter: Box<dyn Running>,
     score: Score,
     refused: Refused,
+    truths: Truths,
     within_two_sigma: (u64, u64),
     time: Duration,
     estimates: Vec<Option<bb_core::nalgebra::UnitQuaternion<f64>>>,
@@ -195,6 +223,7 @@ impl Player {
             filter: chosen.start()?,
             score: Score::default(),
             refused: Refused::default(),
+            truths: Truths::default(),
             within_two_sigma: (0, 0),
             time: Duration::ZERO,
             estimates: Vec::with_capacity(BLOCK),
@@ -202,25 +231,13 @@ impl Player {
         })
     }
 
-    fn play(
-        &mut self,
-        samples: &[bb_estimators::attitude::ImuSample],
-        recording: &Recording,
-        start_ns: i64,
-        evaluator: &Evaluator,
-    ) {
+    fn play(&mut self, samples: &[ImuSample], recording: &Recording, start_ns: i64, keep_errors: bool) {
         for samples in samples.chunks(ASKED) {
-            self.play_some(samples, recording, start_ns, evaluator);
+            self.play_some(samples, recording, start_ns, keep_errors);
         }
     }
 
-    fn play_some(
-        &mut self,
-        samples: &[bb_estimators::attitude::ImuSample],
-        recording: &Recording,
-        start_ns: i64,
-        evaluator: &Evaluator,
-    ) {
+    fn play_some(&mut self, samples: &[ImuSample], recording: &Recording, start_ns: i64, keep_errors: bool) {
         self.estimates.clear();
         let started = Instant::now();
         let refused = self.filter.run(samples, &mut self.estimates);
@@ -231,8 +248,8 @@ impl Player {
         for (sample, estimate) in samples.iter().zip(&self.estimates) {
             let Some(estimate) = estimate else { continue };
             let error = self.score.add_at(&recording.truth, sample.time_ns, estimate);
-            if evaluator.keep_errors {
-                let angle = error.map(|error| match evaluator.axes {
+            if keep_errors {
+                let angle = error.map(|error| match recording.axes {
                     Axes::Six => error.inclination.to_degrees(),
                     Axes::Nine => error.total.to_degrees(),
                 });
@@ -241,12 +258,14 @@ impl Player {
         }
     }
 
-    /// Whether the heading after the last sample is within two standard deviations, where it counts.
-    fn ask(&mut self, samples: &[bb_estimators::attitude::ImuSample], recording: &Recording) {
+    /// Whether the heading after the last sample is within two standard deviations, and which convention the truth has,
+    /// where it counts.
+    fn ask(&mut self, samples: &[ImuSample], recording: &Recording) {
         let Some(sample) = samples.last() else { return };
         let Some(estimate) = self.estimates.last().copied().flatten() else { return };
-        let Some(deviation) = self.filter.heading_deviation() else { return };
         let (Some(truth), true) = recording.truth.at(sample.time_ns) else { return };
+        self.truths.add(&estimate, &truth);
+        let Some(deviation) = self.filter.heading_deviation() else { return };
         let Some(error) = OrientationError::between(&estimate, &truth) else { return };
         self.within_two_sigma.0 += 1;
         self.within_two_sigma.1 += u64::from(error.heading <= 2.0 * deviation);

@@ -1,14 +1,17 @@
-//! From the paths on the command line to the recordings in them.
+//! Finds the recordings that the paths on the command line name.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What the files on the command line are called at their end.
+/// The extension of recordings.
 pub(crate) const EXTENSION: &str = "mcap";
 
-/// The recordings in the order of the arguments, those of a folder by name; a path that leads to none carries the
-/// reason.
+/// Extensions of recordings that cannot be read, or only with another feature. In a folder they are collected too, so that
+/// an error says for each what to do.
+const OTHERS: [&str; 6] = [".db3", ".bag", ".mcap.zstd", ".mcap.zst", ".db3.zstd", ".mcap.gz"];
+
+/// The recordings in the order of the arguments, those of a folder sorted by name; or the reason why a path has none.
 pub(crate) fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)> {
     let mut recordings = Vec::new();
     for path in paths {
@@ -29,7 +32,8 @@ pub(crate) fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)
     recordings
 }
 
-/// Folders in it as well, for a ROS 2 recording is one. Links to folders are not followed, as they may lead back.
+/// Searches subfolders as well, since a ROS 2 recording is a folder. Links to folders are not followed, as they may be
+/// circular.
 fn collect(folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
     let mut entries: Vec<_> = fs::read_dir(folder)?.collect::<Result<_, _>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);
@@ -37,9 +41,14 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
         let path = entry.path();
         if entry.file_type()?.is_dir() {
             collect(&path, found)?;
-        } else if path.extension().is_some_and(|end| end == EXTENSION) {
+        } else if is_recording(&path) {
             found.push(path);
         }
     }
     Ok(())
+}
+
+fn is_recording(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.extension().is_some_and(|end| end == EXTENSION) || OTHERS.iter().any(|end| name.ends_with(end))
 }

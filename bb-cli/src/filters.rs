@@ -1,4 +1,4 @@
-//! The filters to choose from: those of `bb-estimators`, by name.
+//! The filters of `bb-estimators`, by name.
 
 mod list;
 mod settings;
@@ -12,13 +12,13 @@ use bb_estimators::attitude::{self, AttitudeFilter, FilterParams, ImuSample, Sam
 use bb_estimators::attitude_filters;
 use bb_estimators::params::Params;
 
-/// The parameter that every filter of nine axes has: whether it uses the ninth.
+/// The parameter that every nine-axis filter has.
 const MAGNETOMETER: &str = "magnetometer";
 
 /// Gyroscope and accelerometer, or the magnetometer as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Axes {
-    /// Gyroscope and accelerometer: heading starts anywhere and is no result.
+    /// Gyroscope and accelerometer: the initial heading is arbitrary, and heading is not scored.
     #[value(name = "6", alias = "six")]
     Six,
     /// The magnetometer as well.
@@ -35,7 +35,7 @@ impl Axes {
         }
     }
 
-    /// Whether a filter can use so many.
+    /// Whether a filter can use this many axes.
     pub(crate) fn suit(self, filter: &FilterParams) -> bool {
         self == Self::Six || filter.get(MAGNETOMETER).is_some()
     }
@@ -58,12 +58,21 @@ impl Chosen {
         &self.params
     }
 
-    /// A filter that has seen no sample yet.
+    /// The same without its magnetometer, if there are six axes.
+    pub(crate) fn on(&self, axes: Axes) -> Result<Self, String> {
+        let mut params = self.params;
+        if axes == Axes::Six && params.get(MAGNETOMETER).is_some() {
+            params.set(MAGNETOMETER, "false").map_err(|error| format!("{}: {error}", self.name()))?;
+        }
+        Ok(Self { params })
+    }
+
+    /// Creates the filter, before its first sample.
     ///
     /// # Errors
-    /// A value that is refused; there is none after [`all`](Self::all).
+    /// A value is refused, which cannot happen after [`all`](Self::all).
     pub fn start(&self) -> Result<Box<dyn Running>, String> {
-        /// Of its own type, so that the samples of a block pass through no choice of the filter.
+        /// Boxes the concrete type, so that the filter is dispatched once per block.
         macro_rules! started {
             ($params:ident, $($module:ident $estimator:ident $filter:ident $_params:ident;)*) => {
                 match $params {
@@ -78,12 +87,12 @@ impl Chosen {
     }
 }
 
-/// A filter that runs, whichever it is.
+/// A running filter of any type.
 pub trait Running {
-    /// Takes samples, and gives the orientation after each: none where there is none yet, or the sample was refused.
+    /// Processes samples, and appends the orientation after each: `None` if there is none yet, or the sample was refused.
     fn run(&mut self, samples: &[ImuSample], estimates: &mut Vec<Option<UnitQuaternion<f64>>>) -> Refused;
 
-    /// Standard deviation of the heading, rad, if the filter tells.
+    /// Standard deviation of the heading in rad, if the filter reports it.
     fn heading_deviation(&self) -> Option<f64> {
         None
     }

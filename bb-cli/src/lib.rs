@@ -1,15 +1,15 @@
-//! The command `bb`: recordings looked at, plotted and converted, filters scored on them, projects begun. The guide is
+//! The command `bb`: inspects, plots and converts recordings, scores filters on them, and creates projects. The guide is
 //! `docs/command.md`.
 //!
-//! `bb eval attitude FILES…` plays each bag through the filters and prints their errors against the truth; the guide is
-//! `docs/evaluate.md`. What it is made of is a library, for others that score: [`Score`] and [`Averages`] are the one
-//! definition of the figures, [`evaluate`](fn@evaluate) gives them for one recording, [`Picture`] draws
+//! `bb eval attitude FILES…` runs the filters on each bag and prints their errors against the truth; the guide is
+//! `docs/evaluate.md`. It is also available as a library: [`Score`] and [`Averages`] define the
+//! figures, [`evaluate`](fn@evaluate) computes them for one recording, and [`Picture`] plots
 //! lines over time.
 //!
-//! `bb eval navigation DATA…` does the same for navigation filters on data sets of CSV files; [`evaluate_navigation`] is its
+//! `bb eval navigation DATA…` does the same for navigation filters on bags and CSV files; [`evaluate_navigation`] is its
 //! library.
 
-// A robot must not stop because a value was not what it was taken for.
+// A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod arguments;
@@ -21,6 +21,7 @@ mod evaluate;
 mod files;
 mod filters;
 mod navigation;
+mod noise;
 mod periods;
 mod plot;
 mod progress;
@@ -29,6 +30,8 @@ mod report;
 mod score;
 mod table;
 mod topics;
+mod truths;
+mod units;
 mod values;
 mod variants;
 
@@ -36,33 +39,35 @@ pub use averages::Averages;
 pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_variant};
 pub use filters::{Axes, Chosen, Refused, Running, Setting};
 pub use navigation::{
-    DataSet, NAVIGATION_FILTERS, NavigationFilter, NavigationScore, NavigationSetting, evaluate_navigation,
+    BagOptions, BiasDeviation, DataSet, FromBag, Mount, NAVIGATION_FILTERS, NavigationBag, NavigationFilter,
+    NavigationScore, NavigationSetting, Origin, Place, RelativeDeviation, StartFrom, evaluate_navigation,
 };
-pub use plot::{Colour, Line, PALETTE, Panel, Picture, Point};
+pub use plot::{Colour, Line, PALETTE, Panel, Part, Picture, Plane, Point, Scale, Sheet};
 pub use progress::Progress;
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
 pub use variants::{Field, Offset, Starts, Variants};
 
-use arguments::{Attitude, Job, Navigation};
+use arguments::{Attitude, Job};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Runs the command with these arguments, its own name first. The exit code is 2 for a wrong use and 1 for a
-/// recording that could not be evaluated, or not to its end.
+/// Runs the command with these arguments, the first of which is its name. The exit code is 2 for wrong arguments, and 1 for
+/// a recording that could not be evaluated to its end.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let job = match arguments::parse(arguments) {
         Ok(job) => job,
         Err(error) => {
-            // A terminal that is gone is told nothing.
+            // The terminal may be gone.
             let _ = error.print();
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
     let done = match &job {
         Job::Attitude(attitude) => eval_attitude(attitude),
-        Job::Navigation(navigation) => eval_navigation(navigation),
+        Job::Navigation(navigation) => navigation.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
+        Job::Noise(noise) => noise.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
         Job::Print(text) => say(text),
         Job::Other(command) => command.run(),
         Job::Calibrate(calibrate) => calibrate.run().and_then(|(text, is_any)| Ok(say(&text)? && is_any)),
@@ -77,44 +82,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Whether every data set could be evaluated.
-fn eval_navigation(job: &Navigation) -> Result<bool, String> {
-    let Navigation { data, filters, settings, window, json } = job;
-    let (mut scores, mut faults) = (Vec::new(), Vec::new());
-    for prefix in data {
-        let data = match DataSet::read(prefix) {
-            Ok(data) => data,
-            Err(fault) => {
-                faults.push(fault);
-                continue;
-            }
-        };
-        let progress = Progress::new("evaluating", (data.keyframes.len() * filters.len()) as u64);
-        for filter in filters {
-            match evaluate_navigation(&data, filter, settings, *window, || progress.add(1)) {
-                Ok(score) => scores.push((prefix.clone(), filter.name, score)),
-                Err(fault) => faults.push(format!("{}: {}: {fault}", prefix.display(), filter.name)),
-            }
-        }
-        progress.finish();
-    }
-    say(&if *json { navigation::json(&scores)? } else { navigation::table(&scores) })?;
-    for fault in &faults {
-        eprintln!("error: {fault}");
-    }
-    Ok(faults.is_empty())
-}
-
 /// Whether every recording could be evaluated to its end.
 fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     let Attitude { paths, evaluator, json, plot } = attitude;
     let files = files::recordings(paths);
     let evaluations = evaluate::evaluate_all(&files, evaluator);
-    let text = if *json {
-        report::json(&evaluations, evaluator.axes)?
-    } else {
-        report::table(&evaluations, evaluator.axes)
-    };
+    let text = if *json { report::json(&evaluations)? } else { report::table(&evaluations, evaluator.axes) };
     say(&text)?;
     let is_whole = report::complain(&evaluations);
     if let Some(plot) = plot {
@@ -124,7 +97,7 @@ fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     Ok(is_whole)
 }
 
-/// Prints; whether anybody still reads: one who has read enough (`| head`) is no error.
+/// Prints, and returns whether the output is still open: a closed pipe (`| head`) is not an error.
 fn say(text: &str) -> Result<bool, String> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Ok(()) => Ok(true),

@@ -1,15 +1,24 @@
 //! Navigation filters, scored on recorded and simulated drives and flights.
 
+mod bag;
+mod command;
+mod csv;
 mod data;
+mod errors;
 mod evaluate;
 mod filters;
 mod measured;
+mod picture;
 mod player;
 mod report;
+mod trace;
 
+pub use bag::{
+    BagOptions, BiasDeviation, FromBag, Mount, NavigationBag, Origin, Place, RelativeDeviation, StartFrom,
+};
 pub use data::DataSet;
 pub use evaluate::{NavigationScore, evaluate_navigation};
 pub use filters::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting};
 
-pub(crate) use filters::listed;
-pub(crate) use report::{json, table};
+pub(crate) use command::{EXAMPLES, NavigationArguments};
+pub(crate) use csv::inertial;

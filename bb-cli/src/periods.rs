@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What the times between messages have in common.
+/// Statistics of the times between messages.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Periods {
     pub(crate) mean_s: f64,
@@ -11,13 +11,15 @@ pub(crate) struct Periods {
     /// The standard deviation.
     pub(crate) std_s: f64,
     pub(crate) median_s: f64,
-    /// Where messages are missing. Only of messages that come regularly it can be told.
+    /// Whether messages come at a rate; unknown of few.
+    pub(crate) regular: Option<bool>,
+    /// Where messages are missing; known only if they come regularly.
     #[serde(skip)]
     pub(crate) gaps: Vec<Gap>,
-    /// Where the time goes back: indices of the messages after it.
+    /// Where time goes backwards: indices of the messages after it.
     #[serde(skip)]
     pub(crate) backward: Vec<usize>,
-    /// How many messages have the time of the one before.
+    /// How many messages have the same time as the previous one.
     #[serde(skip)]
     pub(crate) repeated: usize,
 }
@@ -30,10 +32,13 @@ pub(crate) struct Gap {
     pub(crate) length_s: f64,
 }
 
-/// A period longer than so many medians is a gap.
+/// A period longer than this many medians is a gap.
 const GAP: f64 = 3.0;
-/// Messages are regular if nine of ten periods are within this many medians, of at least so many.
+/// Messages are regular if nine of ten periods are at most this many medians,
 const REGULAR: f64 = 2.0;
+/// and nine of ten are not this many times shorter than the median, as those of a burst are;
+const BURST: f64 = 10.0;
+/// known only of at least this many periods.
 const FEWEST: usize = 8;
 
 impl Periods {
@@ -49,23 +54,40 @@ impl Periods {
         let mean_s = sorted.iter().sum::<f64>() / count;
         let variance = sorted.iter().map(|step| (step - mean_s).powi(2)).sum::<f64>() / count;
         let median_s = sorted[sorted.len() / 2];
-        let is_regular = sorted.len() >= FEWEST && sorted[sorted.len() * 9 / 10] <= REGULAR * median_s;
-        let gaps = steps().enumerate().filter(|(_, step)| is_regular && *step > GAP * median_s);
+        let tenths = |tenths: usize| sorted[sorted.len() * tenths / 10];
+        let is_regular = tenths(9) <= REGULAR * median_s && tenths(1) * BURST >= median_s && median_s > 0.0;
+        let regular = (sorted.len() >= FEWEST).then_some(is_regular);
+        let gaps = steps().enumerate().filter(|(_, step)| regular == Some(true) && *step > GAP * median_s);
         Some(Self {
             mean_s,
             min_s: first,
             max_s: last,
             std_s: variance.sqrt(),
             median_s,
+            regular,
             gaps: gaps.map(|(after, length_s)| Gap { after, length_s }).collect(),
             backward: steps().enumerate().filter(|(_, step)| *step < 0.0).map(|(index, _)| index + 1).collect(),
             repeated: steps().filter(|step| *step == 0.0).count(),
         })
     }
 
-    /// Messages a second.
+    /// The same for events: they come when something happens, so they have no gaps.
+    pub(crate) fn of_events(self) -> Self {
+        Self { regular: Some(false), gaps: Vec::new(), ..self }
+    }
+
+    /// Messages per second, if they come at a rate.
     pub(crate) fn rate_hz(&self) -> Option<f64> {
-        (self.mean_s > 0.0).then(|| 1.0 / self.mean_s)
+        (self.mean_s > 0.0 && self.regular != Some(false)).then(|| 1.0 / self.mean_s)
+    }
+
+    /// The rate with so many decimals, for a table.
+    pub(crate) fn rate_in_words(&self, decimals: usize) -> String {
+        match (self.rate_hz(), self.regular) {
+            (Some(rate), _) => format!("{rate:.decimals$} Hz"),
+            (None, Some(false)) => "irregular".to_owned(),
+            (None, _) => "-".to_owned(),
+        }
     }
 }
 
@@ -92,6 +114,26 @@ mod tests {
         assert_eq!(Periods::of(&[0, 5 * MS, 900 * MS]).expect("there are some").gaps, []);
         assert_eq!(Periods::of(&[7]), None);
         assert_eq!(Periods::of(&[]), None);
+    }
+
+    /// As health changes: twice within a millisecond, then nothing for a while.
+    #[test]
+    fn bursts_have_no_rate_and_no_gaps() {
+        let bursts: Vec<i64> =
+            (0..40).map(|index| (index / 2 * 1000 + index % 2 + index / 20 * 9000) * MS).collect();
+        let at_once: Vec<i64> = (0..40).map(|index| index / 10 * 1000 * MS).collect();
+        let late: Vec<i64> = (0..40).map(|index| (index * 50 + index % 3 * 20) * MS).collect();
+        assert_eq!(Periods::of(&late).expect("there are some").regular, Some(true), "jitter is no burst");
+        for times in [bursts, at_once] {
+            let periods = Periods::of(&times).expect("there are some");
+            assert_eq!((periods.regular, periods.rate_hz(), &*periods.gaps), (Some(false), None, &[][..]));
+            assert_eq!(periods.rate_in_words(1), "irregular");
+        }
+        let mut times: Vec<i64> = (0..40).map(|index| index * 1000 * MS).collect();
+        times.push(90_000 * MS);
+        assert_eq!(Periods::of(&times).expect("there are some").gaps.len(), 1);
+        let events = Periods::of(&times).expect("there are some").of_events();
+        assert_eq!((events.rate_hz(), &*events.gaps), (None, &[][..]));
     }
 
     #[test]

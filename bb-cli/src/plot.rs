@@ -1,12 +1,18 @@
-//! Lines over time, as a picture.
+//! Plots of lines over time.
 
+mod frame;
 mod line;
 mod palette;
 mod panel;
+mod plane;
 
+pub use frame::Scale;
 pub use line::{Line, Point};
 pub use palette::{Colour, PALETTE};
 pub use panel::Panel;
+pub use plane::{Part, Plane, Sheet};
+
+use frame::Frame;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -25,10 +31,10 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Whether a picture can be written there: to be asked before the run, and told in plain words.
+    /// Checks before a run whether a picture can be written there.
     ///
     /// # Errors
-    /// The file's name ends neither in `.svg` nor in `.png`, or its folder is not there.
+    /// The file's name ends neither in `.svg` nor in `.png`, or its folder does not exist.
     pub fn check(file: &Path, option: &str) -> Result<(), String> {
         if format(file).is_none() {
             let file = file.with_extension("svg");
@@ -47,31 +53,43 @@ impl Picture {
     /// # Errors
     /// It cannot be written there.
     pub fn write(&self, file: &Path) -> Result<(), String> {
-        Self::check(file, "a plot")?;
-        // The font comes along, so that a plot needs nothing of the machine.
-        register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
-            .map_err(|_| "the plot's font cannot be read")?;
-        let (width, height) = self.panel_size;
-        let size = (width, TITLE + height * self.panels.len() as u32);
-        let drawn = match format(file) {
-            Some(Format::Svg) => {
-                self.draw(SVGBackend::new(file, size).into_drawing_area()).map_err(|error| error.to_string())
-            }
-            _ => self.draw(BitMapBackend::new(file, size).into_drawing_area()).map_err(|error| error.to_string()),
-        };
-        drawn.map_err(|error| format!("cannot write {}: {error}", file.display()))
+        let frames: Vec<_> = self.panels.iter().map(Panel::frame).collect();
+        write(file, &self.title, &frames, self.panel_size)
     }
+}
 
-    fn draw<B: DrawingBackend>(&self, root: DrawingArea<B, Shift>) -> Drawn<B> {
-        root.fill(&WHITE)?;
-        let rest = root.titled(&self.title, ("sans-serif", 24))?;
-        // One for all panels, so that their time axes are as long.
-        let legend = self.panels.iter().map(|panel| panel.legend_width(&rest)).max().unwrap_or(0);
-        for (area, panel) in rest.split_evenly((self.panels.len(), 1)).iter().zip(&self.panels) {
-            panel.draw(area, legend)?;
+/// Writes frames below one another, each as high as so many of `panel_size`.
+fn write(file: &Path, title: &str, frames: &[Frame<'_>], panel_size: (u32, u32)) -> Result<(), String> {
+    Picture::check(file, "a plot")?;
+    // The font comes along, so that a plot needs nothing of the machine.
+    register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
+        .map_err(|_| "the plot's font cannot be read")?;
+    let (width, height) = panel_size;
+    let panels: u32 = frames.iter().map(|frame| frame.height).sum();
+    let size = (width, TITLE + height * panels);
+    let drawn = match format(file) {
+        Some(Format::Svg) => {
+            draw(SVGBackend::new(file, size).into_drawing_area(), title, frames).map_err(|error| error.to_string())
         }
-        root.present()
+        _ => draw(BitMapBackend::new(file, size).into_drawing_area(), title, frames)
+            .map_err(|error| error.to_string()),
+    };
+    drawn.map_err(|error| format!("cannot write {}: {error}", file.display()))
+}
+
+fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, title: &str, frames: &[Frame<'_>]) -> Drawn<B> {
+    root.fill(&WHITE)?;
+    let mut rest = root.titled(title, ("sans-serif", 24))?;
+    // One for all, so that their time axes are as long.
+    let legend = frames.iter().map(|frame| frame.legend_width(&rest)).max().unwrap_or(0);
+    let height = rest.dim_in_pixel().1;
+    let panels: u32 = frames.iter().map(|frame| frame.height).sum();
+    for frame in frames {
+        let (area, below) = rest.split_vertically(height * frame.height / panels.max(1));
+        frame.draw(&area, legend)?;
+        rest = below;
     }
+    root.present()
 }
 
 /// The title's height, in pixels.

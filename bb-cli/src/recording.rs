@@ -1,7 +1,7 @@
 //! A recording, opened: its samples, its truth, and what is to be said of it.
 
 use bb_estimators::attitude::ImuSample;
-use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Truth};
+use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Topic, Truth};
 use std::path::Path;
 
 use crate::filters::Axes;
@@ -38,8 +38,13 @@ pub struct Recording {
     pub truth: Truth,
     /// What to say of the truth, where it gives no score.
     pub(crate) note: Option<String>,
+    /// Those there are: six, where the topic of the magnetometer holds no message.
+    pub(crate) axes: Axes,
+    /// The names of the topics, where there is one.
+    pub(crate) imu_topic: String,
+    pub(crate) magnetometer_topic: Option<String>,
+    pub(crate) truth_topic: Option<String>,
     samples: MargSamples,
-    magnetometer: bool,
     /// When the first sample to take was measured at the earliest.
     start_ns: i64,
     /// How many samples there are about; 0 if unknown.
@@ -54,10 +59,9 @@ impl Recording {
     pub fn open(file: &Path, topics: &Topics, axes: Axes, before_motion_s: Option<f64>) -> Result<Self, String> {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
         let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
-        let magnetometer = axes == Axes::Nine;
-        let magnetic = match bag.magnetometer_of(&imu.name, topics.magnetometer.as_deref()) {
-            _ if !magnetometer => None,
-            Ok(topic) => Some(&*topic.name),
+        let magnetometer = match bag.magnetometer_of(&imu.name, topics.magnetometer.as_deref()) {
+            _ if axes == Axes::Six => None,
+            Ok(topic) => Some(topic),
             Err(error) => return Err(format!("{}; without one, choose --axes 6", said(&error, "--mag-topic"))),
         };
         let poses = poses(&bag, topics.truth.as_deref())?;
@@ -85,11 +89,44 @@ impl Recording {
                 motion.saturating_sub((seconds * 1e9) as i64)
             }
         };
+        let axes = if magnetometer.is_some_and(|topic| is_silent(&bag, topic)) { Axes::Six } else { axes };
+        let magnetic = magnetometer.filter(|_| axes == Axes::Nine).map(|topic| &*topic.name);
         let samples = MargSamples::read(&bag, &imu.name, magnetic).map_err(|error| error.kind().to_string())?;
         if samples.next_time().is_none() {
             return Err(format!("{} holds no message, so there is nothing to play", imu.name));
         }
-        Ok(Self { truth, note, samples, magnetometer, start_ns, expected: imu.messages.unwrap_or(0) })
+        Ok(Self {
+            truth,
+            note,
+            axes,
+            imu_topic: imu.name.to_string(),
+            magnetometer_topic: magnetometer.map(|topic| topic.name.to_string()),
+            truth_topic: poses.ok(),
+            samples,
+            start_ns,
+            expected: imu.messages.unwrap_or(0),
+        })
+    }
+
+    /// Opens a recording of which the IMU alone counts.
+    ///
+    /// # Errors
+    /// It is no recording, or has not the topic, or not one; in words.
+    pub(crate) fn inertial(file: &Path, topics: &Topics) -> Result<Self, String> {
+        let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
+        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let samples = MargSamples::read(&bag, &imu.name, None).map_err(|error| error.kind().to_string())?;
+        Ok(Self {
+            truth: Truth::default(),
+            note: None,
+            axes: Axes::Six,
+            imu_topic: imu.name.to_string(),
+            magnetometer_topic: None,
+            truth_topic: None,
+            samples,
+            start_ns: i64::MIN,
+            expected: imu.messages.unwrap_or(0),
+        })
     }
 
     /// Leaves out the samples before this time, nanoseconds.
@@ -117,7 +154,10 @@ impl Recording {
                 time_ns: time.as_nanos(),
                 angular_velocity: marg.imu.angular_velocity,
                 specific_force: marg.imu.linear_acceleration,
-                magnetic_field: marg.magnetic_field.filter(|_| self.magnetometer).map(|field| field.magnetic_field),
+                magnetic_field: marg
+                    .magnetic_field
+                    .filter(|_| self.axes == Axes::Nine)
+                    .map(|field| field.magnetic_field),
             });
         }
         Ok(End::NotYet)
@@ -133,6 +173,14 @@ pub enum End {
     Whole,
     /// All before the break is read; what broke it.
     Broken(String),
+}
+
+/// Whether a topic holds no message; as a driver leaves it that only announces what its chip does not have.
+fn is_silent(bag: &Bag, topic: &Topic) -> bool {
+    match topic.messages {
+        Some(count) => count == 0,
+        None => bag.messages(&[&topic.name]).is_ok_and(|mut messages| messages.next().is_none()),
+    }
 }
 
 /// The topic of poses, or why there is none. One that was named must be there.
@@ -193,7 +241,7 @@ fn is_break(error: &RecordingError) -> bool {
 }
 
 /// What is wrong, with the option that chooses another topic.
-fn said(error: &RecordingError, option: &str) -> String {
+pub(crate) fn said(error: &RecordingError, option: &str) -> String {
     let kind = error.kind();
     match kind {
         RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),

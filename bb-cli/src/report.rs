@@ -28,9 +28,9 @@ struct Row {
 }
 
 /// One object a recording and filter.
-pub(crate) fn json(evaluations: &[Evaluation], axes: Axes) -> Result<String, String> {
+pub(crate) fn json(evaluations: &[Evaluation]) -> Result<String, String> {
     let row = |evaluation: &Evaluation, run: &Run| {
-        let rms = run.score.rms();
+        let (rms, axes) = (run.score.rms(), evaluation.axes);
         let whole = rms.filter(|_| axes == Axes::Nine);
         Row {
             file: evaluation.file.display().to_string(),
@@ -52,9 +52,12 @@ pub(crate) fn json(evaluations: &[Evaluation], axes: Axes) -> Result<String, Str
 
 /// A line a recording and filter, then the averages of each filter.
 pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
+    let is_asked = |evaluation: &Evaluation| evaluation.axes == axes;
+    // Six, where no recording has nine.
+    let axes = if runs(evaluations).any(|(evaluation, _)| is_asked(evaluation)) { axes } else { Axes::Six };
     let mut lines: Vec<[String; 8]> = Vec::new();
     for (evaluation, run) in runs(evaluations) {
-        let [total, heading, inclination] = angles(run.score.rms(), axes);
+        let [total, heading, inclination] = angles(run.score.rms(), evaluation.axes);
         let cost = format!("{:.0}", run.ns_per_update);
         let count = run.score.count().to_string();
         lines.push([
@@ -63,7 +66,7 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
             total,
             heading,
             inclination,
-            percent(within(&[run], axes)),
+            percent(within(&[run], evaluation.axes)),
             count,
             cost,
         ]);
@@ -79,7 +82,8 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
         }
     }
     for filter in filters {
-        let of_filter = runs(evaluations).filter(|(_, run)| run.filter == filter);
+        let of_filter =
+            runs(evaluations).filter(|(evaluation, run)| run.filter == filter && evaluation.axes == axes);
         let all: Vec<_> = of_filter.clone().map(|(_, run)| run).collect();
         let share = percent(within(&all, axes));
         let Some(averages) = Averages::of(of_filter.filter_map(|(_, run)| run.score.rms())) else { continue };

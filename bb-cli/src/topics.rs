@@ -17,9 +17,9 @@ pub(crate) fn open(file: &Path) -> Result<Bag, String> {
 
 /// The topic of this name, with or without the slash at its beginning.
 pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
-    let full = format!("/{}", name.trim_start_matches('/'));
-    let found = bag.topics().iter().find(|topic| *topic.name == *name || *topic.name == *full);
+    let found = bag.topics().iter().find(|topic| is_named(topic, name));
     found.ok_or_else(|| {
+        let full = format!("/{}", name.trim_start_matches('/'));
         let names: Vec<&str> = bag.topics().iter().map(|topic| &*topic.name).collect();
         let file = bag.path().display();
         match names.is_empty() {
@@ -27,6 +27,18 @@ pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
             false => format!("{file}: no topic {full}; {}", near(&full, &names)),
         }
     })
+}
+
+/// Whether a topic has this name, with or without the slash at its beginning.
+pub(crate) fn is_named(topic: &Topic, name: &str) -> bool {
+    *topic.name == *name || topic.name.strip_prefix('/') == Some(name.trim_start_matches('/'))
+}
+
+/// Whether a topic has what happens to a robot, when it happens: no rate is expected of it.
+pub(crate) fn is_of_events(topic: &Topic) -> bool {
+    const EVENTS: [&str; 7] = ["health", "fault", "state_machine", "safety", "command", "param", "journal"];
+    let first = topic.name.trim_start_matches('/').split('/').next();
+    topic.is_own && first.is_some_and(|first| EVENTS.contains(&first))
 }
 
 /// Reads the messages of a topic.
@@ -55,7 +67,7 @@ impl TopicReader {
             Self::Cdr(definition) => message.value(definition).map_err(|error| error.to_string()),
             Self::Json => serde_json::from_slice(&message.data)
                 .map(|FromJson(value)| value)
-                .map_err(|error| format!("a message of {} is no JSON: {error}", message.topic)),
+                .map_err(|error| format!("a message of {} is not JSON: {error}", message.topic)),
         }
     }
 

@@ -78,6 +78,11 @@ impl Variants {
         *self != Self { seed: self.seed, ..Self::default() }
     }
 
+    /// Whether the magnetometer reads something else.
+    pub(crate) fn changes_field(&self) -> bool {
+        self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some()
+    }
+
     pub(crate) fn check(&self, axes: crate::Axes) -> Result<(), String> {
         if self.count() > MOST {
             return Err(format!(
@@ -85,9 +90,7 @@ impl Variants {
                 self.count()
             ));
         }
-        let field =
-            self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some();
-        if field && axes == crate::Axes::Six {
+        if self.changes_field() && axes == crate::Axes::Six {
             return Err("--axes 6 takes no magnetometer, so --offset, --magnet, --disturb and --drift change \
                         nothing; leave them out"
                 .into());
@@ -274,7 +277,7 @@ impl FromStr for Field {
             .iter()
             .find_map(|(unit, value)| Some((text.strip_suffix(unit)?, *value)))
             .ok_or("no unit; write a number with nT, uT, mT or T, as 30uT")?;
-        let number: f64 = number.trim().parse().map_err(|_| format!("`{number}` is no number"))?;
+        let number: f64 = number.trim().parse().map_err(|_| format!("`{number}` is not a number"))?;
         let tesla = number * unit;
         if !(0.0..=1.0).contains(&tesla) {
             return Err("must be from 0 to 1 T".into());

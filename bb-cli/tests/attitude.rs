@@ -234,7 +234,7 @@ fn a_wrong_use_has_exit_code_2_and_a_way_out() {
     let missing = std::path::Path::new("no/such/folder/plot.svg").display().to_string();
     for (arguments, fault) in [
         (&["--filter", "madgwik"][..], "no filter `madgwik`; did you mean `madgwick`?"),
-        (&["--filter", "kalman"], "there is mekf, madgwick"),
+        (&["--filter", "kalman"], "there are mekf, madgwick"),
         (&["--axes", "seven"], "[possible values: 6, 9]"),
         (&["--set", "betta=1"], "has no parameter `betta`; did you mean `beta`?"),
         (&["--set", "beta"], "write NAME=VALUE"),

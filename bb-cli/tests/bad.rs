@@ -58,6 +58,34 @@ fn what_is_not_there_is_named() {
     }
 }
 
+/// A folder may hold recordings that are not read: none is left out in silence.
+#[test]
+fn what_a_folder_holds_is_named_with_the_way_out() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("others");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(folder.join("walk")).expect("makes");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.join(name), bytes).expect("writes");
+    write("a.mcap", &Walk::default().bytes());
+    write("metadata.yaml", b"rosbag2_bagfile_information:");
+    let packed = [&[0x28, 0xb5, 0x2f, 0xfd][..], &[0; 40]].concat();
+    write("walk/walk_0.mcap.zstd", &packed);
+    write("walk/walk_1.bag", b"#ROSBAG V2.0\n");
+    write("walk/walk_2.db3", b"SQLite format 3\0 and no more");
+    let output = eval(&[&folder], &["--json", "--filter", "madgwick"]);
+    assert_eq!(output.code, Some(1));
+    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+    assert_eq!((rows.len(), &rows[0]["samples"]), (1, &199.into()));
+    let lines: Vec<_> = output.err.lines().collect();
+    assert!(lines[0].ends_with(
+        "walk_0.mcap.zstd: not an MCAP file: it is packed as a whole with zstd; unpack it with `zstd -d`"
+    ));
+    assert!(lines[1].contains("walk_1.bag: not an MCAP file: it is a ROS 1 bag; convert it"), "{}", lines[1]);
+    let way_out =
+        if cfg!(feature = "sqlite") { "check that it is a bag of ROS 2" } else { "with the feature `sqlite`" };
+    assert!(lines[2].contains("walk_2.db3: ") && lines[2].contains(way_out), "{}", lines[2]);
+    assert_eq!(lines[3], "error: 3 of 4 recordings could not be evaluated to the end");
+}
+
 /// Cut anywhere, as by a recorder that was killed: scored up to the break, which is reported.
 #[test]
 fn an_interrupted_recording_is_scored_up_to_the_break() {

@@ -152,8 +152,24 @@ fn what_is_wrong_is_told_by_line_and_column() {
         ("word", "0,1,2,3,4,5,6\n1,1,2,x,4,5,6\n", "line 3, column 4 (gz): `x` is not a number"),
         ("short", "0,1,2,3,4,5,6\n\n1,1,2\n", "line 4, column 4 (gz): is missing, since the line has 3 columns"),
         ("empty", "0,1,2,3,,5,6\n", "line 2, column 5 (acc): `` is not a number"),
-        ("time", "0,1,2,3,4,5,6\nnan,1,2,3,4,5,6\n", "line 3, column 1 (t): `nan` is no time"),
-        ("comma", "0;1;2;3;4;5;6\n", "it has no line that begins with a number"),
+        ("time", "0,1,2,3,4,5,6\nnan,1,2,3,4,5,6\n", "line 3, column 1 (t): `nan` is not a time"),
+        (
+            "huge",
+            "0,1,2,3,4,5,6\r\n\r\n1,1e400,2,3,4,5,6\r\n",
+            "line 4, column 2 (gx): `1e400` is not a finite number",
+        ),
+        ("infinite", "0,1,2,3,-inf,5,6", "line 2, column 5 (acc): `-inf` is not a finite number"),
+        (
+            "before",
+            "-0.25,1,2,3,4,5,6\n",
+            "line 2, column 1 (t): `-0.25` is before 1970, where no time of a bag is; add a constant to all times",
+        ),
+        (
+            "after",
+            "1700000000000,1,2,3,4,5,6\n",
+            "line 2, column 1 (t): `1700000000000` is after 2038, which no stamp of ROS holds; is the unit another (s, ms, us, ns)?",
+        ),
+        ("words", "zero,1,2\n", "it has no line that begins with a number"),
         ("none", "", "it has no line that begins with a number"),
     ] {
         let (input, out) = (csv(&format!("bad_{name}.csv"), &format!("{head}{text}")), bag("bad.mcap"));
@@ -162,12 +178,18 @@ fn what_is_wrong_is_told_by_line_and_column() {
         assert_eq!(output.err, format!("error: {}: {fault}\n", input.display()));
         assert!(!out.exists(), "{name}: a bag that is no use is removed");
     }
+    let text = "t;gx;gy;gz;ax;ay;az\n0;1;2;3;4;5;6\n0,01;1;2;3;4;5;6\n";
+    let (input, out) = (csv("bad_decimal.csv", text), bag("bad.mcap"));
+    let output = convert(&input, &out, &map);
+    let fault = "line 3, column 1 (t): `0,01` has a decimal comma; make it a point, as `tr , .` does where cells are not \
+                 separated by commas";
+    assert_eq!(output.err, format!("error: {}: {fault}\n", input.display()));
     let input = csv("bad_map.csv", &format!("{head}0,1,2,3,4,5,6\n"));
     for (map, code, fault) in [
         ("time=t gyr=gx,gy,gzz acc=5-7", 1, "no column `gzz`; did you mean `gz`?"),
         ("gyr=2-4 acc=5-7", 1, "--columns: time is needed, as time=1:us, or --rate"),
         ("time=t gyr=2-4", 1, "--columns: gyr and acc are needed"),
-        ("time=t gyr=2-4:rpm acc=5-7", 2, "no unit `rpm`; there is rad/s, deg/s, dps"),
+        ("time=t gyr=2-4:rpm acc=5-7", 2, "no unit `rpm`; there are rad/s, deg/s, dps"),
         ("time=t gyro=2-4 acc=5-7", 2, "no quantity `gyro`; did you mean `gyr`?"),
     ] {
         let output = convert(&input, &bag("bad_map.mcap"), &["--columns", map]);
@@ -179,4 +201,40 @@ fn what_is_wrong_is_told_by_line_and_column() {
     let output = convert(&input, &out, &map);
     assert!(output.err.contains("it exists already"), "{}", output.err);
     assert_eq!(std::fs::read(&out).expect("reads"), b"mine", "what was there stays");
+}
+
+/// Of the head only its names are used, whatever is in it.
+#[test]
+fn a_comment_does_not_choose_the_delimiter() {
+    let text = "# logged at noon; by me; with a chip; in a hurry\r\nt,gx,gy,gz,ax,ay,az\r\n\r\n1,1,2,3,0,0,9.8";
+    let (input, out) = (csv("comment.csv", text), bag("comment.mcap"));
+    let output = convert(&input, &out, &["--columns", "time=t gyr=gx,gy,gz acc=ax,ay,az"]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    assert_eq!(output.out, format!("{}: 1 on /imu, after 2 lines of head\n", out.display()));
+}
+
+/// A pipe gives each byte once, and its writer waits for the reader.
+#[test]
+fn a_pipe_is_read_once() {
+    let text = walk("t,gx,gy,gz,ax,ay,az,mx,my,mz,w,x,y,z,moving\n", ",");
+    let piped = |input: &str, name: &str| {
+        let out = bag(name);
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_bb"))
+            .args(["convert", input, out.to_str().expect("is text"), "--columns"])
+            .args(&MAP[..6])
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("runs");
+        let mut stdin = child.stdin.take().expect("is piped");
+        std::io::Write::write_all(&mut stdin, text.as_bytes()).expect("is read");
+        drop(stdin);
+        let output = child.wait_with_output().expect("ends");
+        String::from_utf8(output.stdout).expect("is text")
+    };
+    let counts = "1000 on /imu, 500 on /mag, 1000 on /truth, 2 on /moving, after one line of head\n";
+    assert!(piped("-", "pipe.mcap").ends_with(counts));
+    if cfg!(unix) {
+        assert!(piped("/dev/stdin", "pipe_by_name.mcap").ends_with(counts));
+    }
 }

@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::poses;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,6 +21,11 @@ fn scratch(name: &str) -> PathBuf {
     std::fs::write(folder.join("chip.csv"), chip()).expect("writes");
     std::fs::write(folder.join("01.csv"), broad()).expect("writes");
     std::fs::write(folder.join("TStick_Test02_Trial2.csv"), repoimu()).expect("writes");
+    std::fs::copy(
+        poses::bag(&poses::samples(&poses::errors()), &format!("guide_{name}.mcap"), true),
+        folder.join("poses.mcap"),
+    )
+    .expect("copies");
     let (imu, truth) = euroc();
     for (name, text) in [("imu0/data.csv", imu), ("state_groundtruth_estimate0/data.csv", truth)] {
         let file = folder.join("mav0").join(name);
@@ -171,6 +177,19 @@ fn check(guide: &str) {
 #[test]
 fn the_guide_to_the_command() {
     check("docs/command.md");
+}
+
+#[test]
+fn the_guide_to_calibration() {
+    check("docs/calibrate.md");
+    // What the robot in it is given is what the command printed.
+    let text = std::fs::read_to_string(root().join("docs/calibrate.md")).expect("is there");
+    let options: Vec<&str> = text.lines().filter(|line| line.starts_with("                ")).collect();
+    assert!(options.len() >= 2, "{options:?}");
+    for option in options {
+        let printed = option.trim().trim_end_matches(',');
+        assert!(text.lines().any(|line| line == printed), "it prints no `{printed}`");
+    }
 }
 
 #[test]

@@ -209,7 +209,7 @@ fn any_type_is_read_by_its_definition() {
     );
     let output = bb(&["echo", name, "/json"]);
     assert_eq!(output.out, "z: 1\na:\n  b: [true, NaN, \"x\"]\n---\n");
-    assert!(output.err.contains("a message of /json is no JSON"), "{}", output.err);
+    assert!(output.err.contains("a message of /json is not JSON"), "{}", output.err);
     let output = bb(&["echo", name, "/other"]);
     assert!(output.err.contains("encoded as `protobuf`, and only `cdr` and `json` are read"), "{}", output.err);
     // It is counted all the same.
@@ -248,6 +248,23 @@ fn fields_are_plotted_with_their_units() {
         assert!(svg.contains(text), "{text}");
     }
     assert!(!svg.contains("covariance"));
+    // A topic whose name has dots, one of which is the name of another.
+    let mut maker = Maker::new(WriteOptions::new());
+    for topic in ["/imu", "/imu.left", "/imu.left.raw"] {
+        let imu = maker.topic(topic, IMU);
+        (0..9).for_each(|index| maker.bytes_at(imu, START_NS + index, &little(&Imu::default())));
+    }
+    let dotted = file("plot_dotted.mcap", &maker.finish());
+    let dotted = dotted.to_str().expect("is text");
+    for (field, title) in [
+        ("/imu.left.raw.angular_velocity", "/imu.left.raw angular_velocity"),
+        ("imu.left.angular_velocity.x", "/imu.left angular_velocity.x"),
+        ("/imu.left", "/imu.left linear_acceleration"),
+    ] {
+        let output = bb(&["plot", dotted, field, "--out", out]);
+        assert_eq!(output.code, Some(0), "{}", output.err);
+        assert!(std::fs::read_to_string(out).expect("is written").contains(title), "{field}");
+    }
     let output = bb(&["plot", name, "/imu.angular_velocty", "--out", out]);
     assert_eq!(output.code, Some(1));
     assert!(
@@ -272,6 +289,20 @@ pub struct Number {
     pub value: f64,
     /// It may have one.
     pub name: Option<String>,
+    /// Where it is from.
+    pub kind: Kind,
+}
+
+/// Where a number is from.
+#[derive(Clone, Debug, Payload)]
+pub enum Kind {
+    /// From nowhere.
+    NotYetKnown,
+    /// From an instrument.
+    Measured {
+        /// What it is known to.
+        within: f64,
+    },
 }
 
 #[test]
@@ -285,7 +316,8 @@ fn own_recordings_are_read_like_others() {
     let mut simulation = builder.simulate().expect("starts");
     for value in 0..3 {
         simulation.run_for(Duration::from_millis(100));
-        let number = Number { value: f64::from(value), name: (value == 1).then(|| "one".to_owned()) };
+        let kind = if value == 2 { Kind::Measured { within: 0.5 } } else { Kind::NotYetKnown };
+        let number = Number { value: f64::from(value), name: (value == 1).then(|| "one".to_owned()), kind };
         simulation.publish(watched::sensor::base::number, simulation.clock().now(), number);
         recorder.drain().expect("there is room");
     }
@@ -296,6 +328,19 @@ fn own_recordings_are_read_like_others() {
     let payloads: Vec<_> = values.iter().map(|line| line["message"]["payload"].to_string()).collect();
     assert_eq!(
         payloads,
-        [r#"{"name":[],"value":0.0}"#, r#"{"name":["one"],"value":1.0}"#, r#"{"name":[],"value":2.0}"#]
+        [
+            r#"{"kind":{"kind":"NOT_YET_KNOWN","measured":[]},"name":[],"value":0.0}"#,
+            r#"{"kind":{"kind":"NOT_YET_KNOWN","measured":[]},"name":["one"],"value":1.0}"#,
+            r#"{"kind":{"kind":"MEASURED","measured":[{"within":0.5}]},"name":[],"value":2.0}"#
+        ]
     );
+    // The names are in the file; what reads it knows nothing of the type.
+    let output = bb(&["echo", path.to_str().expect("is text"), "sensor/base/number"]);
+    assert!(output.out.contains("    kind: MEASURED\n    measured:\n      - within: 0.5\n"), "{}", output.out);
+    let picture = path.with_extension("svg");
+    let arguments = ["plot", path.to_str().expect("is text"), "sensor/base/number", "--out"];
+    let output = bb(&[&arguments[..], &[picture.to_str().expect("is text")]].concat());
+    assert_eq!(output.code, Some(0), "{}", output.err);
+    let svg = std::fs::read_to_string(&picture).expect("is written");
+    assert!(svg.contains("number payload") && !svg.contains("wall_time"), "times are no curves");
 }

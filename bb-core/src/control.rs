@@ -30,16 +30,4 @@ pub use command::{CommandStatistics, Prepared};
 pub use execution::{CommandError, Execution};
 pub(crate) use hanging::Hanging;
 pub(crate) use system::{ComponentOrder, Control, Declared, Islands, Parts, Summary, Wired};
-pub use topics::SystemTopics;
-
-pub use crate::component::{
-    Arm, Binding, Command, CommandContext, Disarm, FromParameter, NoArguments, Outcome, Sleep,
-};
-pub use crate::declaration::{
-    Cancel, CommandDeclaration, ParameterDeclaration, ParameterDefault, ParameterError, ParameterType,
-    ParameterValues, Role,
-};
-pub use crate::event::{
-    ArmError, CategoryDeclaration, CommandEvent, CommandPhase, DisarmError, ParameterChange, ParameterValue,
-    Refusal, RefusalReason, Safety, SafetyError, SafetyTransition, StateTransition,
-};
+pub(crate) use topics::SystemTopics;

@@ -1,21 +1,19 @@
 //! What `robot!` declares, as constant data.
 
 mod command;
-mod estimator;
+pub(crate) mod estimator;
 mod graph;
-mod join;
-mod parameter;
+pub(crate) mod join;
+pub(crate) mod parameter;
 mod quantity;
 mod source;
 pub(crate) mod unit;
 
 pub use command::{Cancel, CommandDeclaration, Role};
-pub use estimator::{
-    EstimatorDeclaration, HealthDeclaration, InletDeclaration, InputDeclaration, IslandDeclaration,
-    WorkerDeclaration,
-};
-pub use graph::graph;
-pub use join::join;
-pub use parameter::{ParameterDeclaration, ParameterDefault, ParameterError, ParameterType, ParameterValues};
+pub(crate) use estimator::IslandDeclaration;
+pub use estimator::{EstimatorDeclaration, HealthDeclaration, InputDeclaration, WorkerDeclaration};
+pub(crate) use graph::graph;
+pub(crate) use parameter::ParameterValues;
+pub use parameter::{ParameterDeclaration, ParameterDefault, ParameterError, ParameterType};
 pub use quantity::{Dimension, Range};
 pub use source::{ActuatorDeclaration, SensorDeclaration, Supervisor};

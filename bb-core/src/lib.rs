@@ -15,10 +15,7 @@
 //! | the journal of a run, and its replay | [`journal`], [`Replay`] |
 //! | what a handler of telemetry is told | [`telemetry`] |
 //! | what a user implements: [`Sensor`], [`Estimator`], [`Actuator`], [`Service`], [`Command`], and the derives for options, inputs, outputs, payloads | [`component`] |
-//! | make, run, fail, restart: the same for every component | [`lifecycle`] |
-//! | a running estimator: fan-in, health, drops, counters | [`node`] |
-//! | states, commands, parameters, safety, supervision | [`control`] |
-//! | start, run, stop | [`run`] |
+//! | start, run, stop; the handles of what is declared; statistics and errors of a run | [`run`] |
 //!
 //! Each module uses only those above it in this table.
 //!
@@ -32,14 +29,11 @@
 extern crate self as bb_core;
 
 pub mod component;
-pub mod control;
 pub mod declaration;
 pub mod event;
 pub mod journal;
 pub mod kinematics;
-pub mod lifecycle;
 pub mod message;
-pub mod node;
 pub mod payload;
 pub mod pubsub;
 pub mod run;
@@ -49,7 +43,10 @@ pub mod topology;
 
 #[allow(clippy::panic, reason = "a fault is a panic at compile time, which rustc reports")]
 mod check;
+mod control;
 mod fault;
+mod lifecycle;
+mod node;
 mod schedule;
 mod stub;
 
@@ -61,7 +58,6 @@ pub use component::{
     Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,
     SensorContext, Service, ServiceContext,
 };
-pub use control::Execution;
 pub use declaration::{ParameterError, Role};
 pub use event::{
     ArmError, ComponentFault, DisarmError, HealthReason, HealthState, HealthTransition, ParameterValue, Refusal,
@@ -73,9 +69,9 @@ pub use pubsub::{
     DynamicMessage, DynamicSubscription, Overflow, Payloads, Publisher, Select, Subscription, Unmatched,
 };
 pub use run::{
-    ActuatorHandle, Builder, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Live, OutputHandle,
-    ParameterHandle, Replay, ReplayError, Report, Robot, Running, SensorHandle, SettingProblem, SettingsError,
-    SettingsList, Simulation, StartError,
+    ActuatorHandle, Builder, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Execution, Live,
+    OutputHandle, ParameterHandle, Replay, ReplayError, Report, Robot, Running, SensorHandle, SettingProblem,
+    SettingsError, SettingsList, Simulation, StartError,
 };
 /// Handles of the topics that every robot has: subscribe to them as to any other.
 pub mod system {
@@ -116,33 +112,39 @@ pub mod __private {
         Given, check_dynamic, check_estimator, check_input, check_option, check_optional, check_output,
         check_position, check_reachable, check_required, check_role, find_input, find_output,
     };
-    pub use crate::component::{
-        AnyOptions, At, Binding, ByCode, ByText, ByValue, Command, EmittedAt, FieldIndex, FromParameter,
-        FromQuantity, FromText, Input, InputAt, InputField, OptionField, OutputAt, Setting, SettingOf, Slot,
-        SyncMiss, TakenAt, WithUnit, declare,
-    };
+    pub use crate::component::binding::{Binding, FromParameter};
+    pub use crate::component::field::{FromQuantity, FromText};
+    pub use crate::component::inputs::{At, FieldIndex, InputAt, Slot, SyncMiss, TakenAt, declare};
+    pub use crate::component::options::AnyOptions;
+    pub use crate::component::outputs::{EmittedAt, OutputAt};
+    pub use crate::component::setting::{ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
+    pub use crate::component::{Command, Input, InputField, OptionField};
     pub use crate::control::Prepared;
+    pub use crate::declaration::estimator::{InletDeclaration, IslandDeclaration};
+    pub use crate::declaration::join::join;
+    pub use crate::declaration::parameter::ParameterValues;
     pub use crate::declaration::{
         ActuatorDeclaration, Cancel, CommandDeclaration, Dimension, EstimatorDeclaration, HealthDeclaration,
-        InletDeclaration, InputDeclaration, IslandDeclaration, ParameterDeclaration, ParameterDefault,
-        ParameterValues, Range, SensorDeclaration, WorkerDeclaration, join,
+        InputDeclaration, ParameterDeclaration, ParameterDefault, Range, SensorDeclaration, WorkerDeclaration,
     };
     pub use crate::event::CategoryDeclaration;
     pub use crate::lifecycle::{AsSensor, AsService, Periodic};
+    pub use crate::message::codec::derive::{FieldOf, NotField, is_any, is_finite};
     pub use crate::message::codec::{
-        DecodeError, EnumShape, FieldOf, FieldShape, NotField, Reader, RosLayout, Shape, StructShape, Writer,
-        is_any, is_finite,
+        DecodeError, EnumShape, FieldShape, Reader, RosLayout, Shape, StructShape, Writer,
     };
     pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
     pub use crate::node::{
-        Act, Environment, Island, IslandState, IslandWiring, Key, Member, Node, Turn, act, alone, enter, feed,
-        island_of, receive, start,
+        Act, Environment, Island, IslandOf, IslandState, IslandWiring, Key, Member, Node, Turn, act, alone, enter,
+        feed, island_of, receive, start,
     };
     pub use crate::pubsub::{AnyTopic, DynamicMessage, Topic};
+    pub use crate::run::actuator::{ActuatorNode, AnyActuator};
+    pub use crate::run::source::{Assembly, Source};
+    pub use crate::run::visit::visit;
     pub use crate::run::{
-        ActuatorHandle, ActuatorNode, AnyActuator, Assembly, BridgeHandle, CommandHandle, ControllerHandle,
-        EstimatorHandle, EstimatorOfSeveralHandle, IslandOf, OutputHandle, ParameterHandle, Report, Robot,
-        SensorHandle, Source, StartError, visit,
+        ActuatorHandle, BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle,
+        OutputHandle, ParameterHandle, Report, Robot, SensorHandle, StartError,
     };
     pub use crate::stub::{Known, NoField, NotProbed, Probe, Unknown, as_known, both_known, stub};
     pub use crate::time::MonotonicTime;

@@ -15,7 +15,7 @@ mod adapter;
 mod backoff;
 mod slot;
 
-pub(crate) use adapter::AsActuator;
-pub use adapter::{AsEstimator, AsSensor, AsService, Component, HostHandle, Periodic};
+pub(crate) use adapter::{AsActuator, AsEstimator, Component, HostHandle};
+pub use adapter::{AsSensor, AsService, Periodic};
 pub use backoff::Supervision;
 pub(crate) use slot::{AfterFault, Recipe, Slot};

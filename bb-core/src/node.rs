@@ -3,6 +3,7 @@
 
 mod admission;
 mod backlog;
+mod count;
 mod counters;
 mod emission;
 mod entry;
@@ -18,20 +19,17 @@ mod turn;
 
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
 pub(crate) use emission::{Emitting, blame, contained, contained_outside};
-pub use entry::NodeEntry;
-pub(crate) use entry::{HealthReport, Report};
+pub(crate) use entry::{HealthReport, NodeEntry, Report};
 pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Mode, Overseer};
-pub(crate) use island::CallError;
 pub use island::{
-    Act, AnyIsland, Island, IslandState, IslandWiring, Key, Member, Replayed, act, alone, enter, feed,
-    island as island_of, receive, start,
+    Act, Island, IslandOf, IslandState, IslandWiring, Key, Member, act, alone, enter, feed, island as island_of,
+    receive, start,
 };
-pub(crate) use island::{publish, take_turn};
+pub(crate) use island::{AnyIsland, CallError, Replayed, publish, take_turn};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
-pub use running::{Next, Node};
+pub(crate) use running::Next;
+pub use running::Node;
 pub(crate) use shared::SharedNode;
 pub use turn::Turn;
-
-pub use crate::event::{HealthReason, HealthState, HealthTransition};

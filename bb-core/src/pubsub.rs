@@ -1,25 +1,31 @@
 //! Publish and subscribe. A slow subscriber never slows a publisher and never grows without bound.
 
+mod any;
 mod dynamic;
 mod publisher;
 mod queue;
 mod registry;
 mod select;
+mod statistics;
+mod subscribers;
 mod subscription;
 #[cfg(test)]
 mod tests;
 mod topic;
+mod typed;
 mod unmatched;
 mod wakers;
 
-pub use dynamic::{DynamicMessage, DynamicSubscription};
+pub use any::{AnyTopic, DynamicMessage};
+pub use dynamic::DynamicSubscription;
 pub(crate) use publisher::Gate;
 pub use publisher::Publisher;
 pub use queue::Overflow;
 pub(crate) use registry::Registry;
 pub use select::{Payloads, Select};
+pub use statistics::{SubscriberStatistics, TopicStatistics};
 pub use subscription::{RecvAsync, Subscription};
-pub use topic::{AnyTopic, SubscriberStatistics, Topic, TopicStatistics};
+pub use topic::Topic;
 pub use unmatched::Unmatched;
 pub(crate) use unmatched::unmatched_at;
 pub(crate) use wakers::Wakers;

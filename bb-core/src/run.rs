@@ -1,7 +1,8 @@
 //! A robot that runs: assembled by a [`Builder`], driven by real sensors in threads ([`Running`]), on virtual time by its
 //! caller ([`Simulation`]), or from a journal ([`Replay`]).
 
-mod actuator;
+pub(crate) mod actuator;
+mod bound;
 mod builder;
 mod describe;
 mod error;
@@ -12,20 +13,21 @@ mod machine;
 mod occupied;
 mod replay;
 mod report;
-mod robot;
 mod running;
 mod settings;
 mod simulation;
-mod source;
+pub(crate) mod source;
 mod threads;
 mod timekeeper;
-mod visit;
+pub(crate) mod visit;
 
 pub use crate::component::{ActuatorError, ActuatorLink, Bus};
-pub use crate::declaration::{ActuatorDeclaration, SensorDeclaration, Supervisor};
+pub use crate::control::{CommandError, CommandStatistics, Execution};
 pub use crate::event::ComponentFault;
 pub use crate::lifecycle::Supervision;
-pub use actuator::{ActuatorNode, AnyActuator};
+pub use crate::node::{DropReason, EstimatorStatistics, InputStatistics, LatencyStatistics};
+pub use crate::pubsub::{SubscriberStatistics, TopicStatistics};
+pub(crate) use actuator::{ActuatorNode, AnyActuator};
 pub use builder::Builder;
 pub use error::StartError;
 pub use handle::{
@@ -36,9 +38,135 @@ pub use handle::{
 pub use live::Live;
 pub use replay::{Replay, ReplayError};
 pub use report::Report;
-pub use robot::{IslandOf, Robot};
 pub use running::Running;
 pub use settings::{SettingProblem, SettingsError, SettingsList};
 pub use simulation::Simulation;
-pub use source::{Assembly, Source, SourceStatistics};
-pub use visit::{Visit, Visitable, visit};
+pub use source::SourceStatistics;
+pub(crate) use source::{Assembly, Source};
+pub(crate) use visit::Visit;
+pub use visit::Visitable;
+
+use crate::component::AnyOptions;
+use crate::control::Prepared;
+use crate::declaration::{
+    ActuatorDeclaration, CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, SensorDeclaration, graph,
+};
+use crate::event::CategoryDeclaration;
+use crate::node::IslandOf;
+use crate::pubsub::{AnyTopic, DynamicMessage};
+use crate::time::MonotonicTime;
+use crate::topology::{GraphFormat, Topology};
+use builder::MadeByNew;
+use settings::settings_schema;
+use std::sync::Arc;
+
+/// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
+pub trait Robot: Sized + Send + Sync + 'static {
+    /// Its name.
+    const NAME: &'static str;
+    /// Its links and joints.
+    const TOPOLOGY: &'static Topology;
+    /// Its sensors, in the order of their declaration.
+    const SENSORS: &'static [SensorDeclaration];
+    /// Its estimators, in the order of their declaration.
+    const ESTIMATORS: &'static [EstimatorDeclaration];
+    /// Its actuators, in the order of their declaration.
+    const ACTUATORS: &'static [ActuatorDeclaration];
+    /// Its controllers and bridges, in the order of their declaration.
+    const SERVICES: &'static [SensorDeclaration];
+    /// Its declared states, beside the built-in ones.
+    const STATES: &'static [&'static str];
+    /// The categories of its commands.
+    const CATEGORIES: &'static [CategoryDeclaration];
+    /// Its commands, in the order of their declaration.
+    const COMMANDS: &'static [CommandDeclaration];
+    /// Its parameters, in the order of their declaration.
+    const PARAMETERS: &'static [ParameterDeclaration];
+    /// Where its islands are in the wiring.
+    #[doc(hidden)]
+    const ISLANDS: &'static [IslandOf<Self::Wiring>];
+    /// The options that are bound to a parameter: the number of the component in [`Robot::options_of`], the option's name,
+    /// the number of the parameter.
+    #[doc(hidden)]
+    const BOUND_OPTIONS: &'static [(usize, &'static str, usize)];
+
+    /// The options of all components.
+    #[doc(hidden)]
+    type Options: Send;
+    /// The topics of all publishers.
+    #[doc(hidden)]
+    type Topics: Send + Sync;
+    /// The topics and the running estimators.
+    #[doc(hidden)]
+    type Wiring: Send + Sync;
+
+    /// The options as declared.
+    #[doc(hidden)]
+    fn options() -> Self::Options;
+    #[doc(hidden)]
+    fn topics() -> Self::Topics;
+    /// Starts all estimators; what cannot start is kept in `assembly`.
+    #[doc(hidden)]
+    fn wire(topics: Self::Topics, options: &Self::Options, assembly: &Assembly) -> Self::Wiring;
+    /// Starts all sensors; what cannot start is kept in `assembly`.
+    #[doc(hidden)]
+    fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, assembly: &Assembly) -> Vec<Box<dyn Source>>;
+    #[doc(hidden)]
+    fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
+    /// The topic of that publisher; none beyond the last.
+    #[doc(hidden)]
+    fn topic(topics: &Self::Topics, publisher: usize) -> Option<&dyn AnyTopic>;
+    /// The options of that component, an `S::Options`; none beyond the last.
+    #[doc(hidden)]
+    fn options_of(options: &mut Self::Options, component: usize) -> Option<&mut dyn AnyOptions>;
+    /// The actuator of that number; none beyond the last.
+    #[doc(hidden)]
+    fn actuator(wiring: &Self::Wiring, actuator: usize) -> Option<&dyn AnyActuator>;
+    /// Publishes a recorded message of a sensor or a service; false if that publisher is an estimator's, or has another
+    /// payload.
+    #[doc(hidden)]
+    fn feed(wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, now: MonotonicTime) -> bool;
+    /// The commands with their options.
+    #[doc(hidden)]
+    fn commands(options: &Self::Options) -> Vec<Prepared>;
+
+    #[doc(hidden)]
+    fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic> {
+        (0..).map_while(|publisher| Self::topic(topics, publisher)).collect()
+    }
+
+    #[doc(hidden)]
+    fn all_actuators(wiring: &Self::Wiring) -> Vec<&dyn AnyActuator> {
+        (0..).map_while(|actuator| Self::actuator(wiring, actuator)).collect()
+    }
+
+    /// Its links and joints as a URDF file.
+    fn to_urdf() -> String {
+        Self::TOPOLOGY.to_urdf(Self::NAME)
+    }
+
+    /// Its topology and dataflow as a picture, in Mermaid or DOT.
+    fn graph(format: GraphFormat) -> String {
+        graph(format, Self::TOPOLOGY, Self::SENSORS, Self::ESTIMATORS)
+    }
+
+    /// The JSON Schema (draft 2020-12) of its settings, see [`Builder::set`]: options and parameters in nested objects, as a
+    /// TOML file of them is nested.
+    fn settings_schema() -> String {
+        settings_schema::<Self>()
+    }
+
+    /// Has rustc say how a robot is assembled where `new` is called.
+    #[doc(hidden)]
+    fn new() -> Builder<Self>
+    where
+        Self: MadeByNew,
+    {
+        Self::builder()
+    }
+
+    /// Assembles the robot: options may be changed and topics subscribed to before it starts.
+    fn builder() -> Builder<Self> {
+        Builder::new()
+    }
+}

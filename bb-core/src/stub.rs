@@ -1,6 +1,6 @@
 //! What keeps one mistake to one message.
 //!
-//! A type that is declared as a sensor and is none would be reported wherever the wiring names it. So the wiring names
+//! A type that is declared as a sensor but is not one would be reported wherever the wiring names it. So the wiring names
 //! it through [`Known`]: a type that is not what it is declared as is [`Unknown`] there, which fits everywhere, and the
 //! mistake is reported where the options are filled, once. Likewise an input or output that the algorithm does not
 //! have is `Unknown`, and is reported by its check (see `check`). None of this ever runs, since none of it compiles.
@@ -20,7 +20,7 @@ use std::marker::PhantomData;
 #[derive(Debug)]
 pub struct Probe<T>(PhantomData<fn() -> T>);
 
-// The bounds of associated types are written out: an implementation that breaks one is reported by itself, and is none.
+// The bounds of associated types are written out: an implementation that breaks one is reported by itself, and does not count.
 impl<T> Probe<T>
 where
     T: Sensor<Options: Options, Output: Payload>,
@@ -96,14 +96,14 @@ pub const fn both_known<P: Payload, T: Payload>() -> bool {
     P::KNOWN && T::KNOWN
 }
 
-/// The options of a component as the wiring names their type: the same, but for a component that is none.
+/// The options of a component as the wiring names their type: the same, except for a type that is not a component.
 pub fn as_known<T: 'static, U: 'static>(options: U) -> T {
     let mut options = Some(options);
     let known = (&mut options as &mut dyn Any).downcast_mut::<Option<T>>();
     known.and_then(Option::take).unwrap_or_else(stub)
 }
 
-/// Stands where a stub would have to give something.
+/// The value of anything that a stub must return.
 #[expect(clippy::panic, reason = "such a robot does not compile")]
 pub fn stub<T>() -> T {
     panic!("this robot did not verify")

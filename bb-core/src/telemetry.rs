@@ -1,4 +1,4 @@
-//! What the runtime tells handlers that a user attaches: every input, output, latency, drop and transition.
+//! Events for handlers that a user attaches: every input, output, latency, drop and transition.
 
 use crate::event::{ComponentFault, HealthTransition};
 use crate::fault::guarded;
@@ -52,7 +52,7 @@ pub enum TelemetryEvent {
     Fault(ComponentFault),
 }
 
-/// What handlers get.
+/// A handler of telemetry: it gets the robot's name and the event.
 pub type Handler = Arc<dyn Fn(&'static str, &TelemetryEvent) + Send + Sync>;
 
 /// The handlers of one run.

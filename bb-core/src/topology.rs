@@ -34,7 +34,7 @@ pub struct Link {
     pub name: &'static str,
     /// The number of the joint that carries it; none for the root.
     pub parent_joint: Option<usize>,
-    /// Takes points from this link to the root, if only fixed joints lie between.
+    /// Takes points from this link to the root, if all joints between are fixed.
     pub root_from_link: Option<Transform>,
     /// What it weighs.
     pub inertial: Option<Inertial>,
@@ -65,7 +65,7 @@ pub struct Joint {
     pub dynamics: Option<Dynamics>,
     /// The joint that it follows.
     pub mimic: Option<Mimic>,
-    /// What stands between it and its motor.
+    /// The transmission between it and its motor.
     pub transmission: Option<Transmission>,
 }
 

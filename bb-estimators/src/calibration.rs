@@ -38,8 +38,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! It builds without the standard library and does not allocate; who gathers rests and fields does.
+//! [`sensor_noise`] finds white noise, bias instability and random walk of a sensor that lies still, by its Allan deviation.
+//!
+//! It builds without the standard library and does not allocate; who gathers rests, fields and samples does.
 
+mod allan;
 mod ellipsoid;
 mod error;
 #[cfg(feature = "runtime")]
@@ -51,6 +54,7 @@ mod rest;
 #[cfg(test)]
 mod tests;
 
+pub use allan::{AllanCurve, AllanError, AllanPoint, Known, SensorNoise, allan_deviation, integrate, sensor_noise};
 pub use error::CalibrationError;
 #[cfg(feature = "runtime")]
 pub use estimator::{Calibrate, Calibrated, CalibratedOptions};

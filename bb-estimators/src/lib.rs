@@ -13,8 +13,11 @@
 //! | `Calibrated<Marg>(…)` in a sensor | the sensor's `Imu` or `Marg` | the same, calibrated |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
 //!
-//! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry` and `input pose` | `Odometry` of the link |
+//! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input magnetic_field` | `Odometry` of the link |
 //! | `Eskf<NavigationOutputs>(…)` | as before | `output odometry`, and `output status`: biases, dead reckoning, refusals |
+//! | `WheeledEskf(…)`, `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, and `input relative` and `input pressure` for [states](navigation::States) `S` that have them | as before |
+//! | `PlanarEkf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input orientation` | `Odometry` of the link, on a plane |
+//! | `PlanarEkf<PlanarOutputs>(…)` | as before | `output odometry`, and `output status`: bias, scale of the wheels, refusals |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
@@ -27,6 +30,7 @@ extern crate alloc;
 
 pub mod attitude;
 pub mod calibration;
+mod moments;
 pub mod navigation;
 pub mod params;
 #[cfg(feature = "simulation")]
@@ -44,9 +48,20 @@ pub use calibration::Calibrated;
 #[cfg(feature = "simulation")]
 pub use simulation::SimulatedImu;
 
-/// The error-state Kalman filter of position, velocity and attitude as an estimator.
+/// The error-state Kalman filter of position, velocity and attitude as an estimator: it emits `O`, and estimates the optional states
+/// `S`, `N` states in all.
 #[cfg(feature = "runtime")]
-pub type Eskf<O = Odometry> = navigation::EskfEstimator<O>;
+pub type Eskf<O = Odometry, S = navigation::Navigation, const N: usize = { navigation::NAVIGATION }> =
+    navigation::EskfEstimator<O, S, N>;
+
+/// The same for a vehicle whose wheels wear: the scale of their speed is a state.
+#[cfg(feature = "runtime")]
+pub type WheeledEskf<O = Odometry> =
+    Eskf<O, navigation::Wheeled, { <navigation::Wheeled as navigation::States>::DIMENSION }>;
+
+/// The filter of a robot that drives on a plane as an estimator.
+#[cfg(feature = "runtime")]
+pub type PlanarEkf<O = Odometry> = navigation::planar::PlanarEstimator<O>;
 
 /// The estimator of each attitude filter.
 #[cfg(feature = "runtime")]

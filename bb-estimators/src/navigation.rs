@@ -11,16 +11,20 @@
 //! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
 //! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
 //! counts and statistics. [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several
-//! filters and finds which fits; [`Navigator`] is one that is ready for use. `FixedLagSmoother`, with the feature `smoother`,
+//! filters and finds which fits; [`Navigator`] is one that is ready for use. [`planar`] has the filter of a robot that drives on
+//! a plane. `FixedLagSmoother`, with the feature `smoother`,
 //! holds the last keyframes and corrects them in hindsight.
 
 mod alignment;
 mod bank;
 pub mod chi_square;
 mod consistency;
+mod covariance;
 pub mod eskf;
 #[cfg(feature = "runtime")]
 mod estimator;
+mod fused;
+mod fusion;
 mod geodesy;
 mod history;
 mod math;
@@ -28,22 +32,23 @@ pub mod measurement;
 mod navigator;
 #[cfg(test)]
 mod noise;
+pub mod planar;
+mod refusal;
 #[cfg(feature = "smoother")]
 pub mod smoother;
+mod state;
 mod stream;
 
 pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
 pub use consistency::{Consistency, nees};
-pub use eskf::{
-    ACCELEROMETER_BIAS, Eskf, EskfParams, Estimate, GYROSCOPE_BIAS, GaussMarkov, ImuDensities, ImuMean, Keyframe,
-    NAVIGATION, Navigation, Optional, POSITION, ROTATION, Refusal, Start, States, VELOCITY, offset,
-};
+pub use eskf::{Eskf, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
 #[cfg(feature = "runtime")]
 pub use estimator::{
     EskfEstimator, NavigationInputs, NavigationOptions, NavigationOutput, NavigationOutputs, NavigationStatus,
     Verdicts,
 };
+pub use fused::Fused;
 pub use geodesy::{Geodetic, LocalFrame};
 pub use history::{Arrivals, History, Placed, Replayed};
 pub use measurement::{
@@ -52,8 +57,13 @@ pub use measurement::{
     ZeroVelocity,
 };
 pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
+pub use refusal::Refusal;
 #[cfg(feature = "smoother")]
 pub use smoother::{
     Factor, FixedLagSmoother, Kernel, NavigationFactor, Preintegration, Rows, SmootherParams, Updated,
 };
-pub use stream::{Counts, Fused, Stream, StreamParams};
+pub use state::{
+    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
+    States, VELOCITY, Wheeled, offset,
+};
+pub use stream::{Counts, Stream, StreamParams};

@@ -24,6 +24,7 @@ mod nearest;
 mod table;
 #[cfg(test)]
 mod tests;
+mod text;
 mod units;
 mod value;
 
@@ -113,7 +114,7 @@ pub trait Params {
         let parameters = self.parameters();
         let found = parameters.iter().enumerate().find(|(_, parameter)| parameter.name == name);
         let (index, parameter) = found.ok_or(SetError::Unknown { name, parameters })?;
-        let value = value::parse(parameter, text, self.value(index))?;
+        let value = text::parse(parameter, text, self.value(index))?;
         parameter.check(value).map_err(SetError::Refused)?;
         self.replace(index, value);
         Ok(())

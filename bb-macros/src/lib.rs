@@ -56,8 +56,8 @@ pub fn payload(tokens: TokenStream) -> TokenStream {
 }
 
 /// Makes a struct the options of a component: `#[option(default = …, range = a..=b, unit = "…")]` or
-/// `#[option(required)]` on each field. See the trait.
-#[proc_macro_derive(Options, attributes(option))]
+/// `#[option(required)]` on each field. See the trait. (`#[options]` is an attribute so that it can be called a mistake.)
+#[proc_macro_derive(Options, attributes(option, options))]
 pub fn options(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::options).into()
 }

@@ -1,6 +1,6 @@
 //! What happened, as lines of a table.
 
-use bb_core::control::{CommandEvent, CommandPhase, ParameterChange, StateTransition};
+use bb_core::event::{CommandEvent, CommandPhase, ParameterChange, StateTransition};
 use bb_core::prelude::*;
 use bb_core::{DynamicMessage, HealthTransition};
 use std::fmt;

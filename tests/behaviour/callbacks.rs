@@ -1,7 +1,7 @@
 //! Every callback of an estimator, what it may emit and ask for.
 
 use crate::components::{Number, at};
-use bb_core::control::ParameterValue;
+use bb_core::event::ParameterValue;
 use bb_core::prelude::*;
 
 /// What it can be told and asked.

@@ -1,8 +1,8 @@
 //! Commands that misbehave: that never sleep, that block, that start others while they start.
 
 use crate::components::{Number, at, within};
-use bb_core::control::CommandError;
 use bb_core::prelude::*;
+use bb_core::run::CommandError;
 use std::future::Future;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -249,7 +249,7 @@ fn one_that_arms_does_not_arm_a_robot_that_was_disarmed_meanwhile() {
 #[test]
 fn events_of_a_command_come_in_their_order_from_many_threads() {
     within(60, || {
-        use bb_core::control::CommandPhase::{Started, Succeeded};
+        use bb_core::event::CommandPhase::{Started, Succeeded};
         let builder = Unruly::builder();
         let roomy = Overflow::DropOldest { capacity: 1 << 15 };
         let events = builder.subscribe_with(unruly::command::patient, roomy);

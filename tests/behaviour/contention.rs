@@ -3,8 +3,8 @@
 use crate::components::{Number, within};
 use bb_core::ArmError;
 use bb_core::DynamicSubscription;
-use bb_core::node::DropReason;
 use bb_core::prelude::*;
+use bb_core::run::DropReason;
 use std::future::Future;
 use std::pin::pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

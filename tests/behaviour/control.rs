@@ -1,8 +1,9 @@
 //! States, commands, safety, actuators, controllers and bridges.
 
 use crate::components::{Counter, Number, at};
-use bb_core::control::{CommandError, CommandPhase, RefusalReason};
+use bb_core::event::{CommandPhase, RefusalReason};
 use bb_core::prelude::*;
+use bb_core::run::CommandError;
 use bb_core::{ArmError, DisarmError};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 

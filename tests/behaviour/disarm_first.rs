@@ -1,9 +1,10 @@
 //! Whatever hangs, hardware is made safe first; and what is not safe, or was cancelled, moves nothing any more.
 
 use crate::components::{Number, at, within};
-use bb_core::control::{CommandError, CommandPhase};
+use bb_core::event::CommandPhase;
 use bb_core::prelude::*;
 use bb_core::run::ActuatorError;
+use bb_core::run::CommandError;
 use bb_core::{ArmError, DisarmError};
 use std::future::Future;
 use std::pin::pin;

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 #[derive(Clone, Debug, Options)]
 pub struct AccelerometerOptions {
-    /// Device file, such as `/dev/serial/by-id/usb-…`: unlike `/dev/ttyUSB0`, it names the same device after it was unplugged.
+    /// Device file, such as `/dev/serial/by-id/usb-…`: unlike `/dev/ttyUSB0`, it still names this device after a reconnect.
     #[option(required)]
     pub port: String,
     #[option(default = 115_200)]
@@ -28,7 +28,7 @@ impl Sensor for Accelerometer {
     type Output = Accel;
 
     fn init(options: AccelerometerOptions, _: &SensorContext) -> Result<Self, Fault> {
-        // A timeout, so that `read` returns now and then, also if nothing comes.
+        // With a timeout, so that `read` returns now and then even if nothing arrives.
         let port = serialport::new(&options.port, options.baud).timeout(Duration::from_millis(50)).open()?;
         Ok(Self { port, line: Vec::new() })
     }
@@ -48,7 +48,7 @@ impl Sensor for Accelerometer {
             }
         }
         let line = std::mem::take(&mut self.line);
-        // A line that was cut or garbled is skipped. What is wrong every time shows as silence, and so at `lost_after`.
+        // A truncated or garbled line is skipped. If every line is wrong, the sensor is silent, which `lost_after` detects.
         Ok(parse(&line).map_or(Reading::nothing(), Reading::now))
     }
 }

@@ -1,8 +1,8 @@
 //! Driver, last known inputs, tolerance, and what is dropped why.
 
 use crate::components::{Number, Snapshot, at};
-use bb_core::node::DropReason;
 use bb_core::prelude::*;
+use bb_core::run::DropReason;
 
 robot! {
     robot FanIn;

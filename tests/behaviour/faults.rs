@@ -3,8 +3,8 @@
 use crate::components::{Counter, Number, Scale, at};
 use bb_core::message::DecodeError;
 use bb_core::message::codec::{Reader, Shape, Writer};
-use bb_core::node::DropReason;
 use bb_core::prelude::*;
+use bb_core::run::DropReason;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Options of [`Fragile`].

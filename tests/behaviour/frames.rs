@@ -41,7 +41,7 @@ impl<const MOVING: bool> Estimator for Surveyor<MOVING> {
             // Nobody knows the joint's position, so that there is no transform across it.
             Err(fault) if MOVING => {
                 let message =
-                    "a moving joint lies between the input `far` and the output, and its position is not known";
+                    "there is a moving joint between the input `far` and the output, and its position is not known";
                 assert_eq!(fault.to_string(), message);
                 bb_core::nalgebra::Isometry3::identity()
             }

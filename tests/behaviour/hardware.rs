@@ -2,8 +2,8 @@
 
 use crate::components::{Number, at, within};
 use crate::replay::{Heard, Lines, hear, overflow, same};
-use bb_core::control::CommandError;
 use bb_core::prelude::*;
+use bb_core::run::CommandError;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -2,7 +2,7 @@
 
 use crate::components::{Number, Snapshot, at};
 use bb_core::HealthTransition;
-use bb_core::control::{CommandPhase, RefusalReason};
+use bb_core::event::{CommandPhase, RefusalReason};
 use bb_core::prelude::*;
 
 /// Passes numbers on; a negative one is a divergence.

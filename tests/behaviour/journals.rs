@@ -3,9 +3,9 @@
 use crate::components::{Number, at, within};
 use crate::disarm_first::Gate;
 use crate::replay::{Heard, Lines, counts, hear, overflow, same};
-use bb_core::control::CommandError;
-use bb_core::node::DropReason;
 use bb_core::prelude::*;
+use bb_core::run::CommandError;
+use bb_core::run::DropReason;
 use bb_core::{Builder, DynamicSubscription, Report, RequestCodec};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};

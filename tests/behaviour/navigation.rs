@@ -34,20 +34,20 @@ robot! {
 }
 
 const ANTENNA: Vector3<f64> = Vector3::new(-0.5, 0.2, 1.5);
-const ORIGIN: (f64, f64, f64) = (48.1, 11.6, 520.0);
+pub(super) const ORIGIN: (f64, f64, f64) = (48.1, 11.6, 520.0);
 const STEP_MILLIS: i64 = 10;
 
 /// Where the rover is at a time: it is at rest for three seconds, speeds up to 2 m/s along its x axis, east, and then drives on a
 /// circle of 20 m.
-struct Truth {
-    position: Vector3<f64>,
-    heading: f64,
-    speed: f64,
-    rate: f64,
-    acceleration: Vector3<f64>,
+pub(super) struct Truth {
+    pub(super) position: Vector3<f64>,
+    pub(super) heading: f64,
+    pub(super) speed: f64,
+    pub(super) rate: f64,
+    pub(super) acceleration: Vector3<f64>,
 }
 
-fn truth(seconds: f64) -> Truth {
+pub(super) fn truth(seconds: f64) -> Truth {
     const RADIUS: f64 = 20.0;
     let straight = |x: f64, speed: f64, forward: f64| Truth {
         position: Vector3::new(x, 0.0, 0.0),
@@ -74,15 +74,15 @@ fn truth(seconds: f64) -> Truth {
 }
 
 /// Numbers that are alike on every run: uniform, with a standard deviation of 1.
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12_f64.sqrt()
     }
 
-    fn vector(&mut self) -> Vector3<f64> {
+    pub(super) fn vector(&mut self) -> Vector3<f64> {
         Vector3::new(self.next(), self.next(), self.next())
     }
 }
@@ -401,16 +401,19 @@ fn a_rover_at_rest_that_was_blind_for_a_minute_starts_again() -> Result<(), Star
     let mut simulation = builder.simulate()?;
     let board_from_base = UnitQuaternion::from_euler_angles(PI, 0.0, FRAC_PI_2).inverse();
     let gravity = board_from_base * Vector3::new(0.0, 0.0, 9.80665);
-    let place = Geodetic::from_degrees(ORIGIN.0, ORIGIN.1, ORIGIN.2);
-    let position = GeodeticPosition {
-        latitude_rad: place.latitude,
-        longitude_rad: place.longitude,
-        altitude: Some(place.height),
-    };
+    let frame = LocalFrame::new(Geodetic::from_degrees(ORIGIN.0, ORIGIN.1, ORIGIN.2));
     let (status, services) = (GnssStatus::Fix, GnssServices::default());
-    let fix = GnssFix { status, services, position: Some(position), position_covariance: None };
     let mut emitted = [0, 0];
-    for (begin, emitted) in [0_u64, 72_000].into_iter().zip(&mut emitted) {
+    // While it was blind somebody has carried it, but not its world.
+    let places = [Vector3::zeros(), Vector3::new(400.0, 300.0, 0.0)];
+    for ((begin, place), emitted) in [0_u64, 72_000].into_iter().zip(places).zip(&mut emitted) {
+        let geodetic = frame.geodetic(&place);
+        let position = GeodeticPosition {
+            latitude_rad: geodetic.latitude,
+            longitude_rad: geodetic.longitude,
+            altitude: Some(geodetic.height),
+        };
+        let fix = GnssFix { status, services, position: Some(position), position_covariance: None };
         for step in 0..200 {
             let time = MonotonicTime::ZERO + Duration::from_millis(begin + 10 * step);
             if step % 20 == 0 {
@@ -419,7 +422,10 @@ fn a_rover_at_rest_that_was_blind_for_a_minute_starts_again() -> Result<(), Star
             let imu = Imu::new(Vector3::zeros(), gravity);
             simulation.publish(surveyor::sensor::base::bracket::board::imu, time, imu);
         }
-        *emitted = odometry.drain().count();
+        let messages: Vec<_> = odometry.drain().collect();
+        *emitted = messages.len();
+        let last = messages.last().expect("it has started");
+        assert!((last.pose.position + ANTENNA - place).norm() < 0.1, "{}", last.pose.position);
     }
     // Of two seconds at 100 Hz, those after the first; the sample after the gap only tells of it.
     assert!((98..=100).contains(&emitted[0]) && (97..=99).contains(&emitted[1]), "{emitted:?}");

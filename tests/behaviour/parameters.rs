@@ -1,7 +1,7 @@
 //! Parameters that are set from everywhere at once.
 
 use crate::components::{Number, within};
-use bb_core::control::ParameterValue;
+use bb_core::event::ParameterValue;
 use bb_core::prelude::*;
 use bb_core::{Bus, DynamicSubscription};
 

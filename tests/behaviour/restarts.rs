@@ -2,8 +2,8 @@
 
 use crate::components::{Counter, Number, at, within};
 use bb_core::HealthTransition;
-use bb_core::node::DropReason;
 use bb_core::prelude::*;
+use bb_core::run::DropReason;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

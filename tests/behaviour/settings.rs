@@ -49,6 +49,12 @@ pub(crate) struct EveryOptions {
     pub(crate) horizon: f64,
     #[option(default = [f64::NAN, 1.0])]
     pub(crate) scale: [f64; 2],
+    #[option(default = Some(1.5), unit = "m")]
+    pub(crate) reach: Option<f64>,
+    #[option(default = Some(2))]
+    pub(crate) tries: Option<u8>,
+    #[option(default = Some("a".to_owned()))]
+    pub(crate) nick: Option<String>,
 }
 
 #[derive(Debug)]
@@ -224,7 +230,7 @@ fn values_out_of_their_range_are_refused_where_they_are_written() {
     assert_eq!(
         wrong("sensor.base.source.every = 3"),
         "rover.toml:1:20: sensor/base/source/every: is a component; its options are axis, filtering, gain, \
-         horizon, maximum_range, name, opaque, port, rate, retries, scale, timeout"
+         horizon, maximum_range, name, nick, opaque, port, rate, reach, retries, scale, timeout, tries"
     );
     assert_eq!(wrong("a = \nb = ]").lines().count(), 2, "every syntax error");
     assert_eq!(wrong("sensor = 3"), "rover.toml:1:1: sensor: there is no such setting; `--list` shows all");
@@ -240,6 +246,97 @@ fn a_parameter_is_held_against_the_options_that_are_bound_to_it() {
         error,
         "param/gain: sensor/base/source/every/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
     );
+    let error =
+        builder.set_parameter(narrow::param::gain, 1.5).expect_err("it takes as much as in a file").to_string();
+    assert_eq!(
+        error,
+        "param/gain is not set: sensor/base/source/every/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
+    );
+    builder.set_parameter(narrow::param::gain, 0.75).expect("the option takes it");
+    assert!(builder.settings().to_string().contains("gain = 0.75"));
+}
+
+/// An option of its sensor has the name of the estimator that is nested there.
+#[derive(Clone, Debug, Options)]
+pub(crate) struct CrowdedOptions {
+    #[option(default = Filtering::None)]
+    pub(crate) every: Filtering,
+}
+
+#[derive(Debug)]
+pub(crate) struct Crowded;
+
+impl Sensor for Crowded {
+    type Options = CrowdedOptions;
+    type Output = Number;
+    fn init(_: CrowdedOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::finished())
+    }
+}
+
+robot! {
+    robot Crowd;
+    link base {
+        sensor source: Crowded() { rate: 1 Hz; estimator every: Every(port = "/dev/null"); }
+    }
+}
+
+#[test]
+fn options_below_a_setting_of_the_same_name_are_listed_and_in_the_schema() {
+    let mut builder = Crowd::builder();
+    let listed = builder.settings().to_string();
+    assert!(listed.contains("[sensor.base.source]\nevery = \"None\"\n"), "{listed}");
+    assert!(listed.contains("[\"sensor/base/source/every\"]\n# Device file.\n"), "{listed}");
+    let file = listed
+        .replace("retries = 3", "retries = 4")
+        .replace("every = \"None\"", "every = { LowPass = { cutoff = 2.0 } }");
+    builder.set_from_toml("list", &file).expect("what is listed is read");
+    assert_eq!(builder.options(crowd::sensor::base::source).every, Filtering::LowPass { cutoff: 2.0 });
+    assert_eq!(builder.options(crowd::sensor::base::source::every).retries, 4);
+    let schema: serde_json::Value = serde_json::from_str(&Crowd::settings_schema()).expect("it is JSON");
+    let sensor = &schema["properties"]["sensor"]["properties"]["base"]["properties"]["source"]["properties"];
+    assert!(sensor["every"]["$ref"].is_string(), "{schema:#}");
+    assert_eq!(
+        schema["properties"]["sensor/base/source/every"]["properties"]["retries"]["maximum"], 8.0,
+        "{schema:#}"
+    );
+}
+
+#[test]
+fn an_option_that_has_a_value_by_default_can_be_none() {
+    let mut builder = Set::builder();
+    let options = builder.options(set::sensor::base::source::every);
+    (options.reach, options.tries, options.nick) = (None, None, None);
+    let listed = builder.settings().to_string();
+    assert!(listed.contains("reach = \"null\"\ntries = \"null\"\n# nick is not set\n"), "{listed}");
+    let mut other = Set::builder();
+    other.set_from_toml("list", &listed).expect("what is listed is read");
+    let options = other.options(set::sensor::base::source::every);
+    assert_eq!((options.reach, options.tries), (None, None));
+    other.set("sensor/base/source/every/nick", "null").expect("JSON has a null");
+    assert_eq!(other.options(set::sensor::base::source::every).nick, None);
+    other.set_from_toml("text", "sensor.base.source.every.nick = 'null'").expect("a text is one");
+    assert_eq!(other.options(set::sensor::base::source::every).nick.as_deref(), Some("null"));
+}
+
+#[test]
+fn of_many_unknown_names_the_first_get_hints() {
+    let text: String = (0..3000).map(|number| format!("[sensor.base.sorce.a{number}]\nport = 1\n")).collect();
+    let error = Set::builder().set_from_toml("many", &text).expect_err("there are no such names").to_string();
+    assert_eq!(error.lines().count(), 3000);
+    assert!(error.lines().next().is_some_and(|line| line.contains("; ")), "{error}");
+    assert!(error.lines().last().is_some_and(|line| line.ends_with("there is no such setting")), "{error}");
+}
+
+#[test]
+fn a_byte_order_mark_is_no_column_and_depth_is_no_panic() {
+    let wrong = |text: &str| Set::builder().set_from_toml("rover.toml", text).expect_err("it is wrong").to_string();
+    assert_eq!(wrong("\u{feff}a = 1"), "rover.toml:1:1: a: there is no such setting; `--list` shows all");
+    let error = wrong(&format!("sensor.base.source.every.axis = {}1", "[".repeat(10_000)));
+    assert!(error.starts_with("rover.toml:1:"), "{}", &error[..200.min(error.len())]);
 }
 
 /// Tables of which every key is a comment, as `--list` writes them, say nothing.
@@ -314,6 +411,9 @@ filtering = "None"
 # gain is bound to param/tuning/gain
 # horizon has a value that cannot be written
 # scale has a value that cannot be written
+reach = "1.5 m"
+tries = 2
+nick = "a"
 
 [param.tuning]
 # How much is believed.
@@ -338,6 +438,8 @@ fn the_schema_says_what_can_be_set() {
         r##""filtering":{"$ref":"#/$defs/Filtering","default":"None"}"##,
         r#""gain":{"type":"number","minimum":0.0,"maximum":1.0,"description":"How much is believed. In 0.0..=1.0.","default":0.5}"#,
         r#""$defs":{"Filtering":"#,
+        // Neither a number without a unit nor a text without a number.
+        r#""pattern":"^\\s*[-+]?([0-9][0-9_]*\\.?[0-9_]*|\\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?\\s*[^\\s0-9._+\\-eE].*$""#,
     ] {
         assert!(schema.contains(part), "{part} is not in {schema}");
     }
@@ -347,7 +449,7 @@ fn the_schema_says_what_can_be_set() {
         &parsed["properties"]["sensor"]["properties"]["base"]["properties"]["source"]["properties"]["every"];
     assert_eq!(
         options["properties"].as_object().map(serde_json::Map::len),
-        Some(10),
+        Some(13),
         "gain is bound, opaque is none"
     );
 }
@@ -360,7 +462,8 @@ proptest! {
     fn a_list_reads_back_to_the_same_settings(
         port in "\\PC{0,12}",
         range in 0.1..30.0_f64,
-        nanos in 0..4_000_000_000_000_000_u64,
+        seconds in any::<u64>(),
+        nanos in 0..1_000_000_000_u32,
         rate in proptest::num::f32::NORMAL,
         retries in 1..=8_u8,
         axis in [proptest::num::f64::NORMAL, proptest::num::f64::NORMAL, proptest::num::f64::NORMAL],
@@ -369,13 +472,17 @@ proptest! {
         limit in proptest::num::f64::NORMAL,
         count in any::<i64>(),
         label in ".{0,12}",
+        reach in proptest::option::of(proptest::num::f64::NORMAL),
+        tries in any::<Option<u8>>(),
     ) {
         let mut builder = Set::builder();
         let options = builder.options(set::sensor::base::source::every);
         options.port = port.into();
         options.maximum_range = range;
-        options.timeout = Duration::from_nanos(nanos);
+        options.timeout = Duration::new(seconds, nanos);
         options.rate = Some(rate);
+        options.reach = reach;
+        options.tries = tries;
         options.retries = retries;
         options.axis = axis;
         options.name = name;

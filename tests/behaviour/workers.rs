@@ -1,8 +1,8 @@
 //! Estimators with a thread of their own: they hang, fail, tick, are lost and stopped as any other, and hold nobody up.
 
 use crate::components::{Number, within};
-use bb_core::node::DropReason;
 use bb_core::prelude::*;
+use bb_core::run::DropReason;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 

@@ -1,4 +1,4 @@
-//! What `bb calibrate imu` prints and draws.
+//! The output and the plot of `bb calibrate imu`.
 
 use super::Calibration;
 use crate::plot::{Line, Panel, Picture};
@@ -8,7 +8,7 @@ use bb_estimators::calibration::{AccelerometerFit, GyroscopeFit, MagnetometerFit
 use std::fmt::Write;
 use std::path::Path;
 
-/// `key = value` lines, as TOML has them and as options in `robot!` take them, with what is known of each in comments.
+/// `key = value` lines, which are TOML and options of `robot!`, with their uncertainty in comments.
 pub(super) fn text(file: &Path, calibration: &Calibration) -> String {
     let rests = &calibration.rests;
     let seconds: f64 = rests.iter().map(|rest| (rest.end_ns - rest.start_ns) as f64 * 1e-9).sum();
@@ -84,12 +84,12 @@ const MEASURED: (u8, u8, u8) = (230, 150, 30);
 const CALIBRATED: (u8, u8, u8) = (0, 80, 170);
 const WANTED: (u8, u8, u8) = (110, 110, 110);
 
-/// Norms over time, measured and calibrated, beside what they should be.
+/// Norms over time, measured, calibrated and expected.
 pub(super) fn picture(file: &Path, samples: &[ImuSample], calibration: &Calibration, gravity: f64) -> Picture {
     let start_ns = samples.first().map_or(0, |sample| sample.time_ns);
     let seconds = |time_ns: i64| time_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let mut panels = Vec::new();
-    // One point a rest, at its middle: between rests the norm is that of the motion.
+    // One point per rest, at its middle: between rests the norm includes the acceleration of the motion.
     let rests = |norm: &dyn Fn(&Vector3<f64>) -> f64| -> Vec<(f64, Option<f64>)> {
         let rests = calibration.rests.iter();
         rests.map(|rest| (seconds(rest.start_ns / 2 + rest.end_ns / 2), Some(norm(&rest.force)))).collect()

@@ -1,40 +1,42 @@
-//! `bb convert`: recordings of other programs as bags.
+//! `bb convert`: converts recordings of other programs to bags.
 
 mod cells;
 mod columns;
+mod source;
 mod units;
 mod write;
 
+use crate::Progress;
 use cells::{Table, Times};
 use clap::Args;
 use columns::{Columns, Quantity};
 use std::path::{Path, PathBuf};
 
-/// Makes a ROS 2 bag of CSV: an IMU on /imu, its magnetometer on /mag, truth on /truth, and when it moves on /moving.
+/// Converts CSV to a ROS 2 bag: an IMU on /imu, its magnetometer on /mag, truth on /truth, and whether it moves on /moving.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// The CSV: with or without a head, cells separated by commas, semicolons or tabs.
+    /// The CSV, or `-` for standard input: with or without a head, with cells separated by commas, semicolons or tabs.
     #[arg(value_name = "INPUT.csv")]
     input: PathBuf,
-    /// The bag to write; must not exist.
+    /// The bag to write, which must not exist yet.
     #[arg(value_name = "OUT.mcap")]
     out: PathBuf,
-    /// Which columns hold what, in which unit: QUANTITY=COLUMNS[:UNIT], several with spaces.
+    /// What the columns contain, and in which unit: QUANTITY=COLUMNS[:UNIT], separated by spaces.
     #[arg(long, value_name = "MAP", required = true, num_args = 1.., value_delimiter = ' ', long_help = MAP)]
     columns: Vec<Quantity>,
     /// The rate of the samples in Hz, for a CSV without times.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// A CSV of its own for the truth.
+    /// A separate CSV with the truth.
     #[arg(long, value_name = "FILE.csv", requires = "truth_columns")]
     truth: Option<PathBuf>,
-    /// Which of its columns hold what.
+    /// What the columns of that CSV contain.
     #[arg(long, value_name = "MAP", requires = "truth", num_args = 1.., value_delimiter = ' ')]
     truth_columns: Vec<Quantity>,
 }
 
-const MAP: &str = "Which columns hold what, in which unit: QUANTITY=COLUMNS[:UNIT], several with spaces.
+const MAP: &str = "What the columns contain, and in which unit: QUANTITY=COLUMNS[:UNIT], separated by spaces.
 
   time    s (default), ms, us, ns
   gyr     angular velocity: rad/s (default), deg/s
@@ -44,8 +46,8 @@ const MAP: &str = "Which columns hold what, in which unit: QUANTITY=COLUMNS[:UNI
   pos     true position: m (default), cm, mm
   moving  0 or 1: errors are scored while it is 1
 
-COLUMNS are names or numbers from 1, with commas; 2-4 is 2,3,4, and gyr_* is gyr_x,gyr_y,gyr_z. A name may leave out a unit \
-in brackets at its end. A unit may have a factor: mag=12-14:50uT for a field in multiples of 50 µT.";
+COLUMNS are names, or numbers from 1, separated by commas; 2-4 means 2,3,4, and gyr_* means gyr_x,gyr_y,gyr_z. A unit in brackets \
+at the end of a name may be omitted. A unit may have a factor: mag=12-14:50uT for a field in multiples of 50 µT.";
 
 const EXAMPLES: &str = "Examples:
   bb convert log.csv log.mcap --columns time=t:us gyr=gyr_*:deg/s acc=acc_*:g mag=mag_*:uT
@@ -86,7 +88,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     let times = rate.map_or(Times::Column, Times::Rate);
     let mut table = Table::open(input, &columns, times).map_err(|fault| in_file(input, fault))?;
     let mut bag = write::Bag::create(out)?;
-    let progress = crate::Progress::new("converting", table.bytes());
+    let progress =
+        table.bytes().map_or_else(|| Progress::spinner("converting"), |bytes| Progress::new("converting", bytes));
     let mut truths = truths.into_iter().peekable();
     let written = loop {
         match table.next().map_err(|fault| in_file(input, fault)) {
@@ -115,7 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
             Ok(true)
         }
         Err(fault) => {
-            // It was made here, and is of no use.
+            // This run created it, and it is incomplete.
             let _ = std::fs::remove_file(out);
             Err(fault)
         }

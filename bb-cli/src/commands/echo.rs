@@ -15,10 +15,10 @@ pub(crate) struct Arguments {
     /// The topic.
     #[arg(value_name = "TOPIC")]
     topic: String,
-    /// Prints so many messages at most.
+    /// Prints at most this many messages.
     #[arg(long, value_name = "COUNT")]
     limit: Option<usize>,
-    /// Prints one object a line, with whole lists and the time of the log.
+    /// Prints one object per line, with complete lists and the log time.
     #[arg(long)]
     json: bool,
 }
@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
             }
             false => text(&value) + "---\n",
         };
-        // A reader that has read enough needs no more.
+        // The reader of a pipe may have read enough.
         if !crate::say(&printed)? {
             break;
         }

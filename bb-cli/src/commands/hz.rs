@@ -1,20 +1,20 @@
-//! `bb hz`: how often the messages of topics come.
+//! `bb hz`: the rates of topics.
 
 use crate::periods::Periods;
 use crate::table::aligned;
-use crate::topics::{TopicReader, find, log_ns, open};
+use crate::topics::{TopicReader, find, is_of_events, log_ns, open};
 use clap::Args;
 use serde::Serialize;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// Prints how often messages come: by the stamps in their headers, or by the log where they have none.
+/// Prints the rates of topics, by the stamps in the headers, or by the log times if there are none.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// A recording or a ROS 2 bag.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// The topics; all without one.
+    /// The topics; by default all.
     #[arg(value_name = "TOPIC")]
     topics: Vec<String>,
     /// Prints an array of objects instead of the table.
@@ -66,11 +66,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     }
     progress.finish();
 
-    let periods: Vec<_> = names
+    let periods: Vec<_> = topics
         .iter()
-        .map(|name| {
-            let times = times.get(*name).map_or(&[][..], |times| times);
-            (&***name, times.len(), Periods::of(times))
+        .map(|topic| {
+            let times = times.get(&topic.name).map_or(&[][..], |times| times);
+            // Two messages give no rate.
+            let periods = Periods::of(times).filter(|_| times.len() > 2);
+            (&*topic.name, times.len(), if is_of_events(topic) { periods.map(Periods::of_events) } else { periods })
         })
         .collect();
     crate::say(&if arguments.json { json(&periods)? } else { table(&periods) })?;
@@ -101,16 +103,17 @@ fn table(topics: &[(&str, usize, Option<Periods>)]) -> String {
         let ms = |value: fn(&Periods) -> f64| {
             periods.as_ref().map_or_else(|| "-".to_owned(), |periods| format!("{:.3} ms", value(periods) * 1e3))
         };
-        let rate = periods.as_ref().and_then(Periods::rate_hz);
+        let gaps =
+            periods.as_ref().filter(|periods| periods.regular != Some(false)).map(|periods| periods.gaps.len());
         rows.push([
             (*topic).to_owned(),
             messages.to_string(),
-            rate.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2} Hz")),
+            periods.as_ref().map_or_else(|| "-".to_owned(), |periods| periods.rate_in_words(2)),
             ms(|periods| periods.mean_s),
             ms(|periods| periods.min_s),
             ms(|periods| periods.max_s),
             ms(|periods| periods.std_s),
-            periods.as_ref().map_or_else(|| "-".to_owned(), |periods| periods.gaps.len().to_string()),
+            gaps.map_or_else(|| "-".to_owned(), |gaps| gaps.to_string()),
         ]);
     }
     aligned(&rows, 1, usize::MAX)

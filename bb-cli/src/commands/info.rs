@@ -1,17 +1,17 @@
 //! `bb info`: what is in recordings, and what looks wrong with them.
 
 mod date;
+mod quantities;
 mod remark;
 mod report;
 mod scan;
 mod times;
-mod units;
 
 use crate::files;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Prints what is in recordings: topics, types, rates, and what looks wrong: gaps, clocks, units, damage.
+/// Describes recordings: topics, types, rates, and what looks wrong (gaps, clocks, units, damage).
 #[derive(Debug, Args)]
 #[command(after_help = "Exit code: 0; 1 if a file is damaged or could not be read; 2 for a wrong use.")]
 pub(crate) struct Arguments {

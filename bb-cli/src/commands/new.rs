@@ -4,14 +4,14 @@ use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes a project that compiles and runs: a sensor and an estimator of its own, their test, a recording, logs.
+/// Creates a project that compiles and runs: its own sensor and estimator, tests, a recording, logs.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The name of the package, and of the folder, which must not exist.
+    /// The name of the package and of the folder, which must not exist yet.
     #[arg(value_name = "NAME", value_parser = package)]
     name: String,
-    /// The checkout of bb that the project depends on. [default: the one that this command was built in, while it is
-    /// there; else the published crates]
+    /// The checkout of bb that the project depends on. [default: the one that this command was built from, if it still
+    /// exists; else the published crates]
     #[arg(long, value_name = "FOLDER")]
     path: Option<PathBuf>,
 }
@@ -26,8 +26,9 @@ const FILES: [(&str, &str); 6] = [
     ("src/low_pass.rs", include_str!("../../templates/project/src/low_pass.rs")),
 ];
 
-/// The crates that a project depends on, and where they are in a checkout.
-const CRATES: [(&str, &str); 2] = [("bb-core", "bb-core"), ("bb-mcap", "integrations/mcap")];
+/// The crates that a project depends on, where they are in a checkout, and the features that it needs: Ctrl-C.
+const CRATES: [(&str, &str, &[&str]); 2] =
+    [("bb-core", "bb-core", &["signals"]), ("bb-mcap", "integrations/mcap", &[])];
 
 /// Where this command was built.
 const CHECKOUT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -38,7 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     let folder = Path::new(name);
     fs::create_dir(folder).map_err(|error| match error.kind() {
         std::io::ErrorKind::AlreadyExists => format!("{name} exists already; choose another name, or remove it"),
-        _ => format!("{name} cannot be made: {error}"),
+        _ => format!("{name} cannot be created: {error}"),
     })?;
     for (file, text) in FILES {
         let text = text.replace("{{name}}", name).replace("{{dependencies}}", &dependencies);
@@ -46,11 +47,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
         let made = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(&path, text));
         made.map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
     }
-    crate::say(&format!("made {name}; next: cd {name} && cargo run\n"))?;
+    crate::say(&format!("created {name}; next: cd {name} && cargo run\n"))?;
     Ok(true)
 }
 
-/// A name that cargo takes for a package and that does not hide a crate.
+/// Checks that cargo accepts the name for a package, and that it does not shadow a crate.
 fn package(name: &str) -> Result<String, String> {
     const TAKEN: [&str; 14] = [
         "test",
@@ -94,10 +95,10 @@ fn package(name: &str) -> Result<String, String> {
 /// The lines of the manifest.
 fn dependencies(path: Option<&Path>) -> Result<String, String> {
     let has_all =
-        |checkout: &Path| CRATES.iter().all(|(_, folder)| checkout.join(folder).join("Cargo.toml").is_file());
+        |checkout: &Path| CRATES.iter().all(|(_, folder, _)| checkout.join(folder).join("Cargo.toml").is_file());
     let checkout = match path {
         Some(path) if !has_all(path) => {
-            return Err(format!("{} is no checkout of bb: it has no bb-core/Cargo.toml", path.display()));
+            return Err(format!("{} is not a checkout of bb: it has no bb-core/Cargo.toml", path.display()));
         }
         Some(path) => Some(path),
         None => Some(Path::new(CHECKOUT)).filter(|checkout| has_all(checkout)),
@@ -105,10 +106,16 @@ fn dependencies(path: Option<&Path>) -> Result<String, String> {
     let checkout = checkout
         .map(|path| path.canonicalize().map_err(|error| format!("{}: {error}", path.display())))
         .transpose()?;
-    let lines = CRATES.map(|(name, folder)| match &checkout {
-        // A string of TOML between single quotes has no escapes, which paths of Windows need.
-        Some(checkout) => format!("{name} = {{ path = '{}' }}", checkout.join(folder).display()),
-        None => format!("{name} = \"{}\"", env!("CARGO_PKG_VERSION")),
+    let lines = CRATES.map(|(name, folder, features)| {
+        let from = match &checkout {
+            // A string of TOML between single quotes has no escapes, which paths of Windows need.
+            Some(checkout) => format!("path = '{}'", checkout.join(folder).display()),
+            None => format!("version = \"{}\"", env!("CARGO_PKG_VERSION")),
+        };
+        match features.is_empty() {
+            true => format!("{name} = {{ {from} }}"),
+            false => format!("{name} = {{ {from}, features = {features:?} }}"),
+        }
     });
     Ok(lines.join("\n"))
 }
@@ -135,7 +142,7 @@ mod tests {
     #[test]
     fn a_folder_that_is_no_checkout_is_refused() {
         let fault = dependencies(Some(Path::new("/"))).expect_err("is none");
-        assert_eq!(fault, "/ is no checkout of bb: it has no bb-core/Cargo.toml");
+        assert_eq!(fault, "/ is not a checkout of bb: it has no bb-core/Cargo.toml");
         assert!(dependencies(None).expect("is one").contains("bb-core = { path = '"));
     }
 }

@@ -5,7 +5,7 @@ mod units;
 
 use crate::periods::Periods;
 use crate::plot::{Line, PALETTE, Panel, Picture, Point};
-use crate::topics::{TopicReader, find, log_ns, open};
+use crate::topics::{TopicReader, find, is_named, log_ns, open};
 use bb_mcap::{Bag, Topic, Value};
 use clap::Args;
 use select::{Group, Path, groups};
@@ -13,17 +13,17 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Plots fields of messages over time, by the stamps in their headers, or by the log where they have none.
+/// Plots fields of messages over time, by the stamps in the headers, or by the log times if there are none.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
     /// A recording or a ROS 2 bag.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// What to plot: a field of a topic, all numbers in it, or all of a topic but header and covariances.
+    /// What to plot: a field of a topic with all numbers in it, or a whole topic except header and covariances.
     #[arg(value_name = "TOPIC[.FIELD]", required = true)]
     fields: Vec<String>,
-    /// The file to write, an SVG or a PNG; replaced if it exists.
+    /// The SVG or PNG file to write; an existing one is replaced.
     #[arg(long, value_name = "FILE", value_parser = picture)]
     out: PathBuf,
 }
@@ -33,7 +33,7 @@ const EXAMPLES: &str = "Examples:
   bb plot walk.mcap /imu.angular_velocity /imu.linear_acceleration.z --out imu.png
   bb plot walk.mcap '/scan.ranges[0]' --out front.svg";
 
-/// A picture of more is larger than most viewers open.
+/// Most viewers cannot open larger pictures.
 const MOST_PANELS: usize = 40;
 
 fn picture(file: &str) -> Result<PathBuf, String> {
@@ -75,11 +75,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     }
 }
 
+/// The topic and the path of a field in it. The name of a topic may have dots: the longest that fits is taken.
+fn topic_and_field<'a, 'b>(bag: &'a Bag, field: &'b str) -> Result<(&'a Topic, &'b str), String> {
+    let dots = field.match_indices('.').map(|(at, _)| at).chain([field.len()]);
+    let is_topic = |end: &usize| bag.topics().iter().any(|topic| is_named(topic, &field[..*end]));
+    let known = dots.rev().find(is_topic);
+    let (name, path) = match known {
+        Some(end) => (&field[..end], field[end..].trim_start_matches('.')),
+        None => field.split_once('.').unwrap_or((field, "")),
+    };
+    Ok((find(bag, name)?, path))
+}
+
 /// Finds the topic, and by its first message the fields.
 fn choose<'a>(bag: &'a Bag, field: &str) -> Result<Chosen<'a>, String> {
     let in_file = |fault: String| format!("{}: {fault}", bag.path().display());
-    let (name, path) = field.split_once('.').unwrap_or((field, ""));
-    let topic = find(bag, name)?;
+    let (topic, path) = topic_and_field(bag, field)?;
     let reader = TopicReader::new(topic).map_err(in_file)?;
     let mut messages = bag.messages_in_any_encoding(&[&topic.name]).map_err(|error| error.to_string())?;
     let first = messages.next().ok_or_else(|| in_file(format!("{} has no messages", topic.name)))?;

@@ -1,15 +1,15 @@
-//! `bb recover`: a whole file of what is before the break of a broken one.
+//! `bb recover`: saves the part of a damaged file before the break.
 
 use clap::Args;
 use std::path::PathBuf;
 
-/// Makes a whole file of what is before the break of a damaged one.
+/// Saves the part of a damaged file before the break to a complete file.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The damaged file, any MCAP.
+    /// The damaged MCAP file.
     #[arg(value_name = "BROKEN.mcap")]
     broken: PathBuf,
-    /// The file to write; must not exist.
+    /// The file to write, which must not exist yet.
     #[arg(value_name = "WHOLE.mcap")]
     whole: PathBuf,
 }

@@ -1,4 +1,4 @@
-//! What `--help` and `--list` print of filters and their parameters.
+//! Descriptions of filters and their parameters for `--help` and `--list`.
 
 use super::MAGNETOMETER;
 use bb_estimators::attitude::FilterParams;

@@ -31,7 +31,7 @@ impl Chosen {
     /// The filters with these settings.
     ///
     /// # Errors
-    /// A setting that is of none of them, a value that is refused, or a filter that has not so many axes.
+    /// No filter has the setting, a value is refused, or a filter does not have that many axes.
     pub fn all(filters: &[FilterParams], axes: Axes, settings: &[Setting]) -> Result<Vec<Self>, String> {
         for setting in settings {
             setting.check(filters)?;
@@ -95,12 +95,13 @@ impl Setting {
     }
 }
 
-/// What a misspelt word may have been meant to be.
+/// A suggestion for a misspelt word.
 pub(crate) fn near(word: &str, candidates: &[&str]) -> String {
     match nearest(word, candidates.iter().copied()) {
         Some(name) => format!("did you mean `{name}`?"),
         None if candidates.is_empty() => "there is none".into(),
-        None => format!("there is {}", candidates.join(", ")),
+        None if candidates.len() == 1 => format!("there is only {}", candidates.join("")),
+        None => format!("there are {}", candidates.join(", ")),
     }
 }
 
@@ -134,7 +135,7 @@ mod tests {
         assert_eq!(
             fault(&["gain=0.2"], &["madgwick", "complementary"]),
             "--set gain: madgwick, complementary has no parameter `gain`; \
-             there is beta, heading_time_constant, tilt_time_constant"
+             there are beta, heading_time_constant, tilt_time_constant"
         );
         assert_eq!(
             fault(&["madgwik.beta=0.2"], &["madgwick", "mekf"]),
@@ -142,7 +143,7 @@ mod tests {
         );
         assert_eq!(
             fault(&["mekf.beta=0.2"], &["madgwick"]),
-            "--set mekf.beta: no filter `mekf` is chosen; there is madgwick"
+            "--set mekf.beta: no filter `mekf` is chosen; there is only madgwick"
         );
     }
 

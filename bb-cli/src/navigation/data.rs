@@ -1,23 +1,30 @@
-//! A data set as CSV files with one prefix: `_imu`, `_keyframes`, `_truth`, `_init`, `_noise`, and whichever there are of
-//! `_vio`, `_anchor` and `_gps`.
+//! A drive or a flight: what was measured, and the truth.
 
-use bb_core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
+use bb_estimators::navigation::{AbsolutePose, BodyVelocity, GnssPosition, RelativePose, Start};
 use std::collections::HashMap;
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A drive or a flight: what was measured, and the truth at keyframes. The world is ENU, the body the IMU's.
 #[derive(Clone, Debug)]
 pub struct DataSet {
-    /// The prefix of its files.
+    /// The prefix of its files, or the bag.
     pub prefix: PathBuf,
     pub(crate) samples: Vec<Sample>,
     pub(crate) keyframes: Vec<Keyframe>,
+    /// What is known of the first keyframe.
     pub(crate) start: Start,
-    pub(crate) noise: Noise,
-    pub(crate) relative: HashMap<u64, Relative>,
-    pub(crate) anchors: HashMap<u64, Anchor>,
-    pub(crate) fixes: HashMap<u64, Fix>,
+    /// What the data set says of the IMU; none if it says nothing.
+    pub(crate) noise: Option<Noise>,
+    /// What was measured at keyframes, by their number.
+    pub(crate) relative: HashMap<u64, RelativePose>,
+    pub(crate) anchors: HashMap<u64, AbsolutePose>,
+    pub(crate) fixes: HashMap<u64, GnssPosition>,
+    pub(crate) velocities: HashMap<u64, BodyVelocity>,
+    /// Whether filters, too, use fixes where there are relative poses; smoothers always do.
+    pub(crate) fixes_beside_relative: bool,
+    /// The point of the body whose position the truth without an orientation tells, m.
+    pub(crate) antenna: Vector3<f64>,
 }
 
 /// Means over `dt` seconds: rad/s, m/s².
@@ -28,27 +35,24 @@ pub(crate) struct Sample {
     pub(crate) dt: f64,
 }
 
-/// An instant at which there is truth.
+/// An instant at which something was measured besides the IMU, or there is truth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Keyframe {
     pub(crate) time_s: f64,
     /// The first sample after it.
     pub(crate) sample: usize,
     pub(crate) scored: bool,
+    /// By a relative pose.
+    pub(crate) is_referred_to: bool,
+    pub(crate) truth: Option<Truth>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Truth {
     pub(crate) position: Vector3<f64>,
     /// Unknown on some drives.
     pub(crate) world_from_body: Option<UnitQuaternion<f64>>,
     pub(crate) velocity: Option<Vector3<f64>>,
-}
-
-/// What is known of the first keyframe, with standard deviations.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Start {
-    pub(crate) position: (Vector3<f64>, f64),
-    pub(crate) world_from_body: (UnitQuaternion<f64>, f64),
-    pub(crate) velocity: (Vector3<f64>, f64),
-    pub(crate) gyroscope_bias: (Vector3<f64>, f64),
-    pub(crate) accelerometer_bias: (Vector3<f64>, f64),
 }
 
 /// Densities of a data sheet, and gravity.
@@ -61,169 +65,20 @@ pub(crate) struct Noise {
     pub(crate) gravity: f64,
 }
 
-/// The pose at a keyframe relative to an earlier one.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Relative {
-    pub(crate) from: u64,
-    pub(crate) translation: (Vector3<f64>, f64),
-    pub(crate) rotation: (UnitQuaternion<f64>, f64),
-}
-
-/// The pose at a keyframe.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Anchor {
-    pub(crate) position: (Vector3<f64>, f64),
-    pub(crate) world_from_body: (UnitQuaternion<f64>, f64),
-}
-
-/// The position at a keyframe, with horizontal and vertical standard deviations.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Fix {
-    pub(crate) position: Vector3<f64>,
-    pub(crate) horizontal: f64,
-    pub(crate) vertical: f64,
-}
-
 impl DataSet {
-    /// Reads the files of a prefix, `folder/name` for `folder/name_imu.csv` and the others.
-    ///
-    /// # Errors
-    ///
-    /// Which file cannot be read, or in which line what is wrong.
-    pub fn read(prefix: &Path) -> Result<Self, String> {
-        let samples = Rows::read(prefix, "imu", 8)?;
-        let keyframes = Rows::read(prefix, "keyframes", 5)?;
-        let truth = Rows::read(prefix, "truth", 11)?;
-        let init = Rows::read(prefix, "init", 21)?;
-        let noise = Rows::read(prefix, "noise", 5)?;
-        let samples = samples.map(|row| {
-            let sample = Sample { angular_velocity: row.vector(1), specific_force: row.vector(4), dt: row.0[7] };
-            (sample.dt > 0.0).then_some(sample).ok_or("column dt must be positive")
-        })?;
-        let keyframes = keyframes.map(|row| {
-            let truth = truth.rows.get(row.index(3)?).ok_or("column truth_row is beyond the truth")?;
-            let sample = row.index(2)?;
-            if sample > samples.len() {
-                return Err("column imu_start is beyond the samples");
+    /// Notes which keyframes relative poses refer to.
+    pub(crate) fn referred(mut self) -> Self {
+        for relative in self.relative.values() {
+            let keyframe = usize::try_from(relative.keyframe).ok();
+            if let Some(keyframe) = keyframe.and_then(|index| self.keyframes.get_mut(index)) {
+                keyframe.is_referred_to = true;
             }
-            let known = |value: f64| value.is_finite();
-            Ok(Keyframe {
-                time_s: row.0[1],
-                sample,
-                scored: row.0[4] > 0.0,
-                position: truth.vector(1),
-                world_from_body: known(truth.0[4]).then(|| truth.orientation(4)),
-                velocity: known(truth.0[8]).then(|| truth.vector(8)),
-            })
-        })?;
-        if keyframes.len() < 2 || keyframes.windows(2).any(|pair| pair[0].sample > pair[1].sample) {
-            return Err(format!("{}_keyframes.csv: needs two keyframes or more, in order", prefix.display()));
         }
-        let start = init.first(|row| Start {
-            position: (row.vector(0), row.0[17]),
-            world_from_body: (row.orientation(3), row.0[16]),
-            velocity: (row.vector(7), row.0[18]),
-            gyroscope_bias: (row.vector(10), row.0[19]),
-            accelerometer_bias: (row.vector(13), row.0[20]),
-        })?;
-        let noise = noise.first(|row| Noise {
-            gyroscope: row.0[0],
-            gyroscope_bias: row.0[1],
-            accelerometer: row.0[2],
-            accelerometer_bias: row.0[3],
-            gravity: row.0[4],
-        })?;
-        let relative = Rows::read_if_there(prefix, "vio", 12)?.map(|row| {
-            let translation = (row.vector(3), row.0[11]);
-            let rotation = (row.orientation(6), row.0[10]);
-            Ok((row.index(1)? as u64, Relative { from: row.index(0)? as u64, translation, rotation }))
-        })?;
-        let anchors = Rows::read_if_there(prefix, "anchor", 11)?.map(|row| {
-            let position = (row.vector(2), row.0[9]);
-            Ok((row.index(0)? as u64, Anchor { position, world_from_body: (row.orientation(5), row.0[10]) }))
-        })?;
-        let fixes = Rows::read_if_there(prefix, "gps", 7)?.map(|row| {
-            let fix = Fix { position: row.vector(2), horizontal: row.0[5], vertical: row.0[6] };
-            Ok((row.index(0)? as u64, fix))
-        })?;
-        Ok(Self {
-            prefix: prefix.to_owned(),
-            samples,
-            keyframes,
-            start,
-            noise,
-            relative: relative.into_iter().collect(),
-            anchors: anchors.into_iter().collect(),
-            fixes: fixes.into_iter().collect(),
-        })
+        self
     }
 }
 
-/// The numbers of a file, a header row left out.
-struct Rows {
-    file: PathBuf,
-    rows: Vec<Row>,
-}
-
-struct Row(Vec<f64>);
-
-impl Rows {
-    fn read(prefix: &Path, what: &str, columns: usize) -> Result<Self, String> {
-        let rows = Self::read_if_there(prefix, what, columns)?;
-        if rows.rows.is_empty() {
-            return Err(format!("{}: there is no such file, or it has no row", rows.file.display()));
-        }
-        Ok(rows)
-    }
-
-    fn read_if_there(prefix: &Path, what: &str, columns: usize) -> Result<Self, String> {
-        let mut file = prefix.as_os_str().to_owned();
-        file.push(format!("_{what}.csv"));
-        let file = PathBuf::from(file);
-        let text = match std::fs::read_to_string(&file) {
-            Ok(text) => text,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Self { file, rows: Vec::new() }),
-            Err(error) => return Err(format!("{}: {error}", file.display())),
-        };
-        let mut rows = Vec::new();
-        for (index, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
-            let fault = |fault: String| format!("{}, line {}: {fault}", file.display(), index + 1);
-            let numbers: Result<Vec<f64>, _> = line.split(',').map(|cell| cell.trim().parse()).collect();
-            let numbers = numbers.map_err(|error| fault(format!("{error}")))?;
-            if numbers.len() < columns {
-                return Err(fault(format!("{} columns, but must be {columns}", numbers.len())));
-            }
-            rows.push(Row(numbers));
-        }
-        Ok(Self { file, rows })
-    }
-
-    fn map<T>(&self, read: impl Fn(&Row) -> Result<T, &'static str>) -> Result<Vec<T>, String> {
-        let located = |(index, row): (usize, &Row)| {
-            read(row).map_err(|fault| format!("{}, row {}: {fault}", self.file.display(), index + 1))
-        };
-        self.rows.iter().enumerate().map(located).collect()
-    }
-
-    fn first<T>(&self, read: impl Fn(&Row) -> T) -> Result<T, String> {
-        self.rows.first().map(read).ok_or_else(|| format!("{}: has no row", self.file.display()))
-    }
-}
-
-impl Row {
-    fn vector(&self, first: usize) -> Vector3<f64> {
-        Vector3::new(self.0[first], self.0[first + 1], self.0[first + 2])
-    }
-
-    /// w, x, y, z.
-    fn orientation(&self, first: usize) -> UnitQuaternion<f64> {
-        let [w, x, y, z] = [0, 1, 2, 3].map(|i| self.0[first + i]);
-        UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
-    }
-
-    fn index(&self, column: usize) -> Result<usize, &'static str> {
-        let number = self.0[column];
-        let is_index = (0.0..1e12).contains(&number) && number.fract() == 0.0;
-        is_index.then_some(number as usize).ok_or("an index is not a whole number")
-    }
+pub(crate) fn nanoseconds(seconds: f64) -> i64 {
+    // A cast saturates.
+    (seconds * 1e9).round() as i64
 }

@@ -1,11 +1,11 @@
 //! Plays a data set through a filter and scores it at the keyframes.
 
-use super::data::{DataSet, Keyframe};
+use super::data::{DataSet, Truth};
+use super::errors::Errors;
 use super::filters::{NavigationFilter, NavigationSetting};
-use super::measured::start;
 use super::player::{Known, Player};
-use bb_core::nalgebra::Vector6;
-use bb_estimators::navigation::nees;
+use super::trace::Trace;
+use bb_core::nalgebra::Vector3;
 
 /// Keyframes at the start that are not scored: a tenth of all, but not more than these.
 const MOST_LEFT_OUT: usize = 50;
@@ -14,13 +14,14 @@ const MOST_LEFT_OUT: usize = 50;
 /// filter, at the keyframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NavigationScore {
-    /// m.
+    /// m; NaN without truth.
     pub position_rmse_m: f64,
     /// Angle of the whole rotation, degrees; none where the truth has no orientation.
     pub orientation_rmse_deg: Option<f64>,
     /// m/s; none where the truth has no velocity.
     pub velocity_rmse_mps: Option<f64>,
-    /// Normalised estimation error squared, on average: 6 is consistent where the truth has an orientation, otherwise 3.
+    /// Normalised estimation error squared, on average: 6 is consistent where the truth has an orientation, otherwise 3; NaN
+    /// without truth.
     pub nees: f64,
     /// How many keyframes were scored.
     pub keyframes: usize,
@@ -66,12 +67,23 @@ pub fn evaluate_navigation(
     filter: &NavigationFilter,
     settings: &[NavigationSetting],
     window: usize,
+    progress: impl FnMut(),
+) -> Result<NavigationScore, String> {
+    play(data, filter, settings, window, None, progress)
+}
+
+/// The same; what happens on the way goes into the trace, if there is one.
+pub(crate) fn play(
+    data: &DataSet,
+    filter: &NavigationFilter,
+    settings: &[NavigationSetting],
+    window: usize,
+    mut trace: Option<&mut Trace>,
     mut progress: impl FnMut(),
 ) -> Result<NavigationScore, String> {
     let mut player = Player::new(filter, data, settings, window)?;
-    let first = data.keyframes.first().ok_or("no keyframe")?;
-    player.start(&start(data, first)).map_err(|error| format!("cannot start: {error}"))?;
-    let left_out = MOST_LEFT_OUT.min((data.keyframes.len() - 1) / 10);
+    player.start(&data.start).map_err(|error| format!("cannot start: {error}"))?;
+    let left_out = MOST_LEFT_OUT.min(data.keyframes.len().saturating_sub(1) / 10);
     let (mut newest, mut oldest) = (Sums::default(), Sums::default());
     let (mut propagation_s, mut samples) = (0.0, 0_usize);
     let (mut refused, mut allocations) = (0, 0);
@@ -83,29 +95,36 @@ pub fn evaluate_navigation(
         refused += step.refused;
         keyframe_ms.push(step.keyframe_s * 1e3);
         progress();
+        let known = if trace.is_some() || pair[1].scored { player.newest() } else { None };
+        if let Some(trace) = &mut trace {
+            trace.add(&pair[1], &known, &step.answers, data, k as u64);
+        }
         if k <= left_out {
             continue;
         }
         allocations += step.allocations;
-        if let Some(known) = player.newest().filter(|_| pair[1].scored) {
-            newest.add(&pair[1], &known)?;
+        let scored = |k: usize| {
+            let keyframe = data.keyframes.get(k).filter(|keyframe| keyframe.scored && k > left_out)?;
+            keyframe.truth.map(|truth| (keyframe.time_s, truth))
+        };
+        if let Some(((time_s, truth), known)) = scored(k).zip(known) {
+            newest.add(time_s, &truth, &data.antenna, &known)?;
         }
-        let scored = |k: usize| data.keyframes.get(k).filter(|keyframe| keyframe.scored && k > left_out);
-        if let Some((keyframe, known)) = player.oldest().and_then(|(k, known)| Some((scored(k)?, known))) {
-            oldest.add(keyframe, &known)?;
+        if let Some(((time_s, truth), known)) = player.oldest().and_then(|(k, known)| Some((scored(k)?, known))) {
+            oldest.add(time_s, &truth, &data.antenna, &known)?;
         }
-    }
-    if newest.keyframes == 0 {
-        return Err("no keyframe is scored".into());
     }
     keyframe_ms.sort_by(f64::total_cmp);
-    let percentile = |part: f64| keyframe_ms[((keyframe_ms.len() - 1) as f64 * part).round() as usize];
+    let percentile = |part: f64| {
+        let last = keyframe_ms.len().saturating_sub(1);
+        keyframe_ms.get((last as f64 * part).round() as usize).copied().unwrap_or(f64::NAN)
+    };
     let rms = |sum: f64, count: usize| (count > 0).then(|| (sum / count as f64).sqrt());
     Ok(NavigationScore {
         position_rmse_m: rms(newest.position, newest.keyframes).unwrap_or(f64::NAN),
         orientation_rmse_deg: rms(newest.orientation, newest.orientations).map(f64::to_degrees),
         velocity_rmse_mps: rms(newest.velocity, newest.velocities),
-        nees: newest.nees / newest.keyframes as f64,
+        nees: if newest.keyframes > 0 { newest.nees / newest.keyframes as f64 } else { f64::NAN },
         keyframes: newest.keyframes,
         position_smoothed_rmse_m: rms(oldest.position, oldest.keyframes),
         orientation_smoothed_rmse_deg: rms(oldest.orientation, oldest.orientations).map(f64::to_degrees),
@@ -127,23 +146,16 @@ fn resident_mb() -> Option<f64> {
 }
 
 impl Sums {
-    fn add(&mut self, truth: &Keyframe, estimate: &Known) -> Result<(), String> {
-        let covariance = &estimate.covariance;
-        let position = truth.position - estimate.position;
-        self.position += position.norm_squared();
+    fn add(&mut self, time_s: f64, truth: &Truth, antenna: &Vector3<f64>, estimate: &Known) -> Result<(), String> {
+        let error = Errors::between(truth, antenna, estimate);
+        self.position += error.position.norm_squared();
         self.keyframes += 1;
-        let normalised = match truth.world_from_body {
-            Some(orientation) => {
-                let rotation = (orientation * estimate.world_from_body.inverse()).scaled_axis();
-                self.orientation += rotation.norm_squared();
-                self.orientations += 1;
-                let error = Vector6::from_fn(|i, _| if i < 3 { position[i] } else { rotation[i - 3] });
-                nees(&error, covariance)
-            }
-            None => nees(&position, &covariance.fixed_view::<3, 3>(0, 0).into_owned()),
-        };
+        if let Some(rotation) = &error.rotation {
+            self.orientation += rotation.norm_squared();
+            self.orientations += 1;
+        }
         self.nees +=
-            normalised.ok_or_else(|| format!("at {} s: the covariance is not positive definite", truth.time_s))?;
+            error.nees().ok_or_else(|| format!("at {time_s} s: the covariance is not positive definite"))?;
         if let Some(velocity) = truth.velocity {
             self.velocity += (velocity - estimate.velocity).norm_squared();
             self.velocities += 1;

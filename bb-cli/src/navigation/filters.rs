@@ -2,7 +2,7 @@
 
 use super::data::DataSet;
 use crate::filters::parameters;
-use bb_estimators::navigation::{Aiding, EskfParams};
+use bb_estimators::navigation::{Aiding, EskfParams, NavigationOptions};
 use bb_estimators::params::Params;
 use std::str::FromStr;
 
@@ -64,20 +64,33 @@ impl FromStr for NavigationSetting {
         let (name, value) =
             text.split_once('=').ok_or("no `=` in it; write NAME=VALUE, as gyroscope_noise=1e-3")?;
         let setting = Self { name: name.trim().to_owned(), value: value.trim().to_owned() };
-        setting.apply(&mut EskfParams::default())?;
+        setting.apply(&mut EskfParams::default(), &mut NavigationOptions::default())?;
         Ok(setting)
     }
 }
 
+/// What is set of bags alone: where filters start, and the noise of what tells none.
+const OF_BAGS: [&str; 6] = [
+    "heading",
+    "heading_deviation",
+    "heading_from_course",
+    "gnss_deviation",
+    "odometry_deviation",
+    "pose_deviation",
+];
+
 impl NavigationSetting {
-    fn apply(&self, params: &mut EskfParams) -> Result<(), String> {
-        params.set(&self.name, &self.value).map_err(|error| error.to_string())
+    fn apply(&self, params: &mut EskfParams, options: &mut NavigationOptions) -> Result<(), String> {
+        let Self { name, value } = self;
+        let set = if OF_BAGS.contains(&&**name) { options.set(name, value) } else { params.set(name, value) };
+        set.map_err(|error| error.to_string())
     }
 }
 
 /// The parameters of all of them, for `--list`.
 pub(crate) fn listed() -> String {
-    parameters(&EskfParams::default(), |_| true)
+    let of_bags = parameters(&NavigationOptions::default(), |name| OF_BAGS.contains(&name));
+    format!("{}\nof bags:\n{of_bags}", parameters(&EskfParams::default(), |_| true))
 }
 
 impl NavigationFilter {
@@ -93,18 +106,35 @@ impl NavigationFilter {
 ///
 /// A parameter outside its range.
 pub(crate) fn params(data: &DataSet, settings: &[NavigationSetting]) -> Result<EskfParams, String> {
-    let mut params = EskfParams {
-        gyroscope_noise: data.noise.gyroscope,
-        gyroscope_bias_walk: data.noise.gyroscope_bias,
-        accelerometer_noise: data.noise.accelerometer,
-        accelerometer_bias_walk: data.noise.accelerometer_bias,
-        gravity: data.noise.gravity,
-        ..EskfParams::default()
-    };
+    let mut params = EskfParams::default();
+    if let Some(noise) = &data.noise {
+        params = EskfParams {
+            gyroscope_noise: noise.gyroscope,
+            gyroscope_bias_walk: noise.gyroscope_bias,
+            accelerometer_noise: noise.accelerometer,
+            accelerometer_bias_walk: noise.accelerometer_bias,
+            gravity: noise.gravity,
+            ..params
+        };
+    }
+    let mut of_bags = NavigationOptions::default();
     for setting in settings {
-        setting.apply(&mut params)?;
+        setting.apply(&mut params, &mut of_bags)?;
     }
     Ok(params)
+}
+
+/// The parameters of a filter on a bag, and those of what the bag does not tell.
+///
+/// # Errors
+///
+/// A parameter outside its range.
+pub(crate) fn bag_params(settings: &[NavigationSetting]) -> Result<(EskfParams, NavigationOptions), String> {
+    let (mut params, mut options) = (EskfParams::default(), NavigationOptions::default());
+    for setting in settings {
+        setting.apply(&mut params, &mut options)?;
+    }
+    Ok((params, options))
 }
 
 /// What a data set has besides the IMU.

@@ -1,66 +1,82 @@
 //! What a data set has measured at a keyframe.
 
-use super::data::{DataSet, Keyframe};
-use bb_estimators::navigation::{AbsolutePose, GnssPosition, Navigator, RelativePose, Start};
+use super::data::DataSet;
+use bb_estimators::navigation::{
+    AbsolutePose, BodyVelocity, Fused, GnssPosition, Navigator, Refusal, RelativePose,
+};
 
+/// Whatever there is, in the order in which it is fused.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measured {
     pub(crate) relative: Option<RelativePose>,
     pub(crate) anchor: Option<AbsolutePose>,
-    /// Whether there are relative poses at all.
-    has_relative: bool,
+    /// Whether a filter uses the fix.
+    filters_take_fixes: bool,
     pub(crate) fix: Option<GnssPosition>,
+    pub(crate) velocity: Option<BodyVelocity>,
+}
+
+/// A kind of measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sensor {
+    Relative,
+    Anchor,
+    Fix,
+    Velocity,
+}
+
+impl Sensor {
+    pub(crate) const ALL: [Self; 4] = [Self::Relative, Self::Anchor, Self::Fix, Self::Velocity];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Relative => "relative poses",
+            Self::Anchor => "poses",
+            Self::Fix => "fixes",
+            Self::Velocity => "velocities",
+        }
+    }
+
+    pub(crate) fn dimension(self) -> usize {
+        match self {
+            Self::Relative | Self::Anchor => 6,
+            Self::Fix | Self::Velocity => 3,
+        }
+    }
+}
+
+/// What became of the measurements at a keyframe, in the order of [`Sensor::ALL`].
+pub(crate) type Answers = [Option<Result<Fused, Refusal>>; 4];
+
+/// How many were refused.
+pub(crate) fn refused(answers: &Answers) -> u64 {
+    answers.iter().flatten().map(|answer| u64::from(answer.is_err())).sum()
 }
 
 impl Measured {
     pub(crate) fn at(data: &DataSet, keyframe: u64) -> Self {
-        let relative = data.relative.get(&keyframe);
-        let anchor = data.anchors.get(&keyframe);
-        let fix = data.fixes.get(&keyframe);
         Self {
-            relative: relative.map(|of| RelativePose::new(of.from, of.translation, of.rotation)),
-            anchor: anchor.map(|of| AbsolutePose::new(of.position, of.world_from_body)),
-            has_relative: !data.relative.is_empty(),
-            fix: fix.map(|of| GnssPosition::new(of.position, of.horizontal, of.vertical)),
+            relative: data.relative.get(&keyframe).copied(),
+            anchor: data.anchors.get(&keyframe).copied(),
+            filters_take_fixes: data.relative.is_empty() || data.fixes_beside_relative,
+            fix: data.fixes.get(&keyframe).copied(),
+            velocity: data.velocities.get(&keyframe).copied(),
         }
     }
 
-    /// Gives it to a filter, positions from satellites only where there are no relative poses at all; how much of it was
-    /// refused.
-    pub(crate) fn filter(&self, navigator: &mut Navigator) -> u64 {
-        let fix = self.fix.filter(|_| !self.has_relative);
+    /// Gives it to a filter, positions from satellites only where it uses them.
+    pub(crate) fn filter(&self, navigator: &mut Navigator) -> Answers {
+        let fix = self.fix.filter(|_| self.filters_take_fixes);
         Self { fix, ..*self }.all(navigator)
     }
 
-    /// Gives all of it to a filter; how much of it was refused.
-    pub(crate) fn all(&self, navigator: &mut Navigator) -> u64 {
-        let mut refused = 0;
-        if let Some(relative) = &self.relative {
-            refused += u64::from(navigator.relative_pose(relative).is_err());
-        }
-        if let Some(anchor) = &self.anchor {
-            refused += u64::from(navigator.absolute_pose(anchor).is_err());
-        }
-        if let Some(fix) = &self.fix {
-            refused += u64::from(navigator.gnss_position(fix).is_err());
-        }
-        refused
+    /// Gives all of it to a filter.
+    pub(crate) fn all(&self, navigator: &mut Navigator) -> Answers {
+        [
+            self.relative.map(|relative| navigator.relative_pose(&relative)),
+            self.anchor.map(|anchor| navigator.absolute_pose(&anchor)),
+            self.fix.map(|fix| navigator.gnss_position(&fix)),
+            self.velocity.map(|velocity| navigator.body_velocity(&velocity)),
+        ]
     }
-}
-
-/// What the data set says of its first keyframe.
-pub(crate) fn start(data: &DataSet, first: &Keyframe) -> Start {
-    let known = &data.start;
-    Start {
-        gyroscope_bias: known.gyroscope_bias.0,
-        gyroscope_bias_deviation: known.gyroscope_bias.1,
-        accelerometer_bias: known.accelerometer_bias.0,
-        accelerometer_bias_deviation: known.accelerometer_bias.1,
-        ..Start::at(nanoseconds(first.time_s), known.position, known.velocity, known.world_from_body)
-    }
-}
-
-pub(crate) fn nanoseconds(seconds: f64) -> i64 {
-    // A cast saturates.
-    (seconds * 1e9).round() as i64
 }

@@ -1,8 +1,8 @@
 //! A filter while a data set is played: what all of them are asked for.
 
-use super::data::{DataSet, Keyframe};
+use super::data::{DataSet, Keyframe, nanoseconds};
 use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
-use super::measured::{Measured, nanoseconds};
+use super::measured::{Answers, Measured, refused};
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{
     Estimate, FixedLagSmoother, ImuMean, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION,
@@ -34,6 +34,7 @@ pub(crate) struct Smoothed {
     gnss: Stream,
     poses: Stream,
     relative: Stream,
+    velocities: Stream,
 }
 
 /// What a filter says of a keyframe.
@@ -62,6 +63,7 @@ pub(crate) struct Step {
     pub(crate) propagation_s: f64,
     /// Of the heap, at the keyframe.
     pub(crate) allocations: u64,
+    pub(crate) answers: Answers,
 }
 
 impl Player {
@@ -83,8 +85,16 @@ impl Player {
             let smoother = Smoother::new(params).map_err(|error| error.to_string())?;
             // As in a bank: fixes are not gated.
             let gnss = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
-            let (poses, relative) = (Stream::default(), Stream::default());
-            Ok(Self::Smoother(Box::new(Smoothed { smoother, twin, learnt: None, gnss, poses, relative })))
+            let gated = Stream::default();
+            Ok(Self::Smoother(Box::new(Smoothed {
+                smoother,
+                twin,
+                learnt: None,
+                gnss,
+                poses: gated,
+                relative: gated,
+                velocities: gated,
+            })))
         };
         match filter.kind {
             Kind::Bank => navigator(true).map(Self::Filter),
@@ -141,8 +151,11 @@ impl Player {
         step.propagation_s = began.elapsed().as_secs_f64();
         match self {
             Self::Filter(navigator) => {
-                step.refused += Measured::at(data, k as u64).filter(navigator);
-                navigator.set_keyframe(k as u64);
+                step.answers = Measured::at(data, k as u64).filter(navigator);
+                step.refused += refused(&step.answers);
+                if to.is_referred_to {
+                    navigator.set_keyframe(k as u64);
+                }
                 let _ = navigator.estimate();
                 step.keyframe_s = began.elapsed().as_secs_f64();
             }
@@ -201,34 +214,34 @@ impl Smoothed {
                 let _ = twin.propagate(&ImuMean { time_ns: nanoseconds(time_s), angular_velocity, specific_force });
             }
             measured.all(twin);
-            twin.set_keyframe(k);
+            if to.is_referred_to {
+                twin.set_keyframe(k);
+            }
         }
         let began = Instant::now();
-        let mut result = Ok(0);
+        let mut result = Ok(Answers::default());
         let counted = allocation_counter::measure(|| result = self.keyframe(&measured, k));
         step.keyframe_s = began.elapsed().as_secs_f64();
         step.allocations = counted.count_total;
-        step.refused += result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?;
+        step.answers = result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?;
+        step.refused += refused(&step.answers);
         self.learn(Some(k));
         Ok(())
     }
 
-    /// All that is done at a keyframe; how much was refused.
-    fn keyframe(&mut self, measured: &Measured, k: u64) -> Result<u64, Refusal> {
-        let mut refused = 0;
-        self.smoother.add_keyframe(k)?;
-        if let Some(relative) = measured.relative {
-            refused += u64::from(self.smoother.add(&mut self.relative, k, relative).is_err());
-        }
-        if let Some(anchor) = measured.anchor {
-            refused += u64::from(self.smoother.add(&mut self.poses, k, anchor).is_err());
-        }
-        if let Some(fix) = measured.fix {
-            refused += u64::from(self.smoother.add(&mut self.gnss, k, fix).is_err());
-        }
-        self.smoother.update()?;
-        let _ = (self.smoother.estimate(), self.smoother.pose_covariance());
-        Ok(refused)
+    /// All that is done at a keyframe.
+    fn keyframe(&mut self, measured: &Measured, k: u64) -> Result<Answers, Refusal> {
+        let smoother = &mut self.smoother;
+        smoother.add_keyframe(k)?;
+        let answers = [
+            measured.relative.map(|relative| smoother.add(&mut self.relative, k, relative)),
+            measured.anchor.map(|anchor| smoother.add(&mut self.poses, k, anchor)),
+            measured.fix.map(|fix| smoother.add(&mut self.gnss, k, fix)),
+            measured.velocity.map(|velocity| smoother.add(&mut self.velocities, k, velocity)),
+        ];
+        smoother.update()?;
+        let _ = (smoother.estimate(), smoother.pose_covariance());
+        Ok(answers)
     }
 
     /// Takes the noise that the filters have found, if what it has is implausible beside that. Then it takes their estimate as

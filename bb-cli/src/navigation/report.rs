@@ -13,10 +13,10 @@ pub(crate) type Scored = (PathBuf, &'static str, NavigationScore);
 struct Object {
     file: String,
     filter: &'static str,
-    position_rmse_m: f64,
+    position_rmse_m: Option<f64>,
     orientation_rmse_deg: Option<f64>,
     velocity_rmse_mps: Option<f64>,
-    nees: f64,
+    nees: Option<f64>,
     keyframes: usize,
     position_smoothed_rmse_m: Option<f64>,
     orientation_smoothed_rmse_deg: Option<f64>,
@@ -28,14 +28,19 @@ struct Object {
     rss_mb: Option<f64>,
 }
 
+/// What is NaN without truth.
+fn known(value: f64) -> Option<f64> {
+    Some(value).filter(|value| value.is_finite())
+}
+
 pub(crate) fn json(scores: &[Scored]) -> Result<String, String> {
     let object = |(file, filter, score): &Scored| Object {
         file: file.display().to_string(),
         filter,
-        position_rmse_m: score.position_rmse_m,
+        position_rmse_m: known(score.position_rmse_m),
         orientation_rmse_deg: score.orientation_rmse_deg,
         velocity_rmse_mps: score.velocity_rmse_mps,
-        nees: score.nees,
+        nees: known(score.nees),
         keyframes: score.keyframes,
         position_smoothed_rmse_m: score.position_smoothed_rmse_m,
         orientation_smoothed_rmse_deg: score.orientation_smoothed_rmse_deg,
@@ -67,10 +72,10 @@ pub(crate) fn table(scores: &[Scored]) -> String {
     for (file, filter, score) in scores {
         let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
         let cells = [
-            number(Some(score.position_rmse_m)),
+            number(known(score.position_rmse_m)),
             number(score.orientation_rmse_deg),
             number(score.velocity_rmse_mps),
-            format!("{:.2}", score.nees),
+            known(score.nees).map_or_else(|| "-".to_owned(), |nees| format!("{nees:.2}")),
             score.keyframes.to_string(),
             format!("{:.2}", score.us_per_imu_sample),
             format!("{:.4}", score.ms_per_keyframe_p50),

@@ -19,8 +19,8 @@ pub struct Line {
 }
 
 impl Line {
-    /// A line through the values, interrupted where there is none. Of points too many to show, the smallest and the
-    /// largest stay.
+    /// A line through the values, interrupted where they are missing. If there are more points than pixels, the smallest and
+    /// the largest are kept.
     pub fn new(label: impl Into<String>, colour: Colour, width: u32, points: &[Point]) -> Self {
         let thinned = thin(points, MOST_POINTS / 2, |points, thinned| {
             let low = extreme(points, |a, b| a < b);
@@ -42,6 +42,14 @@ impl Line {
             width,
             runs: runs(&thinned, |last, value| (value - last).abs() >= 180.0),
         }
+    }
+
+    /// A line from point to point, in their order; of points too many to show, one in so many stays.
+    pub fn path(label: impl Into<String>, colour: Colour, width: u32, points: &[(f64, f64)]) -> Self {
+        let points: Vec<Point> =
+            points.iter().map(|(x, y)| (*x, Some(*y).filter(|_| x.abs() <= LARGEST))).collect();
+        let thinned = thin(&points, MOST_POINTS, |points, thinned| thinned.push(points[0]));
+        Self { label: label.into(), colour, width, runs: runs(&thinned, |_, _| false) }
     }
 
     /// A line through errors: of points too many to show, the largest stay.

@@ -5,6 +5,7 @@
 
 #[path = "../../../integrations/mcap/tests/bags/common.rs"]
 pub mod bags;
+pub mod poses;
 
 use bags::ros::*;
 use bb_core::nalgebra::{UnitQuaternion, Vector3 as V};
@@ -45,13 +46,35 @@ pub struct Walk {
     pub error: f64,
     /// The gyroscope's, rad/s.
     pub bias: f64,
+    /// What it turns about.
+    pub axis: V<f64>,
+    /// Of the gyroscope, the accelerometer and the magnetometer, as parts of the SI unit.
+    pub units: [f64; 3],
+    /// How the truth is written, of `world_from_body`.
+    pub written: fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>,
+    /// The magnetometer's topic is there, and nothing on it.
+    pub silent: bool,
 }
 
 impl Default for Walk {
     fn default() -> Self {
         let names = ["/imu", "/mag", "/truth", "/moving"];
         let (magnetometer, truth, moving) = (true, true, true);
-        Self { samples: 300, magnetometer, truth, moving, names, twice: false, lost: 0..0, error: 0.0, bias: 0.0 }
+        Self {
+            samples: 300,
+            magnetometer,
+            truth,
+            moving,
+            names,
+            twice: false,
+            lost: 0..0,
+            error: 0.0,
+            bias: 0.0,
+            axis: V::z(),
+            units: [1.0; 3],
+            written: |truth| truth,
+            silent: false,
+        }
     }
 }
 
@@ -82,26 +105,29 @@ impl Walk {
             let time = START_NS + PERIOD_NS * u64::from(i);
             let turning = i > REST;
             let angle = f64::from(i.saturating_sub(REST)) * RATE * 0.01;
-            let rotation = UnitQuaternion::from_axis_angle(&V::z_axis(), angle);
+            let rotation = UnitQuaternion::from_scaled_axis(self.axis * angle);
             let header = Header { stamp: stamp(time), frame_id: "imu".into() };
             if self.moving && (i == 0 || i == REST + 1) {
                 maker.bytes_at(topics[3], time, &bags::little(&Bool { data: turning }));
             }
+            let vector = |v: V<f64>, unit: f64| Vector3 { x: v.x * unit, y: v.y * unit, z: v.z * unit };
+            let rate = V::z() * self.bias + self.axis * if turning { RATE } else { 0.0 };
+            let force = rotation.inverse() * V::new(0.0, 0.0, 9.81);
             let imu = Imu {
                 header: header.clone(),
-                angular_velocity: Vector3 { z: self.bias + if turning { RATE } else { 0.0 }, ..Vector3::default() },
-                linear_acceleration: Vector3 { z: 9.81, ..Vector3::default() },
+                angular_velocity: vector(rate, self.units[0]),
+                linear_acceleration: vector(force, self.units[1]),
                 ..Imu::default()
             };
             maker.bytes_at(topics[0], time, &bags::little(&imu));
-            if self.magnetometer {
+            if self.magnetometer && !self.silent {
                 let field = rotation.inverse() * V::new(0.0, 2e-5, -4e-5);
-                let magnetic_field = Vector3 { x: field.x, y: field.y, z: field.z };
+                let magnetic_field = vector(field, self.units[2]);
                 let field = MagneticField { header: header.clone(), magnetic_field, ..MagneticField::default() };
                 maker.bytes_at(topics[1], time, &bags::little(&field));
             }
             if self.truth {
-                let turned = UnitQuaternion::from_axis_angle(&V::z_axis(), self.error) * rotation;
+                let turned = (self.written)(UnitQuaternion::from_axis_angle(&V::z_axis(), self.error) * rotation);
                 let mut orientation = Quaternion { x: turned.i, y: turned.j, z: turned.k, w: turned.w };
                 if self.lost.contains(&i) {
                     orientation = Quaternion { x: f64::NAN, y: f64::NAN, z: f64::NAN, w: f64::NAN };

@@ -1,15 +1,13 @@
 //! The contract of an actuator.
 
-use super::{ActuatorContext, Fault, Options, Permit};
-use crate::event::Safety;
+use super::{ActuatorContext, Fault, Options};
 use crate::message::{Payload, Stamped};
-use std::fmt;
 
 /// Moves a joint.
 ///
-/// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. Simulation, motion
-/// and kinematics are later work of this framework; what is here starts and stops an actuator with the robot, makes it
-/// safe when the robot is disarmed, and lets everybody see what it was told, at its path.
+/// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. The
+/// framework starts and stops it with the robot, makes it safe when the robot is disarmed, and publishes the commands it was
+/// given at its path. There is no motion planning yet.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -53,21 +51,21 @@ use std::fmt;
     note = "implement `bb_core::Actuator` for it"
 )]
 pub trait Actuator: Sized + Send + 'static {
-    /// What `Name(…)` in `robot!` fills.
+    /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
-    /// What it is told.
+    /// The commands it takes.
     type Command: Payload;
 
     /// Opens the device, without moving anything.
     ///
     /// # Errors
-    /// What keeps it from starting; the robot then does not start.
+    /// Any error keeps the robot from starting.
     fn init(options: Self::Options, context: &ActuatorContext) -> Result<Self, Fault>;
 
-    /// Does what it is told.
+    /// Carries out a command.
     ///
     /// # Errors
-    /// Why it cannot go on; the fault is reported, and the actuator is made safe and restarted.
+    /// Any error: it is reported, and the actuator is made safe and restarted.
     fn handle_command(&mut self, command: &Stamped<Self::Command>) -> Result<(), Fault>;
 
     /// Makes it safe. Called whenever the robot is disarmed, and before a restart; it must return within 5 s.
@@ -88,44 +86,4 @@ pub trait Actuator: Sized + Send + 'static {
 
     /// Closes the device before the actuator stops or is restarted; not called after a panic.
     fn terminate(&mut self) {}
-}
-
-/// Why an actuator has not carried out a command.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ActuatorError {
-    /// The robot is not armed.
-    NotArmed(Safety),
-    /// The command that sent this has ended or was cancelled: its handles are dead.
-    Cancelled,
-    /// The command holds a NaN or an infinity.
-    NonFinite,
-    /// The actuator has failed and does not run.
-    Stopped,
-    /// The actuator has failed at this command.
-    Failed(String),
-    /// The actuator's own code has sent this, and would wait for itself.
-    Inside,
-}
-
-impl fmt::Display for ActuatorError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotArmed(safety) => write!(f, "the robot is not armed ({safety})"),
-            Self::Cancelled => f.write_str("the command that sent this has ended or was cancelled"),
-            Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
-            Self::Stopped => f.write_str("the actuator has failed and does not run"),
-            Self::Failed(message) => write!(f, "the actuator failed: {message}"),
-            Self::Inside => {
-                f.write_str("the actuator's own code cannot send to it, since it would wait for itself")
-            }
-        }
-    }
-}
-
-impl std::error::Error for ActuatorError {}
-
-/// An actuator that takes commands of type `T`.
-pub(crate) trait Accepts<T>: Send + Sync {
-    fn accept(&self, command: T, permit: &Permit) -> Result<(), ActuatorError>;
 }

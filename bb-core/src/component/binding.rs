@@ -34,7 +34,7 @@ impl<O: Options> Binding<O> {
     }
 }
 
-/// What an option may be that is bound to a parameter of type `T`.
+/// A type that an option bound to a parameter of type `T` can have.
 #[diagnostic::on_unimplemented(
     message = "an option of type `{Self}` cannot be bound to a parameter of type `{T}`",
     label = "is a parameter of type `{T}`"

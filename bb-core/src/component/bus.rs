@@ -1,10 +1,9 @@
 //! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
 
 use super::host::Host;
-use super::{Accepts, ActuatorError, Fault, Permit};
+use super::{Accepts, ActuatorLink, CommandInfo, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
-use crate::message::codec::Shape;
 use crate::message::nearest::nearest_path;
 use crate::message::{Payload, Stamp};
 use crate::pubsub::{
@@ -14,31 +13,12 @@ use crate::pubsub::{
 use crate::time::Clock;
 use std::fmt;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// Topics, actuators, parameters, commands and states, by path. Clones are the same.
 #[derive(Clone)]
 pub struct Bus {
     host: Arc<dyn Host>,
     permit: Permit,
-}
-
-/// A command as tools see it.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct CommandInfo {
-    /// Its path: `command/go`.
-    pub path: &'static str,
-    /// What its arguments are made of.
-    pub arguments: Shape,
-    /// What its result is made of.
-    pub output: Shape,
-    /// The states in which it may start; none: as its role has it.
-    pub allowed_states: Option<&'static [&'static str]>,
-    /// Its category.
-    pub category: &'static str,
-    /// How long it may take.
-    pub timeout: Option<Duration>,
 }
 
 impl Bus {
@@ -49,7 +29,7 @@ impl Bus {
     /// Subscribes to what is published at `path`.
     ///
     /// # Errors
-    /// Nothing is published there, or another payload; the nearest path is named.
+    /// Nothing is published there, or another payload is; the error names the nearest path.
     pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
         let subscribed = self.with_topics(|topics| {
             let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
@@ -78,15 +58,15 @@ impl Bus {
         subscribed.unwrap_or_else(|| DynamicSubscription::new([], select, payloads, overflow))
     }
 
-    /// A publisher at a path of the caller's own, such as `mission/progress`: names of letters, digits, `_`, `-` and `.` with
-    /// `/` between them. Those who subscribed to everything, or to a subtree with this path, receive what it publishes
-    /// without doing anything. A second publisher at the same path shares it.
+    /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits, `_`, `-` and `.` with
+    /// `/` between them. Existing subscriptions to everything, or to a subtree with this path, receive what it
+    /// publishes. A second publisher at the same path shares it.
     ///
-    /// Paths are for names that recur: a robot has at most 1024 of them, of which those that nobody uses any more make room.
+    /// A robot has at most 1024 such paths; the oldest that is no longer used makes room for a new one.
     ///
     /// # Errors
     /// The path is that of a declared publisher or of a topic that every robot has, it has another payload already, it is
-    /// malformed, too many are in use, the robot has stopped, or the command whose bus this is has ended.
+    /// malformed, too many are in use, the robot has stopped, or the command that this bus belongs to has ended.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
         self.check_permit()?;
         let topic = self.host.registry().topic(path)?;
@@ -117,7 +97,7 @@ impl Bus {
             return Err(Fault::new(format!("no actuator is at `{path}`{hint}")));
         };
         match accepts.downcast::<Arc<dyn Accepts<T>>>() {
-            Ok(accepts) => Ok(ActuatorLink { accepts: *accepts, permit: self.permit.clone() }),
+            Ok(accepts) => Ok(ActuatorLink::new(*accepts, self.permit.clone())),
             Err(_) => Err(Fault::new(format!("`{path}` takes commands of type `{takes}`, not `{}`", T::NAME))),
         }
     }
@@ -135,7 +115,7 @@ impl Bus {
     /// Sets the parameter at `path`.
     ///
     /// # Errors
-    /// What was expected, or that the command whose bus this is has been cancelled.
+    /// The value is not accepted, or the command that this bus belongs to has been cancelled.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
         self.host.set_parameter(path, value.into(), &self.permit)
     }
@@ -151,7 +131,7 @@ impl Bus {
     /// There is no such command, the arguments do not fit its shape, or it is refused.
     pub fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault> {
         self.check_permit()?;
-        self.host.start_command(path, arguments)
+        self.host.start_command(path, arguments, &self.permit)
     }
 
     /// The operational state.
@@ -186,10 +166,7 @@ impl Bus {
     }
 
     fn check_permit(&self) -> Result<(), Fault> {
-        if self.permit.is_valid() {
-            return Ok(());
-        }
-        Err(Fault::new("the command that asks for this has ended or was cancelled"))
+        self.permit.check()
     }
 
     /// All topics; none if the robot is gone.
@@ -205,7 +182,7 @@ impl Bus {
     }
 }
 
-/// Publishing at a path of one's own.
+/// Publishes at a path of the caller's choice.
 struct OwnPath {
     host: Arc<dyn Host>,
     permit: Permit,
@@ -234,65 +211,5 @@ impl Gate for OwnPath {
 impl fmt::Debug for Bus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Bus").finish_non_exhaustive()
-    }
-}
-
-/// Sends commands of type `T` to one actuator.
-pub struct ActuatorLink<T: Payload> {
-    accepts: Arc<dyn Accepts<T>>,
-    permit: Permit,
-}
-
-impl<T: Payload> ActuatorLink<T> {
-    /// Sends a command; it has been carried out when this returns.
-    ///
-    /// # Errors
-    /// The robot is not armed, the command holds a NaN, the actuator has failed, or the command that obtained this link has
-    /// ended.
-    pub fn send(&self, command: T) -> Result<(), ActuatorError> {
-        self.accepts.accept(command, &self.permit)
-    }
-}
-
-impl<T: Payload> fmt::Debug for ActuatorLink<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("ActuatorLink").finish_non_exhaustive()
-    }
-}
-
-/// A command that was started by path. Dropping it lets the command run on.
-pub struct DynamicExecution(Box<dyn AnyExecution>);
-
-/// An execution whose result is given as JSON.
-pub(crate) trait AnyExecution: Send {
-    fn try_result(&self) -> Option<Result<String, Fault>>;
-    fn wait_timeout(&self, timeout: Duration) -> Option<Result<String, Fault>>;
-    fn cancel(&self);
-}
-
-impl DynamicExecution {
-    pub(crate) fn new(execution: impl AnyExecution + 'static) -> Self {
-        Self(Box::new(execution))
-    }
-
-    /// The result as JSON, if the command has ended and nobody has taken it yet.
-    pub fn try_result(&self) -> Option<Result<String, Fault>> {
-        self.0.try_result()
-    }
-
-    /// Waits for the result as JSON, `timeout` at most; none after that.
-    pub fn wait_timeout(&self, timeout: Duration) -> Option<Result<String, Fault>> {
-        self.0.wait_timeout(timeout)
-    }
-
-    /// Cancels the command.
-    pub fn cancel(&self) {
-        self.0.cancel();
-    }
-}
-
-impl fmt::Debug for DynamicExecution {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("DynamicExecution").finish_non_exhaustive()
     }
 }

@@ -15,15 +15,14 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-/// A short task that a robot is told to do: arm, stop, move to a place.
+/// A short task of a robot: arm, stop, move to a place.
 ///
-/// It is an `async` function on the robot's own clock: [`CommandContext::sleep`] takes virtual time on a robot that is
-/// simulated. It may await anything else too. A command is cancelled by dropping its future, so undo in a `Drop` what must
-/// be undone. From the moment it is cancelled, what it has obtained through its context refuses to act, even if its code
+/// It is an `async` function on the robot's own clock: in a simulation, [`CommandContext::sleep`] takes virtual time. It may
+/// await anything else too. A command is cancelled by dropping its future, so what must be undone is undone in a `Drop`. From the moment it is cancelled, what it has obtained through its context refuses to act, even if its code
 /// blocks and has not noticed yet.
 ///
-/// Commands are the world outside as far as a journal is concerned: it holds what they did and how they ended, and a replay
-/// does not run them.
+/// To a journal, commands are part of the outside world: it holds what they did and how they ended, and a replay does not
+/// run them.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -49,9 +48,9 @@ use std::time::Duration;
     note = "implement `bb_core::Command` for it"
 )]
 pub trait Command: Sized + Send + 'static {
-    /// What `Name(…)` in `robot!` fills.
+    /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
-    /// What its caller gives; derive [`Payload`] for it, so that tools can start the command with arguments from JSON. A
+    /// The arguments its caller gives; derive [`Payload`] for it, so that tools can start the command with arguments from JSON. A
     /// command that a health transition starts gets the default.
     type Arguments: Field + Default + Send + 'static;
     /// Its result.
@@ -63,7 +62,7 @@ pub trait Command: Sized + Send + 'static {
     /// Runs it.
     ///
     /// # Errors
-    /// Why it has failed; reported to the caller and on its topic.
+    /// Any error: it is reported to the caller and on the command's topic.
     fn run(
         options: Self::Options,
         arguments: Self::Arguments,
@@ -101,7 +100,7 @@ impl<T> Outcome<T> {
     }
 }
 
-/// What a running command is given, and what it may do.
+/// What a running command is given, and how it reaches the robot.
 #[derive(Clone, Debug)]
 pub struct CommandContext {
     pub(crate) name: &'static str,
@@ -139,13 +138,13 @@ impl CommandContext {
     }
 
     /// Whether it was cancelled or has timed out: what it sends is refused from then on. A command that blocks its thread
-    /// asks now and then.
+    /// should check it from time to time.
     pub fn is_cancelled(&self) -> bool {
         !self.permit.is_valid()
     }
 
-    /// Registers what makes hardware safe when the robot is disarmed while this command runs: it is forgotten when that has
-    /// ended. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one
+    /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs; it is removed when the
+    /// command ends. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one
     /// that fails or takes longer leads to the safety state `error`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.hooks.add(Arc::new(hook));
@@ -175,7 +174,7 @@ impl CommandContext {
     /// Sets the parameter at `path`.
     ///
     /// # Errors
-    /// What was expected, or that the command has been cancelled.
+    /// The value is not accepted, or the command has been cancelled.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
         self.host.set_parameter(path, value.into(), &self.permit)
     }

@@ -87,7 +87,7 @@ impl Context {
     /// The identity where both are the same frame, and where the input has no frame (a robot-level sensor).
     ///
     /// # Errors
-    /// No input of that name is declared, or a moving joint lies between, whose position nobody computes yet. (Only an
+    /// No input of that name is declared, or there is a moving joint between them, whose position nothing computes yet. (Only an
     /// estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span one.)
     ///
     /// [`Estimator::HANDLES_MOVING_JOINTS`]: super::Estimator::HANDLES_MOVING_JOINTS
@@ -102,7 +102,7 @@ impl Context {
         self.now
     }
 
-    /// Registers what makes hardware safe when the robot is disarmed; see [`SafetyLink::on_disarm`].
+    /// Registers a callback that makes hardware safe when the robot is disarmed; see [`SafetyLink::on_disarm`].
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.safety.on_disarm(hook);
     }
@@ -112,7 +112,7 @@ impl Context {
         self.safety.hardware_error(message);
     }
 
-    /// The same for later, from any callback: keep it.
+    /// The same for use in later callbacks: keep it.
     pub fn safety(&self) -> SafetyLink {
         self.safety.clone()
     }
@@ -130,7 +130,7 @@ impl Context {
     /// The same for the driver, or for the only input.
     ///
     /// # Errors
-    /// A moving joint lies between.
+    /// There is a moving joint between them.
     pub fn frame_from_driver(&self) -> Result<Isometry3<f64>, Fault> {
         let driver = self.declaration.inputs.iter().find(|declared| declared.driver);
         driver.map_or_else(|| Ok(Isometry3::identity()), transform_of)
@@ -141,7 +141,7 @@ fn transform_of(input: &InputDeclaration) -> Result<Isometry3<f64>, Fault> {
     let transform = input.frame_from_input.ok_or_else(|| {
         let name = input.name;
         Fault::new(format!(
-            "a moving joint lies between the input `{name}` and the output, and its position is not known"
+            "there is a moving joint between the input `{name}` and the output, and its position is not known"
         ))
     })?;
     Ok(transform.isometry())
@@ -174,16 +174,16 @@ impl ComponentContext {
         self.host.clock()
     }
 
-    /// Whether the robot has been told to stop: a component that waits for its device gives up its wait then.
+    /// Whether the robot is stopping: a component that waits for its device should then stop waiting.
     pub fn is_stopping(&self) -> bool {
         self.host.is_stopping()
     }
 
-    /// Registers what makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches a laser off. All
+    /// Registers a callback that makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches a laser off. All
     /// callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that fails or takes longer
     /// leads to the safety state `error`. A restart of the component replaces what it registered before.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
-        self.host.on_disarm(self.path, Arc::new(hook));
+        self.host.on_disarm(self.path, None, Arc::new(hook));
     }
 
     /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
@@ -243,8 +243,8 @@ impl SensorContext {
         period_s(self.declaration)
     }
 
-    /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; none if a
-    /// moving joint lies between, or the sensor has no frame.
+    /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; `None` if
+    /// one of the joints moves, or the sensor has no frame.
     pub fn root_from_frame(&self) -> Option<Isometry3<f64>> {
         self.declaration.root_from_frame.map(|transform| transform.isometry())
     }

@@ -41,27 +41,27 @@ use super::{Context, Fault, Info, Inputs, Options, Outputs, Request, RequestCode
     note = "implement `bb_core::Estimator` for it"
 )]
 pub trait Estimator: Sized + Send + 'static {
-    /// What `Name(…)` in `robot!` fills.
+    /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// A payload, or a struct of several inputs.
     type Input: Inputs;
     /// A payload, or a struct of several outputs.
     type Output: Outputs;
 
-    /// Whether it asks for the joints' positions itself, so that its inputs may span moving joints.
+    /// Whether it obtains the joints' positions itself, so that its inputs may span moving joints.
     const HANDLES_MOVING_JOINTS: bool = false;
 
     /// Makes it, at the start and at every restart.
     ///
     /// # Errors
-    /// What keeps it from starting: at the start, the robot then does not start; at a restart, it is tried again later.
-    /// A [`Fault::skip`] leaves it out and lets the robot start.
+    /// At the start, any error keeps the robot from starting, except [`Fault::skip`], which leaves the estimator out; at a
+    /// restart, it is tried again later.
     fn init(options: Self::Options, context: &Context) -> Result<Self, Fault>;
 
     /// Handles one message, or the snapshot of all inputs when the driver has arrived.
     ///
     /// # Errors
-    /// Why it cannot go on; the fault is reported, and the estimator is restarted with fresh state.
+    /// Any error: it is reported, and the estimator is restarted with fresh state.
     fn handle_input(&mut self, input: <Self::Input as Inputs>::View<'_>) -> Result<Reply<Self::Output>, Fault>;
 
     /// Handles a timer, a tick or a timeout that it has asked for. What it emits is stamped with the time now.
@@ -73,7 +73,7 @@ pub trait Estimator: Sized + Send + 'static {
         Ok(Reply::none())
     }
 
-    /// Goes on with work of which it has asked to do more, before anything else happens to it.
+    /// Continues work that it has asked to continue, before anything else happens to it.
     ///
     /// # Errors
     /// As for [`handle_input`](Self::handle_input).
@@ -104,14 +104,14 @@ pub trait Estimator: Sized + Send + 'static {
     label = "no `HandleCall<{Q}>`"
 )]
 pub trait HandleCall<Q>: Estimator {
-    /// What it answers.
+    /// Its answer.
     type Response;
 
     /// How a journal holds these requests, so that a replay makes them again: `Some(RequestCodec::bytes())` for a request
     /// that derives [`Payload`](crate::Payload). By default the journal holds only what they made the estimator emit.
     const RECORD: Option<RequestCodec<Q>> = None;
 
-    /// Answers, and may emit outputs beside.
+    /// Answers, and may emit outputs as well.
     ///
     /// # Errors
     /// As for [`handle_input`](Estimator::handle_input); the caller is told as well.
@@ -129,14 +129,14 @@ pub trait HandleCast<Q>: Estimator {
     /// See [`HandleCall::RECORD`].
     const RECORD: Option<RequestCodec<Q>> = None;
 
-    /// Takes it.
+    /// Handles the request.
     ///
     /// # Errors
     /// As for [`handle_input`](Estimator::handle_input).
     fn handle_cast(&mut self, request: Q) -> Result<Reply<Self::Output>, Fault>;
 }
 
-/// What a callback gives back: outputs or none, and whether the estimate has diverged.
+/// The result of a callback: outputs, if any, and whether the estimate has diverged.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use]
 pub struct Reply<O> {
@@ -156,13 +156,13 @@ impl<O> Reply<O> {
         Self { output: Some(output), diverged: None, request: None }
     }
 
-    /// Reports that the estimate is not to be trusted, and why. Outputs go out all the same.
+    /// Reports that the estimate is not to be trusted, and why. Outputs are published all the same.
     pub fn diverged(mut self, reason: &'static str) -> Self {
         self.diverged = Some(reason);
         self
     }
 
-    /// Asks for a timer, a tick, a timeout or a continue as well. One request a reply: the last one holds.
+    /// Asks for a timer, a tick, a timeout or a continue as well. A reply has one request: the last one wins.
     pub fn and(mut self, request: Request) -> Self {
         self.request = Some(request);
         self

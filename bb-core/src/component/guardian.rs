@@ -1,20 +1,20 @@
 //! What any component can do for the safety of the robot.
 
-use super::{Fault, Permit};
+use super::Fault;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Makes hardware safe.
 pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
 
 /// Keeps disarm callbacks and takes note of hardware errors; the runtime implements it.
 pub(crate) trait Guardian: Send + Sync {
-    /// Adds a callback of the component at `path`; its number.
-    fn on_disarm(&self, path: &'static str, hook: DisarmHook) -> u64;
+    /// Adds a callback of the component at `path`, or of that execution of the command there, which must not have ended.
+    fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook);
     fn hardware_error(&self, path: &'static str, message: String);
 }
 
-/// Registers disarm callbacks and reports hardware errors, for a component whose later calls are given no context: an
+/// Registers disarm callbacks and reports hardware errors, for a component whose later calls get no context: an
 /// estimator keeps the one that [`Context::safety`](super::Context::safety) gives. Clones are the same.
 #[derive(Clone)]
 pub struct SafetyLink {
@@ -28,12 +28,12 @@ impl SafetyLink {
         Self { path, guardian }
     }
 
-    /// Registers what makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
+    /// Registers a callback that makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
     /// own, and must return within 5 s; one that fails or takes longer leads to the safety state `error`. A restart of the
     /// component replaces what it registered before.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         if let Some(guardian) = &self.guardian {
-            guardian.on_disarm(self.path, Arc::new(hook));
+            guardian.on_disarm(self.path, None, Arc::new(hook));
         }
     }
 
@@ -56,27 +56,17 @@ impl fmt::Debug for SafetyLink {
 pub(crate) struct OwnHooks {
     path: &'static str,
     guardian: Arc<dyn Guardian>,
-    permit: Permit,
-    numbers: Arc<Mutex<Vec<u64>>>,
+    execution: u64,
 }
 
 impl OwnHooks {
-    /// `numbers` are those of its callbacks, which are removed when the execution ends.
-    pub(crate) fn new(
-        path: &'static str,
-        guardian: Arc<dyn Guardian>,
-        permit: Permit,
-        numbers: Arc<Mutex<Vec<u64>>>,
-    ) -> Self {
-        Self { path, guardian, permit, numbers }
+    pub(crate) fn new(path: &'static str, guardian: Arc<dyn Guardian>, execution: u64) -> Self {
+        Self { path, guardian, execution }
     }
 
     /// Nothing happens once the execution has ended.
     pub(crate) fn add(&self, hook: DisarmHook) {
-        let mut numbers = self.numbers.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.permit.is_valid() {
-            numbers.push(self.guardian.on_disarm(self.path, hook));
-        }
+        self.guardian.on_disarm(self.path, Some(self.execution), hook);
     }
 
     pub(crate) fn hardware_error(&self, message: String) {

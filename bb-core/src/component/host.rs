@@ -1,8 +1,7 @@
 //! The robot as its components see it.
 
 use super::guardian::Guardian;
-use super::{Fault, Permit};
-use crate::component::bus::{CommandInfo, DynamicExecution};
+use super::{CommandInfo, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::message::Origin;
@@ -36,7 +35,7 @@ pub(crate) trait Host: Guardian {
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
     fn actuators(&self) -> Vec<&'static str>;
     fn commands(&self) -> Vec<CommandInfo>;
-    fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault>;
+    fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault>;
 }
 
 impl fmt::Debug for dyn Host {

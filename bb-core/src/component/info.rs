@@ -2,17 +2,17 @@
 
 use std::time::Duration;
 
-/// What an estimator asks for beside its outputs: from a callback with [`Reply::and`](super::Reply::and), from `init`
+/// What an estimator asks for in addition to its outputs: from a callback with [`Reply::and`](super::Reply::and), from `init`
 /// with [`Context::request`](super::Context::request). Nothing is due sooner than a microsecond after it was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
-    /// [`handle_continue`](super::Estimator::handle_continue) with this number, before anything else happens to it. A million
-    /// in a row stop it: nobody else would ever be served.
+    /// [`handle_continue`](super::Estimator::handle_continue) with this number, before anything else happens to it. After a million
+    /// in a row it is stopped, since nothing else could run.
     Continue(u32),
-    /// [`Info::Timeout`], if nothing else happens to it for so long.
+    /// [`Info::Timeout`], if nothing else happens to it for this long.
     Timeout(Duration),
-    /// [`Info::Timer`] with the number, once, so long from now. One of the same number that is still to come is replaced.
+    /// [`Info::Timer`] with the number, once, after this time. A pending one of the same number is replaced.
     Timer(u32, Duration),
     /// [`Info::Tick`] at a fixed rate from now on; a period of zero ends it.
     Tick(Duration),

@@ -14,7 +14,7 @@ use std::ops::Deref;
 /// What an estimator takes.
 ///
 /// An estimator of one input names the payload: `type Input = Imu;`, and its `handle_input` gets `&Stamped<Imu>`. One of
-/// several inputs derives a struct whose fields are the inputs by name; an `Option` says that the estimator can do
+/// several inputs derives a struct whose fields are the inputs by name; an `Option` says that the estimator can run
 /// without it.
 ///
 /// ```
@@ -32,8 +32,8 @@ use std::ops::Deref;
 /// }
 /// ```
 ///
-/// The estimator names it with the lifetime `'static`, `type Input = PoseInputs<'static>;`. Where that is missing rustc
-/// proposes a lifetime of the implementation, which does not compile either.
+/// The estimator names it with the lifetime `'static`, `type Input = PoseInputs<'static>;`. Without it, rustc
+/// suggests a lifetime parameter on the implementation, which does not compile either.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be the input of an estimator",
     label = "neither a payload nor a struct of inputs",
@@ -45,7 +45,7 @@ pub trait Inputs: 'static {
     /// The last known message of each input.
     #[doc(hidden)]
     type Cache: Default + Send + 'static;
-    /// The field that a nested estimator's sensor feeds: the only one that the estimator cannot do without.
+    /// The field that a nested estimator's sensor feeds: the only required one.
     #[doc(hidden)]
     type Nested: TakenAt<Self>;
     /// The inputs by name; none if the input is a single payload.
@@ -61,7 +61,7 @@ pub trait Inputs: 'static {
 pub struct InputField {
     /// Its name.
     pub name: &'static str,
-    /// Whether the estimator can do without it.
+    /// Whether the estimator can run without it.
     pub optional: bool,
 }
 
@@ -236,7 +236,7 @@ impl<T: Payload> Slot<T> {
             .then_some(SyncMiss { input: declaration.index, age_nanos: Some(age_nanos) })
     }
 
-    /// The message, if it has arrived and is not too old for a driver of `time`; from then on it counts as seen.
+    /// Returns the message if it has arrived and is not too old for a driver of `time`, and marks it as seen.
     pub fn take(&self, time: MonotonicTime) -> Option<Input<'_, T>> {
         let message = self.message.as_ref()?;
         let is_too_old = self.declaration?.is_too_old(time.nanos_since(message.monotonic_time));

@@ -1,5 +1,6 @@
 //! Whether the handles of a command still work.
 
+use super::Fault;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -21,6 +22,15 @@ impl Permit {
         if let Some(is_valid) = &self.0 {
             is_valid.store(false, Ordering::SeqCst);
         }
+    }
+
+    /// # Errors
+    /// It was revoked.
+    pub(crate) fn check(&self) -> Result<(), Fault> {
+        if self.is_valid() {
+            return Ok(());
+        }
+        Err(Fault::new("the command that asks for this has ended or was cancelled"))
     }
 
     pub(crate) fn is_valid(&self) -> bool {

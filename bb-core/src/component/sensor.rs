@@ -44,7 +44,7 @@ use crate::time::MonotonicTime;
     note = "implement `bb_core::Sensor` for it"
 )]
 pub trait Sensor: Sized + Send + 'static {
-    /// What `Name(…)` in `robot!` fills.
+    /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// What it publishes.
     type Output: Payload;
@@ -52,20 +52,20 @@ pub trait Sensor: Sized + Send + 'static {
     /// Opens the device.
     ///
     /// # Errors
-    /// What keeps it from starting; the robot then does not start.
+    /// Any error keeps the robot from starting.
     fn init(options: Self::Options, context: &SensorContext) -> Result<Self, Fault>;
 
     /// Takes one reading. `now` is the time of the call.
     ///
-    /// A read that waits must come back now and then with [`Reading::nothing`], so that the robot can stop.
+    /// A read that waits must return [`Reading::nothing`] from time to time, so that the robot can stop.
     ///
     /// # Errors
-    /// Why there is no reading: the device is unplugged, say. The fault is reported and the sensor is restarted, after a
+    /// There is no reading, because the device is unplugged, for example. The fault is reported and the sensor is restarted, after a
     /// backoff of at most a second, for as long as the robot runs; nothing else is restarted. A [`Fault::permanent`]
     /// leaves it stopped.
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
 
-    /// When it is to be read first; none: at once. A recording gives the stamp of its first message: virtual time
+    /// When it is read first; `None` means at once. A recording gives the stamp of its first message: virtual time
     /// starts at the earliest of all.
     fn starts_at(&self) -> Option<MonotonicTime> {
         None

@@ -15,7 +15,7 @@ use crate::time::MonotonicTime;
     note = "implement `bb_core::Service` for it"
 )]
 pub trait Service: Sized + Send + 'static {
-    /// What `Name(…)` in `robot!` fills.
+    /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// What it publishes at its path: its state, a diagnosis.
     type Output: Payload;

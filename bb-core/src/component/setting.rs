@@ -3,52 +3,12 @@
 //! An option can be of any type. Which of its values can be written in a file is found out by its type, at compile time: a
 //! quantity with a unit, a value with a JSON form ([`Field`]), or a text.
 
-use super::{FromQuantity, OptionField, Options};
+use super::{FromQuantity, OptionField};
 use crate::declaration::unit::{Quantity, dimension_name, si_unit};
 use crate::message::Field;
 use crate::message::codec::{Shape, from_json, to_json};
-use std::any::Any;
 use std::ffi::OsStr;
 use std::marker::PhantomData;
-
-/// The options of one component, whatever its type.
-pub trait AnyOptions: Any + Send {
-    /// See [`Options::FIELDS`].
-    fn fields(&self) -> &'static [OptionField];
-    /// The option number `index` of [`AnyOptions::fields`].
-    fn setting(&mut self, index: usize) -> Option<Box<dyn Setting + '_>>;
-    /// See [`Options::validate`].
-    fn validate(&self) -> Result<(), String>;
-    /// A copy, to be changed and put back by [`AnyOptions::replace`].
-    fn copy(&self) -> Box<dyn AnyOptions>;
-    /// Takes over a copy.
-    fn replace(&mut self, copy: Box<dyn AnyOptions>);
-}
-
-impl<O: Options> AnyOptions for O {
-    fn fields(&self) -> &'static [OptionField] {
-        O::FIELDS
-    }
-
-    fn setting(&mut self, index: usize) -> Option<Box<dyn Setting + '_>> {
-        Options::setting(self, index)
-    }
-
-    fn validate(&self) -> Result<(), String> {
-        Options::validate(self)
-    }
-
-    fn copy(&self) -> Box<dyn AnyOptions> {
-        Box::new(self.clone())
-    }
-
-    fn replace(&mut self, copy: Box<dyn AnyOptions>) {
-        let copy: Box<dyn Any> = copy;
-        if let Ok(copy) = copy.downcast() {
-            *self = *copy;
-        }
-    }
-}
 
 /// One option of a component.
 pub trait Setting {
@@ -156,12 +116,20 @@ struct QuantitySlot<'a, T> {
 impl<T: FromQuantity> Setting for QuantitySlot<'_, T> {
     fn set(&mut self, json: &str) -> Result<(), String> {
         let Some(dimension) = self.field.dimension else { return Err("states no unit".to_owned()) };
+        if json == "null"
+            && let Some(none) = T::none()
+        {
+            *self.slot = none;
+            return Ok(());
+        }
         let value = quantity(json, dimension.exponents)?;
-        let slot = T::from_quantity(value);
+        let text = text_of(json);
+        let number = text.trim().strip_suffix(&si_unit(dimension.exponents)).map(str::trim_end);
+        let slot = number.and_then(T::from_exact).unwrap_or_else(|| T::from_quantity(value));
         // A `Duration` is not negative, and neither endless nor finer than a nanosecond.
         let held = slot.to_quantity().unwrap_or(f64::NAN);
         if (held - value).abs() > 1e-6 * value.abs() {
-            return Err(format!("cannot be {}", text_of(json)));
+            return Err(format!("cannot be {text}"));
         }
         *self.slot = slot;
         Ok(())
@@ -169,10 +137,11 @@ impl<T: FromQuantity> Setting for QuantitySlot<'_, T> {
 
     fn value(&self) -> Option<String> {
         let unit = si_unit(self.field.dimension?.exponents);
-        match self.slot.to_quantity() {
-            Some(value) if value.is_finite() => Some(format!("\"{value} {unit}\"")),
-            Some(_) => None,
-            None => Some("null".to_owned()),
+        match (self.slot.to_quantity(), self.slot.to_exact()) {
+            (Some(_), Some(digits)) => Some(format!("\"{digits} {unit}\"")),
+            (Some(value), None) if value.is_finite() => Some(format!("\"{value} {unit}\"")),
+            (Some(_), None) => None,
+            (None, _) => Some("null".to_owned()),
         }
     }
 

@@ -4,11 +4,12 @@ use super::effects::Effects;
 use super::hooks;
 use super::machine::IDLE;
 use super::step::Step;
-use super::system::{Control, Disarming, Limit, Phase, State};
+use super::system::{Control, Disarming, Limit, NumberedHook, Phase, State};
 use crate::component::{DisarmHook, Guardian, Permit};
 use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// How long disarm callbacks may take.
@@ -43,83 +44,77 @@ impl State {
 impl Control {
     /// Arms the robot, unless it is in `error` or stops. Waits until cancelled commands are gone.
     pub(crate) fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
+        if self.0.mode == Mode::Replay {
+            return Err(ArmError::Replay);
+        }
+        let disarms = self.lock().disarms;
         if !permit.is_valid() {
             return Err(ArmError::Cancelled);
         }
-        match self.0.mode {
-            Mode::Real => {
-                // If it is in vain, the entry finds them still there.
-                self.wait_until(ARM_WITHIN, |state| {
-                    state.machine.safety != Safety::Disarmed || !state.has_lingering() || state.is_stopping
-                });
-            }
-            Mode::Virtual => self.drop_cancelled(),
-            Mode::Replay => {}
+        if self.0.mode == Mode::Real {
+            // If it is in vain, the entry finds them still there.
+            self.wait_until(ARM_WITHIN, |state| {
+                state.machine.safety != Safety::Disarmed
+                    || !state.has_lingering()
+                    || state.is_stopping
+                    || state.disarms != disarms
+            });
+        } else {
+            self.drop_cancelled();
         }
-        let mut step = self.step();
-        // A command may have been cancelled while it waited.
-        if !permit.is_valid() {
+        let step = self.step();
+        // The command may have been cancelled while this waited, or the robot disarmed.
+        if !permit.is_valid() || step.state.disarms != disarms {
             return Err(ArmError::Cancelled);
         }
         step.line(Event::Arm);
-        let result = step.may_arm();
-        if result.is_ok() && step.state.machine.safety == Safety::Disarmed {
-            step.state.machine.safety = Safety::Armed;
-            step.state.machine.resting = IDLE;
-        }
-        step.finish();
-        result
+        step.arm()
+    }
+
+    /// In a replay: somebody asked for the robot to be armed.
+    pub(crate) fn replay_arm(&self) {
+        // Whether it succeeds follows from the state.
+        let _ = self.step().arm();
     }
 
     /// Disarms the robot: commands are cancelled and the disarm callbacks run. If not everything could be made safe, the
-    /// safety state is `error`, which `force` leaves even if something still fails.
+    /// safety state is `error`, which `force` leaves even if something still fails. Of a robot that is disarmed, what would
+    /// arm it is cancelled.
     pub(crate) fn disarm(&self, force: bool) -> Result<(), DisarmError> {
-        let mut step = self.step();
-        if step.state.is_stopped() {
-            return step.state.last_disarm.clone();
+        if self.0.mode == Mode::Replay {
+            return Err(DisarmError::Replay);
         }
-        let (generation, is_new) = match step.state.machine.safety {
-            Safety::Error if !force => return Err(DisarmError::Error),
-            Safety::Disarmed if !force => return Ok(()),
-            Safety::Disarming => (step.state.generation, false),
-            Safety::Armed | Safety::Disarmed | Safety::Error => {
-                step.line(Event::Disarm { force });
-                let generation = step.begin_disarming(None, None, force);
-                (generation, true)
-            }
-        };
-        if !is_new {
-            // Somebody else disarms it: wait for the same callbacks.
-            step.line(Event::Disarm { force });
-            if let Some(disarming) = &mut step.state.disarming {
-                disarming.force |= force;
-            }
-        }
-        step.finish();
-        match self.0.mode {
-            // A callback must not wait for itself.
-            Mode::Real | Mode::Virtual if hooks::is_waited_for(self.id()) => return Err(DisarmError::Callback),
-            Mode::Real => drop(self.wait_until(DISARM_WITHIN + MARGIN, |state| !state.is_disarming(generation))),
-            Mode::Virtual => while self.run_pending_hooks() {},
-            Mode::Replay => {}
-        }
-        let state = self.lock();
-        if state.is_disarming(generation) { Err(DisarmError::Unfinished) } else { state.last_disarm.clone() }
-    }
-
-    /// In a replay: disarms as the journal has it.
-    pub(crate) fn replay_disarm(&self, force: bool) {
         let mut step = self.step();
         match step.state.machine.safety {
-            _ if step.state.is_stopped() => {}
-            Safety::Error if !force => {}
-            Safety::Disarmed if !force => {}
-            Safety::Disarming => {
-                if let Some(disarming) = &mut step.state.disarming {
-                    disarming.force |= force;
-                }
+            Safety::Error if step.state.is_stopped() && step.state.last_disarm.is_ok() => {
+                return Err(DisarmError::Error);
             }
-            _ => drop(step.begin_disarming(None, None, force)),
+            _ if step.state.is_stopped() => return step.state.last_disarm.clone(),
+            Safety::Error if !force => return Err(DisarmError::Error),
+            _ => {}
+        }
+        step.line(Event::Disarm { force });
+        step.disarm(force);
+        let disarming = step.state.disarming.as_ref();
+        let waits_for = disarming.map(|disarming| (disarming.generation, Arc::clone(&disarming.outcome)));
+        step.finish();
+        let Some((generation, outcome)) = waits_for else { return Ok(()) };
+        if hooks::is_waited_for(self.id()) {
+            return Err(DisarmError::Callback);
+        }
+        if self.0.mode == Mode::Real {
+            self.wait_until(DISARM_WITHIN + MARGIN, |state| !state.is_disarming(generation));
+        } else {
+            while self.run_pending_hooks() {}
+        }
+        outcome.get().cloned().unwrap_or(Err(DisarmError::Unfinished))
+    }
+
+    /// In a replay: somebody asked for the robot to be disarmed.
+    pub(crate) fn replay_disarm(&self, force: bool) {
+        let mut step = self.step();
+        if !step.state.is_stopped() {
+            step.disarm(force);
         }
         step.finish();
     }
@@ -169,15 +164,56 @@ impl Control {
         step.finish();
     }
 
-    /// Remembers what makes hardware safe.
-    fn remember(&self, path: &'static str, hook: DisarmHook, is_kept: bool) -> u64 {
-        let mut state = self.lock();
-        if state.has_ended {
-            drop(state);
-            crate::fault::discard(hook);
-            return 0;
+    /// Remembers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
+    /// for the last time, it is run at once.
+    fn remember(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook, is_kept: bool) {
+        let mut step = self.step();
+        if let Some(id) = execution
+            && !step.state.executions.iter().any(|other| other.id == id && matches!(other.phase, Phase::Running))
+        {
+            drop(step);
+            return crate::fault::discard(hook);
         }
-        state.hooks.add(path, hook, is_kept)
+        if step.state.has_ended || step.state.is_stopped() {
+            drop(step);
+            if let Some(SafetyError { path, message }) = self.run_within(path, &hook) {
+                self.note_hardware_error(path, message);
+            }
+            return crate::fault::discard(hook);
+        }
+        match execution {
+            Some(id) => step.state.hooks.add_of_execution(path, id, DisarmHook::clone(&hook)),
+            None => step.state.hooks.add(path, DisarmHook::clone(&hook), is_kept),
+        }
+        // One that a callback registers is for the next time.
+        if !hooks::is_inside(self.id())
+            && let Some(disarming) = &mut step.state.disarming
+        {
+            let (generation, index) = (disarming.generation, disarming.begun);
+            disarming.begun += 1;
+            disarming.left.push((index, path));
+            step.effects.hooks = Some((generation, vec![(index, path, hook)]));
+        }
+        step.finish();
+    }
+
+    /// Runs a callback outside of a disarming; what went wrong.
+    fn run_within(&self, path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
+        if self.0.mode != Mode::Real || cfg!(loom) {
+            return hooks::run(self.id(), path, hook);
+        }
+        let (returned, waits) = std::sync::mpsc::channel();
+        let (robot, run) = (self.id(), DisarmHook::clone(hook));
+        let thread = std::thread::Builder::new().name(format!("disarm {path}")).spawn(move || {
+            let error = hooks::run(robot, path, &run);
+            crate::fault::discard(run);
+            let _ = returned.send(error);
+        });
+        if thread.is_err() {
+            return hooks::run(self.id(), path, hook);
+        }
+        let late = |_| Some(SafetyError { path, message: "did not come back from disarming in time".into() });
+        waits.recv_timeout(DISARM_WITHIN).unwrap_or_else(late)
     }
 
     /// Of a robot that has ended: what they own is closed, and what they hold of the robot no longer keeps it alive.
@@ -188,7 +224,7 @@ impl Control {
 
     /// The same for an actuator's own `disarm`, which restarts do not replace.
     pub(crate) fn on_disarm_always(&self, path: &'static str, hook: DisarmHook) {
-        self.remember(path, hook, true);
+        self.remember(path, None, hook, true);
     }
 
     /// Runs `make`, which makes the component at `path` or changes it. What it registers replaces what was registered before,
@@ -207,17 +243,33 @@ impl Control {
         let gone =
             if is_replaced || made.is_err() { state.hooks.take(path, first, is_replaced) } else { Vec::new() };
         drop(state);
-        gone.into_iter().for_each(crate::fault::discard);
+        if made.is_err() {
+            self.make_safe(path, gone);
+        } else {
+            gone.into_iter().for_each(crate::fault::discard);
+        }
         made
+    }
+
+    /// What an `init` has started that failed then is made safe. A callback that fails stays for the next disarming: a device
+    /// that is unplugged is no danger, but one that cannot be stopped is.
+    fn make_safe(&self, path: &'static str, hooks: Vec<DisarmHook>) {
+        if hooks.is_empty() {
+            return;
+        }
+        let (failed, safe): (Vec<_>, Vec<_>) =
+            hooks.into_iter().partition(|hook| self.run_within(path, hook).is_some());
+        let earlier = self.lock().hooks.replace_leftovers(path, failed);
+        safe.into_iter().chain(earlier).for_each(crate::fault::discard);
     }
 }
 
 /// In a replay, the journal says what components have reported, and there is no hardware.
 impl Guardian for Control {
-    fn on_disarm(&self, path: &'static str, hook: DisarmHook) -> u64 {
+    fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
         match self.0.mode {
-            Mode::Replay => 0,
-            Mode::Real | Mode::Virtual => self.remember(path, hook, false),
+            Mode::Replay => crate::fault::discard(hook),
+            Mode::Real | Mode::Virtual => self.remember(path, execution, hook, false),
         }
     }
 
@@ -229,6 +281,34 @@ impl Guardian for Control {
 }
 
 impl Step<'_> {
+    /// Arms the robot if it may be armed.
+    fn arm(mut self) -> Result<(), ArmError> {
+        let result = self.may_arm();
+        if result.is_ok() && self.state.machine.safety == Safety::Disarmed {
+            self.state.machine.safety = Safety::Armed;
+            self.state.machine.resting = IDLE;
+        }
+        self.finish();
+        result
+    }
+
+    /// Begins to disarm the robot, or has it disarmed by force from now on.
+    fn disarm(&mut self, force: bool) {
+        self.state.disarms += 1;
+        match self.state.machine.safety {
+            Safety::Error if !force => {}
+            Safety::Disarmed if !force => self.cancel_arming(),
+            Safety::Disarming => {
+                if let Some(disarming) = &mut self.state.disarming {
+                    disarming.force |= force;
+                }
+            }
+            Safety::Armed | Safety::Disarmed | Safety::Error => {
+                self.begin_disarming(None, None, force);
+            }
+        }
+    }
+
     /// Whether the robot is armed or may be.
     fn may_arm(&self) -> Result<(), ArmError> {
         match self.state.machine.safety {
@@ -252,6 +332,8 @@ impl Step<'_> {
     pub(super) fn begin_disarming(&mut self, by: Option<u64>, name: Option<&'static str>, force: bool) -> u64 {
         // Those of commands too, which end below.
         let hooks = if self.control.0.mode == Mode::Replay { Vec::new() } else { self.state.hooks.all() };
+        let numbered = hooks.into_iter().enumerate().map(|(index, (path, hook))| (index, path, hook));
+        let hooks: Vec<NumberedHook> = numbered.collect();
         self.state.machine.safety = Safety::Disarming;
         self.state.generation += 1;
         let generation = self.state.generation;
@@ -262,8 +344,10 @@ impl Step<'_> {
             force,
             to_error: false,
             by,
-            left: hooks.iter().map(|(path, _)| *path).enumerate().collect(),
+            begun: hooks.len(),
+            left: hooks.iter().map(|(index, path, _)| (*index, *path)).collect(),
             errors: Vec::new(),
+            outcome: Arc::default(),
         });
         if self.control.0.mode != Mode::Replay {
             let Effects { hooks: waiting, .. } = &mut self.effects;
@@ -281,15 +365,20 @@ impl Step<'_> {
         self.line(Event::Disarmed { errors: errors.clone() });
         self.control.0.limits.clear(Limit::Disarming(disarming.generation));
         let is_safe = errors.is_empty();
-        let is_error = disarming.to_error || !(is_safe || disarming.force);
+        // Force forgives what cannot be made safe, but not of a robot that nobody can disarm again.
+        let is_forgiven = disarming.force && !self.state.is_stopping;
+        let is_error = disarming.to_error || !(is_safe || is_forgiven);
         for error in &errors {
             self.publish_safety_error(error.clone());
         }
-        self.state.last_disarm = match is_error {
+        let outcome = match is_error {
             _ if !is_safe => Err(DisarmError::Failed(errors)),
             true => Err(DisarmError::Error),
             false => Ok(()),
         };
+        // It is set here alone.
+        let _ = disarming.outcome.set(outcome.clone());
+        self.state.last_disarm = outcome;
         self.state.machine.safety = if is_error { Safety::Error } else { Safety::Disarmed };
         let name = disarming.by.and_then(|id| self.name_of(id));
         self.publish_machine(name);

@@ -16,7 +16,7 @@ use crate::event::{
 use crate::fault::Fault;
 use crate::journal::{End, Event};
 use crate::node::Mode;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 impl Control {
@@ -30,11 +30,16 @@ impl Control {
 
     /// Starts a command for a caller who knows the type of its result.
     pub(crate) fn execute<T: 'static>(&self, number: usize, arguments: Arguments) -> Result<Execution<T>, Refusal> {
-        self.request(number, Some(arguments)).map(Execution::new)
+        self.request(self.step(), number, Some(arguments)).map(Execution::new)
     }
 
-    /// Starts the command at `path` with arguments from JSON.
-    pub(crate) fn execute_untyped(&self, path: &str, json: &str) -> Result<DynamicExecution, Fault> {
+    /// Starts the command at `path` with arguments from JSON, for one whose permit that is.
+    pub(crate) fn execute_untyped(
+        &self,
+        path: &str,
+        json: &str,
+        permit: &Permit,
+    ) -> Result<DynamicExecution, Fault> {
         let number = self.0.declared.commands.iter().position(|declared| declared.path == path);
         let Some((number, command)) = number.and_then(|number| Some((number, self.0.commands.get(number)?))) else {
             let paths = self.0.declared.commands.iter().map(|declared| declared.path);
@@ -43,18 +48,29 @@ impl Control {
             return Err(Fault::new(format!("no command is at `{path}`{hint}")));
         };
         let arguments = command.0.arguments(json)?;
-        let slot = self.request(number, Some(arguments))?;
+        let step = self.step();
+        if let Err(fault) = permit.check() {
+            // It was cancelled while the arguments were made.
+            drop(step);
+            crate::fault::discard(arguments);
+            return Err(fault);
+        }
+        let slot = self.request(step, number, Some(arguments))?;
         Ok(DynamicExecution::new(UntypedExecution(slot)))
     }
 
     /// In a replay: a command was asked for.
     pub(crate) fn replay_command(&self, number: usize) {
         // One that was refused is refused again.
-        let _ = self.request(number, None);
+        let _ = self.request(self.step(), number, None);
     }
 
-    fn request(&self, number: usize, arguments: Option<Arguments>) -> Result<Arc<Slot>, Refusal> {
-        let mut step = self.step();
+    fn request(
+        &self,
+        mut step: Step<'_>,
+        number: usize,
+        arguments: Option<Arguments>,
+    ) -> Result<Arc<Slot>, Refusal> {
         step.line(Event::Command { command: number });
         let started = step.start(number, arguments, None);
         step.finish();
@@ -239,10 +255,9 @@ impl Step<'_> {
         let control = self.control.clone();
         let slot = Arc::new(Slot::new(id, number, control.downgrade()));
         let permit = Permit::revocable();
-        let hooks = Arc::new(Mutex::new(Vec::new()));
         let lane = self.lane(number, health.is_some());
         let task = (control.0.mode != Mode::Replay).then(|| {
-            let (permit, numbers, weak) = (permit.clone(), Arc::clone(&hooks), control.downgrade());
+            let (permit, weak) = (permit.clone(), control.downgrade());
             let starter = move || {
                 let gone = || Fault::new("the robot is gone");
                 let control = weak.upgrade().ok_or_else(gone)?;
@@ -251,7 +266,7 @@ impl Step<'_> {
                 let context = CommandContext {
                     name: declared.name,
                     health,
-                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _, permit.clone(), numbers)),
+                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _, id)),
                     host,
                     sleeper: control.0.sleeper.in_lane(lane),
                     permit,
@@ -268,7 +283,7 @@ impl Step<'_> {
         }
         let phase = Phase::Running;
         let execution =
-            RunningCommand { id, command: number, health, slot: Arc::clone(&slot), permit, hooks, task, phase };
+            RunningCommand { id, command: number, health, slot: Arc::clone(&slot), permit, task, phase };
         self.state.executions.push(execution);
         self.publish_phase(number, id, CommandPhase::Started, health);
         self.publish_machine(Some(declared.name));
@@ -329,6 +344,13 @@ impl Step<'_> {
     /// Cancels every command but one.
     pub(super) fn cancel_all(&mut self, but: Option<u64>) {
         for id in self.not_ended(|_, execution| Some(execution.id) != but) {
+            self.cancel_one(id);
+        }
+    }
+
+    /// Cancels what would arm the robot.
+    pub(super) fn cancel_arming(&mut self) {
+        for id in self.not_ended(|step, execution| step.role(execution.command) == Role::Arming) {
             self.cancel_one(id);
         }
     }
@@ -436,8 +458,7 @@ impl Step<'_> {
         let (id, command, health) = (execution.id, execution.command, execution.health);
         execution.permit.revoke();
         let slot = Arc::clone(&execution.slot);
-        let hooks = std::mem::take(&mut *execution.hooks.lock().unwrap_or_else(PoisonError::into_inner));
-        let forgotten = self.state.hooks.take_numbers(&hooks);
+        let forgotten = self.state.hooks.take_of_execution(id);
         self.effects.forgotten.extend(forgotten);
         let Some(execution) = self.state.executions.get_mut(index) else { return };
         // One whose code has ended is gone; another one's code has yet to notice.

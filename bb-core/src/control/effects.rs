@@ -3,7 +3,7 @@
 use super::execution::CommandError;
 use super::execution::Slot;
 use super::hooks;
-use super::system::{Control, KEPT_FAULTS, Wired};
+use super::system::{Control, KEPT_FAULTS, NumberedHook, Wired};
 use super::task::{Task, Value};
 use crate::component::DisarmHook;
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
@@ -28,7 +28,7 @@ pub(super) struct Effects {
     /// Commands whose futures are to be dropped.
     pub(super) cancelled: Vec<Arc<Task>>,
     pub(super) results: Vec<(Arc<Slot>, Result<Value, CommandError>)>,
-    pub(super) hooks: Option<(u64, Vec<(&'static str, DisarmHook)>)>,
+    pub(super) hooks: Option<(u64, Vec<NumberedHook>)>,
     pub(super) dropped: Vec<Value>,
     /// Disarm callbacks of commands that have ended.
     pub(super) forgotten: Vec<DisarmHook>,
@@ -46,9 +46,6 @@ pub(super) enum Log {
     Fault(ComponentFault),
     Refused(Refusal),
 }
-
-/// A disarm callback, its number among those that run, and the path of its component.
-type NumberedHook = (usize, &'static str, DisarmHook);
 
 /// Lines for loggers, in order. Loggers are user code, and may block: one thread of the pool at a time is in them.
 #[derive(Default)]
@@ -141,16 +138,16 @@ impl Control {
 
     /// Runs disarm callbacks, each on a thread of its own, and returns those for which there is none; on virtual time all wait
     /// for [`Self::run_pending_hooks`].
-    fn start_hooks(&self, generation: u64, all: Vec<(&'static str, DisarmHook)>) -> Vec<NumberedHook> {
+    fn start_hooks(&self, generation: u64, all: Vec<NumberedHook>) -> Vec<NumberedHook> {
         if self.0.mode != Mode::Real {
-            lock(&self.0.pending_hooks).push_back(all);
+            lock(&self.0.pending_hooks).push_back((generation, all));
             return Vec::new();
         }
         if all.is_empty() {
             self.hook_returned(generation, None, None);
         }
         let mut left = Vec::new();
-        for (index, (path, hook)) in all.into_iter().enumerate() {
+        for (index, path, hook) in all {
             let (control, kept) = (self.clone(), DisarmHook::clone(&hook));
             let run = move || control.run_hook(generation, index, path, hook);
             if spawn(format!("disarm {path}"), run).is_err() {
@@ -185,13 +182,11 @@ impl Control {
         if hooks::is_waited_for(self.id()) {
             return false;
         }
-        let Some(all) = lock(&self.0.pending_hooks).pop_front() else { return false };
-        let errors = all.into_iter().filter_map(|(path, hook)| {
-            let error = hooks::run(self.id(), path, &hook);
-            discard(hook);
-            error
-        });
-        self.disarmed(errors.collect());
+        let Some((generation, all)) = lock(&self.0.pending_hooks).pop_front() else { return false };
+        if all.is_empty() {
+            self.hook_returned(generation, None, None);
+        }
+        self.run_hooks(generation, all);
         true
     }
 

@@ -38,6 +38,11 @@ impl Overseer for Control {
     fn replacing_hooks(&self, path: &'static str, always: bool, make: &mut dyn FnMut() -> bool) {
         let _ = Control::replacing_hooks(self, path, always, || make().then_some(()).ok_or(()));
     }
+
+    fn forget_hooks(&self, path: &'static str) {
+        let gone = self.lock().hooks.replace_leftovers(path, Vec::new());
+        gone.into_iter().for_each(crate::fault::discard);
+    }
 }
 
 impl Control {

@@ -17,15 +17,38 @@ struct Hook {
     number: u64,
     /// It stays when the component is restarted.
     is_kept: bool,
+    /// The execution of a command that it ends with.
+    execution: Option<u64>,
+    /// It is of an `init` that failed, and failed itself.
+    is_leftover: bool,
     run: DisarmHook,
 }
 
 impl Hooks {
-    pub(super) fn add(&mut self, path: &'static str, run: DisarmHook, is_kept: bool) -> u64 {
-        let number = self.next;
-        self.all.push(Hook { path, number, is_kept, run });
+    /// Of a component; `is_kept` if a restart does not replace it.
+    pub(super) fn add(&mut self, path: &'static str, run: DisarmHook, is_kept: bool) {
+        self.push(Hook { path, number: self.next, is_kept, execution: None, is_leftover: false, run });
+    }
+
+    /// Of an execution of a command.
+    pub(super) fn add_of_execution(&mut self, path: &'static str, execution: u64, run: DisarmHook) {
+        let execution = Some(execution);
+        self.push(Hook { path, number: self.next, is_kept: false, execution, is_leftover: false, run });
+    }
+
+    /// Of an `init` that failed; those of earlier ones are taken out, to be dropped without a lock.
+    pub(super) fn replace_leftovers(&mut self, path: &'static str, left: Vec<DisarmHook>) -> Vec<DisarmHook> {
+        let earlier = self.all.extract_if(.., |hook| hook.path == path && hook.is_leftover);
+        let earlier = earlier.map(|hook| hook.run).collect();
+        for run in left {
+            self.push(Hook { path, number: self.next, is_kept: false, execution: None, is_leftover: true, run });
+        }
+        earlier
+    }
+
+    fn push(&mut self, hook: Hook) {
+        self.all.push(hook);
         self.next += 1;
-        number
     }
 
     /// What is registered from now on has a number from this one on.
@@ -45,9 +68,9 @@ impl Hooks {
         taken.map(|hook| hook.run).collect()
     }
 
-    /// Takes out those of these numbers; to be dropped without a lock.
-    pub(super) fn take_numbers(&mut self, numbers: &[u64]) -> Vec<DisarmHook> {
-        self.all.extract_if(.., |hook| numbers.contains(&hook.number)).map(|hook| hook.run).collect()
+    /// Takes out those of an execution; to be dropped without a lock.
+    pub(super) fn take_of_execution(&mut self, execution: u64) -> Vec<DisarmHook> {
+        self.all.extract_if(.., |hook| hook.execution == Some(execution)).map(|hook| hook.run).collect()
     }
 
     /// Takes out all; to be dropped without a lock.

@@ -62,7 +62,7 @@ impl Motor {
             disarmed.0.lock().expect("nobody panicked").is_safe = true;
             Ok(())
         };
-        control.on_disarm("motor", std::sync::Arc::new(disarm));
+        control.on_disarm("motor", None, std::sync::Arc::new(disarm));
         motor
     }
 
@@ -121,7 +121,7 @@ const TIME_IS_OVER: Thread = |control, _| control.disarm_timeout(1);
 
 /// A brake that fails. Without a motor beside it: a model has room for five threads.
 fn brake(control: &Control) -> Motor {
-    control.on_disarm("brake", std::sync::Arc::new(|| Err(Fault::new("no air"))));
+    control.on_disarm("brake", None, std::sync::Arc::new(|| Err(Fault::new("no air"))));
     Motor::default()
 }
 
@@ -153,5 +153,30 @@ fn a_callback_that_fails_while_the_robot_stops() {
     check([DISARMS, STOPS], brake, |control| {
         assert_eq!(control.safety(), Safety::Error);
         assert!(control.stop_signal().is_set());
+    });
+}
+
+#[test]
+fn a_callback_that_is_registered_while_the_robot_stops() {
+    let mut checker = loom::model::Builder::new();
+    checker.preemption_bound = Some(2);
+    checker.check(|| {
+        let control = control();
+        assert_eq!(control.arm(&Permit::UNLIMITED), Ok(()));
+        let motor = Motor::default();
+        let (stopped, started) = (control.clone(), motor.clone());
+        let (starting, stops) = (control.clone(), thread::spawn(move || stopped.begin_stop()));
+        let starts = thread::spawn(move || {
+            let disarm = move || {
+                started.0.lock().expect("nobody panicked").is_safe = true;
+                Ok(())
+            };
+            starting.on_disarm("motor", None, std::sync::Arc::new(disarm));
+        });
+        [stops, starts].into_iter().for_each(|thread| thread.join().expect("it does not panic"));
+        while control.is_disarming() {
+            thread::yield_now();
+        }
+        assert!(motor.0.lock().expect("nobody panicked").is_safe, "it came before, during or after");
     });
 }

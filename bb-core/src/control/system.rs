@@ -91,7 +91,7 @@ pub(super) struct Inner {
     /// Commands to be polled, on virtual time.
     pub(super) ready: Mutex<VecDeque<Arc<Task>>>,
     /// Disarm callbacks to be run by the loop of a simulation.
-    pub(super) pending_hooks: Mutex<VecDeque<Vec<(&'static str, DisarmHook)>>>,
+    pub(super) pending_hooks: Mutex<VecDeque<(u64, Vec<NumberedHook>)>>,
     /// What islands reported in a replay, until the journal says that it was taken note of.
     pub(super) reports: Mutex<HashMap<usize, VecDeque<Report>>>,
     pub(super) faults: Mutex<Faults>,
@@ -151,7 +151,10 @@ pub(super) struct State {
     pub(super) health: Vec<Health>,
     pub(super) components: Vec<Supervised>,
     pub(super) disarming: Option<Disarming>,
+    /// What became of the last disarming.
     pub(super) last_disarm: Result<(), DisarmError>,
+    /// How often somebody asked for the robot to be disarmed: who waits to arm it since before does not.
+    pub(super) disarms: u64,
     /// How often the robot was disarmed.
     pub(super) generation: u64,
     pub(super) is_stopping: bool,
@@ -167,8 +170,6 @@ pub(super) struct RunningCommand {
     pub(super) health: Option<HealthTransition>,
     pub(super) slot: Arc<Slot>,
     pub(super) permit: Permit,
-    /// Its disarm callbacks, by their numbers.
-    pub(super) hooks: Arc<Mutex<Vec<u64>>>,
     /// None in a replay.
     pub(super) task: Option<Arc<Task>>,
     pub(super) phase: Phase,
@@ -224,10 +225,17 @@ pub(super) struct Disarming {
     pub(super) to_error: bool,
     /// The execution that disarms it.
     pub(super) by: Option<u64>,
-    /// Callbacks that have not returned.
+    /// How many callbacks were begun.
+    pub(super) begun: usize,
+    /// Those that have not returned.
     pub(super) left: Vec<(usize, &'static str)>,
+    /// Where those who wait for it find what became of it.
+    pub(super) outcome: Arc<OnceLock<Result<(), DisarmError>>>,
     pub(super) errors: Vec<SafetyError>,
 }
+
+/// A disarm callback, its number among those that run, and the path of its component.
+pub(super) type NumberedHook = (usize, &'static str, DisarmHook);
 
 /// The newest faults, and how many there were.
 #[derive(Default)]
@@ -258,6 +266,7 @@ impl Control {
             components: Vec::new(),
             disarming: None,
             last_disarm: Ok(()),
+            disarms: 0,
             generation: 0,
             is_stopping: false,
             has_ended: false,

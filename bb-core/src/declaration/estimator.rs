@@ -131,7 +131,7 @@ pub struct InputDeclaration {
     pub tolerance_nanos: Option<i64>,
     /// How old it may be when it arrives, by the clock; for the driver.
     pub stale_after_nanos: Option<i64>,
-    /// Takes points from its frame to the output's; none if a moving joint lies between.
+    /// Takes points from its frame to the output's; `None` if there is a moving joint between.
     pub frame_from_input: Option<Transform>,
 }
 

@@ -5,7 +5,7 @@ use crate::topology::{GraphFormat, Topology};
 use std::fmt::Write;
 
 /// Writes the topology (links, with the joints between them) and the dataflow (what each estimator takes).
-pub fn graph(
+pub(crate) fn graph(
     format: GraphFormat,
     topology: &Topology,
     sensors: &[SensorDeclaration],

@@ -50,7 +50,7 @@ pub trait ParameterType: Sized + Clone + Send + Sync + 'static {
     fn from_value(value: &ParameterValue) -> Option<Self>;
     /// As a value.
     fn into_value(self) -> ParameterValue;
-    /// What stands in for a parameter that does not exist.
+    /// The value used for a parameter that does not exist.
     #[doc(hidden)]
     fn none() -> Self;
 }

@@ -15,7 +15,7 @@ pub struct SensorDeclaration {
     pub frame: Frame,
     /// Nanoseconds between two readings, if it has a `rate`.
     pub period_nanos: Option<i64>,
-    /// Takes points from its frame to the root link's, if only fixed joints lie between.
+    /// Takes points from its frame to the root link's, if all joints between are fixed.
     pub root_from_frame: Option<Transform>,
     /// The number of its supervisor.
     pub supervisor: Supervisor,

@@ -15,8 +15,10 @@ pub enum ArmError {
     Stopping,
     /// The code of these commands, which were cancelled, has not returned.
     Lingering(Vec<&'static str>),
-    /// The command that arms it was cancelled.
+    /// The robot was disarmed while this waited, or the command that arms it was cancelled.
     Cancelled,
+    /// The robot is replayed: its journal says when it is armed.
+    Replay,
 }
 
 /// Why a robot may not be safe.
@@ -32,6 +34,8 @@ pub enum DisarmError {
     Callback,
     /// The robot is being disarmed, and the thread that limits its time is gone.
     Unfinished,
+    /// The robot is replayed: its journal says when it is disarmed.
+    Replay,
 }
 
 impl fmt::Display for ArmError {
@@ -44,7 +48,8 @@ impl fmt::Display for ArmError {
             Self::Lingering(paths) => {
                 write!(f, "the code of cancelled commands has not returned: {}", paths.join(", "))
             }
-            Self::Cancelled => f.write_str("the command that arms it was cancelled"),
+            Self::Cancelled => f.write_str("it was disarmed meanwhile, or the command that arms it was cancelled"),
+            Self::Replay => f.write_str("it is replayed"),
         }
     }
 }
@@ -64,6 +69,7 @@ impl fmt::Display for DisarmError {
                 f.write_str("a disarm callback or an actuator's own code cannot wait for the robot to be disarmed")
             }
             Self::Unfinished => f.write_str("the robot is still being disarmed"),
+            Self::Replay => f.write_str("the robot is replayed"),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What becomes of commands, and of the operational state.
+//! Events of commands and of the operational state.
 
 use super::HealthTransition;
 use crate::Payload;
@@ -15,7 +15,7 @@ pub struct StateTransition {
     pub command: Option<&'static str>,
 }
 
-/// What becomes of a command, published at its path: `command/stop`.
+/// An event of a command, published at its path: `command/stop`.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub struct CommandEvent {
     /// Its name.
@@ -61,11 +61,11 @@ pub struct CategoryDeclaration {
 pub enum RefusalReason {
     /// Its `allowed_states` do not include this one.
     State,
-    /// As many of its category run as may, and it cancels none of them.
+    /// Its category is full, and it cancels none of the commands that run.
     Busy,
     /// The safety state is `error`, or the robot is being disarmed.
     Safety,
-    /// The robot stops.
+    /// The robot is stopping.
     Stopping,
 }
 

@@ -1,4 +1,4 @@
-//! Whether an estimator's output can be relied on, as it is published.
+//! Health of estimators, as published.
 
 use crate::Payload;
 use crate::time::MonotonicTime;

@@ -13,7 +13,7 @@ pub enum Safety {
     Armed,
     /// Motion is inhibited, and the disarm callbacks run.
     Disarming,
-    /// Something could not be made safe, or panicked too often; only a forced disarm leads out.
+    /// Something could not be made safe, or panicked too often; only a forced disarm leaves this state.
     Error,
 }
 

@@ -46,7 +46,7 @@ pub trait Periodic: Component {
     fn starts_at(&self) -> Option<MonotonicTime>;
 }
 
-/// What contexts are made with.
+/// The robot, as contexts hold it.
 #[derive(Clone, Debug)]
 pub struct HostHandle(pub(crate) std::sync::Arc<dyn crate::component::Host>);
 
@@ -77,7 +77,7 @@ macro_rules! component {
 
 component! {
     /// An estimator.
-    pub AsEstimator: Estimator, Context
+    pub(crate) AsEstimator: Estimator, Context
 }
 
 component! {

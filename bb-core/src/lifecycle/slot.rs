@@ -90,7 +90,7 @@ impl<C: Component> Slot<C> {
         Ok(())
     }
 
-    /// Hands new options to it. `Ok(false)`: it has to be restarted with them.
+    /// Hands new options to it. `Ok(false)`: it must be restarted with them.
     pub(crate) fn change(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<bool, Failed> {
         let State::Running(component) = &mut self.state else { return Ok(true) };
         let changed = caught(|| component.change(self.recipe.bound(parameters)?, context));

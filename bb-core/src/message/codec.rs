@@ -22,7 +22,7 @@
 mod algebra;
 mod collections;
 mod definitions;
-mod derive;
+pub(crate) mod derive;
 mod error;
 mod intern;
 mod json;
@@ -38,8 +38,6 @@ mod tests;
 mod type_description;
 mod writer;
 
-#[doc(hidden)]
-pub use derive::{FieldOf, NotField, is_any, is_finite};
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
 pub(crate) use intern::intern;
@@ -59,7 +57,7 @@ use super::Finite;
 ///
 /// Numbers, `bool`, `char`, text, `Option`, `Vec`, arrays, `Arc`, times and nalgebra's fixed and dynamic matrices,
 /// quaternions and isometries are fields; `#[derive(Payload)]` makes structs and enums of fields fields. A type that
-/// contains itself is none, since its shape would have no end.
+/// contains itself cannot be one, since its shape would be infinite.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be written to a recording and read back",
     label = "cannot be a field of a payload",

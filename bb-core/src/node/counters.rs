@@ -1,5 +1,6 @@
 //! What a running estimator counts.
 
+use super::count::Count;
 use super::latency::{Latency, LatencyStatistics};
 use crate::declaration::EstimatorDeclaration;
 use crate::event::HealthState;
@@ -47,35 +48,11 @@ impl DropReason {
     }
 }
 
-/// A count with one writer at a time (whoever holds its estimator) and any number of readers.
-///
-/// A plain load and store instead of an atomic addition: the writers exclude each other already.
-#[derive(Debug, Default)]
-pub(crate) struct Count(AtomicU64);
-
-impl Count {
-    /// The new count.
-    #[inline]
-    pub(crate) fn increment(&self) -> u64 {
-        let count = self.0.load(Ordering::Relaxed).wrapping_add(1);
-        self.0.store(count, Ordering::Relaxed);
-        count
-    }
-
-    pub(super) fn set(&self, value: u64) {
-        self.0.store(value, Ordering::Relaxed);
-    }
-
-    pub(crate) fn get(&self) -> u64 {
-        self.0.load(Ordering::Relaxed)
-    }
-}
-
 #[derive(Debug, Default)]
 pub(super) struct InputCounters {
     pub(super) received: Count,
     pub(super) dropped: [Count; REASONS],
-    /// Messages that did not fit in the inbox. Those who published them count, whoever holds the estimator meanwhile; they
+    /// Messages that did not fit in the inbox. Their publishers count them, while another thread may hold the estimator; they
     /// are not among the other two.
     overflowed: AtomicU64,
     /// How old messages of the driver were when the callback that they led to returned, in nanoseconds.

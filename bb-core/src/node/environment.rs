@@ -30,6 +30,8 @@ pub(crate) trait Overseer: Guardian {
     /// Runs `make`, which makes the component at `path` or changes it, and says whether it has succeeded. The disarm callbacks
     /// that it registers replace those from before.
     fn replacing_hooks(&self, path: &'static str, always: bool, make: &mut dyn FnMut() -> bool);
+    /// The component at `path` was left out: it guards nothing.
+    fn forget_hooks(&self, path: &'static str);
 }
 
 /// Whether options would be valid with these parameters.
@@ -214,6 +216,7 @@ impl Environment {
             let reason = fault.to_string();
             if fault.then == crate::fault::Then::Skip {
                 tracing::info!(component = path, reason, "left out");
+                self.overseer().forget_hooks(path);
                 return Some(reason);
             }
             *refusal = Some(Refusal { path, fault });

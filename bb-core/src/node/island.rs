@@ -6,7 +6,7 @@
 //! to estimator by plain calls on plain fields, without a lock, an atomic or a queue.
 //!
 //! Everything that reaches an island enters here: messages, and timers, options, requests, restarts, losses and the end. A
-//! publisher that finds the island free and nothing waiting runs all that lies downstream; otherwise the entry waits in the
+//! publisher that finds the island free and nothing waiting runs everything downstream; otherwise the entry waits in the
 //! inbox, for the thread that holds the island to process before it leaves. So there is a single writer, and every entry has
 //! its place in one order.
 //!
@@ -21,7 +21,8 @@ mod member;
 #[cfg(all(test, loom))]
 mod model;
 
-pub use self::any::{AnyIsland, Replayed};
+pub use self::any::IslandOf;
+pub(crate) use self::any::{AnyIsland, Replayed};
 use self::inbox::{Entry, Inbox, Pending, Taken};
 use self::inside::{Inside, Within};
 pub use self::member::{Act, Member, act, alone, enter, feed, island, receive, start};
@@ -68,7 +69,7 @@ pub trait IslandState: Sized {
 
     /// Where it is.
     fn find(wiring: &Self::Wiring) -> &Island<Self>;
-    /// Runs all that lies downstream of a message.
+    /// Runs everything downstream of a message.
     fn deliver(&mut self, wiring: &Self::Wiring, message: &Self::Message, turn: &Turn<'_>);
     /// Does something with the estimator of that number; false if it cannot.
     fn act(&mut self, wiring: &Self::Wiring, estimator: usize, act: Act<'_, '_>) -> bool;
@@ -116,7 +117,7 @@ const LONGEST_CALL: Duration = Duration::from_secs(5);
 /// Of what is no part of the model.
 const RELAXED: std::sync::atomic::Ordering = std::sync::atomic::Ordering::Relaxed;
 
-/// An island behind its entry.
+/// An island and the inbox in front of it.
 pub struct Island<S: IslandState> {
     state: Mutex<S>,
     inbox: Mutex<Inbox<Keyed<S::Message>>>,

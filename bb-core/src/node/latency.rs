@@ -1,9 +1,9 @@
 //! How long callbacks take, as a histogram that can be read while it is written.
 //!
 //! Buckets of an eighth of a power of two: a quantile is right within 12.5 %. A count is a load and a store, since
-//! whoever holds the estimator is the only writer; ready-made histograms need a lock for that.
+//! the thread that holds the estimator is the only writer; ready-made histograms need a lock for that.
 
-use super::counters::Count;
+use super::count::Count;
 use std::fmt;
 use std::time::Duration;
 
@@ -61,7 +61,7 @@ impl Latency {
     }
 }
 
-/// Below 8 ns each has its own; above, the three bits behind the highest one choose among the parts of a power.
+/// Below 8 ns each has its own; above, the three bits after the highest one choose among the parts of a power.
 fn bucket(nanos: u64) -> usize {
     if nanos < PARTS as u64 {
         return nanos as usize;

@@ -23,7 +23,7 @@ use crate::time::MonotonicTime;
 use std::fmt;
 use std::sync::Arc;
 
-/// One estimator with its fan-in, its health and its timers. Its island sees to it that one thread at a time is in here.
+/// One estimator with its fan-in, its health and its timers. Its island lets one thread at a time run it.
 pub struct Node<E: Estimator> {
     declaration: &'static EstimatorDeclaration,
     template: Stamp,
@@ -33,7 +33,7 @@ pub struct Node<E: Estimator> {
     cache: <E::Input as Inputs>::Cache,
     make_cache: fn() -> <E::Input as Inputs>::Cache,
     admission: Admission,
-    backlog: Backlog<E>,
+    backlog: Backlog<Deliver<E>>,
     health: Health,
     /// How often it was lost, as far as it knows.
     epoch: u32,
@@ -49,6 +49,10 @@ pub struct Node<E: Estimator> {
     /// The values of parameters as it was last told.
     parameters: ParameterValues,
 }
+
+/// Hands a message that was kept to its estimator; the stamp of what it emitted, if anything.
+type Deliver<E> =
+    Box<dyn FnOnce(&mut Node<E>, &Turn<'_>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + Send>;
 
 /// How often in a row it may go on with its work before it is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
@@ -457,7 +461,13 @@ impl<E: Estimator> Node<E> {
             self.shared.counters().drop(input, DropReason::Stopped);
             return;
         }
-        let kept = caught(|| Ok(self.backlog.push::<F>(input, message)));
+        // User code runs here: the `clone` of this payload, and the `drop` of the oldest that makes room.
+        let kept = caught(|| {
+            let message = message.clone();
+            let deliver: Deliver<E> =
+                Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
+            Ok(self.backlog.push(input, deliver))
+        });
         match kept {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
             Ok(None) => {}

@@ -1,9 +1,9 @@
 //! The part of a running estimator that other threads may read while it runs.
 
+use super::EstimatorStatistics;
 use super::counters::Counters;
-use super::{EstimatorStatistics, HealthState};
 use crate::declaration::EstimatorDeclaration;
-use crate::event::HealthState as State;
+use crate::event::HealthState;
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, Ordering};
@@ -79,7 +79,7 @@ impl SharedNode {
     }
 
     pub(crate) fn health(&self) -> HealthState {
-        State::from_index(self.0.health.load(Ordering::Relaxed))
+        HealthState::from_index(self.0.health.load(Ordering::Relaxed))
     }
 
     pub(crate) fn set_health(&self, state: HealthState) {

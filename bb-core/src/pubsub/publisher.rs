@@ -12,7 +12,7 @@ pub struct Publisher<T> {
     gate: Arc<dyn Gate>,
 }
 
-/// What stands between a publisher and its topic.
+/// What a publisher passes on its way to its topic.
 pub(crate) trait Gate: Send + Sync {
     /// Has `publish` called with the stamp of a payload that is published now; not once the publisher may not act any more.
     fn pass(&self, publish: &mut dyn FnMut(Stamp));

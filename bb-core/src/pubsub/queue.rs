@@ -1,6 +1,6 @@
 //! The bounded queue between a topic and one subscriber.
 
-use super::SubscriberStatistics;
+use super::statistics::SubscriberStatistics;
 use super::wakers::{Wakers, discard, wake};
 use crate::message::{Payload, Stamped};
 use std::collections::VecDeque;
@@ -44,7 +44,7 @@ impl Overflow {
     /// The largest capacity of a subscription, in messages.
     pub const MAX_CAPACITY: usize = 1 << 20;
 
-    /// Bytes that the messages of a subscription may have together, if it does not say otherwise: 64 MiB.
+    /// Bytes that the messages of a subscription may have together, unless it says otherwise: 64 MiB.
     pub const DEFAULT_BYTES: usize = 64 << 20;
 
     fn bound(self) -> Bound {

@@ -1,8 +1,8 @@
 //! Topics that are made while the robot runs, and the subscriptions that are waiting for them.
 
-use super::dynamic::Tap;
+use super::any::{AnyTopic, DynamicMessage, Tap};
 use super::queue::Queue;
-use super::{AnyTopic, DynamicMessage, DynamicSubscription, Overflow, Payloads, Select, Topic};
+use super::{DynamicSubscription, Overflow, Payloads, Select, Topic};
 use crate::message::Payload;
 use crate::message::codec::intern;
 use std::any::{Any, type_name};
@@ -80,6 +80,26 @@ impl Registry {
 
     /// The topic at `path`, made if it is not there.
     pub(crate) fn topic<T: Payload>(&self, path: &str) -> Result<Arc<Topic<T>>, PathError> {
+        let found = self.find_or_make(path, |path| Arc::new(Topic::<T>::new(path)))?;
+        let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&found) as _;
+        topic.downcast().map_err(|_| PathError::other_payload(&*found, T::NAME, type_name::<T>()))
+    }
+
+    /// The topic at the path of a message, made for its payload if it is not there.
+    pub(crate) fn topic_of(&self, message: &DynamicMessage) -> Result<Arc<dyn AnyTopic>, PathError> {
+        let found = self.find_or_make(message.path(), |path| message.message().new_topic(path))?;
+        if !message.message().fits(&*found) {
+            let name = message.payload_name();
+            return Err(PathError::other_payload(&*found, name, message.message().type_name()));
+        }
+        Ok(found)
+    }
+
+    fn find_or_make(
+        &self,
+        path: &str,
+        make: impl FnOnce(&'static str) -> Arc<dyn AnyTopic>,
+    ) -> Result<Arc<dyn AnyTopic>, PathError> {
         if !is_path(path) {
             return Err(PathError::Malformed(path.into()));
         }
@@ -91,8 +111,7 @@ impl Registry {
             return Err(PathError::Stopped(path.into()));
         }
         if let Some(made) = state.topics.get(path) {
-            let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&made.topic) as _;
-            return topic.downcast().map_err(|_| PathError::other_payload::<T>(&*made.topic));
+            return Ok(Arc::clone(&made.topic));
         }
         let room = state.room().ok_or_else(|| PathError::TooMany(path.into()))?;
         // Last, since a name that is interned stays.
@@ -101,11 +120,11 @@ impl Registry {
             Room::Free => None,
             Room::Of(unused) => state.topics.remove(unused),
         };
-        let topic = Arc::new(Topic::<T>::new(path));
+        let topic = make(path);
         state.selections.tap(&*topic);
         let number = state.made;
         state.made += 1;
-        state.topics.insert(path, Made { number, topic: Arc::clone(&topic) as _ });
+        state.topics.insert(path, Made { number, topic: Arc::clone(&topic) });
         drop(state);
         drop(evicted);
         Ok(topic)
@@ -263,10 +282,10 @@ pub(crate) enum PathError {
 }
 
 impl PathError {
-    fn other_payload<T: Payload>(topic: &dyn AnyTopic) -> Self {
+    fn other_payload(topic: &dyn AnyTopic, name: &str, type_name: &str) -> Self {
         let payload = topic.payload_name();
         // Two types may have the same name.
-        let wanted = if payload == T::NAME { type_name::<T>() } else { T::NAME };
+        let wanted = if payload == name { type_name } else { name };
         Self::OtherPayload { path: topic.path(), payload: payload.into(), wanted: wanted.into() }
     }
 }

@@ -1,7 +1,7 @@
 //! The subscriber's end.
 
 use super::queue::Queue;
-use super::topic::{Subscribers, leave};
+use super::subscribers::{Subscribers, leave};
 use crate::message::Stamped;
 use std::fmt;
 use std::future::Future;
@@ -36,23 +36,23 @@ impl<T> Subscription<T> {
         self.queue.pop()
     }
 
-    /// Waits for the next message; none once the robot has stopped and all are read.
+    /// Waits for the next message. Returns `None` once the robot has stopped and all messages are read.
     pub fn recv(&self) -> Option<Stamped<T>> {
         self.queue.wait(None)
     }
 
-    /// Waits for the next message, `timeout` at most; none after that, or once the robot has stopped.
+    /// Waits for the next message, at most `timeout`. Returns `None` after that, or once the robot has stopped.
     pub fn recv_timeout(&self, timeout: Duration) -> Option<Stamped<T>> {
         self.queue.wait(Some(timeout))
     }
 
-    /// Awaits the next message, on any executor; none once the robot has stopped and all are read. One task at a time
-    /// may await a subscription.
+    /// Awaits the next message, on any executor; `None` once the robot has stopped and all messages are read. One task
+    /// at a time may await a subscription.
     pub fn recv_async(&mut self) -> RecvAsync<'_, T> {
         RecvAsync(self)
     }
 
-    /// The messages that wait now; those that arrive meanwhile are left.
+    /// Takes the messages that wait now; those that arrive meanwhile stay.
     pub fn drain(&self) -> impl Iterator<Item = Stamped<T>> + '_ {
         (0..self.queue.len()).map_while(|_| self.try_recv())
     }

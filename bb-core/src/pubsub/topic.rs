@@ -1,43 +1,27 @@
 //! One publisher's end: who listens to it.
 
-use super::dynamic::Tap;
-use super::queue::{Queue, counted_bytes};
+use super::any::DynamicMessage;
+use super::queue::{Overflow, Queue, counted_bytes};
+use super::subscribers::{Subscribers, lock};
+use super::subscription::Subscription;
 use super::wakers::Wakers;
-use super::{DynamicMessage, Overflow, Subscription};
 use crate::Payload;
-use crate::message::{DecodeError, Schema, Stamped};
-use std::any::Any;
+use crate::message::Stamped;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Where the messages of one publisher are subscribed to. Dropping it tells its subscribers that no more will come.
 pub struct Topic<T> {
-    path: &'static str,
-    published: AtomicU64,
+    pub(super) path: &'static str,
+    pub(super) published: AtomicU64,
     /// Messages that slow subscribers did not get.
-    lost: AtomicU64,
+    pub(super) lost: AtomicU64,
     /// How many listen: read before the lock, so that publishing to nobody costs next to nothing.
-    listening: AtomicUsize,
-    subscribers: Arc<Mutex<Subscribers<T>>>,
+    pub(super) listening: AtomicUsize,
+    pub(super) subscribers: Arc<Mutex<Subscribers<T>>>,
     /// Held while a message is written into a journal and enqueued, so that both have the same order.
     order: Mutex<()>,
-}
-
-pub(super) struct Subscribers<T> {
-    /// Replaced as a whole, so that a publisher takes a list along and holds no lock while it wakes subscribers, who may
-    /// subscribe and unsubscribe on that thread. A queue that is dropped with its list is abandoned, and so runs no
-    /// user's code.
-    queues: Arc<[Arc<Queue<Stamped<T>>>]>,
-    /// Those who do not know the payload.
-    taps: Arc<[Arc<Queue<DynamicMessage>>]>,
-    closed: bool,
-}
-
-impl<T> Subscribers<T> {
-    fn count(&self) -> usize {
-        self.queues.len() + self.taps.len()
-    }
 }
 
 impl<T> Topic<T> {
@@ -54,7 +38,7 @@ impl<T> Topic<T> {
         }
     }
 
-    /// Listens from now on, until the subscription is dropped.
+    /// Subscribes from now on, until the subscription is dropped.
     pub fn subscribe(&self, overflow: Overflow) -> Subscription<T> {
         let queue = Arc::new(Queue::new(overflow));
         let mut subscribers = lock(&self.subscribers);
@@ -68,7 +52,7 @@ impl<T> Topic<T> {
         Subscription::new(self.path, queue, Arc::downgrade(&self.subscribers))
     }
 
-    fn close(&self) {
+    pub(super) fn close_all(&self) {
         let mut subscribers = lock(&self.subscribers);
         subscribers.closed = true;
         subscribers.taps = Arc::new([]);
@@ -227,148 +211,12 @@ fn tap_all(taps: &[Arc<Queue<DynamicMessage>>], message: DynamicMessage, bytes: 
 
 impl<T> Drop for Topic<T> {
     fn drop(&mut self) {
-        self.close();
+        self.close_all();
     }
-}
-
-/// Takes `queue` off the list of its topic, if that is still there.
-pub(super) fn leave<T>(topic: &Weak<Mutex<Subscribers<T>>>, queue: &Arc<Queue<Stamped<T>>>) {
-    if let Some(subscribers) = topic.upgrade() {
-        let mut subscribers = lock(&subscribers);
-        let others = subscribers.queues.iter().filter(|other| !Arc::ptr_eq(other, queue)).map(Arc::clone);
-        subscribers.queues = others.collect();
-    }
-}
-
-fn lock<T>(subscribers: &Mutex<Subscribers<T>>) -> MutexGuard<'_, Subscribers<T>> {
-    subscribers.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<T> fmt::Debug for Topic<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Topic").field("path", &self.path).finish_non_exhaustive()
     }
-}
-
-/// What all topics have in common.
-pub trait AnyTopic: Any + Send + Sync {
-    /// Its path.
-    fn path(&self) -> &'static str;
-    /// The name of its payload's type.
-    fn payload_name(&self) -> &'static str;
-    /// Makes the definitions of its messages: the exact one, and those of ROS if it has any.
-    #[doc(hidden)]
-    fn schemas(&self) -> fn() -> Vec<Schema>;
-    /// Everybody who listens.
-    fn subscribers(&self) -> Vec<SubscriberStatistics>;
-    /// Hands every message to `tap` as well.
-    #[doc(hidden)]
-    fn tap(&self, tap: &Tap);
-    /// A message from its bytes, as [`DynamicMessage::encode`] has made them.
-    #[doc(hidden)]
-    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
-    /// Publishes a message if its payload is this topic's; else does nothing and returns `false`.
-    fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
-    /// Itself, for whoever knows the payload.
-    #[doc(hidden)]
-    fn as_any(&self) -> &dyn Any;
-    /// What it has counted.
-    fn statistics(&self) -> TopicStatistics;
-    /// Tells all subscribers that no more will come.
-    fn close(&self);
-}
-
-impl<T: Payload> AnyTopic for Topic<T> {
-    fn path(&self) -> &'static str {
-        self.path
-    }
-
-    fn payload_name(&self) -> &'static str {
-        T::NAME
-    }
-
-    fn schemas(&self) -> fn() -> Vec<Schema> {
-        || {
-            let ros = Stamped::<T>::ros_schema();
-            let companion = Stamped::<T>::ros_companion().map(|(_, schema)| schema);
-            [Stamped::<T>::schema()].into_iter().chain(ros).chain(companion).collect()
-        }
-    }
-
-    fn subscribers(&self) -> Vec<SubscriberStatistics> {
-        let subscribers = lock(&self.subscribers);
-        let typed = subscribers.queues.iter().map(|queue| queue.statistics(true));
-        let taps = subscribers.taps.iter().filter(|tap| !tap.is_abandoned());
-        typed.chain(taps.map(|tap| tap.statistics(false))).collect()
-    }
-
-    fn tap(&self, tap: &Tap) {
-        let mut subscribers = lock(&self.subscribers);
-        if !subscribers.closed {
-            // Those that were dropped leave the list here too: nothing may ever be published at this topic.
-            let others = subscribers.taps.iter().filter(|other| !other.is_abandoned());
-            subscribers.taps = others.chain([&tap.0]).map(Arc::clone).collect();
-            self.listening.store(subscribers.count(), Ordering::Release);
-        }
-    }
-
-    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError> {
-        let message: Stamped<T> = crate::message::codec::decode(bytes)?;
-        Ok(DynamicMessage::new(self.path, &message))
-    }
-
-    fn publish_dynamic(&self, message: &DynamicMessage) -> bool {
-        let message = message.downcast();
-        message.inspect(|message| self.publish(message)).is_some()
-    }
-
-    fn as_any(&self) -> &dyn Any {
-        self
-    }
-
-    fn statistics(&self) -> TopicStatistics {
-        TopicStatistics {
-            path: self.path,
-            payload: T::NAME,
-            published: self.published.load(Ordering::Relaxed),
-            lost: self.lost.load(Ordering::Relaxed),
-            subscribers: self.subscribers().len(),
-        }
-    }
-
-    fn close(&self) {
-        Topic::close(self);
-    }
-}
-
-/// One who listens to a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct SubscriberStatistics {
-    /// Whether it knows the payload's type.
-    pub is_typed: bool,
-    /// Messages that wait for it.
-    pub waiting: usize,
-    /// How many may wait.
-    pub capacity: usize,
-    /// Bytes of the messages that wait, as far as they count towards the bound: see [`Overflow`].
-    pub bytes: usize,
-    /// Messages it has lost because it was slow.
-    pub lost: u64,
-}
-
-/// What a topic has counted since the start.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct TopicStatistics {
-    /// Its path.
-    pub path: &'static str,
-    /// The name of its payload's type.
-    pub payload: &'static str,
-    /// Messages published.
-    pub published: u64,
-    /// Messages that subscribers lost because they were slow, or read only after more had come than they keep.
-    pub lost: u64,
-    /// Subscriptions that listen now.
-    pub subscribers: usize,
 }

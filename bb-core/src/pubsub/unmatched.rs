@@ -1,6 +1,7 @@
 //! What a subscription asks for and nothing publishes.
 
-use super::{AnyTopic, Payloads, Select};
+use super::any::AnyTopic;
+use super::select::{Payloads, Select};
 use crate::message::nearest::{nearest, nearest_path};
 use std::collections::BTreeSet;
 use std::fmt;

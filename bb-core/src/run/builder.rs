@@ -1,5 +1,6 @@
 //! A robot before it starts.
 
+use super::bound::refused_by_bound;
 use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
@@ -73,13 +74,17 @@ impl<R: Robot> Builder<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
+        let Some(declared) = R::PARAMETERS.get(parameter.number()) else { return Ok(()) };
         let value = value.into_value();
-        if let Some(declared) = R::PARAMETERS.get(parameter.number()) {
-            declared.check(&value)?;
-        }
-        if let Some(slot) = self.parameters.get_mut(parameter.number()) {
+        declared.check(&value)?;
+        let mut parameters = self.parameters.clone();
+        if let Some(slot) = parameters.get_mut(parameter.number()) {
             *slot = value;
         }
+        if let Some(message) = refused_by_bound::<R>(&mut self.options, &parameters, declared.path) {
+            return Err(ParameterError { path: declared.path.to_owned(), message });
+        }
+        self.parameters = parameters;
         Ok(())
     }
 
@@ -298,3 +303,11 @@ impl<R: Robot> fmt::Debug for Builder<R> {
         f.debug_tuple("Builder").field(&R::NAME).finish()
     }
 }
+
+/// No robot is.
+#[doc(hidden)]
+#[diagnostic::on_unimplemented(
+    message = "a robot is assembled with `{Self}::builder()`, and there is no `new`",
+    label = "call `builder` instead"
+)]
+pub trait MadeByNew {}

@@ -1,9 +1,9 @@
-//! Why a robot does not start.
+//! Errors at the start of a robot.
 
 use crate::fault::Fault;
 use std::fmt;
 
-/// Why a robot does not start: which component, and what keeps it. `Debug` prints the same as `Display`, since that is
+/// A robot does not start: which component failed, and why. `Debug` prints the same as `Display`, since that is
 /// what a `main` that returns it shows.
 pub struct StartError {
     path: &'static str,
@@ -20,7 +20,7 @@ impl StartError {
         self.path
     }
 
-    /// What keeps it from starting.
+    /// Why it does not start.
     pub fn fault(&self) -> &Fault {
         &self.fault
     }

@@ -20,7 +20,7 @@ use std::marker::PhantomData;
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be subscribed to",
     label = "is no handle of a publisher",
-    note = "name a publisher by its handle, as in `rover::sensor::base::imu`; paths that are known at run time only go to \
+    note = "name a publisher by its handle, as in `rover::sensor::base::imu`; a path that is known only at run time goes to \
             `subscribe_any(Select::Path(path), …)`",
     note = "an estimator of several outputs is subscribed to output by output"
 )]

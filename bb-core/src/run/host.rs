@@ -31,8 +31,8 @@ impl<R: Robot> RobotHost<R> {
 }
 
 impl<R: Robot> Guardian for RobotHost<R> {
-    fn on_disarm(&self, path: &'static str, hook: DisarmHook) -> u64 {
-        self.control.on_disarm(path, hook)
+    fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
+        self.control.on_disarm(path, execution, hook);
     }
 
     fn hardware_error(&self, path: &'static str, message: String) {
@@ -124,8 +124,8 @@ impl<R: Robot> Host for RobotHost<R> {
         self.control.infos()
     }
 
-    fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault> {
-        self.control.execute_untyped(path, arguments)
+    fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault> {
+        self.control.execute_untyped(path, arguments, permit)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What can be asked and told of a robot that runs, whoever drives it.
+//! The interface of a running robot: the same in real time, in a simulation and in a replay.
 
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::machine::Machine;
@@ -14,7 +14,7 @@ use std::fmt;
 use std::sync::Arc;
 
 /// A robot that runs. [`Running`](super::Running) and [`Simulation`](super::Simulation) dereference to it; a clone may go
-/// to another thread, into a driver's callback say, and lives on when the robot has stopped.
+/// to another thread, such as a driver's callback, and outlives the run.
 pub struct Live<R: Robot>(pub(super) Arc<Machine<R>>);
 
 impl<R: Robot> Clone for Live<R> {
@@ -34,7 +34,7 @@ impl<R: Robot> Live<R> {
         self.subscribe_with(publisher, Overflow::default())
     }
 
-    /// Subscribes from now on, and says what happens when the subscriber is slow.
+    /// Subscribes from now on; `overflow` says what happens when the subscriber is slow.
     pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
         self.0.subscribe(publisher, overflow)
     }
@@ -54,11 +54,11 @@ impl<R: Robot> Live<R> {
         self.0.bus()
     }
 
-    /// Asks an estimator, and waits for its answer. What it emits beside is published as always.
+    /// Sends a request to an estimator and waits for its answer. Outputs that it emits are published as usual.
     ///
     /// # Errors
-    /// The estimator does not run, or fails at this request; or an estimator's message has woken the caller on this very
-    /// thread, so that he would wait for himself.
+    /// The estimator does not run, or fails at this request; or the caller was woken by an estimator's message on this very
+    /// thread, and would wait for itself.
     pub fn call<V: Visitable<R>, Q>(
         &self,
         estimator: V,
@@ -70,7 +70,7 @@ impl<R: Robot> Live<R> {
         self.settled(|machine| machine.call(estimator, request))
     }
 
-    /// Tells an estimator something. It takes it when it is free; nobody waits.
+    /// Sends a one-way request to an estimator, which handles it when it is free. Does not wait.
     ///
     /// # Errors
     /// More than a thousand requests wait for it, or the robot has stopped.
@@ -89,7 +89,7 @@ impl<R: Robot> Live<R> {
     /// Starts a command.
     ///
     /// # Errors
-    /// Why it is refused; that is counted and published as well.
+    /// The command is refused; the refusal is counted and published as well.
     pub fn command<C: Command>(
         &self,
         command: CommandHandle<R, C>,
@@ -118,7 +118,7 @@ impl<R: Robot> Live<R> {
     /// Sets a parameter: it is published, and reaches the options that are bound to it.
     ///
     /// # Errors
-    /// What was expected, or which component would refuse it.
+    /// The value is not accepted, by the parameter's range or by a component, which is named.
     pub fn set_parameter<T: ParameterType>(
         &self,
         parameter: ParameterHandle<R, T>,
@@ -162,12 +162,12 @@ impl<R: Robot> Live<R> {
         self.settled(|machine| machine.control.disarm(true))
     }
 
-    /// What it has done so far.
+    /// A report of the run so far.
     pub fn report(&self) -> Report {
         self.0.report()
     }
 
-    /// Publishes as if `sensor` had measured `payload` at `time`; all estimators downstream run before this returns, but
+    /// Publishes as if `sensor` had measured `payload` at `time`; all estimators downstream run before this returns, except
     /// those that are busy on another thread or have one of their own.
     pub fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
         self.settled(|machine| machine.publish(sensor, time, payload));
@@ -178,7 +178,7 @@ impl<R: Robot> Live<R> {
         self.clone()
     }
 
-    /// Disarms the robot, cancels its commands, and tells sensors and services to stop as soon as it is safe; nobody waits.
+    /// Disarms the robot, cancels its commands, and tells sensors and services to stop as soon as it is safe. Does not wait.
     pub fn request_stop(&self) {
         self.settled(|machine| machine.control.begin_stop());
     }

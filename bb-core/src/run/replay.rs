@@ -4,7 +4,7 @@ use super::describe::difference;
 use super::machine::Machine;
 use super::visit::Visitable;
 use super::{Live, Report, Robot};
-use crate::component::{HandleCall, HandleCast, Permit};
+use crate::component::{HandleCall, HandleCast};
 use crate::declaration::ParameterValues;
 use crate::journal::{Callback, Entry, Event, Publishers, Recorded, Request, decoded};
 use crate::node::{Key, NodeEntry, Replayed, know_calls, know_casts};
@@ -15,7 +15,7 @@ use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// A robot that is run again from its journal, on the caller's thread. Subscribers get what was published then.
+/// A robot that is run again from its journal, on the caller's thread. Subscribers get what was published in that run.
 pub struct Replay<R: Robot> {
     live: Live<R>,
     /// Lines that were not played yet: the line of a measured turn waits for the one that says how long its callbacks took.
@@ -246,10 +246,7 @@ impl<R: Robot> Replay<R> {
             Event::Cancel { execution } => control.cancel(execution),
             Event::Timeout { execution } => control.timed_out(execution),
             Event::Gone { execution } => control.gone(execution),
-            Event::Arm => {
-                // Whether it succeeds follows from the state.
-                let _ = control.arm(&Permit::UNLIMITED);
-            }
+            Event::Arm => control.replay_arm(),
             Event::Disarm { force } => {
                 control.replay_disarm(force);
             }
@@ -337,7 +334,7 @@ impl<R: Robot> Replay<R> {
         self.island(declared.island, time, Replayed::Node(estimator, NodeEntry::Cast { request, handle: None }))
     }
 
-    /// Holds an output against what it was.
+    /// Compares an output with the recorded one.
     fn compare(&self, island: usize, publisher: usize, checksum: u64) -> Result<(), String> {
         let path = self.path_of(publisher);
         match self.live.0.environment.replayed().take(island) {
@@ -388,7 +385,7 @@ impl<R: Robot> Replay<R> {
         let topics = registry.topics();
         let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
             (Some(topic), _) => Arc::clone(topic),
-            (None, Recorded::Message(message)) => message.topic(registry).map_err(|error| error.to_string())?,
+            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string())?,
             (None, Recorded::Bytes(_)) => {
                 return Err(format!(
                     "something was published at `{path}`, a path made at run time, and the payload is not known: make a \

@@ -45,7 +45,7 @@ impl<R: Robot> Running<R> {
         Ok(running)
     }
 
-    /// Waits until every sensor and service has finished: for recordings, simulated sensors that end, and
+    /// Waits until every sensor and service has finished: at the end of recordings and simulated sensors, and after
     /// [`Live::request_stop`].
     pub fn wait(&mut self) {
         for (path, thread) in std::mem::take(&mut self.sources) {

@@ -57,11 +57,13 @@ impl<R: Robot> Builder<R> {
     #[cfg(feature = "toml")]
     pub fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
         let names = assign::names(self);
-        let assignments = file::read(name, text, |path| match path {
-            path if names.contains(path) => file::Known::Setting,
-            path if assign::is_beginning(&names, path) => file::Known::Table,
-            _ => file::Known::No,
-        })?;
+        let assignments =
+            file::read(name, text, |path| match (names.contains(path), assign::is_beginning(&names, path)) {
+                (true, true) => file::Known::Both,
+                (true, false) => file::Known::Setting,
+                (false, true) => file::Known::Table,
+                (false, false) => file::Known::No,
+            })?;
         assign::assign(self, &assignments)
     }
 

@@ -52,12 +52,12 @@ impl<R: Robot> Simulation<R> {
         simulation
     }
 
-    /// When the next sensor is due; none once all have finished.
+    /// When the next sensor is due; `None` once all have finished.
     pub fn next_due(&self) -> Option<MonotonicTime> {
         self.due.peek().map(|Reverse((time, _))| *time)
     }
 
-    /// Moves time on to the next sensor that is due and reads it, with whatever else is due before; false once all
+    /// Moves time to the next sensor that is due and reads it, after whatever else is due before. Returns `false` once all
     /// sensors have finished.
     pub fn step(&mut self) -> bool {
         self.catch_up();
@@ -103,8 +103,8 @@ impl<R: Robot> Simulation<R> {
         self.catch_up();
     }
 
-    /// Has the callbacks of an estimator take so long from now on, as far as its `latency_budget` is concerned: on virtual
-    /// time nothing takes time by itself.
+    /// Makes the callbacks of an estimator appear to take this long from now on, for its `latency_budget`: on virtual time
+    /// nothing takes time by itself.
     pub fn pretend_latency<V: Visitable<R>>(&self, estimator: V, latency: Duration) {
         let nanos = i64::try_from(latency.as_nanos()).unwrap_or(i64::MAX);
         self.live.0.environment.node(estimator.number()).pretend_latency(nanos);

@@ -39,7 +39,7 @@ pub fn visit<M: Member>(
     *error = called.err();
 }
 
-/// What answers requests: the handle of an estimator.
+/// A handle that requests can be sent to: that of an estimator.
 pub trait Visitable<R: Robot>: Copy {
     /// The estimator.
     type Estimator: Estimator;

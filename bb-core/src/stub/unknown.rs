@@ -1,10 +1,11 @@
 //! The type that fits everywhere.
 
 use super::stub;
+use crate::component::inputs::Slot;
 use crate::component::{
     Actuator, ActuatorContext, At, Command, CommandContext, Context, Estimator, Fault, InputAt, InputField, Inputs,
     NoArguments, NoOptions, Outcome, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, Service,
-    ServiceContext, Slot, SyncMiss,
+    ServiceContext, SyncMiss,
 };
 use crate::message::codec::{Reader, Shape, Writer};
 use crate::message::{DecodeError, Field, Finite, Payload, Stamped};

@@ -10,7 +10,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// The one source of time of a robot. Clones read the same clock.
 ///
-/// *Real* time starts at zero when the process first reads it and never goes back. *Virtual* time stands still until
+/// *Real* time starts at zero when the process first reads it and never goes back. *Virtual* time does not move until
 /// it is set, so that a recorded or simulated run replays with the same stamps, as fast as the machine can.
 ///
 /// A clock made by [`Clock::real`] starts with the date that the machine has at that moment. A running robot keeps
@@ -47,7 +47,7 @@ impl Clock {
         Self { kind: Kind::Real(zero), wall_offset_nanos: Arc::new(AtomicI64::new(offset)) }
     }
 
-    /// A virtual clock that stands at `start`, with the Unix epoch at its zero.
+    /// A virtual clock that is at `start`, with the Unix epoch at its zero.
     pub fn virtual_at(start: MonotonicTime) -> Self {
         let now = Arc::new(AtomicI64::new(start.as_nanos()));
         Self { kind: Kind::Virtual(now), wall_offset_nanos: Arc::new(AtomicI64::new(0)) }
@@ -83,8 +83,8 @@ impl Clock {
         matches!(self.kind, Kind::Virtual(_))
     }
 
-    /// Measures the offset of a real clock again. The new offset, if it differs from the current one by more than 1 ms:
-    /// the machine's date was set. One caller gets it.
+    /// Measures the offset of a real clock again. Returns the new offset if it differs from the current one by more than 1 ms,
+    /// because the machine's date was set. Only one caller gets it.
     // The thread of the timers calls it, at most once a second.
     pub(crate) fn refresh_wall(&self) -> Option<i64> {
         match self.kind {

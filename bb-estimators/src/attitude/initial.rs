@@ -8,12 +8,10 @@ use core::fmt;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::Quantity;
 use super::Real;
 use super::rotation::{turn_heading, turn_upright};
-
-/// Below this specific force, m/s², a sensor is in free fall and does not show where up is.
-pub const FREE_FALL: f64 = 0.5;
+pub use super::sample::FREE_FALL;
+use super::sample::Quantity;
 
 /// The least horizontal part of the magnetic field, as a fraction of its norm, that shows a heading: a dip of
 /// 89.4°, met only next to the magnetic poles.

@@ -46,6 +46,7 @@ mod iron;
 mod measurement;
 mod params;
 mod rest;
+mod states;
 #[cfg(test)]
 mod tests;
 mod vertical;
@@ -62,3 +63,7 @@ pub const ABOUT: super::About = super::About {
 
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
+
+/// Standard deviation of the tilt that one accelerometer sample shows in motion, rad. At rest it is forgotten
+/// within a second.
+const INITIAL_TILT: f64 = 0.35;

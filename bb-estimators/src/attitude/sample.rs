@@ -6,7 +6,9 @@ use core::fmt;
 use nalgebra::Vector3;
 
 use super::Real;
-use super::initial::FREE_FALL;
+
+/// Below this specific force, m/s², a sensor is in free fall and does not show where up is.
+pub const FREE_FALL: f64 = 0.5;
 
 /// The greatest component of the angular velocity that a filter takes, rad/s. Gyroscopes end below 100 rad/s.
 pub const MAX_ANGULAR_VELOCITY: f64 = 1e3;

@@ -53,3 +53,6 @@ pub const ABOUT: super::About = super::About {
     when: "to agree with other programs that use VQF's published defaults",
     idea: "gravity by a strong low-pass in the gyroscope's frame, heading apart; finds bias, rest and disturbances",
 };
+
+/// rad.
+const DEGREE: f64 = core::f64::consts::PI / 180.0;

@@ -4,6 +4,7 @@ use nalgebra::ComplexField;
 use nalgebra::Vector3;
 
 use crate::attitude::{ImuSample, ParamsError};
+use crate::moments::Moments;
 use crate::params::{Params as _, params};
 
 params! {
@@ -63,33 +64,6 @@ struct Sums {
     count: f64,
     force: Moments,
     rate: Moments,
-}
-
-/// Mean, and sum of squared differences to it; B. P. Welford, Technometrics 4(3), 1962.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Moments {
-    mean: Vector3<f64>,
-    squares: Vector3<f64>,
-}
-
-impl Moments {
-    fn add(&mut self, count: f64, value: &Vector3<f64>) {
-        let before = value - self.mean;
-        self.mean += before / count;
-        self.squares += before.component_mul(&(value - self.mean));
-    }
-
-    /// Of both; T. F. Chan, G. H. Golub, R. J. LeVeque, COMPSTAT 1982.
-    fn merge(&mut self, count: f64, other: &Self, others: f64) {
-        let difference = other.mean - self.mean;
-        let part = others / (count + others);
-        self.mean += difference * part;
-        self.squares += other.squares + difference.component_mul(&difference) * (count * part);
-    }
-
-    fn largest_variance(&self, count: f64) -> f64 {
-        self.squares.max() / count
-    }
 }
 
 impl Sums {

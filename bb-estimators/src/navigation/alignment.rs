@@ -5,9 +5,11 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::eskf::{ImuMean, Refusal, Start};
+use super::eskf::{ImuMean, Start};
 use super::math::{atan2, sqrt};
+use super::refusal::Refusal;
 use crate::attitude::initial::initial_orientation;
+use crate::moments::Moments;
 use crate::params::params;
 
 #[cfg(test)]
@@ -53,26 +55,6 @@ pub struct Alignment {
     last_ns: i64,
     rotation: Moments,
     force: Moments,
-}
-
-/// Mean, and sum of squared differences to it; B. P. Welford, Technometrics 4(3), 1962.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Moments {
-    mean: Vector3<f64>,
-    squares: Vector3<f64>,
-}
-
-impl Moments {
-    fn add(&mut self, count: f64, value: &Vector3<f64>) {
-        let before = value - self.mean;
-        self.mean += before / count;
-        self.squares += before.component_mul(&(value - self.mean));
-    }
-
-    /// The largest standard deviation of a component.
-    fn deviation(&self, count: f64) -> f64 {
-        sqrt(self.squares.max() / count)
-    }
 }
 
 impl Alignment {
@@ -126,7 +108,7 @@ impl Alignment {
         let world_from_body = self.orientation(&Vector3::x(), heading.0)?;
         let tilt = accelerometer_bias / gravity;
         let start = Start::at(self.last_ns, position, (Vector3::zeros(), 0.02), (world_from_body, tilt));
-        let bias = self.rotation.deviation(self.count) / sqrt(self.count);
+        let bias = sqrt(self.rotation.largest_variance(self.count)) / sqrt(self.count);
         Ok(Start {
             gyroscope_bias: self.rotation.mean,
             // Of noise that is not white over the whole of it, no less than a part is known.
@@ -172,8 +154,8 @@ impl Alignment {
     }
 
     fn is_still(&self) -> bool {
-        self.rotation.deviation(self.count) <= self.params.rest_rotation
-            && self.force.deviation(self.count) <= self.params.rest_force
+        sqrt(self.rotation.largest_variance(self.count)) <= self.params.rest_rotation
+            && sqrt(self.force.largest_variance(self.count)) <= self.params.rest_force
     }
 
     fn beginning_with(mut self, sample: &ImuMean) -> Self {

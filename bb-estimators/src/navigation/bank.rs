@@ -8,10 +8,13 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::eskf::{Eskf, Estimate, ImuMean, Refusal, Start, States};
+use super::eskf::{Eskf, ImuMean, Start};
+use super::fused::Fused;
 use super::math::{exp, ln};
 use super::measurement::Measurement;
-use super::stream::{Fused, Stream};
+use super::refusal::Refusal;
+use super::state::{Estimate, States};
+use super::stream::Stream;
 
 /// A filter whose log likelihood is this far below that of the best is dropped: odds of 1 to 10¹¹.
 const IMPLAUSIBLE: f64 = 25.0;

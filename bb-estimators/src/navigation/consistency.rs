@@ -5,8 +5,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::navigation::fused::Fused;
 use crate::navigation::math::sqrt;
-use crate::navigation::stream::Fused;
 
 /// Statistics of one sensor's innovations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

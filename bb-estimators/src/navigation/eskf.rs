@@ -8,7 +8,7 @@
 //! Errors are what truth is more than the estimate. Position and velocity are those of the IMU, in the world; the
 //! rotation error is one of the world, `R_true = exp(θ) R`; biases are in the body. Then nothing of the filter depends on
 //! how the sensor is mounted, nor on the world's heading or origin, and between two samples no error has a transition of its
-//! own: see `propagation.rs`, which has the equations. [`Optional`] states follow, by type.
+//! own: see `propagation.rs`, which has the equations. [`Optional`](super::Optional) states follow, by type.
 //!
 //! # Update
 //!
@@ -17,29 +17,16 @@
 //! the last bit. The noise of a scalar is taken as at least 1e-10 of its predicted variance, which bounds what rounding
 //! can do; a Cholesky decomposition every 1024 updates checks it, and [`Eskf::repairs`] counts what it found.
 
-mod covariance;
-mod estimate;
 mod filter;
 mod params;
 mod propagation;
-mod refusal;
-mod states;
 #[cfg(test)]
 mod tests;
 
-pub use estimate::{Estimate, Keyframe};
 pub use filter::{Eskf, ImuMean, Start};
-#[cfg(feature = "smoother")]
 pub(super) use filter::{LONGEST_GAP_S, seconds_between};
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};
 #[cfg(feature = "smoother")]
 pub(super) use propagation::{Transition, rows};
-pub use refusal::Refusal;
-#[cfg(feature = "smoother")]
-pub(super) use states::distinct;
-pub use states::{
-    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
-    offset,
-};

@@ -1,40 +1,38 @@
 //! The error-state Kalman filter as an estimator to declare in `robot!`.
 
 mod aligning;
+pub(super) mod course;
 mod filter;
-mod health;
+pub(super) mod health;
+mod height;
 mod input;
+mod measured;
 mod options;
 mod output;
-mod world;
+mod report;
+mod running;
+mod states;
+pub(super) mod world;
 
 pub use input::NavigationInputs;
 pub use options::NavigationOptions;
-pub use output::{NavigationOutput, NavigationOutputs, NavigationStatus, Verdicts};
+pub use output::{NavigationOutput, NavigationOutputs};
+pub use report::{NavigationStatus, Verdicts};
 
 use self::aligning::Aligning;
-use self::filter::{Filter, Measured};
-use self::health::Watch;
+use self::health::Limits;
 use self::input::Mounting;
-use self::world::World;
-use super::eskf::{ImuMean, Refusal};
-use super::history::History;
+use self::running::Core;
+use super::refusal::Refusal;
+use super::state::{NAVIGATION, Navigation, States};
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
 use bb_core::{Context, Estimator, Fault, Reply};
 use std::marker::PhantomData;
 
-/// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
-const SAMPLES: usize = 512;
-const MEASUREMENTS: usize = 64;
-const STATES: usize = 16;
-type Past = History<Filter, SAMPLES, MEASUREMENTS, STATES>;
-
-/// How far ahead of the IMU a measurement may be stamped, ns.
-const LONGEST_LEAD_NS: i64 = 500_000_000;
-
 /// Position, velocity and attitude of the link where it is declared, from an IMU and any of satellite navigation, wheels or
-/// another odometry, and poses in the world. It emits [`Odometry`] with every sample of the IMU, or [`NavigationOutputs`].
+/// another odometry, poses in the world or relative to each other, a magnetometer and a barometer. It emits [`Odometry`] with every
+/// sample of the IMU, or [`NavigationOutputs`].
 ///
 /// ```
 /// # fn main() {}
@@ -60,6 +58,96 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 /// }
 /// ```
 ///
+/// `S` are its optional [states](States), and `N` is [`States::DIMENSION`]. Inputs and states that belong together are declared
+/// together: without `Optional::Keyframe` there are no relative poses, without `Optional::BarometerBias` no pressures, and a state
+/// needs the input that tells it. With `Optional::WheelScale`, wheels are taken not to move sideways.
+///
+/// ```
+/// # fn main() {}
+/// use bb_core::payload::{FluidPressure, RelativePose};
+/// use bb_core::prelude::*;
+/// use bb_estimators::Eskf;
+/// use bb_estimators::navigation::{Optional, States};
+///
+/// #[derive(Clone, Copy, Debug, PartialEq)]
+/// pub struct Drone;
+///
+/// impl States for Drone {
+///     const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale, Optional::BarometerBias];
+/// }
+///
+/// robot! {
+///     robot Quadrotor;
+///
+///     link body {
+///         sensor imu: External<Imu>();
+///         sensor camera: External<RelativePose>();
+///         sensor barometer: External<FluidPressure>();
+///         estimator navigation: Eskf<Odometry, Drone, { Drone::DIMENSION }>() {
+///             input imu: sensor::body::imu, driver;
+///             input relative: sensor::body::camera, optional;
+///             input pressure: sensor::body::barometer, optional;
+///         }
+///     }
+/// }
+/// ```
+///
+/// Another number, a state that is listed twice, and a scale of relative poses without their keyframe do not compile:
+///
+/// ```compile_fail
+/// use bb_core::prelude::*;
+/// use bb_estimators::Eskf;
+/// use bb_estimators::navigation::Wheeled;
+///
+/// robot! {
+///     robot Rover;
+///
+///     link base {
+///         sensor imu: External<Imu>();
+///         sensor wheels: External<Odometry>();
+///         estimator navigation: Eskf<Odometry, Wheeled, 17>() {
+///             input imu: sensor::base::imu, driver;
+///             input odometry: sensor::base::wheels, optional;
+///         }
+///     }
+/// }
+///
+/// fn main() -> Result<(), StartError> {
+///     Rover::builder().simulate().map(drop)
+/// }
+/// ```
+///
+/// ```compile_fail
+/// use bb_core::payload::RelativePose;
+/// use bb_core::prelude::*;
+/// use bb_estimators::Eskf;
+/// use bb_estimators::navigation::{Optional, States};
+///
+/// #[derive(Clone, Copy, Debug, PartialEq)]
+/// pub struct Scaled;
+///
+/// impl States for Scaled {
+///     const OPTIONAL: &'static [Optional] = &[Optional::RelativeScale];
+/// }
+///
+/// robot! {
+///     robot Drone;
+///
+///     link body {
+///         sensor imu: External<Imu>();
+///         sensor camera: External<RelativePose>();
+///         estimator navigation: Eskf<Odometry, Scaled, { Scaled::DIMENSION }>() {
+///             input imu: sensor::body::imu, driver;
+///             input relative: sensor::body::camera, optional;
+///         }
+///     }
+/// }
+///
+/// fn main() -> Result<(), StartError> {
+///     Drone::builder().simulate().map(drop)
+/// }
+/// ```
+///
 /// The world is a local tangent frame, x east, y north, z up. Its origin is where the first fix was; without satellites, where
 /// the filter started. It starts once the IMU has been at rest for a second, with the heading of the options, or, with
 /// `heading_from_course`, once fixes show in which direction the robot travels. Until then it emits nothing.
@@ -68,36 +156,36 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 /// it has refused is in the status. The health of the estimator says when the position was dead-reckoned for too long, is less
 /// certain than the options allow, or does not agree with what is measured.
 #[derive(Debug)]
-pub struct EskfEstimator<O = Odometry> {
+pub struct EskfEstimator<O = Odometry, S: States = Navigation, const N: usize = NAVIGATION> {
     options: NavigationOptions,
     mounting: Mounting,
     phase: Phase,
-    output: PhantomData<fn() -> O>,
+    types: PhantomData<fn(S) -> O>,
 }
 
 #[derive(Debug)]
 enum Phase {
     Aligning(Box<Aligning>),
-    Running(Box<Running>),
+    Running(Box<dyn Core>),
 }
 
-#[derive(Debug)]
-struct Running {
-    past: Past,
-    world: World,
-    watch: Watch,
-}
-
-impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
+impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator for EskfEstimator<O, S, N> {
     type Options = NavigationOptions;
     type Input = NavigationInputs<'static>;
     type Output = O;
 
     fn init(options: NavigationOptions, context: &Context) -> Result<Self, Fault> {
         options.params().check()?;
+        const {
+            assert!(
+                states::is_possible::<S>(),
+                "`Optional::RelativeScale` needs `Optional::Keyframe`: the scale is that of poses relative to it"
+            );
+        }
         let mounting = Mounting::of(context)?;
-        let phase = Phase::Aligning(Box::new(Aligning::new(&options)));
-        Ok(Self { options, mounting, phase, output: PhantomData })
+        states::check::<S>(&mounting)?;
+        let phase = Phase::Aligning(Box::new(Aligning::new(&options, None)));
+        Ok(Self { options, mounting, phase, types: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
@@ -111,19 +199,23 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
                     Reply::none()
                 };
                 if let Some((start, world)) = start {
-                    let filter = Filter::new(&self.options, &start)?;
-                    let past =
-                        Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
-                    let watch = Watch::new(&self.mounting);
-                    self.phase = Phase::Running(Box::new(Running { past, world, watch }));
+                    let limits = self.limits();
+                    self.phase = Phase::Running(running::started::<S, N>(&self.options, &start, world, limits)?);
                 }
                 Ok(reply)
             }
             Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
-                Ok(()) => Ok(running.reply(&self.options, &self.mounting)),
+                Ok(()) => {
+                    let reply: Reply<O> = O::of(running.as_ref(), &self.mounting).into();
+                    Ok(match running.divergence() {
+                        Some(reason) => reply.diverged(reason),
+                        None => reply,
+                    })
+                }
                 Err(Refusal::Gap { .. }) => {
                     tracing::info!("no sample for too long: it starts again");
-                    self.phase = Phase::Aligning(Box::new(Aligning::new(&self.options)));
+                    let frame = running.frame();
+                    self.phase = Phase::Aligning(Box::new(Aligning::new(&self.options, frame)));
                     Ok(Reply::none().diverged("no sample of the IMU for too long"))
                 }
                 Err(refusal) => {
@@ -135,49 +227,12 @@ impl<O: NavigationOutput> Estimator for EskfEstimator<O> {
     }
 }
 
-impl Running {
-    fn take(
-        &mut self,
-        sample: &ImuMean,
-        inputs: &NavigationInputs<'_>,
-        options: &NavigationOptions,
-        mounting: &Mounting,
-    ) -> Result<(), Refusal> {
-        self.past.propagate(sample)?;
-        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
-            && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
-        {
-            self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
-        }
-        if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
-            let measured = mounting.velocity(&odometry.payload, options);
-            self.fuse(odometry.monotonic_time.as_nanos(), Measured::Odometry(measured));
-        }
-        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
-            let measured = self.world.pose(&pose.payload, options, mounting);
-            self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
-        }
-        if let Some(new_from_old) = self.past.now().position().and_then(|position| self.world.moves_on(&position)) {
-            // What is in the history belongs to the world that is left.
-            let mut filter = self.past.now().clone();
-            filter.move_world(&new_from_old)?;
-            self.past = Past::new(filter, LONGEST_LEAD_NS)?;
-        }
-        Ok(())
-    }
-
-    fn fuse(&mut self, time_ns: i64, measured: Measured) {
-        if let Err(refusal) = self.past.update(time_ns, &measured) {
-            tracing::debug!(%refusal, sensor = measured.name(), "measurement refused");
-        }
-    }
-
-    fn reply<O: NavigationOutput>(&mut self, options: &NavigationOptions, mounting: &Mounting) -> Reply<O> {
-        let filter = self.past.now();
-        let reply: Reply<O> = O::of(filter, &self.world, mounting).into();
-        match self.watch.look(filter, options) {
-            Some(reason) => reply.diverged(reason),
-            None => reply,
+impl<O, S: States, const N: usize> EskfEstimator<O, S, N> {
+    fn limits(&self) -> Limits {
+        let longest_s = self.options.longest_dead_reckoning;
+        Limits {
+            dead_reckoning_s: self.mounting.has_positions().then_some(longest_s),
+            deviation: self.options.largest_deviation,
         }
     }
 }

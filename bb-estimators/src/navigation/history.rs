@@ -5,8 +5,9 @@
 //! order of their stamps, to the last bit; T. D. Larsen et al., "Incorporation of time delayed measurements in a
 //! discrete-time Kalman filter", CDC 1998, compare it with methods that are cheaper and approximate.
 
-use super::eskf::{ImuMean, Refusal};
-use super::stream::Fused;
+use super::eskf::ImuMean;
+use super::fused::Fused;
+use super::refusal::Refusal;
 
 mod ring;
 #[cfg(test)]

@@ -47,7 +47,8 @@ pub use wheels::{BodyVelocity, NonHolonomic, WheelSpeed};
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use crate::navigation::eskf::{Estimate, Refusal, States};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, States};
 
 /// A measurement of `D` numbers.
 pub trait Measurement<const D: usize> {
@@ -122,6 +123,6 @@ impl<const D: usize, const N: usize> Linearised<D, N> {
 
 /// Covariance of noise that is alike along all axes.
 #[inline]
-fn isotropic(deviation: f64) -> Matrix3<f64> {
+pub(in crate::navigation) fn isotropic(deviation: f64) -> Matrix3<f64> {
     Matrix3::identity() * (deviation * deviation)
 }

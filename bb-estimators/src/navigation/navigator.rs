@@ -3,9 +3,12 @@
 use nalgebra::SMatrix;
 
 use super::bank::Bank;
-use super::eskf::{Eskf, EskfParams, Estimate, GaussMarkov, ImuMean, Optional, Refusal, Start, States};
-use super::measurement::{AbsolutePose, GnssPosition, RelativePose};
-use super::stream::{Fused, Stream, StreamParams};
+use super::eskf::{Eskf, EskfParams, GaussMarkov, ImuMean, Start};
+use super::fused::Fused;
+use super::measurement::{AbsolutePose, BodyVelocity, GnssPosition, RelativePose};
+use super::refusal::Refusal;
+use super::state::{Estimate, Optional, States};
+use super::stream::{Stream, StreamParams};
 use crate::attitude::ParamsError;
 
 /// How many filters the bank has room for.
@@ -52,6 +55,7 @@ pub struct Navigator {
     gnss: [Stream; FILTERS],
     poses: [Stream; FILTERS],
     relative: [Stream; FILTERS],
+    velocities: [Stream; FILTERS],
 }
 
 /// One filter of the bank: what it multiplies, and whether the scale drifts.
@@ -81,7 +85,7 @@ impl Navigator {
             gnss[i] = Stream::new(StreamParams { variance_factor: hypothesis.gnss, ..open });
         }
         let gated = [Stream::default(); FILTERS];
-        Ok(Self { bank: Bank::new(filters), gnss, poses: gated, relative: gated })
+        Ok(Self { bank: Bank::new(filters), gnss, poses: gated, relative: gated, velocities: gated })
     }
 
     /// One filter with these parameters, in place of a bank, for those who have tuned it.
@@ -94,7 +98,7 @@ impl Navigator {
         filters[0].1 = 1.0;
         let open = [Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }); FILTERS];
         let gated = [Stream::default(); FILTERS];
-        Ok(Self { bank: Bank::new(filters), gnss: open, poses: gated, relative: gated })
+        Ok(Self { bank: Bank::new(filters), gnss: open, poses: gated, relative: gated, velocities: gated })
     }
 
     /// See [`Eskf::start`].
@@ -142,6 +146,15 @@ impl Navigator {
         self.bank.update(&mut self.relative, measurement)
     }
 
+    /// The velocity of the body, from wheels; see [`Bank::update`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn body_velocity(&mut self, measurement: &BodyVelocity) -> Result<Fused, Refusal> {
+        self.bank.update(&mut self.velocities, measurement)
+    }
+
     /// See [`Eskf::set_keyframe`].
     pub fn set_keyframe(&mut self, id: u64) {
         self.bank.set_keyframe(id);
@@ -152,10 +165,10 @@ impl Navigator {
         self.bank.estimate()
     }
 
-    /// The streams of the most plausible filter: GNSS positions, poses, relative poses.
-    pub fn streams(&self) -> [&Stream; 3] {
+    /// The streams of the most plausible filter: GNSS positions, poses, relative poses, velocities.
+    pub fn streams(&self) -> [&Stream; 4] {
         let best = self.bank.best();
-        [&self.gnss[best], &self.poses[best], &self.relative[best]]
+        [&self.gnss[best], &self.poses[best], &self.relative[best], &self.velocities[best]]
     }
 
     /// The parameters of the most plausible filter, which are what the bank has learnt, and how plausible it is.

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::{Kind, Params, SetError, Value};
 use crate::attitude::{FilterParams, MadgwickParams, MekfParams};
+use crate::navigation::planar::PlanarParams;
 use crate::navigation::{AlignmentParams, EskfParams, StreamParams};
 
 /// Calls a law with the parameters of each algorithm.
@@ -16,6 +17,9 @@ fn each(mut law: impl FnMut(&mut dyn Params)) {
     law(&mut StreamParams::default());
     #[cfg(feature = "runtime")]
     law(&mut crate::navigation::NavigationOptions::default());
+    law(&mut PlanarParams::default());
+    #[cfg(feature = "runtime")]
+    law(&mut crate::navigation::planar::PlanarOptions::default());
 }
 
 #[test]

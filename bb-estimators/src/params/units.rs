@@ -74,7 +74,7 @@ impl Unit {
     }
 }
 
-/// Symbol, dimension, factor to SI. `tests/architecture.rs` holds that it is the language's table.
+/// Symbol, dimension, factor to SI. `tests/architecture/` holds that it is the language's table.
 const UNITS: &[(&str, [i8; 6], f64)] = &[
     ("m", [1, 0, 0, 0, 0, 0], 1.0),
     ("km", [1, 0, 0, 0, 0, 0], 1e3),

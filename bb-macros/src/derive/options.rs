@@ -1,12 +1,16 @@
 //! `#[derive(Options)]`: names, docs, defaults, ranges and units of a component's options.
 
+mod attribute;
+mod numbers;
+
 use super::fields;
 use crate::diagnostics::Diagnostics;
-use crate::units::Unit;
+use attribute::Attribute;
+use numbers::literal_number;
 use proc_macro2::TokenStream;
-use quote::{ToTokens, quote, quote_spanned};
+use quote::{quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{DeriveInput, Expr, ExprRange, ExprUnary, Field, Lit, LitStr, RangeLimits, Type, UnOp};
+use syn::{DeriveInput, Expr, Field, Lit};
 
 pub(crate) fn options(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
     let Some(named) = fields::named(item, "Options", diagnostics) else {
@@ -54,44 +58,7 @@ pub(crate) fn options(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     }
 }
 
-/// What `#[option(…)]` says.
-#[derive(Default)]
-struct Attribute {
-    required: bool,
-    default: Option<Expr>,
-    range: Option<(Expr, Expr, String)>,
-    unit: Option<(Unit, String)>,
-}
-
 impl Attribute {
-    fn read(field: &Field, diagnostics: &mut Diagnostics) -> Self {
-        let mut option = Self::default();
-        if is_duration(&field.ty) {
-            option.unit = Some((Unit::SECOND, "s".to_owned()));
-        }
-        for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("option")) {
-            let result = attribute.parse_nested_meta(|meta| {
-                if meta.path.is_ident("required") {
-                    option.required = true;
-                } else if meta.path.is_ident("default") {
-                    option.default = Some(meta.value()?.parse()?);
-                } else if meta.path.is_ident("range") {
-                    option.range = Some(read_range(meta.value()?.parse()?)?);
-                } else if meta.path.is_ident("unit") {
-                    let text: LitStr = meta.value()?.parse()?;
-                    option.unit = Some((text.parse_with(Unit::parse)?, text.value()));
-                } else {
-                    return Err(meta.error("expected `default`, `required`, `range` or `unit`"));
-                }
-                Ok(())
-            });
-            if let Err(error) = result {
-                diagnostics.syntax(&error);
-            }
-        }
-        option
-    }
-
     /// The row of the constant table.
     fn schema(&self, name: String, doc: &str) -> TokenStream {
         let required = self.required;
@@ -121,6 +88,9 @@ impl Attribute {
     }
 
     fn default_value(&self, field: &Field, diagnostics: &mut Diagnostics) -> TokenStream {
+        if self.is_mistaken {
+            return quote!(::bb_core::__private::stub());
+        }
         match (&self.default, self.required) {
             (Some(default), false) => {
                 if let (Some(value), Some((start, end, range))) = (literal_number(default), &self.range)
@@ -175,23 +145,6 @@ impl Attribute {
     }
 }
 
-/// `a..=b` as its ends and its text.
-fn read_range(range: ExprRange) -> syn::Result<(Expr, Expr, String)> {
-    let span = range.clone().into_token_stream();
-    match range {
-        ExprRange { start: Some(start), end: Some(end), limits: RangeLimits::Closed(_), .. } => {
-            let text = format!("{}..={}", plain(&start), plain(&end));
-            Ok((*start, *end, text))
-        }
-        _ => Err(syn::Error::new_spanned(span, "expected both ends, `a..=b`")),
-    }
-}
-
-/// The text of an expression without the blanks between its tokens.
-fn plain(expression: &Expr) -> String {
-    expression.to_token_stream().to_string().replace(' ', "")
-}
-
 /// Texts become what the field is: `String`, `PathBuf`, `&'static str`.
 pub(crate) fn into_if_text(value: &Expr) -> TokenStream {
     match value {
@@ -200,23 +153,4 @@ pub(crate) fn into_if_text(value: &Expr) -> TokenStream {
         }
         other => quote!(#other),
     }
-}
-
-/// The number of a literal, with or without a minus.
-fn literal_number(expression: &Expr) -> Option<f64> {
-    match expression {
-        Expr::Unary(ExprUnary { op: UnOp::Neg(_), expr, .. }) => literal_number(expr).map(|number| -number),
-        Expr::Lit(literal) => match &literal.lit {
-            Lit::Int(number) => number.base10_parse().ok(),
-            Lit::Float(number) => number.base10_parse().ok(),
-            _ => None,
-        },
-        _ => None,
-    }
-}
-
-/// `Duration`, or an `Option` of it.
-fn is_duration(kind: &Type) -> bool {
-    let kind = fields::wrapped(kind, "Option").unwrap_or(kind);
-    matches!(kind, Type::Path(path) if path.path.segments.last().is_some_and(|last| last.ident == "Duration"))
 }

@@ -19,7 +19,7 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
         let mut payload = fields::wrapped(&field.ty, "Option").map(ToTokens::to_token_stream);
         let mut take = quote!(emitted.as_mut()?.#field_name.take());
         if payload.is_none() {
-            diagnostics.error(&field.ty, "expected `Option<Payload>`: none when there is nothing to emit".into());
+            diagnostics.error(&field.ty, "expected `Option<Payload>`: `None` when there is nothing to emit".into());
             // The field still exists, so that this is the only error.
             payload = Some(quote!(::bb_core::__private::Unknown));
             take = quote!(::bb_core::__private::stub());

@@ -1,4 +1,4 @@
-//! Which estimators always run together, behind one lock: see `bb_core::node::Island`.
+//! Which estimators always run together, behind one lock: see `bb_core::run::Island`.
 //!
 //! An estimator belongs to the island of what feeds it, if all of its inputs come from there; one that several islands or
 //! sensors feed begins an island of its own, as does one with `runs_on: worker`.

@@ -88,7 +88,7 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
     }
 }
 
-/// A `bb_core::control::Binding`: which parameters the options of a part are bound to.
+/// A `bb_core::component::binding::Binding`: which parameters the options of a part are bound to.
 pub(super) fn binding(types: &Types<'_>, part: Part) -> TokenStream {
     let robot = types.model();
     let bound = part.component(robot).options.iter();

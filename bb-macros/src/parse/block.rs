@@ -44,7 +44,7 @@ pub(super) fn items<I: Words, S: Words>(
     settings: &mut Settings<S>,
     mut item: impl FnMut(I, Head, ParseStream<'_>, &mut Notes<'_>) -> syn::Result<()>,
 ) {
-    let expected = "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`";
+    let expected = "this does not start a part of a robot; expected a word such as `link`, `joint` or `sensor`";
     let mut seen: Vec<&str> = Vec::new();
     items_of(input, expected, notes, |head, input, notes| {
         let ident = head.word.clone();
@@ -173,7 +173,7 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
         return Ok(None);
     }
     for attribute in attributes.iter().filter(|attribute| !attribute.path().is_ident("doc")) {
-        let message = "only doc comments can stand before a part of a robot; leave this attribute out";
+        let message = "only doc comments are allowed before a part of a robot; leave this attribute out";
         notes.error(attribute, message.into());
     }
     let place = input.span();
@@ -196,9 +196,9 @@ pub(super) fn attributes(input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::
         }
         let place = input.span();
         let message = if input.peek2(Token![!]) {
-            "`//!` and `#![…]` cannot stand in a robot; write `///` before what it documents"
+            "`//!` and `#![…]` cannot be used in a robot; write `///` before what it documents"
         } else {
-            "`#` starts no comment; write `//`"
+            "`#` does not start a comment; write `//`"
         };
         notes.at(place, message.into());
         while input.span().start().line == place.start().line && input.parse::<TokenTree>().is_ok() {}

@@ -61,6 +61,7 @@ impl Component {
     fn parse(name: &Ident, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<(Self, bool)> {
         let mut kind = path_of_type(name, input)?;
         let is_made_here = mistaken::constructor(&mut kind, notes);
+        mistaken::ros_messages(&mut kind, notes);
         let mut options = Vec::new();
         let mut is_closed = false;
         if input.peek(syn::token::Paren) {

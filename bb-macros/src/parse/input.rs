@@ -42,9 +42,8 @@ impl Input {
             Ok(())
         })?;
         if input.peek(syn::token::Paren) {
-            return Err(
-                input.error("what an input is follows a comma: `, driver`, `, optional` or `, within: 250 ms`")
-            );
+            return Err(input
+                .error("properties of an input follow a comma: `, driver`, `, optional` or `, within: 250 ms`"));
         }
         semicolon(input, &format!("`{}`", parsed.name), notes);
         Ok(parsed)

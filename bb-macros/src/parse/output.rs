@@ -24,7 +24,7 @@ impl Output {
             input.parse::<Token![:]>()?;
             path = Some(names(
                 input,
-                "expected a path in brackets, as in `[nav, velocity]`; the type is the algorithm's to say",
+                "expected a path in brackets, as in `[nav, velocity]`; the algorithm gives the type",
             )?);
         }
         semicolon(input, &format!("`{name}`"), notes);

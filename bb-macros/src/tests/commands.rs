@@ -79,7 +79,7 @@ fn declared_categories() {
         &with("a: A { cancel: [motion, motion, all, b]; } b: B { category: speech; }"),
         &[
             ("motion", "`motion` is given twice; leave one out"),
-            ("all", "`all` is no category; to end all commands write `cancel: all;`"),
+            ("all", "`all` is not a category; to end all commands write `cancel: all;`"),
             ("b", "`b` is a command, not a category; give it a `category` and name that"),
             (
                 "speech",

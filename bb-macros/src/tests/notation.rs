@@ -92,8 +92,8 @@ fn brackets_for_braces() {
 
 #[test]
 fn comments() {
-    let hash = "`#` starts no comment; write `//`";
-    let inner = "`//!` and `#![…]` cannot stand in a robot; write `///` before what it documents";
+    let hash = "`#` does not start a comment; write `//`";
+    let inner = "`//!` and `#![…]` cannot be used in a robot; write `///` before what it documents";
     wrong("# The rover.\nrobot Rover; link base;", &[("#", hash)]);
     wrong("//! The rover.\nrobot Rover; link base;", &[("//! The rover.", inner)]);
     wrong(
@@ -104,7 +104,7 @@ fn comments() {
         "robot Rover;\n//! Doc.\n link base { 5; }",
         &[
             ("//! Doc.", inner),
-            ("5", "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`"),
+            ("5", "this does not start a part of a robot; expected a word such as `link`, `joint` or `sensor`"),
         ],
     );
 }

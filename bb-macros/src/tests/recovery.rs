@@ -25,8 +25,8 @@ fn words() {
     wrong(
         &base("5; #[cfg(test)] sensor imu: A();"),
         &[
-            ("5", "this starts no part of a robot; expected a word such as `link`, `joint` or `sensor`"),
-            ("#[cfg(test)]", "only doc comments can stand before a part of a robot; leave this attribute out"),
+            ("5", "this does not start a part of a robot; expected a word such as `link`, `joint` or `sensor`"),
+            ("#[cfg(test)]", "only doc comments are allowed before a part of a robot; leave this attribute out"),
         ],
     );
 }
@@ -113,7 +113,7 @@ fn declarations() {
             (";", "expected the path of a publisher, as in `sensor::base_link::imu`"),
             (",", "expected the path of a publisher, as in `sensor::base_link::imu`"),
             ("fast", "expected `driver`, `optional` or `within: …`"),
-            ("[]", "expected a path in brackets, as in `[nav, velocity]`; the type is the algorithm's to say"),
+            ("[]", "expected a path in brackets, as in `[nav, velocity]`; the algorithm gives the type"),
         ],
     );
 }

@@ -175,7 +175,7 @@ fn one_driver() {
     );
     wrong(
         &heading(", driver", ", driver"),
-        &[("driver", "`h` has a driver already, the input `imu`; leave out all but one")],
+        &[("driver", "`h` already has a driver, the input `imu`; leave out all but one")],
     );
 }
 
@@ -186,7 +186,10 @@ fn single_input_tolerance() {
     ));
     wrong(
         &sensing("estimator h: H() { input a: sensor::base::imu; sync_tolerance: 1 s; }"),
-        &[("sync_tolerance", "there is a single input, and nothing for it to be in step with; leave this out")],
+        &[(
+            "sync_tolerance",
+            "there is a single input, and nothing for it to be in step with; add the other input, or leave this out",
+        )],
     );
 }
 
@@ -282,7 +285,7 @@ fn distinct_paths() {
     right(&sensing(&motion("m", "output a: [estimator, base, m];")));
     wrong(
         &sensing(&motion("m", "output a; output a;")),
-        &[("a", "an output `a` is declared already; leave one out")],
+        &[("a", "an output `a` is already declared; leave one out")],
     );
     let nav = "something else publishes at `nav::x`; choose another path";
     wrong(&sensing(&motion("m", "output a: [nav, x]; output b: [nav, x];")), &[("nav, x", nav)]);
@@ -295,11 +298,11 @@ fn distinct_paths() {
     );
     wrong(
         &sensing(&format!("{} {}", motion("m", "output a;"), motion("n", "output a: [estimator, base, m];"))),
-        &[("estimator, base, m", "the estimator `m` has this path already; choose another path")],
+        &[("estimator, base, m", "the estimator `m` already has this path; choose another path")],
     );
     wrong(
         &sensing("estimator h: H() { input i: sensor::base::imu, driver; input i: sensor::base::mag; }"),
-        &[("i", "`h` has an input `i` already; choose another name")],
+        &[("i", "`h` already has an input `i`; choose another name")],
     );
 }
 

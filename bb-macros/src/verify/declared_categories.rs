@@ -40,7 +40,7 @@ fn declared(robot: &Robot, name: &Ident, diagnostics: &mut Diagnostics) -> bool 
     let message = if robot.command(name).is_some() {
         format!("`{name}` is a command, not a category; give it a `category` and name that")
     } else if name == "all" {
-        "`all` is no category; to end all commands write `cancel: all;`".into()
+        "`all` is not a category; to end all commands write `cancel: all;`".into()
     } else {
         let known: Vec<String> = robot.categories.iter().map(|category| text(&category.name)).collect();
         let way_out = way_out(&text(name), known.iter().map(String::as_str), "commands");

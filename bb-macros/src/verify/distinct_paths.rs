@@ -23,7 +23,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
                 diagnostics.at(place, format!("something else publishes at `{path}`; choose another path"));
             }
             (None, Some(output)) if estimator(publisher) == estimator(first) => {
-                let message = format!("an output `{}` is declared already; leave one out", output.name);
+                let message = format!("an output `{}` is already declared; leave one out", output.name);
                 diagnostics.error(&output.name, message);
             }
             (None, _) => {}
@@ -36,7 +36,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             && estimator(publisher) != Some(id)
             && !own.outputs.is_empty()
         {
-            let message = format!("the estimator `{}` has this path already; choose another path", own.name);
+            let message = format!("the estimator `{}` already has this path; choose another path", own.name);
             diagnostics.at(place, message);
         }
     }
@@ -51,7 +51,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         for input in &estimator.inputs {
             if names.insert(input.name.to_string(), &input.name).is_some() {
                 let message =
-                    format!("`{}` has an input `{}` already; choose another name", estimator.name, input.name);
+                    format!("`{}` already has an input `{}`; choose another name", estimator.name, input.name);
                 diagnostics.error(&input.name, message);
             }
         }

@@ -35,7 +35,7 @@ fn shape(shape: &Shape, diagnostics: &mut Diagnostics) {
     for (extra, _) in shape.geometries.iter().skip(1) {
         diagnostics.error(
             extra,
-            format!("there is a `{word}` already; put a second shape into a `{}` of its own", shape.word),
+            format!("there is already a `{word}`; put a second shape into a `{}` of its own", shape.word),
         );
     }
     match geometry {

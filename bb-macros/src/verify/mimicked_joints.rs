@@ -42,7 +42,7 @@ fn followed(robot: &Robot, id: JointId, joint: &Joint, name: &Ident, diagnostics
         diagnostics.error(name, message);
     } else if is_circle(robot, id) {
         diagnostics
-            .error(name, format!("the joint `{}` follows itself round a circle; let one of them lead", joint.name));
+            .error(name, format!("the joint `{}` follows itself in a circle; let one of them lead", joint.name));
     }
 }
 

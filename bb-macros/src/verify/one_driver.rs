@@ -15,7 +15,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             Some((first, _)) => {
                 for (_, extra) in drivers {
                     let message =
-                        format!("`{name}` has a driver already, the input `{first}`; leave out all but one");
+                        format!("`{name}` already has a driver, the input `{first}`; leave out all but one");
                     diagnostics.error(extra, message);
                 }
             }

@@ -13,7 +13,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         .filter(|_| robot.complete)
         .flat_map(|estimator| estimator.settings.of(EstimatorSetting::SyncTolerance))
     {
-        let message = "there is a single input, and nothing for it to be in step with; leave this out";
+        let message = "there is a single input, and nothing for it to be in step with; add the other input, or leave this out";
         diagnostics.error(&tolerance.word, message.into());
     }
 }

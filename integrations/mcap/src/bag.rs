@@ -9,10 +9,10 @@ mod sqlite;
 mod summary;
 mod truth;
 
-pub use imu::{BagImu, BagImuOptions, IMU, MAGNETIC_FIELD};
+pub use imu::{BagImu, BagImuOptions};
 pub use message::BagMessage;
 pub use messages::BagMessages;
-pub use samples::MargSamples;
+pub use samples::{IMU, MAGNETIC_FIELD, MargSamples};
 pub use truth::{Bool, MOVING, ODOMETRY, POSE, Truth};
 
 use crate::definition::MessageDefinition;
@@ -41,19 +41,19 @@ pub struct Topic {
     pub definition: Arc<str>,
     /// How the definition is written: `ros2msg`, say.
     pub definition_encoding: Arc<str>,
-    /// Whether a robot of this project published it, by a recording of ours. Its poses may be estimates, so they are not
-    /// taken for the truth unasked.
+    /// Whether it is from a recording of a robot of this project. Its poses may be estimates, so they are not
+    /// used as truth by default.
     pub is_own: bool,
     /// How many messages there are, in a broken bag before the break; `None` if a summary leaves it out.
     pub messages: Option<u64>,
 }
 
 impl Topic {
-    /// What the messages consist of.
+    /// The fields of the messages.
     ///
     /// # Errors
     ///
-    /// If the file has no definition of the type that can be read, and the type is not a known one; in words.
+    /// The file has no readable definition of the type, and the type is not a known one; in words.
     pub fn message_definition(&self) -> Result<MessageDefinition, String> {
         MessageDefinition::of(&self.schema, &self.definition_encoding, &self.definition)
     }
@@ -67,7 +67,7 @@ pub struct Bag {
 }
 
 impl Bag {
-    /// Opens a bag and learns its topics: from its summary, or by reading it through once if there is none.
+    /// Opens a bag and finds its topics: from its summary, or by reading it once if there is none.
     ///
     /// A bag that breaks off opens if it has topics before the break; [`messages`](Self::messages) reports the
     /// break when it comes to it.
@@ -95,7 +95,7 @@ impl Bag {
     ///
     /// # Errors
     ///
-    /// If there is none, which names the topics there are, or several, which names these.
+    /// There is none, and the error lists all topics; or several, and it lists those.
     pub fn topic_of(&self, schema: &str) -> Result<&Topic, RecordingError> {
         let schema = full_name(schema);
         let mut found = self.topics.iter().filter(|t| *t.schema == *schema);
@@ -114,7 +114,7 @@ impl Bag {
     ///
     /// # Errors
     ///
-    /// If there is none of the name, or it is of another type, or the type does not choose one.
+    /// There is none of this name, it has another type, or the type is ambiguous.
     pub fn choose(&self, schema: &str, name: Option<&str>) -> Result<&Topic, RecordingError> {
         let Some(name) = name else { return self.topic_of(schema) };
         let wanted = full_name(schema);
@@ -132,8 +132,8 @@ impl Bag {
         Err(RecordingError::new(&self.path, kind))
     }
 
-    /// The topic of the magnetometer that goes with an IMU: the one of this name, if one is given, or else that which a
-    /// recorder of this crate has written beside the IMU, or else the only one of its type.
+    /// The topic of the magnetometer that belongs to an IMU: the one of this name, if one is given; else the one that a
+    /// recorder of this crate has written beside the IMU; else the only one of its type.
     ///
     /// # Errors
     ///
@@ -148,9 +148,9 @@ impl Bag {
 
     /// The messages of the named topics, read as they are asked for and in the order of the file.
     ///
-    /// Recorders write messages as they arrive, so the order of the file is that of the log times but for small
-    /// exceptions; it need not be that of the stamps. No names, no messages. The iterator has the file open by
-    /// itself: it can go to another thread and outlive the bag, and several can read at once.
+    /// Recorders write messages as they arrive, so the order of the file is, with small exceptions, that of the log times;
+    /// it need not be that of the stamps. Without names there are no messages. The iterator opens the file
+    /// itself: it can be sent to another thread and outlive the bag, and several can read at the same time.
     ///
     /// # Errors
     ///
@@ -159,7 +159,7 @@ impl Bag {
         self.messages_of(topics, true)
     }
 
-    /// The same, of topics in any encoding: only the bytes of messages that are not CDR can be had.
+    /// The same for topics in any encoding; for messages that are not CDR only the bytes are available.
     ///
     /// # Errors
     ///

@@ -1,7 +1,7 @@
 //! Messages of types that are known only from the definition in the file.
 //!
-//! Why not `re_ros_msg`, which reads the same: it panics on some malformed definitions, allocates what a length in a file
-//! asks for, sorts the fields by name and does not say which field is wrong.
+//! The crate `re_ros_msg` reads the same, but panics on some malformed definitions, trusts lengths in the file when it
+//! allocates, sorts the fields by name, and does not say which field is wrong.
 
 mod known;
 mod parse;
@@ -27,6 +27,8 @@ struct Message {
     /// `sensor_msgs/Imu`
     name: String,
     fields: Vec<Field>,
+    /// The names of the numbers of `kind`, of a message that is an enum.
+    variants: Vec<(u32, Arc<str>)>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,6 +53,8 @@ enum Kind {
     F32,
     F64,
     Text,
+    /// The number of an enum's variant, whose names the message of this index has.
+    Variant(usize),
     /// By index.
     Message(usize),
 }
@@ -63,7 +67,7 @@ enum Count {
     Any,
 }
 
-/// The messages in a message in a message, and so on: more is no type that anybody wrote.
+/// The deepest nesting of messages that is accepted.
 const DEEPEST: usize = 32;
 
 impl MessageDefinition {
@@ -85,7 +89,7 @@ impl MessageDefinition {
         }
     }
 
-    /// From the text of a definition and those of all types that it names, as ROS 2 writes it into bags (`ros2msg`).
+    /// Parses a definition, followed by those of all types that it names, as ROS 2 writes it to bags (`ros2msg`).
     ///
     /// # Errors
     /// The line that is wrong; or a type that is not defined, or contains itself.

@@ -50,7 +50,7 @@ pub enum RecordingErrorKind {
     #[error("no such file; check the path")]
     Missing,
     /// The path is a directory or a device.
-    #[error("not a file; name the .mcap file itself, which a ROS 2 recording keeps in its directory")]
+    #[error("not a file; name the .mcap or .db3 file itself, which a ROS 2 recording keeps in its directory")]
     NotAFile,
     /// The operating system refused.
     #[error("cannot be read at byte {byte}: {cause}; check the file's permissions and the disk")]

@@ -4,17 +4,17 @@
 //! |---|---|
 //! | write what a robot publishes | [`Recorder`] |
 //! | read it back, bit for bit | [`Recording`] |
-//! | read the messages of ROS in any bag, those of a [`Recorder`] too | [`Bag`] |
-//! | play a recorded IMU as the sensor of a robot, or take its samples | [`BagImu`], [`MargSamples`] |
+//! | read ROS messages from any bag, including those of a [`Recorder`] | [`Bag`] |
+//! | play back a recorded IMU as the sensor of a robot, or read its samples | [`BagImu`], [`MargSamples`] |
 //! | read messages of any type, by the definition in the file | [`MessageDefinition`], [`Value`] |
-//! | write payloads as the messages of ROS | [`BagWriter`] |
-//! | what a bag knows of the true orientation | [`Truth`] |
-//! | make a whole file of what is before a break | [`recover`] |
+//! | write payloads as ROS messages | [`BagWriter`] |
+//! | the true orientation in a bag | [`Truth`] |
+//! | save the part of a damaged file before the break | [`recover`] |
 //!
-//! A recording is a ROS 2 bag: payloads that ROS has a message for are written as that message, all others with a
-//! definition of their own; the robot's frames, its URDF and its name are there as well, so that viewers show the run
-//! with no further set-up. What ROS's message cannot hold of a message is written beside it, and what a [`Recording`]
-//! gives is the `Stamped<T>` that was published.
+//! A recording is a ROS 2 bag. Payloads that correspond to a ROS message are written as that message, all others with their
+//! own definition. The robot's frames, URDF and name are included, so that viewers show the run
+//! without further set-up. What the ROS message cannot represent is written beside it, so that a [`Recording`]
+//! returns the `Stamped<T>` that was published.
 //!
 //! ```no_run
 //! use bb_core::prelude::*;
@@ -46,26 +46,26 @@
 //!
 //! # What is lost when the process dies
 //!
-//! What was flushed stays: at most the last [`flush_messages`](RecorderOptions::flush_messages) messages or those of the
-//! last [`flush_interval`](RecorderOptions::flush_interval), whichever is less, and what still waits in the subscription.
-//! Such a file has no end; [`Recording::open`] reads it up to the break, and [`recover`] makes a whole one of it. When the
-//! machine loses power, what the operating system had not yet written is lost too, unless
+//! Everything that was flushed is kept. At most the last [`flush_messages`](RecorderOptions::flush_messages) messages or those of the
+//! last [`flush_interval`](RecorderOptions::flush_interval), whichever is less, are lost, and those that still wait in the
+//! subscription. Such a file is truncated; [`Recording::open`] reads it up to the break, and [`recover`] makes a complete file
+//! of that part. When the machine loses power, what the operating system had not yet written is lost too, unless
 //! [`sync`](RecorderOptions::sync) is set.
 //!
 //! # Memory and trust
 //!
-//! Files are streamed: memory holds one chunk, packed and unpacked, and no record or chunk above 256 MiB is taken. Lengths
-//! are compared with the file before anything is allocated for them. A chunk's checksum is compared before its first
-//! message is delivered, where the recorder wrote one; of a chunk that breaks off it cannot be. Messages outside chunks
-//! carry no checksum of their own, so there a changed bit in a payload goes unseen unless it breaks the encoding. Every
-//! error names the file, the place in it and the way out; no input makes this crate panic.
+//! Files are streamed: one chunk is in memory, compressed and decompressed, and records or chunks above 256 MiB are refused.
+//! Lengths are compared with the file before anything is allocated for them. If the recorder wrote a checksum for a chunk, it is
+//! checked before the first message is delivered, except for a chunk that breaks off. Messages outside chunks
+//! have no checksum, so a changed bit in their payload is not detected unless it breaks the encoding. Every
+//! error names the file, the position in it and what to do; no input makes this crate panic.
 //!
 //! # A slow disk
 //!
-//! Nothing waits for it: the subscription is the queue, and when it is full the oldest message is lost, counted, and the
+//! Nothing waits for the disk. The subscription is the queue; when it is full, the oldest message is lost and counted, and the
 //! count is written at the end of the file.
 
-// A robot must not stop because a value was not what it was taken for.
+// A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod bag;

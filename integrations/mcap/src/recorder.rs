@@ -1,4 +1,4 @@
-//! Writes what a subscription gets.
+//! Writes what subscriptions receive.
 
 mod background;
 mod frames;
@@ -50,23 +50,24 @@ pub(crate) const END: &str = "bb.recorder";
 pub struct RecorderReport {
     /// Messages written.
     pub messages: u64,
-    /// Messages that the operating system has: they survive the death of the process.
+    /// Messages that were handed to the operating system: they survive the end of the process.
     pub flushed: u64,
-    /// Messages lost since the recorder was too slow for the room that its subscription has.
+    /// Messages lost because the recorder was too slow for the capacity of its subscriptions.
     pub lost: u64,
-    /// Messages left out since they have more than 128 MiB, which no chunk that is read back may hold.
+    /// Messages left out because they exceed 128 MiB, which is more than readers accept.
     pub too_large: u64,
 }
 
-/// Writes what a subscription gets into a file, when its owner says so ([`drain`](Self::drain): on virtual time) or on a
-/// thread of its own ([`spawn`](Self::spawn)). Dropping it ends the file.
+/// Writes what a subscription receives to a file, either when [`drain`](Self::drain) is called, as for a simulation, or on
+/// its own thread ([`spawn`](Self::spawn)). Dropping it completes the file.
 pub struct Recorder {
     path: PathBuf,
     /// None once the file has its end, or an error came.
     writer: Option<Box<FileWriter>>,
     /// The same file, to wait for the disk.
     to_sync: Option<File>,
-    subscription: DynamicSubscription,
+    /// The first is waited for, the others are looked at.
+    subscriptions: Vec<DynamicSubscription>,
     options: RecorderOptions,
     channels: HashMap<&'static str, Channel>,
     report: RecorderReport,
@@ -106,11 +107,11 @@ struct Bytes {
 const LARGEST: usize = LIMIT as usize / 2;
 
 impl Recorder {
-    /// Creates the file `path` for what `subscription` gets.
+    /// Creates the file `path` for what `subscription` receives.
     ///
     /// # Errors
-    /// The file exists already, or cannot be created; or two of the paths publish different types that would have one name
-    /// in the file.
+    /// The file exists already or cannot be created, or two of the paths publish different types that would have the same
+    /// name in the file.
     pub fn new(
         path: impl AsRef<Path>,
         subscription: DynamicSubscription,
@@ -135,14 +136,8 @@ impl Recorder {
         options: RecorderOptions,
     ) -> Result<Self, RecordingError> {
         let fail = |error| RecordingError::new(file, write_error(0, error));
-        // Before the run rather than at the first message: nobody looks at a recorder's errors then.
         let mut names = Names::default();
-        for (path, schemas) in subscription.schemas() {
-            let mut schemas = schemas.iter();
-            schemas
-                .try_for_each(|schema| names.take(path, schema))
-                .map_err(|kind| RecordingError::new(file, kind))?;
-        }
+        take_names(&mut names, &subscription).map_err(|kind| RecordingError::new(file, kind))?;
         let robot = options.robot.as_ref().filter(|_| options.transforms);
         let frames = robot.map(|robot| Frames::new(robot.topology, options.body.clone()));
         let mut writer = options.mcap().create(BufWriter::new(output)).map_err(fail)?;
@@ -151,7 +146,7 @@ impl Recorder {
             path: file.to_owned(),
             writer: Some(Box::new(writer)),
             to_sync,
-            subscription,
+            subscriptions: vec![subscription],
             options,
             channels: HashMap::new(),
             report: RecorderReport::default(),
@@ -164,24 +159,43 @@ impl Recorder {
         })
     }
 
-    /// Writes all messages that wait now; how many.
+    /// Also records what this subscription receives. Each subscription has its own queue, so that frequent messages do not push
+    /// out rare ones when the disk is slow. A message that several subscriptions receive is recorded several times.
     ///
     /// # Errors
-    /// The file cannot be written on, the disk is full say. Nothing more is recorded then.
+    /// A path publishes a type that would have the same name in the file as a different one.
+    pub fn also(mut self, subscription: DynamicSubscription) -> Result<Self, RecordingError> {
+        if let Err(kind) = take_names(&mut self.names, &subscription) {
+            let path = self.path.clone();
+            drop(self);
+            // As `new` leaves no file behind.
+            let _ = std::fs::remove_file(&path);
+            return Err(RecordingError::new(&path, kind));
+        }
+        self.subscriptions.push(subscription);
+        Ok(self)
+    }
+
+    /// Writes all waiting messages, and returns their number.
+    ///
+    /// # Errors
+    /// Writing failed, for example because the disk is full. Nothing more is recorded then.
     pub fn drain(&mut self) -> Result<u64, RecordingError> {
         let before = self.report.messages;
-        for _ in 0..self.subscription.waiting() {
-            let Some(message) = self.subscription.try_recv() else { break };
-            self.record(&message)?;
+        for index in 0..self.subscriptions.len() {
+            for _ in 0..self.subscriptions[index].waiting() {
+                let Some(message) = self.subscriptions[index].try_recv() else { break };
+                self.record(&message)?;
+            }
         }
         self.flush_if_due()?;
         Ok(self.report.messages - before)
     }
 
-    /// Hands all that is written to the operating system.
+    /// Hands everything that was written to the operating system.
     ///
     /// # Errors
-    /// The file cannot be written on.
+    /// Writing failed.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.guarded(|recorder, writer| {
             writer.flush()?;
@@ -197,19 +211,20 @@ impl Recorder {
 
     /// What has been recorded so far.
     pub fn report(&self) -> RecorderReport {
-        RecorderReport { lost: self.subscription.lagged(), ..self.report }
+        let lost = self.subscriptions.iter().map(DynamicSubscription::lagged).sum();
+        RecorderReport { lost, ..self.report }
     }
 
-    /// Writes what waits, and the end of the file.
+    /// Writes the waiting messages and the end of the file.
     ///
     /// # Errors
-    /// The file cannot be written on.
+    /// Writing failed.
     pub fn finish(mut self) -> Result<RecorderReport, RecordingError> {
         self.end()?;
         Ok(self.report())
     }
 
-    /// Writes on a thread of its own from now on.
+    /// Continues on its own thread.
     ///
     /// # Errors
     /// The thread cannot be started.
@@ -223,7 +238,8 @@ impl Recorder {
 
     /// Waits for a message, and writes it and all that wait after it.
     pub(crate) fn work(&mut self, wait: Duration) -> Result<(), RecordingError> {
-        if let Some(message) = self.subscription.recv_timeout(wait.min(self.options.flush_interval)) {
+        let wait = wait.min(self.options.flush_interval);
+        if let Some(message) = self.subscriptions.first().and_then(|first| first.recv_timeout(wait)) {
             self.record(&message)?;
         }
         self.drain().map(drop)
@@ -428,6 +444,14 @@ impl From<io::Error> for WriteFault {
     fn from(error: io::Error) -> Self {
         Self::File(error.into())
     }
+}
+
+/// Refuses two types of one name before the run rather than at the first message: nobody looks at a recorder's errors then.
+fn take_names(names: &mut Names, subscription: &DynamicSubscription) -> Result<(), RecordingErrorKind> {
+    for (path, schemas) in subscription.schemas() {
+        schemas.iter().try_for_each(|schema| names.take(path, schema))?;
+    }
+    Ok(())
 }
 
 fn add(writer: &mut FileWriter, names: &mut Names, channel: &Description) -> Result<u16, WriteFault> {

@@ -76,7 +76,7 @@ impl BagWriter {
     /// Writes the end of the file; how many messages it has.
     ///
     /// # Errors
-    /// The file cannot be written on.
+    /// Writing failed.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         let (path, messages) = (self.path, self.messages);
         let fail = |error| RecordingError::new(&path, write_error(messages, error));

@@ -1,8 +1,8 @@
 //! A run that is recorded with its journal, read back from the file, and run again.
 
 use bb_core::journal::{JournalLine, JournalReader};
-use bb_core::node::{DropReason, InputStatistics};
 use bb_core::prelude::*;
+use bb_core::run::{DropReason, InputStatistics};
 use bb_mcap::{Recorder, RecorderOptions, Recording};
 use std::error::Error;
 

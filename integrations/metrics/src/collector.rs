@@ -1,9 +1,9 @@
 //! A report as metrics. One family after the other: the text format wants each in one piece.
 
-use bb_core::control::CommandStatistics;
-use bb_core::node::{DropReason, EstimatorStatistics, LatencyStatistics};
 use bb_core::pubsub::TopicStatistics;
+use bb_core::run::CommandStatistics;
 use bb_core::run::SourceStatistics;
+use bb_core::run::{DropReason, EstimatorStatistics, LatencyStatistics};
 use bb_core::{HealthState, Live, Report, Robot, Safety};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, MetricEncoder, NoLabelSet};

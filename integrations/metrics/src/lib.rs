@@ -33,7 +33,7 @@
 //!
 //! Counters are exported at 0 from the first scrape on, so that the first increment is seen as one.
 
-// A robot must not stop because a value was not what it was taken for.
+// A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod collector;

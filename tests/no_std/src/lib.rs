@@ -9,8 +9,9 @@ use bb_estimators::attitude::{
     AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample, OrientationError, Real,
 };
 use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Optional, Start, States, Stream};
+use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart};
 use bb_estimators::params::Params;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
@@ -53,6 +54,16 @@ pub fn navigate(sample: &ImuMean) -> Option<f64> {
     filter.start(&Start::at(0, (rest, 5.0), (rest, 0.1), (UnitQuaternion::identity(), 0.1))).ok()?;
     filter.propagate(sample).ok()?;
     filter.update(&mut Stream::default(), &GnssPosition::new(rest, 1.0, 2.0)).ok()?;
+    Some(filter.estimate()?.position.x)
+}
+
+/// The same on a plane.
+pub fn drive(sample: &ImuMean) -> Option<f64> {
+    let mut filter = PlanarEkf::new(PlanarParams::default()).ok()?;
+    let rest = Vector2::zeros();
+    filter.start(&PlanarStart::at(0, (rest, 5.0), (0.0, 0.1), (rest, 0.1))).ok()?;
+    filter.propagate(sample).ok()?;
+    filter.update(&mut Stream::default(), &PlanarPosition::new(rest, 1.0)).ok()?;
     Some(filter.estimate()?.position.x)
 }
 

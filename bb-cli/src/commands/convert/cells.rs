@@ -1,14 +1,13 @@
 //! The rows of a CSV as quantities in SI.
 
 use super::columns::{Column, Columns, Quantity, What};
+use super::source::{LONGEST_HEAD, Source, is_number};
 use crate::filters::near;
-use csv::{ReaderBuilder, StringRecord};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use csv::StringRecord;
+use std::path::Path;
 
-/// Lines before the first one of numbers.
-const LONGEST_HEAD: usize = 100;
+/// The last time of a stamp of ROS, whose seconds have 32 bits, nanoseconds.
+const LAST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
 
 /// Where the times of rows come from.
 #[derive(Clone, Copy, Debug)]
@@ -37,45 +36,35 @@ pub(super) struct Row {
 
 /// A CSV that is being read.
 pub(super) struct Table {
-    file: PathBuf,
-    reader: csv::Reader<File>,
-    bytes: u64,
+    source: Source,
     times: Times,
     quantities: Vec<(Quantity, Vec<usize>)>,
-    /// Lines before the first row, and that row.
+    /// Lines before the first row, and that row with its line.
     head: usize,
-    first: Option<StringRecord>,
+    first: Option<(u64, StringRecord)>,
     /// Rows given.
     rows: u64,
 }
 
 impl Table {
-    /// Reads the head, and finds the columns.
+    /// Reads the head, and finds the columns. A file `-` is the standard input.
     pub(super) fn open(file: &Path, columns: &Columns, times: Times) -> Result<Self, String> {
-        let opened = File::open(file).map_err(|error| format!("cannot be read: {error}"))?;
-        let bytes = opened.metadata().map_or(0, |about| about.len());
-        let mut reader = ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .trim(csv::Trim::All)
-            .delimiter(delimiter(file)?)
-            .from_reader(opened);
+        let mut source = Source::open(file)?;
         let mut head: Vec<StringRecord> = Vec::new();
-        let mut record = StringRecord::new();
         let first = loop {
-            if !reader.read_record(&mut record).map_err(said)? {
+            let Some((line, record)) = source.next()? else {
                 return Err(match head.is_empty() {
                     true => "it is empty".into(),
                     false => "it has no line that begins with a number".to_owned(),
                 });
-            }
-            if record.get(0).is_some_and(|cell| cell.parse::<f64>().is_ok()) {
-                break record;
+            };
+            if record.get(0).is_some_and(is_number) {
+                break (line, record);
             }
             if head.len() == LONGEST_HEAD {
                 return Err(format!("none of the first {LONGEST_HEAD} lines begins with a number"));
             }
-            head.push(std::mem::take(&mut record));
+            head.push(record);
         };
         let find = |column: &Column| find(column, &head);
         let quantities = columns.quantities.iter().map(|quantity| {
@@ -83,26 +72,17 @@ impl Table {
             Ok((quantity.clone(), indices))
         });
         let quantities = quantities.collect::<Result<_, String>>()?;
-        Ok(Self {
-            file: file.to_owned(),
-            reader,
-            bytes,
-            times,
-            quantities,
-            head: head.len(),
-            first: Some(first),
-            rows: 0,
-        })
+        Ok(Self { source, times, quantities, head: head.len(), first: Some(first), rows: 0 })
     }
 
-    /// The length of the file.
-    pub(super) fn bytes(&self) -> u64 {
-        self.bytes
+    /// The length of the file; none of a pipe.
+    pub(super) fn bytes(&self) -> Option<u64> {
+        self.source.bytes()
     }
 
     /// How far it is read.
     pub(super) fn byte(&self) -> u64 {
-        self.reader.position().byte()
+        self.source.byte()
     }
 
     /// How many lines are before the first row.
@@ -112,58 +92,20 @@ impl Table {
 
     /// The next row; an error names its line and column.
     pub(super) fn next(&mut self) -> Result<Option<Row>, String> {
-        let record = match self.first.take() {
-            Some(first) => first,
-            None => {
-                let mut record = StringRecord::new();
-                if !self.reader.read_record(&mut record).map_err(said)? {
-                    return Ok(None);
-                }
-                record
-            }
+        let first = self.first.take();
+        let Some((line, record)) = first.map_or_else(|| self.source.next(), |first| Ok(Some(first)))? else {
+            return Ok(None);
         };
         let mut row = Row::default();
         if let Times::Rate(rate) = self.times {
             row.time_ns = (self.rows as f64 / rate * 1e9).round() as i64;
         }
         for (quantity, indices) in &self.quantities {
-            take(&record, quantity, indices, &mut row)
-                .map_err(|fault| format!("line {}, {fault}", self.line_of(&record)))?;
+            take(&record, quantity, indices, &mut row).map_err(|fault| format!("line {line}, {fault}"))?;
         }
         self.rows += 1;
         Ok(Some(row))
     }
-}
-
-impl Table {
-    /// The line of a record. Its position is that before empty lines.
-    fn line_of(&self, record: &StringRecord) -> u64 {
-        let Some(position) = record.position() else { return 0 };
-        let empty = File::open(&self.file).and_then(|mut file| {
-            file.seek(SeekFrom::Start(position.byte()))?;
-            let bytes = BufReader::new(file).bytes().map_while(Result::ok);
-            Ok(bytes.take_while(|byte| b"\r\n".contains(byte)).filter(|byte| *byte == b'\n').count())
-        });
-        position.line() + empty.unwrap_or(0) as u64
-    }
-}
-
-fn said(error: csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::Utf8 { pos: Some(place), .. } => format!("line {} is not UTF-8", place.line()),
-        csv::ErrorKind::Io(cause) => format!("cannot be read: {cause}"),
-        _ => error.to_string(),
-    }
-}
-
-/// Of commas, semicolons and tabs the one that the first line has most of.
-fn delimiter(file: &Path) -> Result<u8, String> {
-    let mut line = Vec::new();
-    let opened = File::open(file).map_err(|error| format!("cannot be read: {error}"))?;
-    BufReader::new(opened).read_until(b'\n', &mut line).map_err(|error| format!("cannot be read: {error}"))?;
-    let count = |delimiter: u8| line.iter().filter(|byte| **byte == delimiter).count();
-    // Of those that are as many, the first.
-    Ok([b'\t', b';', b','].into_iter().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b','))
 }
 
 /// A column's index; by its name in any line of the head, which may have a unit in brackets at its end.
@@ -234,14 +176,32 @@ impl Cells<'_> {
 
     fn number(&self, component: usize) -> Result<f64, String> {
         let cell = self.cell(component)?;
-        cell.parse().map_err(|_| self.fault(component, format!("`{cell}` is not a number")))
+        let value: Result<f64, _> = cell.parse();
+        let fault = match value {
+            Ok(value) if !value.is_infinite() => return Ok(value),
+            Ok(_) => "is not a finite number",
+            Err(_) if is_number(cell) => {
+                "has a decimal comma; make it a point, as `tr , .` does where cells are not separated by commas"
+            }
+            Err(_) => "is not a number",
+        };
+        Err(self.fault(component, format!("`{cell}` {fault}")))
+    }
+
+    /// A number in SI.
+    fn in_si(&self, component: usize) -> Result<f64, String> {
+        let value = self.number(component)? * self.quantity.factor;
+        match value.is_infinite() {
+            true => Err(self.fault(component, format!("`{}` is too large", self.cell(component)?))),
+            false => Ok(value),
+        }
     }
 
     /// Numbers in SI that must be there.
     fn measured<const N: usize>(&self) -> Result<[f64; N], String> {
         let mut values = [0.0; N];
         for (component, value) in values.iter_mut().enumerate() {
-            *value = self.number(component)? * self.quantity.factor;
+            *value = self.in_si(component)?;
         }
         Ok(values)
     }
@@ -251,7 +211,7 @@ impl Cells<'_> {
         let mut values = [f64::NAN; N];
         for (component, value) in values.iter_mut().enumerate() {
             if !self.cell(component)?.is_empty() {
-                *value = self.number(component)? * self.quantity.factor;
+                *value = self.in_si(component)?;
             }
         }
         Ok(values)
@@ -260,14 +220,20 @@ impl Cells<'_> {
     fn time_ns(&self) -> Result<i64, String> {
         let cell = self.cell(0)?;
         // A float of nanoseconds since 1970 has no nanoseconds.
-        if let Some(time_ns) = exact_ns(cell, self.quantity.factor) {
-            return Ok(time_ns);
-        }
-        let time_ns = (self.number(0)? * self.quantity.factor * 1e9).round();
-        match time_ns.abs() < 9e18 {
-            true => Ok(time_ns as i64),
-            false => Err(self.fault(0, format!("`{cell}` is no time"))),
-        }
+        let time_ns = match exact_ns(cell, self.quantity.factor) {
+            Some(time_ns) => time_ns,
+            None => match self.number(0)? {
+                nan if nan.is_nan() => return Err(self.fault(0, format!("`{cell}` is not a time"))),
+                // Beyond the range it saturates, and is refused below.
+                time => (time * self.quantity.factor * 1e9).round() as i64,
+            },
+        };
+        let fault = match time_ns {
+            ..0 => "is before 1970, where no time of a bag is; add a constant to all times",
+            0..=LAST_NS => return Ok(time_ns),
+            _ => "is after 2038, which no stamp of ROS holds; is the unit another (s, ms, us, ns)?",
+        };
+        Err(self.fault(0, format!("`{cell}` {fault}")))
     }
 }
 

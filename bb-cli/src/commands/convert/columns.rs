@@ -1,4 +1,4 @@
-//! Which columns hold what.
+//! What the columns contain.
 
 use super::units::{self, Units};
 use crate::filters::near;
@@ -114,7 +114,7 @@ impl FromStr for Quantity {
                 }
                 1.0
             }
-            (What::Orientation, Some(other)) => return Err(format!("no order `{other}`; there is wxyz, xyzw")),
+            (What::Orientation, Some(other)) => return Err(format!("no order `{other}`; there are wxyz, xyzw")),
             (What::Moving, Some(_)) => return Err("`moving` has no unit".into()),
             (_, Some(unit)) => units::factor(unit, what.units())?,
         };
@@ -137,7 +137,7 @@ fn parse_columns(text: &str, what: What) -> Result<Vec<Column>, String> {
                 columns.extend(names.map(Column::Name));
             }
             (None, None, None) if !part.is_empty() && part != "0" => columns.push(Column::Name(part.to_owned())),
-            _ => return Err(format!("`{part}` is no column; name it, or count from 1, as 2-4")),
+            _ => return Err(format!("`{part}` is not a column; name it, or count from 1, as 2-4")),
         }
     }
     Ok(columns)
@@ -205,10 +205,10 @@ mod tests {
         assert_eq!(fault("gyro=1-3"), "no quantity `gyro`; did you mean `gyr`?");
         assert_eq!(fault("gyr=1-2"), "`gyr` has 3 columns, and 2 are named");
         assert_eq!(fault("time=1,2"), "`time` has 1 column, and 2 are named");
-        assert_eq!(fault("gyr=1-3:dgs/s"), "no unit `dgs/s`; there is rad/s, deg/s, dps");
+        assert_eq!(fault("gyr=1-3:dgs/s"), "no unit `dgs/s`; there are rad/s, deg/s, dps");
         assert_eq!(fault("gyr=0-2"), "`gyr` has 3 columns, and 1 are named");
-        assert_eq!(fault("quat=1-4:zyx"), "no order `zyx`; there is wxyz, xyzw");
-        assert_eq!(fault("acc=4-2"), "`4-2` is no column; name it, or count from 1, as 2-4");
+        assert_eq!(fault("quat=1-4:zyx"), "no order `zyx`; there are wxyz, xyzw");
+        assert_eq!(fault("acc=4-2"), "`4-2` is not a column; name it, or count from 1, as 2-4");
         let of = |texts: &[&str], rate| {
             let quantities: Vec<Quantity> = texts.iter().map(|text| text.parse().expect("is one")).collect();
             Columns::new(&quantities, rate).expect_err("is wrong")

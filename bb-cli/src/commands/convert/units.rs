@@ -27,7 +27,7 @@ pub(super) fn factor(text: &str, units: Units) -> Result<f64, String> {
     match found {
         Some(factor) if factor.is_finite() && factor > 0.0 => Ok(factor),
         Some(_) => Err(format!("the factor of `{text}` must be above 0")),
-        None => Err(format!("no unit `{name}`; there is {}", names())),
+        None => Err(format!("no unit `{name}`; there are {}", names())),
     }
 }
 
@@ -47,9 +47,9 @@ mod tests {
         close("50uT", FIELD, 5e-5);
         close("1e-3rad/s", RATE, 1e-3);
         close("mG", FIELD, 1e-7);
-        assert_eq!(factor("gauss", FIELD), Err("no unit `gauss`; there is T, mT, uT, nT, G, mG".into()));
+        assert_eq!(factor("gauss", FIELD), Err("no unit `gauss`; there are T, mT, uT, nT, G, mG".into()));
         assert_eq!(factor("0uT", FIELD), Err("the factor of `0uT` must be above 0".into()));
         assert_eq!(factor("-2uT", FIELD), Err("the factor of `-2uT` must be above 0".into()));
-        assert_eq!(factor("5", LENGTH), Err("no unit ``; there is m, cm, mm".into()));
+        assert_eq!(factor("5", LENGTH), Err("no unit ``; there are m, cm, mm".into()));
     }
 }

@@ -1,4 +1,4 @@
-//! Dates, for those who read them.
+//! Dates for readers.
 
 use std::time::{Duration, UNIX_EPOCH};
 

@@ -1,4 +1,4 @@
-//! What is printed of what is in files.
+//! The output of `bb info`.
 
 use super::date::date;
 use super::remark::Remark;
@@ -88,7 +88,7 @@ fn one(content: &Content) -> String {
             topic.name.clone(),
             topic.schema.clone(),
             topic.messages.to_string(),
-            periods.and_then(Periods::rate_hz).map_or_else(|| "-".to_owned(), |rate| format!("{rate:.1} Hz")),
+            periods.map_or_else(|| "-".to_owned(), |periods| periods.rate_in_words(1)),
             periods.map_or_else(|| "-".to_owned(), |periods| format!("{:.3} s", periods.max_s)),
         ]);
     }

@@ -1,10 +1,11 @@
 //! Reads a file through once.
 
+use super::quantities;
 use super::remark::{Remark, Subject};
 use super::times::Times;
-use super::units::Units;
 use crate::periods::Periods;
-use crate::topics::{TopicReader, log_ns};
+use crate::topics::{TopicReader, is_of_events, log_ns};
+use crate::units::Units;
 use bb_mcap::Bag;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -53,8 +54,8 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
 
     let mut topics: HashMap<_, Open> = HashMap::new();
     for topic in bag.topics() {
-        let reader = TopicReader::new(topic).ok();
-        topics.insert((topic.name.clone(), topic.schema.clone()), Open { reader, ..Open::default() });
+        let (reader, times) = (TopicReader::new(topic).ok(), Times::new(is_of_events(topic)));
+        topics.insert((topic.name.clone(), topic.schema.clone()), Open { reader, times, ..Open::default() });
     }
     let mut span_ns: Option<(i64, i64)> = None;
     let mut messages = 0;
@@ -74,7 +75,7 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
         span_ns = Some(span_ns.map_or((log, log), |(start, end)| (start.min(log), end.max(log))));
         let topic = topics.entry((message.topic.clone(), message.schema.clone())).or_default();
         topic.times.push(log, topic.reader.as_ref().and_then(|reader| reader.stamp_ns(&message)));
-        let read = topic.units.take(&message).map_err(|error| error.to_string());
+        let read = quantities::take(&mut topic.units, &message).map_err(|error| error.to_string());
         let read = read.and_then(|()| match &topic.reader {
             // Once is enough for those that tell nothing of units.
             Some(reader) if topic.times.count() == 1 => reader.read(&message).map(drop),
@@ -90,7 +91,7 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
     let content = bag.topics().iter().map(|topic| {
         let open = topics.remove(&(topic.name.clone(), topic.schema.clone())).unwrap_or_default();
         let mut remarks = open.times.remarks(start_ns);
-        remarks.extend(open.units.remarks());
+        remarks.extend(quantities::remarks(&open.units));
         remarks.extend(open.fault.map(|fault| Remark::new(Subject::Messages, fault)));
         TopicContent {
             name: topic.name.to_string(),

@@ -6,6 +6,8 @@ use crate::periods::Periods;
 /// The times of the messages of a topic.
 #[derive(Debug, Default)]
 pub(super) struct Times {
+    /// Whether messages come only when something happens.
+    of_events: bool,
     log_ns: Vec<i64>,
     /// Those in the headers, as long as all messages have one.
     stamp_ns: Vec<i64>,
@@ -15,6 +17,10 @@ pub(super) struct Times {
 const JUMP_S: f64 = 1.0;
 
 impl Times {
+    pub(super) fn new(of_events: bool) -> Self {
+        Self { of_events, ..Self::default() }
+    }
+
     pub(super) fn push(&mut self, log_ns: i64, stamp_ns: Option<i64>) {
         self.log_ns.push(log_ns);
         self.stamp_ns.extend(stamp_ns);
@@ -30,7 +36,8 @@ impl Times {
     }
 
     pub(super) fn periods(&self) -> Option<Periods> {
-        Periods::of(self.measured())
+        let periods = Periods::of(self.measured());
+        if self.of_events { periods.map(Periods::of_events) } else { periods }
     }
 
     /// Gaps and jumps, each by the time since the start of the recording.
@@ -68,7 +75,8 @@ impl Times {
                 format!("{count} back in time; the farthest by {farthest_s:.6} s, at {at_s:.3} s"),
             ));
         }
-        if periods.repeated > 0 && has_stamps {
+        // Several events may happen at one instant.
+        if periods.repeated > 0 && has_stamps && !self.of_events {
             let count = periods.repeated;
             let text = match count {
                 1 => format!("1 message has the {what} of the one before"),
@@ -159,6 +167,16 @@ mod tests {
         );
         let twice = |index| EVEN(index - index % 2);
         assert_eq!(remarks(EVEN, twice), ["50 messages have the stamp of the one before"]);
+    }
+
+    #[test]
+    fn events_may_happen_at_one_instant() {
+        let remarks = |of_events| {
+            let mut times = Times::new(of_events);
+            (0..20).for_each(|index| times.push(5_000 * MS + index / 2, Some(5_000 * MS + index / 2)));
+            times.remarks(5_000 * MS).len()
+        };
+        assert_eq!((remarks(false), remarks(true)), (1, 0));
     }
 
     #[test]

@@ -39,7 +39,9 @@ impl Path {
             steps.extend(parts.next().filter(|name| !name.is_empty()).map(|name| Step::Field(name.to_owned())));
             for index in parts {
                 let index = index.strip_suffix(']').and_then(|index| index.parse().ok());
-                steps.push(Step::Index(index.ok_or_else(|| format!("`{part}` is no element; write ranges[3]"))?));
+                steps.push(Step::Index(
+                    index.ok_or_else(|| format!("`{part}` is not an element; write ranges[3]"))?,
+                ));
             }
         }
         Ok(Self(steps))
@@ -103,8 +105,8 @@ pub(super) fn groups(message: &Value, path: &Path) -> Result<Vec<Group>, String>
                 let length = values.len();
                 values.get(*index).ok_or_else(|| format!("`{way}` has {length} elements, and no [{index}]"))?
             }
-            (Step::Field(name), _) => return Err(format!("`{way}` is no message, and has no field `{name}`")),
-            (Step::Index(_), _) => return Err(format!("`{way}` is no list of numbers")),
+            (Step::Field(name), _) => return Err(format!("`{way}` is not a message, so it has no field `{name}`")),
+            (Step::Index(_), _) => return Err(format!("`{way}` is not a list of numbers")),
         };
         way = way.join(step.clone());
     }
@@ -135,7 +137,11 @@ fn collect(value: &Value, path: &Path, is_whole: bool, groups: &mut Vec<Group>) 
     };
     let is_left_out = |step: &Step| match step {
         Step::Field(name) => {
-            is_whole && (name == "header" || name.contains("covariance") || is_unknown(name, value))
+            is_whole
+                && (name == "header"
+                    || name.contains("covariance")
+                    || is_unknown(name, value)
+                    || is_time_of_payload(name, value))
         }
         Step::Index(_) => false,
     };
@@ -156,6 +162,11 @@ fn is_unknown(name: &str, message: &Value) -> bool {
         Some(Value::List(values)) => values.first().and_then(Value::as_f64) == Some(-1.0),
         _ => false,
     }
+}
+
+/// Whether a field is a time of a message of a payload that ROS has none for: these are what is plotted over.
+fn is_time_of_payload(name: &str, message: &Value) -> bool {
+    ["monotonic_time", "wall_time"].contains(&name) && message.field("payload").is_some()
 }
 
 fn label(step: &Step) -> String {
@@ -211,14 +222,28 @@ mod tests {
     }
 
     #[test]
+    fn of_a_payload_the_times_are_no_curves() {
+        let own = message(r#"{"header":{"stamp":{"sec":1}},"monotonic_time":5,"wall_time":6,"payload":{"x":1}}"#);
+        let paths = |path: &str| {
+            let groups = groups(&own, &Path::parse(path).expect("is one")).expect("has some");
+            groups.iter().map(|group| group.path.to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!(paths(""), ["payload"]);
+        assert_eq!(paths("wall_time"), ["wall_time"]);
+        // What another has of that name is a number like any other.
+        let other = message(r#"{"wall_time":6,"x":1}"#);
+        assert_eq!(groups(&other, &Path::default()).expect("has some")[0].fields.len(), 2);
+    }
+
+    #[test]
     fn a_wrong_field_is_answered_with_those_there_are() {
         let fault = |path: &str| chosen(path).expect_err("it is wrong");
         assert_eq!(fault("rat.x"), "no field `rat`; did you mean `rate`?");
-        assert_eq!(fault("rate.q"), "no field `rate.q`; there is x, y");
-        assert_eq!(fault("rate.x.y"), "`rate.x` is no message, and has no field `y`");
+        assert_eq!(fault("rate.q"), "no field `rate.q`; there are x, y");
+        assert_eq!(fault("rate.x.y"), "`rate.x` is not a message, so it has no field `y`");
         assert_eq!(fault("long[20]"), "`long` has 20 elements, and no [20]");
         assert_eq!(fault("long"), "`long` holds no number to plot; of a list of more than 16 name an element");
-        assert_eq!(fault("list[a]"), "`list[a]` is no element; write ranges[3]");
+        assert_eq!(fault("list[a]"), "`list[a]` is not an element; write ranges[3]");
         assert_eq!(
             fault("pose.name"),
             "`pose.name` holds no number to plot; of a list of more than 16 name an element"

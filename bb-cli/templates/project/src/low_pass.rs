@@ -12,7 +12,7 @@ pub struct LowPass {
 
 #[derive(Clone, Debug, Options)]
 pub struct LowPassOptions {
-    /// After it a step is followed by two thirds. Unit: s.
+    /// The time after which the output has followed two thirds of a step. Unit: s.
     #[option(default = 1.0, range = 0.001..=1000.0, unit = "s")]
     pub time_constant: f64,
 }
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn after_a_time_constant_two_thirds_of_a_step_are_followed() -> Result<(), Fault> {
+    fn two_thirds_of_a_step_are_followed_after_a_time_constant() -> Result<(), Fault> {
         let mut filter = LowPass::init(LowPassOptions::defaults(), &Context::for_test(&[]))?;
         let mut smooth = f64::NAN;
         for (time_s, temperature_k) in [(0, 300.0), (1, 400.0)] {

@@ -7,6 +7,7 @@ use bb_core::prelude::*;
 use bb_mcap::{Recorder, RecorderOptions};
 use low_pass::LowPass;
 use std::error::Error;
+use std::io::IsTerminal;
 use std::time::SystemTime;
 use thermometer::Thermometer;
 
@@ -22,26 +23,52 @@ robot! {
     }
 }
 
+/// Frequent and rare messages are recorded from separate queues, so that a slow disk loses samples but no events.
+const SAMPLES: Select<'static> = Select::Below("sensor");
+const EVENTS: Select<'static> = Select::AnyOf(&[
+    Select::Path("fault"),
+    Select::Path("health"),
+    Select::Path("state_machine"),
+    Select::Below("safety"),
+]);
+
+/// Runs until Ctrl-C, or for a number of seconds: `cargo run -- 3`.
 fn main() -> Result<(), Box<dyn Error>> {
-    // What the robot tells of itself: restarts, what was left out, faults.
-    tracing_subscriber::fmt().with_writer(std::io::stderr).init();
+    // Logs: faults, restarts, changes of health and safety. Without colours if stderr is a file.
+    let stderr = std::io::stderr;
+    tracing_subscriber::fmt().with_writer(stderr).with_ansi(stderr().is_terminal()).init();
 
-    let builder = Oven::builder();
+    let mut builder = Oven::builder();
+    // `--list`, `--config FILE`, `--set PATH=VALUE`: options without recompiling. Other arguments are returned.
+    let Some(others) = builder.take_arguments(std::env::args_os().skip(1))? else { return Ok(()) };
+    let seconds: Option<u64> = others.first().map(|seconds| seconds.to_string_lossy().parse()).transpose()?;
     let smooth = builder.subscribe(oven::sensor::body::thermometer::smooth);
-    let all = builder.subscribe_any(Select::All, None, Overflow::DropOldest { capacity: 10_000 });
+    let samples = builder.subscribe_any(SAMPLES, None, Overflow::DropOldest { capacity: 10_000 });
+    let events = builder.subscribe_any(EVENTS, None, Overflow::DropOldest { capacity: 1_000 });
     std::fs::create_dir_all("recordings")?;
-    let now_s = SystemTime::UNIX_EPOCH.elapsed()?.as_secs();
-    let file = format!("recordings/run-{now_s}.mcap");
-    let recorder = Recorder::new(&file, all, RecorderOptions::of::<Oven>())?.spawn()?;
+    // Named by time and process, since an existing recording is not overwritten.
+    let seconds_since_1970 = SystemTime::UNIX_EPOCH.elapsed()?.as_secs();
+    let file = format!("recordings/run-{seconds_since_1970}-{}.mcap", std::process::id());
+    let recorder = Recorder::new(&file, samples, RecorderOptions::of::<Oven>())?.also(events)?.spawn()?;
 
-    let running = builder.start()?; // in real time, a thread for each sensor
-    for _ in 0..3 {
-        std::thread::sleep(Duration::from_secs(1));
-        if let Some(temperature) = smooth.drain().last() {
+    let mut running = builder.start()?; // in real time, with a thread per sensor
+    running.stop_on_signals()?;
+    if let Some(seconds) = seconds {
+        let live = running.live();
+        std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_secs(seconds));
+            live.request_stop();
+        });
+    }
+    // Prints once a second; the messages end when the robot has stopped.
+    let printer = std::thread::spawn(move || {
+        for temperature in std::iter::from_fn(|| smooth.recv()).step_by(20) {
             println!("{}: {:.2} K", temperature.monotonic_time, temperature.temperature_k);
         }
-    }
+    });
+    running.wait();
     println!("{}", running.stop()); // what was published where
+    let _ = printer.join();
     let report = recorder.stop()?;
     println!("{file}: {} messages; look at it with `bb info {file}`", report.messages);
     Ok(())
@@ -51,7 +78,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 mod tests {
     use super::*;
 
-    /// On virtual time: ten seconds take milliseconds, and give the same each time.
+    /// On virtual time: ten seconds take milliseconds, and every run gives the same result.
     #[test]
     fn the_temperature_is_smoothed() -> Result<(), Box<dyn Error>> {
         let builder = Oven::builder();

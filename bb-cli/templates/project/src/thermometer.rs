@@ -9,15 +9,15 @@ pub struct Temperature {
     pub temperature_k: f64,
 }
 
-/// Options are given in the parentheses in `robot!`, and checked there.
+/// Options are set in the parentheses in `robot!`, and checked at compile time.
 #[derive(Clone, Debug, Options)]
 pub struct ThermometerOptions {
-    /// What is added to each reading, at most. Unit: K.
+    /// The largest noise of a reading. Unit: K.
     #[option(default = 0.1, range = 0.0..=10.0, unit = "K")]
     pub noise: f64,
 }
 
-/// A thermometer that is made up. A real one holds its device.
+/// A simulated thermometer. A real one would hold its device.
 #[derive(Debug)]
 pub struct Thermometer {
     noise_k: f64,
@@ -28,13 +28,14 @@ impl Sensor for Thermometer {
     type Options = ThermometerOptions;
     type Output = Temperature;
 
-    /// Opens the device. Any error becomes a `Fault` with `?`; the sensor is then tried again after a while.
+    /// Opens the device; `?` converts any error to a `Fault`. If it fails at the start, the robot does not start; after a
+    /// restart it is retried.
     fn init(options: ThermometerOptions, _: &SensorContext) -> Result<Self, Fault> {
         Ok(Self { noise_k: options.noise, readings: 0 })
     }
 
-    /// Reads the device, at the rate that the robot declares. An error, as of a device that is unplugged, is reported,
-    /// and the sensor is made again.
+    /// Reads the device, at the rate that the robot declares. An error, for example because the device is unplugged, is
+    /// published, and the sensor is created again by `init`.
     fn read(&mut self, _now: MonotonicTime) -> Result<Reading<Temperature>, Fault> {
         self.readings = self.readings.wrapping_add(1);
         let noise = (f64::from(self.readings) * 12.9898).sin();

@@ -1,4 +1,4 @@
-//! How the derive names the fields of a payload: so that a type that is none is reported at one place.
+//! How the derive names the fields of a payload: so that a type that is not a field is reported in one place.
 
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::marker::PhantomData;

@@ -124,7 +124,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// What stands for a struct without fields.
+    /// The placeholder of a struct without fields.
     #[doc(hidden)]
     pub fn nothing(&mut self) -> Result<(), DecodeError> {
         self.raw(1, "a byte").map(drop)

@@ -160,7 +160,7 @@ pub trait RosMessage: Sized {
     /// Its payload and time.
     ///
     /// # Errors
-    /// It is none that [`to_ros`](Self::to_ros) makes.
+    /// The message is not one that [`to_ros`](Self::to_ros) makes.
     fn from_ros(message: Self::Message) -> Result<(Self, WallTime), DecodeError>;
 }
 

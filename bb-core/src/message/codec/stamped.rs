@@ -104,7 +104,7 @@ pub fn encode_as_ros<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> b
     true
 }
 
-/// Appends the second message of a payload that ROS has two for; false, and nothing, if there is none.
+/// Appends the second message of a payload for which ROS has two; returns `false` and appends nothing if there is none.
 pub fn encode_companion<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> bool {
     let Some(companion) = T::ROS.and_then(|layout| layout.companion) else { return false };
     let start = bytes.len();

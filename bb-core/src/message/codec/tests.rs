@@ -155,7 +155,7 @@ pub(super) fn bytes_of<T: Field>(value: &T) -> Vec<u8> {
     bytes
 }
 
-/// Written, read, and written again it is the same; so it is behind other bytes.
+/// Written, read, and written again it is the same; so it is after other bytes.
 pub(super) fn round_trip<T: Field>(value: &T) {
     let bytes = bytes_of(value);
     let read: T = decode(&bytes).expect("it was written just now");

@@ -6,7 +6,7 @@ use super::Field;
 #[derive(Debug)]
 pub struct Writer<'a> {
     bytes: &'a mut Vec<u8>,
-    /// Where alignment counts from: behind the four bytes that name the encoding.
+    /// Where alignment counts from: after the four bytes that name the encoding.
     start: usize,
 }
 
@@ -44,7 +44,7 @@ impl<'a> Writer<'a> {
         self.raw(&[0]);
     }
 
-    /// Appends what stands for a struct without fields, as ROS has it.
+    /// Appends the placeholder of a struct without fields, as ROS does.
     #[doc(hidden)]
     pub fn nothing(&mut self) {
         self.raw(&[0]);

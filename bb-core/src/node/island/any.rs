@@ -14,6 +14,9 @@ use std::{
     time::Duration,
 };
 
+/// Finds an island in a wiring.
+pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
+
 /// What all islands of a robot with the wiring `W` have in common.
 pub trait AnyIsland<W> {
     /// The island as declared.
@@ -129,7 +132,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
             }
             if self.waiting.load(Ordering::SeqCst) != 0 {
                 self.tell_waiting();
-                // A lock is not fair, and this thread would be faster than those that have to be woken.
+                // A lock is not fair, and this thread would be faster than those that must be woken.
                 self.wait(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
             }
         }

@@ -57,9 +57,7 @@ impl IslandWiring for Wiring {
 struct Nobody;
 
 impl Guardian for Nobody {
-    fn on_disarm(&self, _: &'static str, _: DisarmHook) -> u64 {
-        0
-    }
+    fn on_disarm(&self, _: &'static str, _: Option<u64>, _: DisarmHook) {}
 
     fn hardware_error(&self, _: &'static str, _: String) {}
 }
@@ -68,6 +66,8 @@ impl Overseer for Nobody {
     fn replacing_hooks(&self, _: &'static str, _: bool, make: &mut dyn FnMut() -> bool) {
         make();
     }
+
+    fn forget_hooks(&self, _: &'static str) {}
 
     fn report(&self, _: usize, _: Report) {}
 

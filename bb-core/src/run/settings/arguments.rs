@@ -31,7 +31,10 @@ impl<R: Robot> Builder<R> {
     ///
     /// fn main() -> Result<(), Box<dyn std::error::Error>> {
     ///     let mut builder = Rover::builder();
-    ///     let Some(_others) = builder.take_arguments(std::env::args_os().skip(1))? else { return Ok(()) };
+    ///     let Some(others) = builder.take_arguments(std::env::args_os().skip(1))? else { return Ok(()) };
+    ///     if let Some(other) = others.first() {
+    ///         return Err(format!("there is no argument `{}`", other.display()).into());
+    ///     }
     ///     let running = builder.start()?;
     ///     running.stop();
     ///     Ok(())

@@ -1,13 +1,20 @@
 //! Settings to options and parameters: all of them, or none.
 
 use super::error::{Place, SettingProblem, SettingsError};
-use crate::component::{AnyOptions, OptionField, quantity};
+use crate::component::{AnyOptions, quantity};
 use crate::declaration::{ParameterDeclaration, ParameterDefault, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::{from_json, to_json};
 use crate::message::nearest::{nearest, nearest_path};
+use crate::run::bound::{bound_to, component_paths, fields, refused_by_bound};
 use crate::run::{Builder, Robot};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// How a file says that an option which may be `None` is.
+pub(super) const NULL_TEXT: &str = "\"null\"";
+
+/// How many of the names that there are not are held against all there are.
+const HINTS: usize = 32;
 
 /// A setting as written.
 pub(super) struct Assignment {
@@ -35,21 +42,6 @@ impl Assignment {
     }
 }
 
-/// The paths of a robot's components, as their options are listed.
-pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
-    let sensors = R::SENSORS.iter().map(|declared| declared.path);
-    let estimators = R::ESTIMATORS.iter().map(|declared| declared.path);
-    let actuators = R::ACTUATORS.iter().map(|declared| declared.path);
-    let services = R::SERVICES.iter().map(|declared| declared.path);
-    let commands = R::COMMANDS.iter().map(|declared| declared.path);
-    sensors.chain(estimators).chain(actuators).chain(services).chain(commands).collect()
-}
-
-/// The options of a component.
-fn fields<R: Robot>(options: &mut R::Options, component: usize) -> &'static [OptionField] {
-    R::options_of(options, component).map_or(&[], |options| options.fields())
-}
-
 /// The paths of all settings.
 pub(super) fn names<R: Robot>(builder: &mut Builder<R>) -> BTreeSet<String> {
     let paths = component_paths::<R>().into_iter().enumerate();
@@ -71,6 +63,7 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
     let names = names(builder);
     let paths = component_paths::<R>();
     let mut problems = Vec::new();
+    let mut unknown_names = 0;
     let mut parameters = builder.parameters.clone();
     // The changed options of a component, and what changed them.
     let mut changed: BTreeMap<usize, (Box<dyn AnyOptions>, Vec<&Assignment>)> = BTreeMap::new();
@@ -91,7 +84,11 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
                     None => Err("has no options".to_owned()),
                 },
             },
-            None => Err(unknown(&names, &paths, &assignment.path)),
+            None if unknown_names < HINTS => {
+                unknown_names += 1;
+                Err(unknown(&names, &paths, &assignment.path))
+            }
+            None => Err("there is no such setting".to_owned()),
         };
         if let Err(message) = result {
             problems.push(assignment.problem(message));
@@ -107,7 +104,7 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
             }
         }
         for assignment in assignments {
-            if let Some(message) = refused_by_bound::<R>(builder, &paths, &parameters, &assignment.path) {
+            if let Some(message) = refused_by_bound::<R>(&mut builder.options, &parameters, &assignment.path) {
                 problems.push(assignment.problem(message));
             }
         }
@@ -139,36 +136,6 @@ fn target<R: Robot>(paths: &[&str], options: &mut R::Options, path: &str) -> Opt
     Some(Target::Option { component, field })
 }
 
-/// The path of the parameter that an option is bound to.
-pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'static str> {
-    let is_bound = |bound: &&(usize, &str, usize)| bound.0 == component && bound.1 == last(path);
-    let (_, _, parameter) = R::BOUND_OPTIONS.iter().find(is_bound)?;
-    Some(R::PARAMETERS.get(*parameter)?.path)
-}
-
-/// Why an option that is bound to this parameter would refuse its new value.
-fn refused_by_bound<R: Robot>(
-    builder: &mut Builder<R>,
-    paths: &[&str],
-    parameters: &[ParameterValue],
-    path: &str,
-) -> Option<String> {
-    let number = R::PARAMETERS.iter().position(|declared| declared.path == path)?;
-    let value = match parameters.get(number)? {
-        ParameterValue::Float(value) => *value,
-        ParameterValue::Integer(value) => *value as f64,
-        ParameterValue::Bool(_) | ParameterValue::Text(_) => return None,
-    };
-    R::BOUND_OPTIONS.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
-        let fields = fields::<R>(&mut builder.options, *component).iter();
-        let range = fields.filter(|field| field.name == *name).find_map(|field| field.range)?;
-        let path = paths.get(*component)?;
-        let is_inside = (range.start..=range.end).contains(&value);
-        (!is_inside)
-            .then(|| format!("{path}/{name} is bound to it, and must be in {}, found `{value}`", range.text))
-    })
-}
-
 /// Whether an option that is a number keeps its range.
 fn in_range(options: &mut dyn AnyOptions, field: usize) -> Result<(), String> {
     let Some(declared) = options.fields().get(field).copied() else { return Ok(()) };
@@ -182,10 +149,6 @@ fn in_range(options: &mut dyn AnyOptions, field: usize) -> Result<(), String> {
     }
 }
 
-fn last(path: &str) -> &str {
-    path.rsplit('/').next().unwrap_or(path)
-}
-
 fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -> Result<(), String> {
     let Some(mut setting) = options.setting(field) else {
         return Err("can be set in code only: its options are not derived".to_owned());
@@ -193,6 +156,8 @@ fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -
     let set = setting.set(&assignment.json);
     match (&set, &assignment.text) {
         (Err(_), Some(text)) if setting.set(text).is_ok() => Ok(()),
+        // TOML has no null: the text means it, unless the option is a text.
+        (Err(_), None) if assignment.json == NULL_TEXT && setting.set("null").is_ok() => Ok(()),
         _ => set,
     }
 }

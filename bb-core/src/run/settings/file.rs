@@ -15,6 +15,9 @@ pub(super) enum Known {
     Setting,
     /// The beginning of one: a table there holds settings.
     Table,
+    /// Both: an option has the name of an estimator nested in its sensor. A table is the value of the first where it is nested
+    /// by its names, and holds the settings of the second where its whole path is one name.
+    Both,
     /// Neither.
     No,
 }
@@ -69,6 +72,9 @@ impl<F: Fn(&str) -> Known> Reader<'_, F> {
             };
             match value.get_ref() {
                 DeValue::Table(inner) if (self.is_known)(&path) == Known::Table => self.table(&path, inner),
+                DeValue::Table(inner) if (self.is_known)(&path) == Known::Both && key.get_ref().contains('/') => {
+                    self.table(&path, inner);
+                }
                 DeValue::Table(inner) if (self.is_known)(&path) == Known::No && !inner.is_empty() => {
                     self.table(&path, inner)
                 }
@@ -79,7 +85,8 @@ impl<F: Fn(&str) -> Known> Reader<'_, F> {
 
     fn setting(&mut self, path: String, start: usize, value: &Spanned<DeValue<'_>>) {
         // What is wrong with a name is shown at the name, and what is wrong with a value at the value.
-        let start = if (self.is_known)(&path) == Known::Setting { value.span().start } else { start };
+        let is_name_known = matches!((self.is_known)(&path), Known::Setting | Known::Both);
+        let start = if is_name_known { value.span().start } else { start };
         let place = self.place(start);
         let json = json(value.get_ref());
         self.found.push((start, Assignment { place, path, json, text: None }));

@@ -1,10 +1,11 @@
 //! All settings of a robot, as a TOML file.
 
-use super::assign::{bound_to, component_paths, names};
+use super::assign::{NULL_TEXT, names};
 use crate::component::{OptionField, SettingKind};
 use crate::declaration::{Range, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::to_json;
+use crate::run::bound::{bound_to, component_paths};
 use crate::run::{Builder, Robot};
 use std::fmt;
 
@@ -44,17 +45,33 @@ pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
         }
     };
     let mut tables = Vec::new();
+    let mut declared = R::options();
     let paths = component_paths::<R>();
     for (number, path) in paths.into_iter().enumerate() {
         let Some(options) = R::options_of(&mut builder.options, number) else { continue };
+        let mut declared = R::options_of(&mut declared, number);
+        let mut is_declared_none = |index| {
+            let declared = declared.as_mut().and_then(|options| options.setting(index));
+            declared.and_then(|setting| setting.value()).is_some_and(|json| json == "null")
+        };
         let fields = options.fields().iter().enumerate();
         let settings: Vec<Line> = fields
             .filter_map(|(index, field)| {
-                let setting = options.setting(index)?;
+                let mut setting = options.setting(index)?;
                 let value = match (bound_to::<R>(number, field.name), setting.kind(), setting.value()) {
                     (Some(parameter), ..) => Err(format!("is bound to {parameter}")),
                     (None, SettingKind::Code, _) => Err("can be set in code only".to_owned()),
                     (None, _, None) => Err("has a value that cannot be written".to_owned()),
+                    // A comment would leave it as declared.
+                    (None, _, Some(json)) if json == "null" && !is_declared_none(index) => {
+                        let is_text = setting.set(NULL_TEXT).is_ok();
+                        let is_none = setting.set("null");
+                        if is_text || is_none.is_err() {
+                            Err("is not set".to_owned())
+                        } else {
+                            Ok(NULL_TEXT.to_owned())
+                        }
+                    }
                     (None, _, Some(json)) => toml(&json).ok_or_else(|| "is not set".to_owned()),
                 };
                 Some(Line { name: field.name, doc: field.doc, value, limits: limits_of(field) })

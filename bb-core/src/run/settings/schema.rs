@@ -1,11 +1,11 @@
 //! The JSON Schema of a robot's settings: for editors, and for programs that write them.
 
-use super::assign::{bound_to, component_paths};
 use crate::component::{OptionField, Setting, SettingKind};
 use crate::declaration::unit::si_unit;
 use crate::declaration::{ParameterDeclaration, ParameterDefault, Range};
 use crate::message::codec::{Definitions, Shape, document, member, to_json};
 use crate::run::Robot;
+use crate::run::bound::{bound_to, component_paths};
 use std::collections::BTreeMap;
 
 pub(crate) fn settings_schema<R: Robot>() -> String {
@@ -35,21 +35,31 @@ enum Node {
     Table(BTreeMap<String, Node>),
 }
 
-/// Puts a schema in its place. What is below a setting of its own, an estimator named like an option of its sensor, is left out.
+/// Puts a schema in its place: `sensor/base/imu/rate` in the tables `sensor`, `base` and `imu`. Where one of these is a setting
+/// itself, as an option that has the name of a nested estimator, the whole path is one name, as `SettingsList` writes it.
 fn insert(root: &mut BTreeMap<String, Node>, path: &str, schema: String) {
-    let mut table = &mut *root;
-    let mut names: Vec<&str> = path.split('/').collect();
-    let last = names.pop().unwrap_or(path);
-    for name in names {
+    let (above, last) = path.rsplit_once('/').unwrap_or(("", path));
+    let above: Vec<&str> = if is_through_setting(root, above) { vec![above] } else { above.split('/').collect() };
+    let mut table = root;
+    for name in above {
         let node = table.entry(name.to_owned()).or_insert_with(|| Node::Table(BTreeMap::new()));
-        match node {
-            Node::Table(inner) => table = inner,
-            Node::Setting(_) => return,
+        let Node::Table(inner) = node else { return };
+        table = inner;
+    }
+    table.insert(last.to_owned(), Node::Setting(schema));
+}
+
+/// Whether a table at this path would be where a setting is.
+fn is_through_setting(root: &BTreeMap<String, Node>, path: &str) -> bool {
+    let mut table = root;
+    for name in path.split('/') {
+        match table.get(name) {
+            Some(Node::Table(inner)) => table = inner,
+            Some(Node::Setting(_)) => return true,
+            None => return false,
         }
     }
-    if !matches!(table.get(last), Some(Node::Table(_))) {
-        table.insert(last.to_owned(), Node::Setting(schema));
-    }
+    false
 }
 
 fn object(table: &BTreeMap<String, Node>) -> String {
@@ -115,7 +125,8 @@ fn with_notes(keywords: String, doc: &str, unit: &str, range: Option<Range>, def
 
 /// A text of a number and a unit; that the unit is of the right dimension is checked when it is read.
 fn quantity(unit: &str) -> String {
-    let pattern = r"^\s*[-+]?[0-9._]+([eE][-+]?[0-9]+)?\s*\S.*$";
+    // What follows the number is a unit, of which none begins as a number goes on.
+    let pattern = r"^\s*[-+]?([0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?\s*[^\s0-9._+\-eE].*$";
     format!(
         "{},{},\"examples\":[{}]",
         member("type", "string"),

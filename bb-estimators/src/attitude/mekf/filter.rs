@@ -6,12 +6,14 @@ mod windows;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::errors::{BIAS, Errors, ROTATION};
+use super::INITIAL_TILT;
+use super::errors::Errors;
 use super::field::FieldReference;
 use super::iron::HardIron;
 use super::measurement::Measurements;
 use super::params::MekfParams;
 use super::rest::Rest;
+use super::states::{BIAS, ROTATION};
 use super::vertical::Vertical;
 use super::window::Window;
 use crate::attitude::initial::heading_error;
@@ -19,10 +21,6 @@ use crate::attitude::rotation::{turn, turn_heading};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
-
-/// Standard deviation of the tilt that one accelerometer sample shows in motion, rad. At rest it is forgotten
-/// within a second.
-pub(super) const INITIAL_TILT: f64 = 0.35;
 
 /// Standard deviation of an orientation that was given, about every axis, rad.
 const GIVEN: f64 = 0.087;

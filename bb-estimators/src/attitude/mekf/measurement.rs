@@ -6,7 +6,8 @@
 
 use nalgebra::Vector3;
 
-use super::errors::{BIAS, Errors, ROTATION, VELOCITY};
+use super::errors::Errors;
+use super::states::{BIAS, ROTATION, VELOCITY};
 use crate::attitude::Real;
 
 /// Heading, seen by the magnetic field.

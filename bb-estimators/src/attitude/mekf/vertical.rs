@@ -5,7 +5,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::GRAVITY;
+use super::{GRAVITY, INITIAL_TILT};
 use crate::attitude::Real;
 
 /// A mean is over this time, s.
@@ -21,7 +21,7 @@ const LEAST_START_S: f64 = 0.05;
 const START_VELOCITY: f64 = 1.4;
 
 /// The greatest slope that a start leaves alone, rad: the deviation of the first sample's tilt.
-const MAX_START_SLOPE: f64 = super::filter::INITIAL_TILT;
+const MAX_START_SLOPE: f64 = INITIAL_TILT;
 
 /// What the mean specific force contradicts.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::errors::{BIAS, CALIBRATION};
 use super::iron::FieldMeans;
+use super::states::{BIAS, CALIBRATION};
 use crate::attitude::Real;
 
 /// A window ends after this many samples: enough to do the filter's work in small pieces, one with each.

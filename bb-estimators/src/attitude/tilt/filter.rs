@@ -3,9 +3,10 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::TiltParams;
-use crate::attitude::initial::{FREE_FALL, heading_error};
+use crate::attitude::initial::heading_error;
 use crate::attitude::low_pass::gain;
 use crate::attitude::rotation::{turn_heading, turn_upright};
+use crate::attitude::sample::FREE_FALL;
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
 use crate::params::Params as _;

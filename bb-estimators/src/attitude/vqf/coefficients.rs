@@ -1,7 +1,7 @@
 //! What depends on parameters and sample time alone, made when the sample time changes.
 
-use super::VqfParams;
 use super::low_pass::Coefficients;
+use super::{DEGREE, VqfParams};
 use crate::attitude::Real;
 use crate::attitude::low_pass::gain;
 
@@ -10,9 +10,6 @@ const TOLERANCE: f64 = 1.0 / 64.0;
 
 /// How far a bias wanders within the forgetting time, rad/s: 0.1°/s. Source: section 3.4 of the paper.
 const BIAS_WANDER: f64 = 0.1 * DEGREE;
-
-/// rad.
-pub(super) const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
 /// For what happens with every sample of gyroscope and accelerometer.
 #[derive(Clone, Debug, PartialEq)]

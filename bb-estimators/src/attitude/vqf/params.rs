@@ -1,6 +1,6 @@
 //! The tuning of VQF: all of the paper's parameters, with their published defaults.
 
-use super::coefficients::DEGREE;
+use super::DEGREE;
 use crate::params::params;
 
 params! {

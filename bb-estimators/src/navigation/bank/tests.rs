@@ -29,7 +29,7 @@ fn fly(scale: f64) -> (Bank<Odometry, N, 2>, [[Stream; 2]; 2]) {
     let start = Start::at(0, (Vector3::zeros(), 1.0), (velocity, 0.3), (UnitQuaternion::identity(), 0.03));
     bank.start(&start).unwrap();
     bank.set_keyframe(0);
-    let mut noise = Noise(1);
+    let mut noise = Noise::new(1);
     let mut odometry = [Stream::default(); 2];
     let mut gnss = [Stream::new(StreamParams { gate: 1e-4, ..StreamParams::default() }); 2];
     let up = Vector3::new(0.0, 0.0, EskfParams::default().gravity);

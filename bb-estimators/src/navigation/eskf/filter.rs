@@ -2,19 +2,20 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use super::covariance::{Covariance, Innovation};
-use super::estimate::{Estimate, Keyframe};
 use super::params::{EskfParams, ImuDensities};
 use super::propagation::Transition;
-use super::refusal::Refusal;
-use super::states::{
-    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
-    distinct, offset,
-};
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE, ParamsError};
+use crate::navigation::covariance::{Covariance, MOST_ROTATION, MOST_VARIANCE};
+use crate::navigation::fused::Fused;
+use crate::navigation::fusion::{Weighed, innovation, prepared};
 use crate::navigation::math::{Integrals, exp};
 use crate::navigation::measurement::{Linearised, Measurement};
-use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
+    States, VELOCITY, distinct, offset,
+};
+use crate::navigation::stream::{Gate, Stream};
 use crate::params::Params as _;
 
 /// A correction of the rotation below this squared angle, rad², leaves the covariance as it is: to rounding, the same.
@@ -23,6 +24,19 @@ const RESET: f64 = 1e-12;
 /// What a keyframe differs from the pose that it copies by, as a part of the variance: 3 µm where a pose is known to a
 /// metre.
 const COPY: f64 = 1e-11;
+
+/// The largest variances of position, velocity and rotation.
+const LIMITS: [f64; 9] = [
+    MOST_VARIANCE,
+    MOST_VARIANCE,
+    MOST_VARIANCE,
+    MOST_VARIANCE,
+    MOST_VARIANCE,
+    MOST_VARIANCE,
+    MOST_ROTATION,
+    MOST_ROTATION,
+    MOST_ROTATION,
+];
 
 /// The longest gap that is bridged at all, s: a body may be anywhere after it.
 pub(in crate::navigation) const LONGEST_GAP_S: f64 = 60.0;
@@ -253,7 +267,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         transition.apply(self.covariance.rows_mut(), &self.densities);
-        self.covariance.bound();
+        self.covariance.bound(&LIMITS);
         self.decay(dt);
         Ok(())
     }
@@ -290,7 +304,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.specific_force = estimate.world_from_body.inverse_transform_vector(&up);
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         transition.apply(self.covariance.rows_mut(), &self.params.gap_densities());
-        self.covariance.bound();
+        self.covariance.bound(&LIMITS);
         self.gaps = self.gaps.wrapping_add(1);
         self.decay(dt);
         Ok(())
@@ -326,7 +340,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// Whether the gate of `stream` would let a measurement pass.
     pub(crate) fn accepts<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
-        let innovation = self.linearised(stream, measurement).and_then(|model| self.innovation(&model));
+        let model = self.linearised(stream, measurement);
+        let innovation = model.and_then(|model| innovation(&self.covariance, &model));
         innovation.is_ok_and(|innovation| {
             stream.weigh(innovation.nis(), D, innovation.log_density(), Gate::Closed).is_ok()
         })
@@ -338,33 +353,17 @@ impl<S: States, const N: usize> Eskf<S, N> {
         measurement: &M,
         gate: Gate,
     ) -> Result<Fused, Refusal> {
-        let mut model = self.linearised(stream, measurement)?;
-        let mut innovation = self.innovation(&model)?;
-        let nis = innovation.nis();
-        let Verdict { weight, raised, limit, log_likelihood } =
-            stream.weigh(nis, D, innovation.log_density(), gate)?;
-        let mut before = None;
-        if weight < 1.0 || raised > 1.0 {
-            model.noise /= weight;
-            before = Some(self.covariance);
-            self.covariance.raise(raised);
-            match self.innovation(&model) {
-                Ok(softened) => innovation = softened,
-                Err(error) => {
-                    self.covariance = before.unwrap_or(self.covariance);
-                    return Err(error);
-                }
-            }
-        }
-        let error = innovation.mean();
+        let model = self.linearised(stream, measurement)?;
+        let weighed = Weighed::new(&mut self.covariance, stream, &model, gate)?;
+        let error = weighed.innovation.mean();
         let corrected = self.estimate.as_ref().ok_or(Refusal::NotStarted)?.corrected::<S>(&error);
         // Of finite numbers all is finite, unless they are beyond all reason.
         if !corrected.is_finite() {
-            self.covariance = before.unwrap_or(self.covariance);
+            weighed.undo(&mut self.covariance);
             return Err(Refusal::NonFinite);
         }
         self.estimate = Some(corrected);
-        self.covariance.update(&innovation);
+        self.covariance.update(&weighed.innovation);
         if Self::fixes_position(&model) {
             self.fixed_ns = corrected.time_ns;
         }
@@ -372,8 +371,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         if let Some(index) = offset::<S>(Optional::Keyframe) {
             self.reset_rotation(index + 3, &error);
         }
-        let whitened = innovation.whitened.first().copied().unwrap_or(0.0);
-        Ok(Fused { nis, dimension: D, weight, raised, limit, log_likelihood, whitened })
+        Ok(weighed.fused())
     }
 
     #[inline]
@@ -385,25 +383,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
         let mut model = Linearised::new();
         measurement.linearise::<S, N>(estimate, &mut model)?;
-        let is_finite = |row: &[f64]| row.iter().all(|x| x.is_finite());
-        if !is_finite(&model.residual)
-            || !model.jacobian.iter().all(|row| is_finite(row))
-            || !is_finite(model.noise.as_slice())
-        {
-            return Err(Refusal::NonFinite);
-        }
-        if (0..D).any(|i| model.noise[(i, i)] < 0.0) {
-            return Err(Refusal::Noise);
-        }
-        model.noise *= stream.noise_factor();
-        Ok(model)
-    }
-
-    #[inline]
-    fn innovation<const D: usize>(&self, model: &Linearised<D, N>) -> Result<Innovation<D, N>, Refusal> {
-        let projected = self.covariance.project(&model.jacobian);
-        let innovation = self.covariance.innovation(&model.jacobian, &projected, &model.residual, &model.noise);
-        innovation.ok_or(Refusal::Noise)
+        prepared(model, stream)
     }
 
     /// Whether a measurement sees a horizontal position in the world, and not one relative to the keyframe.

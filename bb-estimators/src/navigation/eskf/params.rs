@@ -1,6 +1,6 @@
 //! What the sensors and the optional states are like.
 
-use super::states::Optional;
+use crate::navigation::state::Optional;
 use crate::params::{Field, Kind, Value};
 
 /// Adds what is known of the IMU and of gravity, which is set of the filter and of the estimator alike, to a struct of

@@ -23,10 +23,11 @@
 use nalgebra::SMatrix;
 use nalgebra::{Matrix3, Vector3};
 
-use super::estimate::Estimate;
 use super::params::ImuDensities;
-use super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY};
 use crate::navigation::math::{Integrals, renormalised, rotation, skew};
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY,
+};
 
 /// The errors from [`ROTATION`] on that position and velocity integrate: rotation and both biases.
 pub(in crate::navigation) const SOURCES: usize = NAVIGATION - ROTATION;

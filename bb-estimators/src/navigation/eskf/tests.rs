@@ -9,10 +9,9 @@ mod transition;
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::estimate::Estimate;
 use super::filter::{Eskf, ImuMean, Start};
 use super::params::EskfParams;
-use super::states::{Optional, States};
+use crate::navigation::state::{Estimate, Optional, States};
 
 /// Everything that there is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +28,44 @@ impl States for All {
         Optional::BarometerBias,
     ];
 }
+
+/// Wheels that wear, and an antenna on a mast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rover;
+
+impl States for Rover {
+    const OPTIONAL: &'static [Optional] = &[Optional::WheelScale, Optional::GnssLeverArm, Optional::GnssDelay];
+}
+
+/// Poses from a camera, relative to keyframes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Drone;
+
+impl States for Drone {
+    const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale];
+}
+
+/// A compass and a barometer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Boat;
+
+impl States for Boat {
+    const OPTIONAL: &'static [Optional] = &[Optional::BarometerBias, Optional::HardIron];
+}
+
+/// Calls a macro with every configuration whose laws are tested.
+macro_rules! configurations {
+    ($macro:ident) => {
+        $macro! {
+            plain: Navigation;
+            rover: Rover;
+            drone: Drone;
+            boat: Boat;
+            all: All;
+        }
+    };
+}
+use configurations;
 
 const ALL: usize = All::DIMENSION;
 
@@ -47,7 +84,11 @@ fn estimate() -> impl Strategy<Value = Estimate<ALL>> {
     let rest = (vector(0.5), vector(0.1), vector(30.0), orientation(), proptest::array::uniform32(-0.2..0.2));
     (motion, rest).prop_map(|((position, velocity, world_from_body, angular_velocity, specific_force), rest)| {
         let (accelerometer_bias, gyroscope_bias, way, turn, optional) = rest;
-        let keyframe = super::Keyframe { id: 7, position: position - way, world_from_body: turn * world_from_body };
+        let keyframe = crate::navigation::Keyframe {
+            id: 7,
+            position: position - way,
+            world_from_body: turn * world_from_body,
+        };
         let mut estimate = Estimate {
             time_ns: 0,
             position,
@@ -58,7 +99,9 @@ fn estimate() -> impl Strategy<Value = Estimate<ALL>> {
             angular_velocity,
             specific_force,
             keyframe: Some(keyframe),
-            optional: SVector::from_fn(|i, _| if i < super::NAVIGATION { 0.0 } else { optional[i % 32] }),
+            optional: SVector::from_fn(
+                |i, _| if i < crate::navigation::NAVIGATION { 0.0 } else { optional[i % 32] },
+            ),
         };
         // A keyframe has no values of its own there.
         estimate = estimate.corrected::<All>(&SVector::zeros());

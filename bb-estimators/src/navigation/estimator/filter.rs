@@ -1,21 +1,27 @@
 //! The filter with a stream for each sensor.
 
+use super::health::{Sight, largest_deviation};
+use super::input::keyframe_at;
 use super::options::NavigationOptions;
-use crate::attitude::ParamsError;
-use crate::navigation::eskf::{Eskf, Estimate, ImuMean, NAVIGATION, POSITION, Refusal, Start};
+use crate::navigation::eskf::{Eskf, ImuMean, Start};
+use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
-use crate::navigation::measurement::{AbsolutePose, BodyVelocity, GnssPosition};
-use crate::navigation::stream::{Counts, Fused, Stream, StreamParams};
+use crate::navigation::measurement::{
+    AbsolutePose, BarometricHeight, BodyVelocity, GnssPosition, MagneticHeading, NonHolonomic, RelativePose,
+    WheelSpeed,
+};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, POSITION, States};
+use crate::navigation::stream::{Counts, Stream, StreamParams};
 use bb_core::Fault;
 use nalgebra::{Isometry3, Vector3};
 
 /// See the [module](self).
 #[derive(Clone, Debug)]
-pub(super) struct Filter {
-    eskf: Eskf,
-    gnss: Stream,
-    odometry: Stream,
-    pose: Stream,
+pub(super) struct Filter<S: States, const N: usize> {
+    eskf: Eskf<S, N>,
+    /// By [`Measured::sensor`].
+    streams: [Stream; SENSORS],
 }
 
 /// A measurement of one of the sensors.
@@ -23,32 +29,51 @@ pub(super) struct Filter {
 pub(super) enum Measured {
     Gnss(GnssPosition),
     Odometry(BodyVelocity),
+    Wheels(WheelSpeed),
+    Sideways(NonHolonomic),
     Pose(AbsolutePose),
+    /// With the instant at which the next one begins, ns.
+    Relative(RelativePose, i64),
+    MagneticField(MagneticHeading),
+    Pressure(BarometricHeight),
 }
+
+/// The streams of sensors: wheels have a second one, for what they do not do.
+const SENSORS: usize = 7;
+const NAMES: [&str; SENSORS] =
+    ["gnss", "odometry", "odometry, sideways", "pose", "relative", "magnetic_field", "pressure"];
 
 impl Measured {
-    pub(super) fn name(&self) -> &'static str {
+    fn sensor(&self) -> usize {
         match self {
-            Self::Gnss(_) => "gnss",
-            Self::Odometry(_) => "odometry",
-            Self::Pose(_) => "pose",
+            Self::Gnss(_) => 0,
+            Self::Odometry(_) | Self::Wheels(_) => 1,
+            Self::Sideways(_) => 2,
+            Self::Pose(_) => 3,
+            Self::Relative(..) => 4,
+            Self::MagneticField(_) => 5,
+            Self::Pressure(_) => 6,
         }
+    }
+
+    pub(super) fn name(&self) -> &'static str {
+        NAMES[self.sensor()]
     }
 }
 
-impl Filter {
+impl<S: States, const N: usize> Filter<S, N> {
     pub(super) fn new(options: &NavigationOptions, start: &Start) -> Result<Self, Fault> {
-        let mut eskf = Eskf::new(options.params()).map_err(|error: ParamsError| Fault::from(error))?;
+        let mut eskf = Eskf::new(options.params())?;
         eskf.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let stream = Stream::new(StreamParams { patience: options.patience, ..StreamParams::default() });
-        Ok(Self { eskf, gnss: stream, odometry: stream, pose: stream })
+        Ok(Self { eskf, streams: [stream; SENSORS] })
     }
 
-    pub(super) fn eskf(&self) -> &Eskf {
+    pub(super) fn eskf(&self) -> &Eskf<S, N> {
         &self.eskf
     }
 
-    pub(super) fn estimate(&self) -> Option<&Estimate<NAVIGATION>> {
+    pub(super) fn estimate(&self) -> Option<&Estimate<N>> {
         self.eskf.estimate()
     }
 
@@ -59,15 +84,23 @@ impl Filter {
     /// Standard deviation of the horizontal position, in the direction where it is least known, m.
     pub(super) fn horizontal_deviation(&self) -> f64 {
         let covariance = self.eskf.covariance();
-        let (xx, yy) = (covariance[(POSITION, POSITION)], covariance[(POSITION + 1, POSITION + 1)]);
-        let xy = covariance[(POSITION, POSITION + 1)];
-        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        (mean + half.hypot(xy)).sqrt()
+        let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
+        largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
-    /// What became of the measurements: satellites, odometry, poses.
-    pub(super) fn counts(&self) -> [&Counts; 3] {
-        [self.gnss.counts(), self.odometry.counts(), self.pose.counts()]
+    /// What became of the measurements: satellites, odometry, what wheels do not do, poses, relative poses, magnetic field, pressure.
+    pub(super) fn counts(&self) -> [&Counts; SENSORS] {
+        self.streams.each_ref().map(Stream::counts)
+    }
+
+    /// What its health is judged by.
+    pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
+        Some(Sight {
+            now_ns: self.time_ns()?,
+            counts,
+            dead_reckoning_s: self.eskf.dead_reckoning_s(),
+            deviation: self.horizontal_deviation(),
+        })
     }
 
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
@@ -75,7 +108,7 @@ impl Filter {
     }
 }
 
-impl Replayed for Filter {
+impl<S: States, const N: usize> Replayed for Filter<S, N> {
     type Measurement = Measured;
 
     fn time_ns(&self) -> Option<i64> {
@@ -87,10 +120,22 @@ impl Replayed for Filter {
     }
 
     fn update(&mut self, measured: &Measured) -> Result<Fused, Refusal> {
+        let Self { eskf, streams } = self;
+        let stream = &mut streams[measured.sensor()];
         match measured {
-            Measured::Gnss(fix) => self.eskf.update(&mut self.gnss, fix),
-            Measured::Odometry(velocity) => self.eskf.update(&mut self.odometry, velocity),
-            Measured::Pose(pose) => self.eskf.update(&mut self.pose, pose),
+            Measured::Gnss(fix) => eskf.update(stream, fix),
+            Measured::Odometry(velocity) => eskf.update(stream, velocity),
+            Measured::Wheels(speed) => eskf.update(stream, speed),
+            Measured::Sideways(none) => eskf.update(stream, none),
+            Measured::Pose(pose) => eskf.update(stream, pose),
+            Measured::Relative(relative, end_ns) => {
+                let result = eskf.update(stream, relative);
+                // The next one begins here, whatever became of this one.
+                eskf.set_keyframe(keyframe_at(*end_ns));
+                result
+            }
+            Measured::MagneticField(heading) => eskf.update(stream, heading),
+            Measured::Pressure(height) => eskf.update(stream, height),
         }
     }
 }

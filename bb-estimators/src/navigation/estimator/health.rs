@@ -1,9 +1,6 @@
 //! When the estimate is not to be trusted.
 
-use super::filter::Filter;
-use super::input::Mounting;
-use super::options::NavigationOptions;
-use crate::navigation::history::Replayed as _;
+use crate::navigation::stream::Counts;
 
 /// For how long the filter is distrusted after it had to be pulled towards its sensors, ns.
 const DISTRUST_NS: i64 = 1_000_000_000;
@@ -13,33 +10,57 @@ const STORM: u64 = 3;
 
 /// What was seen of the filter so far.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Watch {
-    has_positions: bool,
+pub(in crate::navigation) struct Watch {
+    limits: Limits,
     recoveries: u64,
     distrusted_until_ns: i64,
 }
 
+/// What an estimate may be at most.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::navigation) struct Limits {
+    /// For how long the position may be dead-reckoned, s; none if nothing measures it.
+    pub(in crate::navigation) dead_reckoning_s: Option<f64>,
+    /// Standard deviation of the horizontal position, m.
+    pub(in crate::navigation) deviation: f64,
+}
+
+/// What there is to see of a filter.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::navigation) struct Sight<'a> {
+    pub(in crate::navigation) now_ns: i64,
+    pub(in crate::navigation) counts: &'a [&'a Counts],
+    pub(in crate::navigation) dead_reckoning_s: f64,
+    /// Standard deviation of the horizontal position, in the direction where it is least known, m.
+    pub(in crate::navigation) deviation: f64,
+}
+
 impl Watch {
-    pub(super) fn new(mounting: &Mounting) -> Self {
-        Self { has_positions: mounting.has_positions(), recoveries: 0, distrusted_until_ns: i64::MIN }
+    pub(in crate::navigation) fn new(limits: Limits) -> Self {
+        Self { limits, recoveries: 0, distrusted_until_ns: i64::MIN }
     }
 
     /// Why the estimate is not to be trusted, if it is not.
-    pub(super) fn look(&mut self, filter: &Filter, options: &NavigationOptions) -> Option<&'static str> {
-        let now_ns = filter.time_ns()?;
-        let counts = filter.counts();
-        let recoveries = counts.iter().map(|counts| counts.recoveries).sum();
+    pub(in crate::navigation) fn look(&mut self, sight: &Sight<'_>) -> Option<&'static str> {
+        let recoveries = sight.counts.iter().map(|counts| counts.recoveries).sum();
         // A late measurement has the filter take back a recovery, and perhaps make it again.
         if recoveries > self.recoveries {
-            self.distrusted_until_ns = now_ns.saturating_add(DISTRUST_NS);
+            self.distrusted_until_ns = sight.now_ns.saturating_add(DISTRUST_NS);
         }
         self.recoveries = recoveries;
-        if now_ns < self.distrusted_until_ns || counts.iter().any(|counts| counts.gate_in_a_row >= STORM) {
+        let is_storm = sight.counts.iter().any(|counts| counts.gate_in_a_row >= STORM);
+        if sight.now_ns < self.distrusted_until_ns || is_storm {
             return Some("its sensors do not agree with it");
         }
-        if self.has_positions && filter.eskf().dead_reckoning_s() > options.longest_dead_reckoning {
+        if self.limits.dead_reckoning_s.is_some_and(|longest_s| sight.dead_reckoning_s > longest_s) {
             return Some("the position was dead-reckoned for too long");
         }
-        (filter.horizontal_deviation() > options.largest_deviation).then_some("the position is too uncertain")
+        (sight.deviation > self.limits.deviation).then_some("the position is too uncertain")
     }
+}
+
+/// The standard deviation of a covariance of two numbers in the direction where it is the largest.
+pub(in crate::navigation) fn largest_deviation(xx: f64, xy: f64, yy: f64) -> f64 {
+    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    (mean + half.hypot(xy)).sqrt()
 }

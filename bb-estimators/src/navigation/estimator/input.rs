@@ -2,11 +2,11 @@
 
 use super::options::NavigationOptions;
 use crate::navigation::eskf::ImuMean;
-use crate::navigation::measurement::BodyVelocity;
+use crate::navigation::measurement::{BodyVelocity, MagneticHeading, NonHolonomic, RelativePose, WheelSpeed};
 use bb_core::message::Stamped;
-use bb_core::payload::{GnssFix, Imu, Odometry, Pose};
+use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Pose};
 use bb_core::{Context, Fault, Input, Inputs};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
 /// The inputs of [`EskfEstimator`](super::EskfEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -19,39 +19,56 @@ pub struct NavigationInputs<'a> {
     pub odometry: Option<Input<'a, Odometry>>,
     /// Poses in the world, from a map or a tracking system.
     pub pose: Option<Input<'a, Pose>>,
+    /// Poses relative to the one before, of a visual or lidar odometry: each begins where the last one ended.
+    pub relative: Option<Input<'a, payload::RelativePose>>,
+    /// A magnetometer: the heading of the field is used.
+    pub magnetic_field: Option<Input<'a, MagneticField>>,
+    /// A barometer: changes of height since its first reading.
+    pub pressure: Option<Input<'a, FluidPressure>>,
 }
 
-/// Where the sensors are.
+/// Where the sensors are; none where the robot does not declare an input.
 ///
 /// The body of the filter has the axes of the link, and its origin where the IMU is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mounting {
     link_from_imu: Isometry3<f64>,
-    link_from_gnss: Option<Isometry3<f64>>,
-    link_from_odometry: Option<Isometry3<f64>>,
-    link_from_pose: Option<Isometry3<f64>>,
+    pub(super) gnss: Option<Isometry3<f64>>,
+    pub(super) odometry: Option<Isometry3<f64>>,
+    pub(super) pose: Option<Isometry3<f64>>,
+    pub(super) relative: Option<Isometry3<f64>>,
+    pub(super) magnetic_field: Option<Isometry3<f64>>,
+    pub(super) pressure: Option<Isometry3<f64>>,
 }
 
 impl Mounting {
     /// As the robot declares them.
     pub(super) fn of(context: &Context) -> Result<Self, Fault> {
+        let link_from_imu = context.frame_from_driver()?;
+        let of_body = |sensor: Isometry3<f64>| {
+            let from_imu = sensor.translation.vector - link_from_imu.translation.vector;
+            Isometry3::from_parts(from_imu.into(), sensor.rotation)
+        };
         // Of inputs that the robot does not declare, there is none.
-        let optional = |name: &str| context.frame_from_input(name).ok();
+        let optional = |name: &str| context.frame_from_input(name).ok().map(of_body);
         Ok(Self {
-            link_from_imu: context.frame_from_driver()?,
-            link_from_gnss: optional("gnss"),
-            link_from_odometry: optional("odometry"),
-            link_from_pose: optional("pose"),
+            link_from_imu,
+            gnss: optional("gnss"),
+            odometry: optional("odometry"),
+            pose: optional("pose"),
+            relative: optional("relative"),
+            magnetic_field: optional("magnetic_field"),
+            pressure: optional("pressure"),
         })
     }
 
     /// Whether something measures the position in the world.
     pub(super) fn has_positions(&self) -> bool {
-        self.has_gnss() || self.link_from_pose.is_some()
+        self.has_gnss() || self.pose.is_some()
     }
 
     pub(super) fn has_gnss(&self) -> bool {
-        self.link_from_gnss.is_some()
+        self.gnss.is_some()
     }
 
     /// The sample in the axes of the link.
@@ -66,7 +83,7 @@ impl Mounting {
 
     /// The antenna in the body, m.
     pub(super) fn antenna(&self) -> Vector3<f64> {
-        self.in_body(self.link_from_gnss.as_ref())
+        place(self.gnss.as_ref())
     }
 
     /// The link's origin in the body, m.
@@ -76,30 +93,83 @@ impl Mounting {
 
     /// The velocity that an odometry has counted.
     pub(super) fn velocity(&self, odometry: &Odometry, options: &NavigationOptions) -> BodyVelocity {
-        let covariance = odometry.twist.covariance;
-        // One number stands for all axes: the mean of their variances.
-        let variance = covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).trace() / 3.0);
-        let deviation = variance.filter(|variance| *variance > 0.0).map_or(options.odometry_deviation, f64::sqrt);
-        BodyVelocity {
-            velocity: odometry.twist.linear,
-            deviation,
-            body_from_sensor: rotation(self.link_from_odometry.as_ref()),
-            lever_arm: self.in_body(self.link_from_odometry.as_ref()),
+        let body_from_sensor = self.odometry.unwrap_or_else(Isometry3::identity);
+        BodyVelocity::of_odometry(odometry, &body_from_sensor, options.odometry_deviation)
+    }
+
+    /// The same of wheels: their speed along the sensor's x axis, and that they move neither sideways nor off the ground.
+    pub(super) fn wheels(&self, odometry: &Odometry, options: &NavigationOptions) -> (WheelSpeed, NonHolonomic) {
+        let variance = odometry.twist.covariance.map(|covariance| covariance[(0, 0)]);
+        let body_from_vehicle = rotation(self.odometry.as_ref());
+        let lever_arm = place(self.odometry.as_ref());
+        let speed = WheelSpeed {
+            speed: odometry.twist.linear.x,
+            deviation: deviation(variance, options.odometry_deviation),
+            forward: body_from_vehicle * Vector3::x(),
+            lever_arm,
+        };
+        let lateral = options.sideways_deviation;
+        (speed, NonHolonomic { lateral, vertical: lateral, body_from_vehicle, lever_arm })
+    }
+
+    /// The heading that a magnetic field shows.
+    pub(super) fn magnetic_heading(&self, field: &MagneticField, options: &NavigationOptions) -> MagneticHeading {
+        MagneticHeading {
+            field: rotation(self.magnetic_field.as_ref()) * field.magnetic_field,
+            declination: options.declination,
+            deviation: options.magnetic_deviation,
         }
     }
 
-    /// What turns the sensor of poses in the body, and where it is there.
-    pub(super) fn of_pose(&self) -> (UnitQuaternion<f64>, Vector3<f64>) {
-        (rotation(self.link_from_pose.as_ref()), self.in_body(self.link_from_pose.as_ref()))
-    }
-
-    /// Where a sensor is in the body, m.
-    fn in_body(&self, link_from_sensor: Option<&Isometry3<f64>>) -> Vector3<f64> {
-        let sensor = link_from_sensor.map_or(Vector3::zeros(), |sensor| sensor.translation.vector);
-        sensor - self.link_from_imu.translation.vector
+    /// A relative pose of its sensor, as one of the body: `X T X⁻¹` with the pose X of the sensor in the body.
+    ///
+    /// The scale is that of the sensor's way. Where the body turns, a part of the lever arm is not scaled; that is left out.
+    pub(super) fn relative_pose(
+        &self,
+        relative: &payload::RelativePose,
+        options: &NavigationOptions,
+    ) -> RelativePose {
+        let body_from_sensor = rotation(self.relative.as_ref());
+        let lever_arm = place(self.relative.as_ref());
+        let start_from_end = body_from_sensor * relative.start_from_end * body_from_sensor.inverse();
+        let way = body_from_sensor * relative.position + lever_arm - start_from_end * lever_arm;
+        let isotropic = |deviation: f64| Matrix3::identity() * (deviation * deviation);
+        let (translation_covariance, rotation_covariance) = match relative.covariance {
+            Some(covariance) => {
+                let turned = |rotation: UnitQuaternion<f64>, first: usize| {
+                    let turn = rotation.to_rotation_matrix().into_inner();
+                    turn * covariance.fixed_view::<3, 3>(first, first) * turn.transpose()
+                };
+                // In the frame at the start; the filter has it in that of the body at the end.
+                (turned(start_from_end.inverse() * body_from_sensor, 0), turned(body_from_sensor, 3))
+            }
+            None => (isotropic(options.relative_deviation), isotropic(0.1 * options.relative_deviation)),
+        };
+        RelativePose {
+            keyframe: keyframe_at(relative.start.as_nanos()),
+            translation: way,
+            keyframe_from_body: start_from_end,
+            translation_covariance,
+            rotation_covariance,
+        }
     }
 }
 
-fn rotation(link_from_sensor: Option<&Isometry3<f64>>) -> UnitQuaternion<f64> {
-    link_from_sensor.map_or(UnitQuaternion::identity(), |sensor| sensor.rotation)
+/// What the filter calls the keyframe of an instant.
+pub(super) fn keyframe_at(time_ns: i64) -> u64 {
+    time_ns.cast_unsigned()
+}
+
+/// Where a sensor is in the body, m.
+pub(super) fn place(body_from_sensor: Option<&Isometry3<f64>>) -> Vector3<f64> {
+    body_from_sensor.map_or(Vector3::zeros(), |sensor| sensor.translation.vector)
+}
+
+fn rotation(body_from_sensor: Option<&Isometry3<f64>>) -> UnitQuaternion<f64> {
+    body_from_sensor.map_or(UnitQuaternion::identity(), |sensor| sensor.rotation)
+}
+
+/// The square root of a variance, if one is told.
+pub(super) fn deviation(variance: Option<f64>, otherwise: f64) -> f64 {
+    variance.filter(|variance| *variance > 0.0).map_or(otherwise, f64::sqrt)
 }

@@ -1,13 +1,10 @@
 //! What the declared filter emits.
 
-use super::filter::Filter;
 use super::input::Mounting;
-use super::world::World;
-use crate::navigation::eskf::{GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
-use crate::navigation::math::skew;
-use bb_core::payload::{Odometry, Pose, Twist};
-use bb_core::{Outputs, Payload};
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use super::report::NavigationStatus;
+use super::running::Core;
+use bb_core::Outputs;
+use bb_core::payload::Odometry;
 
 /// An output that can be made of the filter after a sample.
 #[diagnostic::on_unimplemented(
@@ -19,39 +16,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 pub trait NavigationOutput: Outputs + Sized {
     /// What there is to emit.
     #[doc(hidden)]
-    fn of(filter: &Filter, world: &World, mounting: &Mounting) -> Option<Self>;
-}
-
-/// What the filter knows beside the odometry.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
-pub struct NavigationStatus {
-    /// What the accelerometer reads more than the specific force, axes of the link, m/s².
-    pub accelerometer_bias: Vector3<f64>,
-    /// What the gyroscope reads more than the angular velocity, axes of the link, rad/s.
-    pub gyroscope_bias: Vector3<f64>,
-    /// For how long the horizontal position has not been corrected by one in the world, s.
-    pub dead_reckoning_s: f64,
-    /// Standard deviation of the horizontal position, in the direction where it is least known, m.
-    pub horizontal_deviation: f64,
-    /// Fixes that were fused, and that were refused.
-    pub gnss: Verdicts,
-    /// The same for velocities of the odometry.
-    pub odometry: Verdicts,
-    /// The same for poses.
-    pub pose: Verdicts,
-    /// How often samples of the IMU were missing for longer than a sample may take.
-    pub gaps: u32,
-}
-
-/// What became of a sensor's measurements since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
-pub struct Verdicts {
-    /// They have corrected the estimate.
-    pub fused: u64,
-    /// The gate refused them: too far from what was expected.
-    pub refused: u64,
-    /// They were not finite, or came too late or from the future.
-    pub invalid: u64,
+    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self>;
 }
 
 /// The outputs of `Eskf<NavigationOutputs>`: `output odometry;`, `output status;`.
@@ -65,86 +30,14 @@ pub struct NavigationOutputs {
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for Odometry {
-    fn of(filter: &Filter, world: &World, mounting: &Mounting) -> Option<Self> {
-        let estimate = filter.estimate()?;
-        let covariance = filter.eskf().covariance();
-        let block = |row: usize, column: usize| covariance.fixed_view::<3, 3>(row, column).into_owned();
-        let rotation = estimate.rotation();
-        let link = mounting.link();
-        let arm = rotation * link;
-        // The link's origin: errors of the body's, and of where the rotation takes it, θ × R l.
-        let from_rotation = -skew(&arm);
-        let position = block(POSITION, POSITION)
-            + block(POSITION, ROTATION) * from_rotation.transpose()
-            + from_rotation * block(ROTATION, POSITION)
-            + from_rotation * block(ROTATION, ROTATION) * from_rotation.transpose();
-        let position_rotation = block(POSITION, ROTATION) + from_rotation * block(ROTATION, ROTATION);
-        let first_from_frame = world.first_from_frame();
-        let turned = first_from_frame.rotation.to_rotation_matrix().into_inner();
-        // Rotations of the body, as a pose has them.
-        let to_body = rotation.transpose();
-        let pose = Pose {
-            position: first_from_frame.transform_point(&(estimate.position + arm).into()).coords,
-            world_from_body: first_from_frame.rotation * estimate.world_from_body,
-            covariance: Some(symmetric(
-                turned * position * turned.transpose(),
-                turned * position_rotation * to_body.transpose(),
-                to_body * block(ROTATION, ROTATION) * to_body.transpose(),
-            )),
-        };
-        // Rᵀ v + ω × l: errors of v, of R by Rᵀ [v]ₓ, and of the gyroscope's bias by [l]ₓ.
-        let of_rotation = to_body * skew(&estimate.velocity);
-        let of_bias = skew(&link);
-        let linear = to_body * block(VELOCITY, VELOCITY) * to_body.transpose()
-            + to_body * block(VELOCITY, ROTATION) * of_rotation.transpose()
-            + of_rotation * block(ROTATION, VELOCITY) * to_body.transpose()
-            + of_rotation * block(ROTATION, ROTATION) * of_rotation.transpose()
-            + to_body * block(VELOCITY, GYROSCOPE_BIAS) * of_bias.transpose()
-            + of_bias * block(GYROSCOPE_BIAS, VELOCITY) * to_body.transpose()
-            + of_rotation * block(ROTATION, GYROSCOPE_BIAS) * of_bias.transpose()
-            + of_bias * block(GYROSCOPE_BIAS, ROTATION) * of_rotation.transpose()
-            + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS) * of_bias.transpose();
-        let linear_angular = -(to_body * block(VELOCITY, GYROSCOPE_BIAS)
-            + of_rotation * block(ROTATION, GYROSCOPE_BIAS)
-            + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS));
-        let twist = Twist {
-            linear: to_body * estimate.velocity + estimate.angular_velocity.cross(&link),
-            angular: estimate.angular_velocity,
-            covariance: Some(symmetric(linear, linear_angular, block(GYROSCOPE_BIAS, GYROSCOPE_BIAS))),
-        };
-        Some(Self { pose, twist })
+    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self> {
+        core.odometry(mounting)
     }
 }
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for NavigationOutputs {
-    fn of(filter: &Filter, world: &World, mounting: &Mounting) -> Option<Self> {
-        let estimate = filter.estimate()?;
-        let [gnss, odometry, pose] = filter.counts().map(|counts| Verdicts {
-            fused: counts.fused + counts.weighed_down,
-            refused: counts.gate,
-            invalid: counts.invalid + counts.late + counts.future,
-        });
-        let status = NavigationStatus {
-            accelerometer_bias: estimate.accelerometer_bias,
-            gyroscope_bias: estimate.gyroscope_bias,
-            dead_reckoning_s: filter.eskf().dead_reckoning_s(),
-            horizontal_deviation: filter.horizontal_deviation(),
-            gnss,
-            odometry,
-            pose,
-            gaps: filter.eskf().gaps(),
-        };
-        Some(Self { odometry: Some(Odometry::of(filter, world, mounting)?), status: Some(status) })
+    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self> {
+        Some(Self { odometry: Some(core.odometry(mounting)?), status: Some(core.status()?) })
     }
-}
-
-/// The matrix of these blocks and the transpose of the second, symmetric to the last bit.
-fn symmetric(first: Matrix3<f64>, between: Matrix3<f64>, second: Matrix3<f64>) -> Matrix6<f64> {
-    let mut matrix = Matrix6::zeros();
-    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&(0.5 * (first + first.transpose())));
-    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&between);
-    matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&between.transpose());
-    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&(0.5 * (second + second.transpose())));
-    matrix
 }

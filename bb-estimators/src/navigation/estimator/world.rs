@@ -3,17 +3,13 @@
 use super::input::Mounting;
 use super::options::NavigationOptions;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
-use crate::navigation::math::skew;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition};
-use bb_core::payload::{GnssFix, GnssStatus, Pose};
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use bb_core::payload::{GnssFix, Pose};
+use nalgebra::{Isometry3, Vector3};
 
 /// How far from the origin of its world a filter works, m: there down differs by 0.8 mrad, as much as a good accelerometer's
 /// bias.
 const FARTHEST: f64 = 5000.0;
-
-/// Standard deviation of a height that a fix does not tell, m.
-const UNKNOWN_HEIGHT: f64 = 1e4;
 
 /// The world that outputs are in has its origin where the filter started. The filter's own is the same until it has left it far
 /// behind.
@@ -21,12 +17,19 @@ const UNKNOWN_HEIGHT: f64 = 1e4;
 pub(super) struct World {
     /// On the Earth; none without satellites.
     frame: Option<LocalFrame>,
+    /// Where it was at the start.
+    first: Option<LocalFrame>,
     first_from_frame: Isometry3<f64>,
 }
 
 impl World {
     pub(super) fn new(frame: Option<LocalFrame>) -> Self {
-        Self { frame, first_from_frame: Isometry3::identity() }
+        Self { frame, first: frame, first_from_frame: Isometry3::identity() }
+    }
+
+    /// The frame that outputs are in.
+    pub(super) fn first(&self) -> Option<LocalFrame> {
+        self.first
     }
 
     /// Takes coordinates of the filter's world to the one that outputs are in.
@@ -41,34 +44,19 @@ impl World {
         options: &NavigationOptions,
         mounting: &Mounting,
     ) -> Option<GnssPosition> {
-        let frame = self.frame?;
-        let (position, covariance) = position_of(fix, &frame, options)?;
-        Some(GnssPosition { position, covariance, lever_arm: mounting.antenna() })
+        GnssPosition::of_fix(fix, &self.frame?, mounting.antenna(), options.gnss_deviation)
     }
 
     /// A pose in the outputs' world as a measurement.
     pub(super) fn pose(&self, pose: &Pose, options: &NavigationOptions, mounting: &Mounting) -> AbsolutePose {
-        let (body_from_sensor, lever_arm) = mounting.of_pose();
-        let frame_from_first = self.first_from_frame.inverse();
-        let world_from_body = frame_from_first.rotation * pose.world_from_body * body_from_sensor.inverse();
-        let arm = world_from_body * lever_arm;
-        let turned = frame_from_first.rotation.to_rotation_matrix().into_inner();
-        // Of the orientation it is the covariance of a small rotation of the sensor.
-        let of_sensor = (frame_from_first.rotation * pose.world_from_body).to_rotation_matrix().into_inner();
-        let isotropic = |deviation: f64| Matrix3::identity() * (deviation * deviation);
-        let (position, rotation) = match pose.covariance {
-            Some(covariance) => {
-                let block = |first: usize| covariance.fixed_view::<3, 3>(first, first).into_owned();
-                (turned * block(0) * turned.transpose(), of_sensor * block(3) * of_sensor.transpose())
-            }
-            None => (isotropic(options.pose_deviation), isotropic(0.1 * options.pose_deviation)),
-        };
-        AbsolutePose {
-            position: frame_from_first.transform_point(&pose.position.into()).coords - arm,
-            world_from_body,
-            position_covariance: position + skew(&arm) * rotation * skew(&arm).transpose(),
-            rotation_covariance: rotation,
-        }
+        let body_from_sensor = mounting.pose.unwrap_or_else(Isometry3::identity);
+        AbsolutePose::of_pose(pose, &body_from_sensor, options.pose_deviation)
+            .moved(&self.first_from_frame.inverse())
+    }
+
+    /// How far the world's z is below the height above the ellipsoid that it began at, at `position`, m: its plane is no sphere.
+    pub(super) fn drop(&self, position: &Vector3<f64>) -> f64 {
+        self.frame.map_or(0.0, |frame| frame.geodetic(position).height - frame.origin().height - position.z)
     }
 
     /// The filter is at `position`: if that is far out, its world moves on, and what takes coordinates there is returned.
@@ -80,30 +68,4 @@ impl World {
         *frame = next;
         Some(next_from_frame)
     }
-}
-
-/// The position of a fix in a frame, and its covariance; none if it has no position.
-pub(super) fn position_of(
-    fix: &GnssFix,
-    frame: &LocalFrame,
-    options: &NavigationOptions,
-) -> Option<(Vector3<f64>, Matrix3<f64>)> {
-    let geodetic = geodetic_of(fix, frame.origin().height)?;
-    let deviations = Vector3::new(1.0, 1.0, 2.0) * options.gnss_deviation;
-    let mut covariance =
-        fix.position_covariance.unwrap_or_else(|| Matrix3::from_diagonal(&deviations.component_mul(&deviations)));
-    if fix.position.is_some_and(|position| position.altitude.is_none()) {
-        covariance[(2, 2)] = UNKNOWN_HEIGHT * UNKNOWN_HEIGHT;
-    }
-    Some((frame.position(&geodetic), covariance))
-}
-
-/// Where a fix is, at `height` if it does not tell; none if it has no position.
-pub(super) fn geodetic_of(fix: &GnssFix, height: f64) -> Option<Geodetic> {
-    let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
-    Some(Geodetic {
-        latitude: position.latitude_rad,
-        longitude: position.longitude_rad,
-        height: position.altitude.unwrap_or(height),
-    })
 }

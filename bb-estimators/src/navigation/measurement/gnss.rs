@@ -3,10 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Linearised, Measurement};
-use crate::navigation::eskf::{
-    Estimate, GYROSCOPE_BIAS, Optional, POSITION, ROTATION, Refusal, States, VELOCITY, offset,
-};
 use crate::navigation::math::{atan2, skew, wrapped};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY, offset};
 
 /// A horizontal direction shorter than this, as a fraction or in m, has no heading.
 const LEAST_HORIZONTAL: f64 = 1e-3;

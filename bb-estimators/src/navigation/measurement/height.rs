@@ -1,7 +1,8 @@
 //! Height: known, or from air pressure.
 
 use super::{Linearised, Measurement};
-use crate::navigation::eskf::{Estimate, Optional, POSITION, Refusal, States, offset};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, Optional, POSITION, States, offset};
 
 /// Height of the body's origin in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]

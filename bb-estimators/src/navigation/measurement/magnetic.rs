@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use super::gnss::heading_of;
 use super::{Linearised, Measurement, isotropic};
-use crate::navigation::eskf::{Estimate, Optional, ROTATION, Refusal, States, offset};
 use crate::navigation::math::{skew, wrapped};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, Optional, ROTATION, States, offset};
 
 /// The magnetic field where it is known in the world: `Rᵀ m + h`, with the hard iron h.
 #[derive(Clone, Copy, Debug, PartialEq)]

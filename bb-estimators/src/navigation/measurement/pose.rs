@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::{Linearised, Measurement, isotropic};
-use crate::navigation::eskf::{Estimate, POSITION, ROTATION, Refusal, States};
 use crate::navigation::math::rotation_vector;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
 /// Position and orientation of the body in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::{Linearised, Measurement, isotropic};
-use crate::navigation::eskf::{Estimate, Optional, POSITION, ROTATION, Refusal, States, offset};
 use crate::navigation::math::{rotation_vector, skew};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, Optional, POSITION, ROTATION, States, offset};
 
 /// The pose of the body in the frame of a keyframe, which the filter holds as [`Optional::Keyframe`]:
 /// `translation = (1 + s) R_kᵀ (p - p_k)`, `keyframe_from_body = R_kᵀ R`, with [`Optional::RelativeScale`] s.

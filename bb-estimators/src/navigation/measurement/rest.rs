@@ -3,7 +3,8 @@
 use nalgebra::Matrix3;
 
 use super::{Linearised, Measurement, isotropic};
-use crate::navigation::eskf::{Estimate, GYROSCOPE_BIAS, Refusal, States, VELOCITY};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, GYROSCOPE_BIAS, States, VELOCITY};
 
 /// The velocity is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]

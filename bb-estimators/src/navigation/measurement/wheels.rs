@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::{Linearised, Measurement, isotropic};
-use crate::navigation::eskf::{Estimate, GYROSCOPE_BIAS, Optional, ROTATION, Refusal, States, VELOCITY, offset};
 use crate::navigation::math::skew;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, GYROSCOPE_BIAS, Optional, ROTATION, States, VELOCITY, offset};
 
 /// Velocity of a point of the body, in the axes of a sensor: `Mᵀ (Rᵀ v + ω × l)`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::link::predicted;
 use super::matrix::{Square, mirror};
-use crate::navigation::eskf::{Estimate, POSITION, ROTATION, States};
+use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// What is estimated of the newest keyframe; none before the start.

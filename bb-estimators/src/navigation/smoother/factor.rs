@@ -2,11 +2,12 @@
 
 use super::relative::compare;
 use super::rows::Rows;
-use crate::navigation::eskf::{Estimate, Refusal, States};
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, MagneticField,
     MagneticHeading, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation, ZeroVelocity,
 };
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, States};
 
 /// What was measured at one keyframe, or between it and the one before.
 ///

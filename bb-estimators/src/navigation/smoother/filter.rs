@@ -13,10 +13,9 @@ use super::link::Information;
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{
-    EskfParams, Estimate, ImuMean, LONGEST_GAP_S, NAVIGATION, Navigation, Optional, Refusal, Start, States,
-    distinct, offset, seconds_between,
-};
+use crate::navigation::eskf::{EskfParams, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};
 
 /// Position, velocity, attitude and biases at the last keyframes, with the optional states `S`, `N` errors in all, and
 /// factors of type `F`; see the [module](super).

@@ -6,8 +6,10 @@ use super::filter::FixedLagSmoother;
 use super::kernel::Kernel;
 use super::keyframe::{Held, Prior};
 use super::rows::Rows;
-use crate::navigation::eskf::{Refusal, States};
-use crate::navigation::stream::{Fused, Gate, Stream, Verdict};
+use crate::navigation::fused::Fused;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::States;
+use crate::navigation::stream::{Gate, Stream, Verdict};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Adds what was measured at a keyframe of the window, in any order.

@@ -12,7 +12,8 @@ use super::matrix::{axpy, dot, mirror, times};
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use super::rows::Rows;
-use crate::navigation::eskf::{Estimate, POSITION, ROTATION, Refusal, States};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
 /// A weight that differs by less from what the kernel says stays.
 const REWEIGHED: f64 = 0.02;

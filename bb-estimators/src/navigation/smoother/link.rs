@@ -12,11 +12,11 @@ use nalgebra::{Matrix3, Vector3};
 use super::matrix::{Square, add_gram, axpy, dot, times, zeros};
 use super::preintegration::Preintegration;
 use super::rows::{MOST_ROWS, Rows};
-use crate::navigation::eskf::{
-    ACCELEROMETER_BIAS, EskfParams, Estimate, GYROSCOPE_BIAS, ImuDensities, POSITION, ROTATION, States, Transition,
-    VELOCITY, offset, rows,
-};
+use crate::navigation::eskf::{EskfParams, ImuDensities, Transition, rows};
 use crate::navigation::math::{Integrals, exp, renormalised, rotation, skew, sqrt};
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, States, VELOCITY, offset,
+};
 
 /// An optional state keeps at least this part of itself from one keyframe to the next, so that there is a way back.
 const LEAST_KEPT: f64 = 1e-6;

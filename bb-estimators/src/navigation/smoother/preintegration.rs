@@ -16,10 +16,9 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::navigation::eskf::{
-    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, ImuDensities, NAVIGATION, POSITION, ROTATION, VELOCITY,
-};
+use crate::navigation::eskf::ImuDensities;
 use crate::navigation::math::{Integrals, renormalised, rotation, skew};
+use crate::navigation::state::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY};
 
 /// What position, velocity and rotation have in common: a 3 × 3 matrix for each.
 #[derive(Clone, Copy, Debug, PartialEq)]

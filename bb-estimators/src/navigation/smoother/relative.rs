@@ -3,9 +3,10 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::rows::Rows;
-use crate::navigation::eskf::{Estimate, Optional, POSITION, ROTATION, Refusal, States, offset};
 use crate::navigation::math::{rotation_vector, skew};
 use crate::navigation::measurement::RelativePose;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, Optional, POSITION, ROTATION, States, offset};
 
 /// Compares with the poses of both keyframes: `R_k t - (1 + s) (p - p_k)` and `log(R_k Q Rᵀ)`, in the world's axes.
 ///

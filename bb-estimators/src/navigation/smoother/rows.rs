@@ -3,9 +3,10 @@
 use nalgebra::SMatrix;
 
 use super::matrix::is_sound;
-use crate::navigation::eskf::{Estimate, Refusal, States};
 use crate::navigation::math::{ln, sqrt};
 use crate::navigation::measurement::{Linearised, Measurement};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, States};
 
 /// The most numbers that one factor compares.
 pub const MOST_ROWS: usize = 9;

@@ -3,7 +3,8 @@
 use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::params::SmootherParams;
-use crate::navigation::eskf::{ROTATION, Refusal, States};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{ROTATION, States};
 
 /// Where a correction changes by less than this part of what is linearised again, earlier ones are left as they are until
 /// they are asked for.

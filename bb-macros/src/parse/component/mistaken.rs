@@ -29,6 +29,36 @@ pub(super) fn constructor(kind: &mut syn::Path, notes: &mut Notes<'_>) -> bool {
     true
 }
 
+/// The packages of ROS that have the messages of robots.
+const ROS_PACKAGES: [&str; 6] =
+    ["geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "tf2_msgs", "trajectory_msgs"];
+
+/// Reports messages of ROS, `External<sensor_msgs::Imu>`, and leaves the last name. No type of another crate can be a payload,
+/// so that such a path names no payload either where a crate of that name is there.
+pub(super) fn ros_messages(kind: &mut syn::Path, notes: &mut Notes<'_>) {
+    for segment in &mut kind.segments {
+        let syn::PathArguments::AngleBracketed(arguments) = &mut segment.arguments else { continue };
+        for argument in &mut arguments.args {
+            let syn::GenericArgument::Type(syn::Type::Path(message)) = argument else { continue };
+            let path = &mut message.path;
+            let (Some(first), Some(last)) = (path.segments.first(), path.segments.last()) else { continue };
+            let package = first.ident.to_string();
+            if path.segments.len() < 2 || !ROS_PACKAGES.contains(&&*package) {
+                continue;
+            }
+            let last = last.clone();
+            let error = format!(
+                "`{package}` is a package of ROS; the payload is a type of Rust, `{}`, which the prelude has if it is one of \
+                 `bb_core` (a module of that name is `self::{package}`)",
+                last.ident
+            );
+            notes.error(&path, error);
+            path.segments = std::iter::once(last).collect();
+            path.leading_colon = None;
+        }
+    }
+}
+
 /// The error for options in braces, `Encoder { port: 1 }`, which are read if they come next.
 pub(super) fn fields(kind: &syn::Path, input: ParseStream<'_>) -> Option<syn::Error> {
     let names = names(&input.fork())?;

@@ -81,6 +81,9 @@ impl OptionValue {
 /// The error for a value in the notation of Python or of a launch file: `True`, `param.imu.beta`, `$(arg beta)`.
 fn elsewhere(input: ParseStream<'_>) -> Option<syn::Error> {
     let (start, place) = (input.cursor(), input.span());
+    if is_function(&input.fork()) {
+        return Some(syn::Error::new(place, "a function is written as a closure of Rust, as in `|x| 2.0 * x`"));
+    }
     if input.peek(Token![$]) {
         return Some(syn::Error::new(place, "a value is Rust, or a parameter, as in `param::beta`"));
     }
@@ -107,6 +110,15 @@ fn elsewhere(input: ParseStream<'_>) -> Option<syn::Error> {
     let is_all = input.is_empty() || input.peek(Token![,]);
     let message = format!("a parameter is written with `::`; write `{}`", names.join("::"));
     (is_all && names.len() > 1).then(|| place_since(start, input).syntax(message))
+}
+
+/// Whether a function begins here as Python, JavaScript or C++ writes it: `lambda x: …`, `(x) => …`, `[](double x) { … }`.
+fn is_function(input: ParseStream<'_>) -> bool {
+    if input.fork().parse::<Ident>().is_ok_and(|word| word == "lambda") {
+        return input.peek2(syn::Ident) || input.peek2(Token![:]) && !input.peek2(Token![::]);
+    }
+    let is_arrow = input.peek2(Token![=>]) && (input.peek(syn::Ident) || input.peek(syn::token::Paren));
+    is_arrow || input.peek(syn::token::Bracket) && input.peek2(syn::token::Paren) && input.peek3(syn::token::Brace)
 }
 
 fn parenthesized<'a>(input: ParseStream<'a>) -> Option<syn::parse::ParseBuffer<'a>> {

@@ -1,13 +1,9 @@
-//! A sensor that plays the IMU and the magnetometer of a ROS 2 bag.
+//! A sensor that plays back the IMU and the magnetometer of a ROS 2 bag.
 
-use super::{Bag, MargSamples};
+use super::Bag;
+use super::samples::{IMU, MargSamples};
 use bb_core::prelude::*;
 use std::path::PathBuf;
-
-/// The type of an IMU's topic.
-pub const IMU: &str = "sensor_msgs/msg/Imu";
-/// The type of a magnetometer's topic.
-pub const MAGNETIC_FIELD: &str = "sensor_msgs/msg/MagneticField";
 
 /// Options of [`BagImu`].
 #[derive(Clone, Debug, Options)]
@@ -21,15 +17,15 @@ pub struct BagImuOptions {
     /// The topic of the magnetometer. Default: the one that was recorded with the IMU, or the only one of its type.
     #[option(default = "")]
     pub magnetometer_topic: String,
-    /// Whether to play the magnetometer; the bag must have one then. Default: yes.
+    /// Whether to play back the magnetometer, which the bag must then contain. Default: yes.
     #[option(default = true)]
     pub magnetometer: bool,
 }
 
-/// Plays a recorded IMU, and its magnetometer, at the stamps of their headers.
+/// Plays back a recorded IMU and its magnetometer at the stamps of their headers.
 ///
-/// Which reading of the magnetometer goes with which sample, [`MargSamples`] says. A sample out of order is published
-/// with its own stamp, and refused by the estimators that take it.
+/// [`MargSamples`] documents which reading of the magnetometer belongs to which sample. A sample out of order is published
+/// with its own stamp, and estimators refuse it.
 ///
 /// ```no_run
 /// use bb_mcap::BagImu;

@@ -21,9 +21,9 @@ pub struct BagMessage {
     /// When the recorder received it, in nanoseconds of the recorder's clock, mostly since 1970. When its values
     /// held is in the header.
     pub log_time_ns: u64,
-    /// As the type and the encoding say; unpacked, if the message was packed by itself.
+    /// The encoded message; decompressed, if the message was compressed individually.
     pub data: Vec<u8>,
-    /// How they are encoded: `cdr`, which is the only one that is read here.
+    /// The encoding of `data`; only `cdr` can be decoded here.
     pub encoding: Arc<str>,
     path: Arc<Path>,
     /// Its number on its topic, from 1.
@@ -46,7 +46,7 @@ impl BagMessage {
         Self { topic: Arc::clone(topic), schema, log_time_ns, data, encoding, path: Arc::clone(path), number, byte }
     }
 
-    /// The payload and the time in the header of a message that ROS has for payloads `T`; see the table in
+    /// The payload of the ROS message that corresponds to `T`, and the time in its header; see the table in
     /// [`bb_core::message::codec::ros`].
     ///
     /// # Errors
@@ -68,7 +68,7 @@ impl BagMessage {
         self.read(wanted, decode)
     }
 
-    /// The header that the message begins with, as most do: the time and the frame of its values.
+    /// The header at the beginning of the message, as most messages have: the time and the frame of its values.
     ///
     /// # Errors
     /// Its bytes are no header.

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// The messages of chosen topics in the order of the file; see [`Bag::messages`](crate::Bag::messages).
 ///
-/// After an error of the file there is nothing more. A message whose payload is malformed is an error only where it is
+/// The iterator ends after an error of the file. A message with a malformed payload is an error only when it is
 /// decoded.
 pub struct BagMessages {
     path: Arc<Path>,

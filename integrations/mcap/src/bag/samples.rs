@@ -1,17 +1,21 @@
 //! The samples of a recorded IMU, each with the reading of the magnetometer that belongs to it.
 
-use super::{Bag, BagMessage, BagMessages, IMU};
+use super::{Bag, BagMessage, BagMessages};
 use crate::RecordingError;
 use bb_core::prelude::*;
 
+/// The type of an IMU's topic.
+pub const IMU: &str = "sensor_msgs/msg/Imu";
+/// The type of a magnetometer's topic.
+pub const MAGNETIC_FIELD: &str = "sensor_msgs/msg/MagneticField";
+
 /// The samples of a recorded IMU at the stamps of their headers, in the order of the file.
 ///
-/// A reading of the magnetometer goes with the IMU's sample of the same stamp, if that comes just before or after it in the
-/// file, or else with the sample before it: bags hold messages of one instant in any order, so a sample waits for the next
-/// one. Samples may be out of order; estimators
-/// refuse those.
+/// A reading of the magnetometer belongs to the IMU sample with the same stamp, if that comes just before or after it in the
+/// file, or else to the sample before it. Bags contain messages of one instant in any order, so each sample waits for the next
+/// one. Samples may be out of order; estimators refuse those.
 ///
-/// An error comes after the last sample before it, and is the end.
+/// An error comes after the last sample before it, and ends the iteration.
 #[derive(Debug)]
 pub struct MargSamples {
     messages: BagMessages,

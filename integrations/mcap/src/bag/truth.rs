@@ -21,7 +21,7 @@ pub struct Bool {
     pub data: bool,
 }
 
-/// Beyond it nothing is said about the time between two poses.
+/// Poses farther apart are not interpolated.
 const LONGEST_GAP_NS: i64 = 100_000_000;
 
 /// What a recording knows of the true orientation: poses (`geometry_msgs/PoseStamped`, or `nav_msgs/Odometry` where it
@@ -49,7 +49,7 @@ impl Truth {
         Ok(truth)
     }
 
-    /// Takes in poses and when the body moves; other messages are none of its business.
+    /// Adds poses and the times at which the body moves; other messages are ignored.
     ///
     /// # Errors
     /// The bag is broken; says where. What came before stays.
@@ -86,7 +86,7 @@ impl Truth {
         self.poses.push((time.as_unix_nanos(), rotation));
     }
 
-    /// When the body first moves, nanoseconds; none where the recording does not say, or it never does.
+    /// When the body first moves, in nanoseconds; `None` if the recording does not say, or it never moves.
     pub fn first_motion(&self) -> Option<i64> {
         self.moving.iter().find(|(_, moving)| *moving).map(|(time, _)| *time)
     }

@@ -2,6 +2,7 @@
 
 use super::{Count, DEEPEST, Field, Kind, Message, MessageDefinition};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// The definition of the type `name`; the texts of the types it is made of follow it, each after a line of `=` and a
 /// line `MSG: package/Name`.
@@ -22,10 +23,19 @@ pub(super) fn definition(name: &str, text: &str) -> Result<MessageDefinition, St
     let names: HashMap<&str, usize> =
         texts.iter().enumerate().rev().map(|(index, (name, _))| (&**name, index)).collect();
     let mut messages = Vec::new();
-    for (name, lines) in &texts {
+    for (index, (name, lines)) in texts.iter().enumerate() {
         let fields = lines.iter().filter_map(|line| field(line, name, &names).transpose());
-        let fields = fields.collect::<Result<Vec<_>, _>>().map_err(|fault| format!("{name}: {fault}"))?;
-        messages.push(Message { name: name.clone(), fields });
+        let mut fields = fields.collect::<Result<Vec<_>, _>>().map_err(|fault| format!("{name}: {fault}"))?;
+        let variants: Vec<_> = lines.iter().filter_map(|line| variant(line)).collect();
+        // As recordings of this project have an enum: its number is first, its constants are the names.
+        if let Some(first) = fields.first_mut()
+            && *first.name == *"kind"
+            && (first.kind, first.count) == (Kind::U32, Count::One)
+            && !variants.is_empty()
+        {
+            first.kind = Kind::Variant(index);
+        }
+        messages.push(Message { name: name.clone(), fields, variants });
     }
     depth_below(&messages, 0, 0, &mut vec![None; messages.len()])?;
     Ok(MessageDefinition { messages })
@@ -55,11 +65,17 @@ fn field(line: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<Option
         Some((element, bound)) => {
             let bound = bound.strip_suffix(']').ok_or_else(|| format!("`]` is missing in `{kind}`"))?;
             let length = bound.strip_prefix("<=").unwrap_or(bound).parse();
-            let length = length.map_err(|_| format!("`{bound}` is no length in `{kind}`"))?;
+            let length = length.map_err(|_| format!("`{bound}` is not a length in `{kind}`"))?;
             (element, if bound.starts_with('<') { Count::Any } else { Count::Exactly(length) })
         }
     };
     Ok(Some(Field { name: name.into(), kind: element_kind(element, owner, names)?, count }))
+}
+
+/// The number and the name of a constant `uint32 NAME=3`.
+fn variant(line: &str) -> Option<(u32, Arc<str>)> {
+    let (name, number) = line.split('#').next()?.trim().strip_prefix("uint32 ")?.split_once('=')?;
+    Some((number.trim().parse().ok()?, name.trim().into()))
 }
 
 fn element_kind(element: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<Kind, String> {
@@ -160,12 +176,27 @@ mod tests {
         assert_eq!(messages[1].fields, [Field { name: "numbers".into(), kind: Kind::I8, count: Count::Any }]);
     }
 
+    /// Only the first field of an enum has names: other constants may be of any field.
+    #[test]
+    fn the_number_of_an_enum_has_names() {
+        let names = |text: &str| {
+            let MessageDefinition { messages } = definition("a/A", text).expect("it is one");
+            (messages[0].fields[0].kind, messages[0].variants.len())
+        };
+        let constants = "uint32 OPEN=0\nuint32 HOLDING = 1 # something\n";
+        assert_eq!(names(&format!("{constants}uint32 kind\n")), (Kind::Variant(0), 2));
+        assert_eq!(names("uint32 kind\n"), (Kind::U32, 0));
+        assert_eq!(names("int32 OPEN=0\nuint32 kind\n"), (Kind::U32, 0));
+        assert_eq!(names(&format!("{constants}uint32[] kind\n")).0, Kind::U32);
+        assert_eq!(names(&format!("{constants}uint32 status\n")).0, Kind::U32);
+    }
+
     #[test]
     fn what_is_malformed_is_named() {
         assert_eq!(fault("float64"), "a/A: a name is missing in `float64`");
         assert_eq!(fault("float65 x"), "a/A: a/float65 is not defined");
         assert_eq!(fault("float64[3 x"), "a/A: `]` is missing in `float64[3`");
-        assert_eq!(fault("float64[-3] x"), "a/A: `-3` is no length in `float64[-3]`");
+        assert_eq!(fault("float64[-3] x"), "a/A: `-3` is not a length in `float64[-3]`");
         assert_eq!(fault("wstring x"), "a/A: `wstring` is not read, since writers disagree on its bytes");
         assert_eq!(fault("===\nfloat64 x"), "`MSG:` is missing in `float64 x`");
         assert_eq!(fault("A again"), "a/A contains itself, or too many messages in one another");

@@ -3,6 +3,7 @@
 use super::{Count, Field, Kind, MessageDefinition, Value};
 use bb_core::message::DecodeError;
 use bb_core::message::codec::Reader;
+use std::sync::Arc;
 
 /// What follows the message is ignored: ROS counts padding for empty lists that it does not write.
 pub(super) fn message(definition: &MessageDefinition, data: &[u8]) -> Result<Value, DecodeError> {
@@ -57,6 +58,14 @@ fn one(definition: &MessageDefinition, kind: Kind, reader: &mut Reader<'_>) -> R
         Kind::I64 => Value::Signed(i64::from_le_bytes(reader.number(NUMBER)?)),
         Kind::U8 => Value::Unsigned(u8::from_le_bytes(reader.number(NUMBER)?).into()),
         Kind::U16 => Value::Unsigned(u16::from_le_bytes(reader.number(NUMBER)?).into()),
+        Kind::Variant(index) => {
+            let number = u32::from_le_bytes(reader.number(NUMBER)?);
+            let variants = &definition.messages[index].variants;
+            match variants.iter().find(|(known, _)| *known == number) {
+                Some((_, name)) => Value::Variant { number, name: Arc::clone(name) },
+                None => Value::Unsigned(number.into()),
+            }
+        }
         Kind::U32 => Value::Unsigned(u32::from_le_bytes(reader.number(NUMBER)?).into()),
         Kind::U64 => Value::Unsigned(u64::from_le_bytes(reader.number(NUMBER)?)),
         Kind::F32 => Value::F32(f32::from_le_bytes(reader.number(NUMBER)?)),

@@ -11,6 +11,13 @@ pub enum Value {
     Signed(i64),
     /// An integer.
     Unsigned(u64),
+    /// Which variant of an enum, and the name that the definition has for it.
+    Variant {
+        /// Counted from zero.
+        number: u32,
+        /// As the constants of messages are written: `OUT_OF_RANGE`.
+        name: Arc<str>,
+    },
     /// `float32`
     F32(f32),
     /// `float64`
@@ -26,12 +33,13 @@ pub enum Value {
 }
 
 impl Value {
-    /// A number, or a `bool` as 0 or 1.
+    /// A number, that of a variant too, or a `bool` as 0 or 1.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Self::Bool(value) => Some(f64::from(u8::from(*value))),
             Self::Signed(value) => Some(*value as f64),
             Self::Unsigned(value) => Some(*value as f64),
+            Self::Variant { number, .. } => Some(f64::from(*number)),
             Self::F32(value) => Some(f64::from(*value)),
             Self::F64(value) => Some(*value),
             Self::Text(_) | Self::Bytes(_) | Self::List(_) | Self::Message(_) => None,

@@ -236,17 +236,33 @@ impl Records {
     }
 }
 
-/// What a file that is not MCAP is likely to be.
-fn guess(start: &[u8]) -> &'static str {
-    if start.starts_with(b"SQLite format 3") {
+/// What a file that is not MCAP is likely to be, by what it starts with, and the way out.
+const OTHERS: [(&[u8], &str); 10] = [
+    (
+        b"SQLite format 3",
         "it is an SQLite database; if it is a ROS 2 bag, build with the feature `sqlite`, or convert it with `ros2 bag \
-         convert` to storage `mcap`"
-    } else if start.starts_with(b"#ROSBAG") {
-        "it is a ROS 1 bag; convert it to a ROS 2 bag with storage `mcap`"
-    } else if start.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) {
-        "it is packed as a whole with zstd; unpack it with `zstd -d`"
-    } else {
-        "it does not start with MCAP's magic bytes; record or convert with storage `mcap`"
+         convert` to storage `mcap`",
+    ),
+    (b"#ROSBAG", "it is a ROS 1 bag; convert it to a ROS 2 bag with storage `mcap`"),
+    (&[0x28, 0xb5, 0x2f, 0xfd], "it is packed as a whole with zstd; unpack it with `zstd -d`"),
+    (&[0x1f, 0x8b], "it is packed as a whole with gzip; unpack it with `gunzip`"),
+    (&[0x04, 0x22, 0x4d, 0x18], "it is packed as a whole with lz4; unpack it with `lz4 -d`"),
+    (b"PK\x03\x04", "it is a zip archive; unpack it"),
+    (
+        b"ULog",
+        "it is a log of PX4; make CSV of it with `ulog2csv` of `pyulog`, and a bag of that with `bb convert`",
+    ),
+    (b"MATLAB", "it is a MATLAB file; make CSV of it, and a bag of that with `bb convert`"),
+    (b"\x89HDF", "it is an HDF5 file; make CSV of it, and a bag of that with `bb convert`"),
+    (b"version https://", "it is a pointer of Git LFS; fetch the file itself with `git lfs pull`"),
+];
+
+fn guess(start: &[u8]) -> &'static str {
+    let is_text = || start.iter().all(|byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace());
+    match OTHERS.iter().find(|(magic, _)| start.starts_with(magic)) {
+        Some((_, found)) => found,
+        None if is_text() => "it is text; if it is CSV, make a bag of it with `bb convert`",
+        None => "it does not start with MCAP's magic bytes; record or convert with storage `mcap`",
     }
 }
 
@@ -258,6 +274,9 @@ mod tests {
     fn other_formats_are_recognised() {
         assert!(guess(b"SQLite format 3\0").contains("ros2 bag"));
         assert!(guess(b"#ROSBAG V2.0\n").contains("ROS 1"));
-        assert!(guess(b"t,x,y").contains("magic"));
+        assert!(guess(b"\x1f\x8b\x08").contains("gunzip"));
+        assert!(guess(b"version https://git-lfs").contains("git lfs pull"));
+        assert!(guess(b"t,x,y\r\n0,1,2").contains("bb convert"));
+        assert!(guess(b"\x00\xff").contains("magic"));
     }
 }

@@ -1,4 +1,4 @@
-//! A recorder on a thread of its own.
+//! A recorder on its own thread.
 
 use super::{Recorder, RecorderReport};
 use crate::error::{RecordingError, RecordingErrorKind};
@@ -11,7 +11,7 @@ use std::time::Duration;
 /// How long the thread waits for a message before it looks whether it shall stop.
 const WAIT: Duration = Duration::from_millis(20);
 
-/// A recorder that writes on a thread of its own until it is stopped or dropped.
+/// A recorder that writes on its own thread until it is stopped or dropped.
 #[derive(Debug)]
 pub struct BackgroundRecorder {
     path: PathBuf,
@@ -54,15 +54,15 @@ impl BackgroundRecorder {
         self.shared.report()
     }
 
-    /// Whether it still writes; if not before it is stopped, an error came, which [`stop`](Self::stop) tells.
+    /// Whether it is still writing. If it ends before it is stopped, there was an error, which [`stop`](Self::stop) returns.
     pub fn is_running(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Writes what waits, and the end of the file.
+    /// Writes the waiting messages and the end of the file.
     ///
     /// # Errors
-    /// The file could not be written on, now or before.
+    /// Writing failed, now or earlier.
     pub fn stop(mut self) -> Result<RecorderReport, RecordingError> {
         self.end().unwrap_or_else(|| Ok(self.report()))
     }

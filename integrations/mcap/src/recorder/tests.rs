@@ -80,3 +80,25 @@ fn a_recorder_on_a_thread_says_when_it_has_failed() {
     let error = recorder.stop().expect_err("it does not fit");
     assert!(matches!(error.kind(), RecordingErrorKind::Write { .. }), "{error}");
 }
+
+/// A queue that the samples fill is not where the faults wait.
+#[test]
+fn what_is_rare_has_a_queue_of_its_own() {
+    let often = Topic::<JointState>::new("sensor/arm/encoder");
+    let rare = Topic::<JointState>::new("health");
+    let of = |topic: &Topic<JointState>, capacity| {
+        let overflow = Overflow::DropOldest { capacity };
+        DynamicSubscription::new([topic as &dyn AnyTopic], Select::All, None, overflow)
+    };
+    let file = std::env::temp_dir().join(format!("bb-mcap-also-{}.mcap", std::process::id()));
+    let recorder = Recorder::new(&file, of(&often, 10), RecorderOptions::default()).expect("starts");
+    let mut recorder = recorder.also(of(&rare, 10)).expect("its names are free");
+    publish(&rare, 3);
+    publish(&often, 1000);
+    assert_eq!(recorder.drain().expect("there is room"), 13);
+    let report = recorder.finish().expect("there is room");
+    assert_eq!((report.messages, report.lost), (13, 990));
+    let recording = crate::Recording::open(&file).expect("is whole");
+    assert_eq!(recording.messages::<JointState>("health").expect("was recorded").count(), 3);
+    std::fs::remove_file(&file).expect("it is ours");
+}

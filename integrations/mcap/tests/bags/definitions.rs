@@ -57,6 +57,7 @@ fn leaves(value: &Value) -> Vec<String> {
         Value::Bool(value) => vec![value.to_string()],
         Value::Signed(value) => vec![value.to_string()],
         Value::Unsigned(value) => vec![value.to_string()],
+        Value::Variant { number, .. } => vec![number.to_string()],
         Value::F32(value) => vec![format!("{value:?}")],
         Value::F64(value) => vec![format!("{value:?}")],
         Value::Text(value) => vec![value.clone()],

@@ -5,10 +5,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::MekfFilter;
 use crate::attitude::Real;
 use crate::attitude::initial::heading_error;
-use crate::attitude::mekf::errors::ROTATION;
 use crate::attitude::mekf::field::{FieldReference, Verdict, in_plane};
 use crate::attitude::mekf::iron::{Adoption, FieldMeans};
 use crate::attitude::mekf::measurement::Heading;
+use crate::attitude::mekf::states::ROTATION;
 use crate::attitude::rotation::turn_heading;
 
 /// How long a disturbance of the field lasts for a body that moves, s.

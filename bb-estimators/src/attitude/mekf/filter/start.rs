@@ -2,11 +2,12 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::{INITIAL_HEADING, INITIAL_TILT, MekfFilter};
+use super::{INITIAL_HEADING, MekfFilter};
 use crate::attitude::initial::heading_error;
-use crate::attitude::mekf::errors::{BIAS, CALIBRATION, FORCE_LATENCY, ROTATION, VELOCITY};
+use crate::attitude::mekf::INITIAL_TILT;
 use crate::attitude::mekf::measurement::Measurements;
 use crate::attitude::mekf::rest::Rest;
+use crate::attitude::mekf::states::{BIAS, CALIBRATION, FORCE_LATENCY, ROTATION, VELOCITY};
 use crate::attitude::mekf::vertical::Vertical;
 use crate::attitude::mekf::window::Window;
 use crate::attitude::rotation::{turn_heading, turn_upright};

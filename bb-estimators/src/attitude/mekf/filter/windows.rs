@@ -4,9 +4,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::MekfFilter;
 use crate::attitude::Real;
-use crate::attitude::mekf::errors::{BIAS, CALIBRATION, ProcessNoise, ROTATION};
+use crate::attitude::mekf::errors::ProcessNoise;
 use crate::attitude::mekf::iron::FieldMeans;
 use crate::attitude::mekf::measurement::Measurements;
+use crate::attitude::mekf::states::{BIAS, CALIBRATION, ROTATION};
 use crate::attitude::mekf::vertical::Contradiction;
 use crate::attitude::mekf::window::Window;
 use crate::attitude::rotation::turn;

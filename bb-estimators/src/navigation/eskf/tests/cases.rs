@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::super::states::Navigation;
 use super::{ALL, All, sample, started};
+use crate::navigation::state::Navigation;
 use crate::navigation::{
     AbsolutePose, Eskf, EskfParams, GnssPosition, GnssVelocity, Height, ImuMean, Refusal, RelativePose, Start,
     Stream, StreamParams, ZeroVelocity,

@@ -3,14 +3,13 @@
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
 
-use super::super::estimate::Estimate;
-use super::super::states::Optional;
 use super::{ALL, All, estimate, orientation, vector};
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, Linearised,
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
     ZeroVelocity,
 };
+use crate::navigation::state::{Estimate, Optional};
 
 /// `measurement` is exact at `truth`; nearby, its residual is that of the Jacobian.
 fn check<const D: usize>(measurement: &impl Measurement<D>, truth: &Estimate<ALL>) -> Result<(), TestCaseError> {

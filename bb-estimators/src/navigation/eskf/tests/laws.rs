@@ -4,40 +4,18 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
-use super::super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset};
-use super::{All, Estimate, estimate, orientation, sample, started, vector};
+use super::{All, Boat, Drone, Estimate, Rover, configurations, estimate, orientation, sample, started, vector};
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset,
+};
 use crate::navigation::{
-    AbsolutePose, Eskf, EskfParams, Fused, GnssPosition, GnssVelocity, History, ImuMean, Refusal, RelativePose,
-    Replayed, Start, Stream, StreamParams,
+    AbsolutePose, BarometricHeight, Eskf, EskfParams, Fused, GnssPosition, GnssVelocity, History, ImuMean,
+    MagneticField, Refusal, RelativePose, Replayed, Start, Stream, StreamParams, WheelSpeed,
 };
 
 type Law = Result<(), TestCaseError>;
 
-/// Wheels that wear, and an antenna on a mast.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Rover;
-
-impl States for Rover {
-    const OPTIONAL: &'static [Optional] = &[Optional::WheelScale, Optional::GnssLeverArm, Optional::GnssDelay];
-}
-
-/// Poses from a camera, relative to keyframes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Drone;
-
-impl States for Drone {
-    const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale];
-}
-
-/// A compass and a barometer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Boat;
-
-impl States for Boat {
-    const OPTIONAL: &'static [Optional] = &[Optional::BarometerBias, Optional::HardIron];
-}
-
-/// Two seconds with a fix, an anchor and, where there are keyframes, a relative pose each half second; `turn` is of the world,
+/// Two seconds with a fix, an anchor and what measures the optional states each half second; `turn` is of the world,
 /// `shift` of its origin, `mounting` takes the IMU's coordinates to those it would have had.
 fn flight<S: States, const N: usize>(
     turn: UnitQuaternion<f64>,
@@ -65,6 +43,21 @@ fn flight<S: States, const N: usize>(
             filter.update(&mut stream, &GnssPosition::new(to_world(point), 1.0, 1.5)).unwrap();
             let pose = AbsolutePose::new((to_world(point), 3.0), (orientation(level), 0.3));
             filter.update(&mut stream, &pose).unwrap();
+            if offset::<S>(Optional::WheelScale).is_some() {
+                let (forward, lever_arm) = (in_body(Vector3::x()), in_body(Vector3::new(0.1, 0.3, -0.4)));
+                let wheel = WheelSpeed { speed: 3.2, deviation: 0.1, forward, lever_arm };
+                filter.update(&mut stream, &wheel).unwrap();
+            }
+            if offset::<S>(Optional::HardIron).is_some() {
+                let north = Vector3::new(1e-6, 20e-6, -44e-6);
+                let field = in_body(level.inverse() * north + Vector3::new(2e-6, -1e-6, 0.0));
+                let field = MagneticField { field, reference: turn * north, deviation: 1e-6 };
+                filter.update(&mut stream, &field).unwrap();
+            }
+            if offset::<S>(Optional::BarometerBias).is_some() {
+                let pressure = BarometricHeight { height: to_world(point).z + 2.0, deviation: 0.5 };
+                filter.update(&mut stream, &pressure).unwrap();
+            }
             if offset::<S>(Optional::Keyframe).is_some() {
                 let way = (in_body(Vector3::new(1.5, 0.1, 0.0)), 0.1);
                 let relative = RelativePose::new((i / 50 - 1) as u64, way, (UnitQuaternion::identity(), 0.05));
@@ -250,13 +243,7 @@ macro_rules! laws {
     )* };
 }
 
-laws! {
-    plain: Navigation;
-    rover: Rover;
-    drone: Drone;
-    boat: Boat;
-    all: All;
-}
+configurations!(laws);
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]

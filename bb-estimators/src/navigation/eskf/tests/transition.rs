@@ -3,13 +3,12 @@
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
-use super::super::covariance::Covariance;
-use super::super::estimate::Estimate;
 use super::super::params::ImuDensities;
 use super::super::propagation::Transition;
-use super::super::states::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 use super::{ALL, All, estimate};
+use crate::navigation::covariance::Covariance;
 use crate::navigation::math::rotation_vector;
+use crate::navigation::state::{ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, VELOCITY};
 
 const DENSITIES: ImuDensities =
     ImuDensities { accelerometer: 1e-4, gyroscope: 2e-6, accelerometer_bias: 3e-5, gyroscope_bias: 4e-8 };

@@ -37,7 +37,7 @@ struct Problem {
 impl Problem {
     /// `stiffness` is what noise between keyframes is multiplied by.
     fn new(seed: u64, keyframes: usize, stiffness: f64) -> Self {
-        let mut noise = Noise(seed);
+        let mut noise = Noise::new(seed);
         let size = N * keyframes;
         let mut all = Self {
             own: Vec::new(),

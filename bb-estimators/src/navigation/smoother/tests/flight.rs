@@ -72,7 +72,7 @@ impl Flight {
     /// `keyframes` of them, with noise of `level` times what the smoother is told.
     pub(super) fn new(seed: u64, keyframes: usize, level: f64) -> Self {
         let params = sensors();
-        let mut noise = Noise(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+        let mut noise = Noise::new(seed);
         let mut draw = |deviation: f64| noise.vector(deviation * level);
         let level_start = UnitQuaternion::from_euler_angles(0.1, -0.1, 1.0);
         let velocity = Vector3::new(8.0, 2.0, 0.0);

@@ -2,19 +2,14 @@
 
 mod gyroscope;
 
-use super::remark::{Remark, Subject};
 use bb_core::nalgebra::Vector3;
-use bb_core::payload::{FluidPressure, Imu, MagneticField};
-use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, RecordingError};
-
-const PRESSURE: &str = "sensor_msgs/msg/FluidPressure";
 
 /// Samples kept for the verdict: minutes of a fast IMU, and not the memory of a machine.
 const MOST: usize = 200_000;
 
 /// What the messages of a topic say.
 #[derive(Debug, Default)]
-pub(super) struct Units {
+pub(crate) struct Units {
     /// Time in seconds, angular velocity, specific force.
     imu: Vec<(f64, Vector3<f64>, Vector3<f64>)>,
     /// Norms of magnetic fields.
@@ -47,53 +42,58 @@ const PRESSURES: [Guess; 2] = [(300.0, 1100.0, "in hPa"), (30.0, 110.0, "in kPa"
 const PRESSURE_PA: (f64, f64) = (3e4, 2e5);
 
 impl Units {
-    /// Takes a message in, of whatever type.
-    pub(super) fn take(&mut self, message: &BagMessage) -> Result<(), RecordingError> {
-        match &*message.schema {
-            IMU if self.imu.len() < MOST => {
-                let (imu, time) = message.payload::<Imu>()?;
-                let (rate, force) = (imu.angular_velocity, imu.linear_acceleration);
-                match rate.iter().chain(&force).all(|value| value.is_finite()) {
-                    true => self.imu.push((time.as_unix_nanos() as f64 * 1e-9, rate, force)),
-                    false => self.not_finite += 1,
-                }
-            }
-            MAGNETIC_FIELD if self.fields.len() < MOST => {
-                let (field, _) = message.payload::<MagneticField>()?;
-                self.keep(field.magnetic_field.norm(), |units| &mut units.fields);
-            }
-            PRESSURE if self.pressures.len() < MOST => {
-                let (pressure, _) = message.payload::<FluidPressure>()?;
-                self.keep(pressure.fluid_pressure, |units| &mut units.pressures);
-            }
-            _ => {}
+    /// Whether no more is taken in.
+    pub(crate) fn is_full(&self) -> bool {
+        [self.imu.len(), self.fields.len(), self.pressures.len()].contains(&MOST)
+    }
+
+    /// Takes in a sample of an IMU: its time in nanoseconds, its angular velocity and its specific force.
+    pub(crate) fn take_imu(&mut self, time_ns: i64, rate: Vector3<f64>, force: Vector3<f64>) {
+        if !rate.iter().chain(&force).all(|value| value.is_finite()) {
+            self.not_finite += 1;
+        } else if self.imu.len() < MOST {
+            self.imu.push((time_ns as f64 * 1e-9, rate, force));
         }
-        Ok(())
+    }
+
+    /// Takes in a reading of a magnetometer.
+    pub(crate) fn take_field(&mut self, field: &Vector3<f64>) {
+        self.keep(field.norm(), |units| &mut units.fields);
+    }
+
+    /// Takes in a reading of a barometer.
+    pub(crate) fn take_pressure(&mut self, pressure: f64) {
+        self.keep(pressure, |units| &mut units.pressures);
     }
 
     fn keep(&mut self, value: f64, list: fn(&mut Self) -> &mut Vec<f64>) {
-        match value.is_finite() {
-            true => list(self).push(value),
-            false => self.not_finite += 1,
+        if !value.is_finite() {
+            self.not_finite += 1;
+        } else if list(self).len() < MOST {
+            list(self).push(value);
         }
     }
 
-    /// What looks wrong.
-    pub(super) fn remarks(self) -> Vec<Remark> {
-        let mut remarks = Vec::new();
-        if self.not_finite > 0 {
-            let text = format!("{} messages hold NaN or infinity", self.not_finite);
-            remarks.push(Remark::new(Subject::Values, text));
-        }
+    /// How many messages hold what is no number.
+    pub(crate) fn not_finite(&self) -> usize {
+        self.not_finite
+    }
+
+    /// What looks wrong with the specific force and the angular velocity.
+    pub(crate) fn of_imu(&self) -> Vec<String> {
         let forces: Vec<f64> = self.imu.iter().map(|(_, _, force)| force.norm()).collect();
-        let units = [
-            guess("the specific force", calm(&forces), FORCE, &FORCES, "m/s²"),
-            gyroscope::verdict(&self.imu),
-            guess("the magnetic field", self.fields, FIELD, &FIELDS, "T"),
-            guess("the pressure", self.pressures, PRESSURE_PA, &PRESSURES, "Pa"),
-        ];
-        remarks.extend(units.into_iter().flatten().map(|text| Remark::new(Subject::Unit, text)));
-        remarks
+        let force = guess("the specific force", calm(&forces), FORCE, &FORCES, "m/s²");
+        force.into_iter().chain(gyroscope::verdict(&self.imu)).collect()
+    }
+
+    /// What looks wrong with the magnetic field.
+    pub(crate) fn of_field(&self) -> Option<String> {
+        guess("the magnetic field", self.fields.clone(), FIELD, &FIELDS, "T")
+    }
+
+    /// What looks wrong with the pressure.
+    pub(crate) fn of_pressure(&self) -> Option<String> {
+        guess("the pressure", self.pressures.clone(), PRESSURE_PA, &PRESSURES, "Pa")
     }
 }
 

@@ -4,18 +4,17 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-use super::states::ROTATION;
-use crate::navigation::math::{ln, sqrt};
+use super::math::{ln, sqrt};
 
 /// One update never takes more than this ratio of variance out of a direction: what rounding adds, 1e-16 of what was
 /// there, stays far below what is left.
 const LEAST_NOISE: f64 = 1e-10;
 
-/// The largest variance of a position or a velocity: 10,000 km, or as much a second.
-const MOST_VARIANCE: f64 = 1e14;
+/// The largest variance of a position or a velocity that says anything: 10,000 km, or as much a second.
+pub(in crate::navigation) const MOST_VARIANCE: f64 = 1e14;
 
 /// The largest variance of a rotation error, rad²: a hundred turns are as good as one.
-const MOST_ROTATION: f64 = 4e5;
+pub(in crate::navigation) const MOST_ROTATION: f64 = 4e5;
 
 /// Updates between two checks by a Cholesky decomposition.
 const CHECK_EVERY: u32 = 1024;
@@ -25,7 +24,7 @@ const REPAIR: f64 = 1e-9;
 
 /// Covariance of `N` errors, in the square of their units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Covariance<const N: usize> {
+pub(in crate::navigation) struct Covariance<const N: usize> {
     matrix: SMatrix<f64, N, N>,
     updates: u32,
     repairs: u64,
@@ -33,24 +32,24 @@ pub(super) struct Covariance<const N: usize> {
 
 /// An innovation, decomposed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Innovation<const D: usize, const N: usize> {
+pub(in crate::navigation) struct Innovation<const D: usize, const N: usize> {
     /// `L⁻¹ H P`, with `L Lᵀ = H P Hᵀ + R`.
     gain: [[f64; N]; D],
     /// `L⁻¹` times the residual: standard normal where model and measurement agree.
-    pub(super) whitened: [f64; D],
+    pub(in crate::navigation) whitened: [f64; D],
     /// `det S` to the power of -½.
     density: f64,
 }
 
 impl<const D: usize, const N: usize> Innovation<D, N> {
     /// Normalised innovation squared.
-    pub(super) fn nis(&self) -> f64 {
+    pub(in crate::navigation) fn nis(&self) -> f64 {
         self.whitened.iter().map(|x| x * x).sum()
     }
 
     /// The mean of the errors, given the residual.
     #[inline]
-    pub(super) fn mean(&self) -> SVector<f64, N> {
+    pub(in crate::navigation) fn mean(&self) -> SVector<f64, N> {
         let mut mean = SVector::<f64, N>::zeros();
         for (gain, whitened) in self.gain.iter().zip(&self.whitened) {
             for i in 0..N {
@@ -61,28 +60,28 @@ impl<const D: usize, const N: usize> Innovation<D, N> {
     }
 
     /// `-½ ln det S`.
-    pub(super) fn log_density(&self) -> f64 {
+    pub(in crate::navigation) fn log_density(&self) -> f64 {
         ln(self.density)
     }
 }
 
 impl<const N: usize> Covariance<N> {
-    pub(super) fn new() -> Self {
+    pub(in crate::navigation) fn new() -> Self {
         Self { matrix: SMatrix::identity(), updates: 0, repairs: 0 }
     }
 
-    pub(super) fn matrix(&self) -> &SMatrix<f64, N, N> {
+    pub(in crate::navigation) fn matrix(&self) -> &SMatrix<f64, N, N> {
         &self.matrix
     }
 
     /// How often a check failed and variances were raised.
-    pub(super) fn repairs(&self) -> u64 {
+    pub(in crate::navigation) fn repairs(&self) -> u64 {
         self.repairs
     }
 
     /// Rows, which are columns too.
     #[inline]
-    pub(super) fn rows_mut(&mut self) -> &mut [[f64; N]; N] {
+    pub(in crate::navigation) fn rows_mut(&mut self) -> &mut [[f64; N]; N] {
         &mut self.matrix.data.0
     }
 
@@ -92,7 +91,7 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Forgets a state and its correlations.
-    pub(super) fn forget(&mut self, state: usize, variance: f64) {
+    pub(in crate::navigation) fn forget(&mut self, state: usize, variance: f64) {
         let p = self.rows_mut();
         p[state] = [0.0; N];
         for row in p.iter_mut() {
@@ -102,7 +101,7 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Sets the covariance of three states; they are uncorrelated with all others.
-    pub(super) fn set(&mut self, first: usize, block: &Matrix3<f64>) {
+    pub(in crate::navigation) fn set(&mut self, first: usize, block: &Matrix3<f64>) {
         for i in 0..3 {
             self.forget(first + i, 0.0);
         }
@@ -114,7 +113,7 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Makes `target` the same random variable as `source`, up to `variance`.
-    pub(super) fn copy(&mut self, source: usize, target: usize, variance: f64) {
+    pub(in crate::navigation) fn copy(&mut self, source: usize, target: usize, variance: f64) {
         let p = self.rows_mut();
         let mut row = p[source];
         row[target] = row[source] + variance;
@@ -126,7 +125,7 @@ impl<const N: usize> Covariance<N> {
 
     /// First-order Gauss–Markov step of one state: factor, then noise.
     #[inline]
-    pub(super) fn decay(&mut self, state: usize, factor: f64, variance: f64) {
+    pub(in crate::navigation) fn decay(&mut self, state: usize, factor: f64, variance: f64) {
         let p = self.rows_mut();
         for j in 0..N {
             p[state][j] *= factor;
@@ -139,17 +138,16 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Multiplies all of it: what is known is known so much less.
-    pub(super) fn raise(&mut self, factor: f64) {
+    pub(in crate::navigation) fn raise(&mut self, factor: f64) {
         self.matrix *= factor;
     }
 
-    /// Keeps variances of position, velocity and rotation below what is as good as unknown, so that no number overflows.
+    /// Keeps the first variances below limits that are as good as unknown, so that no number overflows.
     #[inline]
-    pub(super) fn bound(&mut self) {
-        let limits = [MOST_VARIANCE; ROTATION].into_iter().chain([MOST_ROTATION; 3]);
-        for (i, limit) in limits.enumerate() {
+    pub(in crate::navigation) fn bound<const L: usize>(&mut self, limits: &[f64; L]) {
+        for (i, limit) in limits.iter().enumerate() {
             let variance = self.matrix[(i, i)];
-            if variance > limit {
+            if variance > *limit {
                 self.shrink(i, sqrt(limit / variance));
             }
         }
@@ -162,12 +160,12 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Adds to a variance.
-    pub(super) fn inflate(&mut self, state: usize, variance: f64) {
+    pub(in crate::navigation) fn inflate(&mut self, state: usize, variance: f64) {
         self.rows_mut()[state][state] += variance;
     }
 
     /// Rotates three states by a matrix close to the identity: `P ← G P Gᵀ`.
-    pub(super) fn transform(&mut self, first: usize, block: &Matrix3<f64>) {
+    pub(in crate::navigation) fn transform(&mut self, first: usize, block: &Matrix3<f64>) {
         let p = self.rows_mut();
         let old = [p[first], p[first + 1], p[first + 2]];
         for i in 0..3 {
@@ -191,7 +189,7 @@ impl<const N: usize> Covariance<N> {
 
     /// `H P`, row by row. Zeros of the Jacobian, which is most of it, cost nothing.
     #[inline]
-    pub(super) fn project<const D: usize>(&self, jacobian: &[[f64; N]; D]) -> [[f64; N]; D] {
+    pub(in crate::navigation) fn project<const D: usize>(&self, jacobian: &[[f64; N]; D]) -> [[f64; N]; D] {
         let p = self.rows();
         let mut product = [[0.0; N]; D];
         for (row, factors) in product.iter_mut().zip(jacobian) {
@@ -208,7 +206,7 @@ impl<const N: usize> Covariance<N> {
 
     /// Decomposes `S = H P Hᵀ + R`; none if it is not positive definite.
     #[inline]
-    pub(super) fn innovation<const D: usize>(
+    pub(in crate::navigation) fn innovation<const D: usize>(
         &self,
         jacobian: &[[f64; N]; D],
         projected: &[[f64; N]; D],
@@ -258,7 +256,7 @@ impl<const N: usize> Covariance<N> {
 
     /// `P ← P - Wᵀ W`, the update in the order of the decomposition, one scalar after the other.
     #[inline]
-    pub(super) fn update<const D: usize>(&mut self, innovation: &Innovation<D, N>) {
+    pub(in crate::navigation) fn update<const D: usize>(&mut self, innovation: &Innovation<D, N>) {
         let p = self.rows_mut();
         for gain in &innovation.gain {
             for i in 0..N {
@@ -276,7 +274,7 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Whether a Cholesky decomposition exists.
-    pub(super) fn is_positive_definite(&self) -> bool {
+    pub(in crate::navigation) fn is_positive_definite(&self) -> bool {
         let mut lower = self.matrix;
         for i in 0..N {
             for j in 0..=i {

@@ -72,7 +72,7 @@ pub trait States: Copy + Debug + PartialEq {
     /// In the order of the error vector, each at most once.
     const OPTIONAL: &'static [Optional];
 
-    /// The number of errors that are estimated: the second parameter of [`Eskf`](super::Eskf).
+    /// The number of errors that are estimated: the second parameter of [`Eskf`](crate::navigation::Eskf).
     const DIMENSION: usize = NAVIGATION + dimension(Self::OPTIONAL);
 }
 
@@ -82,6 +82,14 @@ pub struct Navigation;
 
 impl States for Navigation {
     const OPTIONAL: &'static [Optional] = &[];
+}
+
+/// Navigation states and the scale of wheels, which depends on the pressure of the tyres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wheeled;
+
+impl States for Wheeled {
+    const OPTIONAL: &'static [Optional] = &[Optional::WheelScale];
 }
 
 /// Where the errors of an optional state begin, if the filter estimates it.

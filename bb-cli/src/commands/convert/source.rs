@@ -1,0 +1,128 @@
+//! A CSV that is being read: once, from its beginning to its end, so that it may be a pipe.
+
+use csv::{ReaderBuilder, StringRecord, Terminator};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Read};
+use std::path::Path;
+
+/// Lines before the first one of numbers.
+pub(super) const LONGEST_HEAD: usize = 100;
+/// Bytes that are looked at for it, if a file has no lines.
+const LONGEST_START: u64 = 1 << 20;
+
+/// The lines of a CSV as cells.
+pub(super) struct Source {
+    reader: csv::Reader<Box<dyn Read>>,
+    bytes: Option<u64>,
+}
+
+impl Source {
+    /// Opens a file, or the standard input for `-`.
+    pub(super) fn open(file: &Path) -> Result<Self, String> {
+        let failed = |error: std::io::Error| format!("cannot be read: {error}");
+        let (mut input, bytes): (Box<dyn BufRead>, _) = match file == Path::new("-") {
+            true => (Box::new(BufReader::new(std::io::stdin())), None),
+            false => {
+                let opened = File::open(file).map_err(failed)?;
+                let about = opened.metadata().map_err(failed)?;
+                (Box::new(BufReader::new(opened)), Some(about.len()).filter(|_| about.is_file()))
+            }
+        };
+        let (start, delimiter) = start(&mut input).map_err(failed)?;
+        // The last line may have no end, and the line of a record is counted by ends.
+        let whole = Cursor::new(start).chain(input).chain(&b"\n"[..]);
+        let reader = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .delimiter(delimiter)
+            // A carriage return before it is trimmed.
+            .terminator(Terminator::Any(b'\n'))
+            .from_reader(Box::new(whole) as Box<dyn Read>);
+        Ok(Self { reader, bytes })
+    }
+
+    /// The length of the file, if it is one.
+    pub(super) fn bytes(&self) -> Option<u64> {
+        self.bytes
+    }
+
+    /// How far it is read.
+    pub(super) fn byte(&self) -> u64 {
+        self.reader.position().byte()
+    }
+
+    /// The next line that is not empty, and its number.
+    pub(super) fn next(&mut self) -> Result<Option<(u64, StringRecord)>, String> {
+        let mut record = StringRecord::new();
+        while self.reader.read_record(&mut record).map_err(said)? {
+            if record.iter().any(|cell| !cell.is_empty()) || record.len() > 1 {
+                let within: usize = record.iter().map(|cell| cell.matches('\n').count()).sum();
+                let line = self.reader.position().line().saturating_sub(1 + within as u64);
+                return Ok(Some((line, record)));
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn said(error: csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::Utf8 { pos: Some(place), .. } => format!("line {} is not UTF-8", place.line()),
+        csv::ErrorKind::Io(cause) => format!("cannot be read: {cause}"),
+        _ => error.to_string(),
+    }
+}
+
+/// Whether a cell is a number, be it one with a decimal comma.
+pub(super) fn is_number(cell: &str) -> bool {
+    cell.replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// Reads up to the first line that begins with a number; the delimiter is that line's, since a head may have others in its
+/// words.
+fn start(input: &mut dyn BufRead) -> std::io::Result<(Vec<u8>, u8)> {
+    let mut input = input.take(LONGEST_START);
+    let mut start = Vec::new();
+    let mut delimiters = Vec::new();
+    for _ in 0..=LONGEST_HEAD {
+        let before = start.len();
+        if input.read_until(b'\n', &mut start)? == 0 {
+            break;
+        }
+        let line = String::from_utf8_lossy(&start[before..]);
+        let delimiter = delimiter(&line);
+        let first = line.trim_start_matches('\u{feff}').split(delimiter).next().unwrap_or("");
+        if is_number(first.trim().trim_matches('"').trim()) {
+            return Ok((start, delimiter as u8));
+        }
+        delimiters.push(delimiter);
+    }
+    // There will be an error that names the head.
+    Ok((start, delimiters.first().map_or(b',', |delimiter| *delimiter as u8)))
+}
+
+/// A line with tabs or semicolons has its commas in its numbers.
+fn delimiter(line: &str) -> char {
+    ['\t', ';'].into_iter().find(|delimiter| line.contains(*delimiter)).unwrap_or(',')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> u8 {
+        start(&mut text.as_bytes()).expect("reads").1
+    }
+
+    #[test]
+    fn the_delimiter_is_that_of_the_first_line_of_numbers() {
+        assert_eq!(of("t,x\n0,1\n"), b',');
+        assert_eq!(of("# logged by me; at noon; with a chip\nt,x\n0,1\n"), b',');
+        assert_eq!(of("# x, y, z, and so on, and on\n0;1\n"), b';');
+        assert_eq!(of("t;x\n0,5;1,5\n"), b';');
+        assert_eq!(of("\u{feff}\"0\"\t1\r\n"), b'\t');
+        assert_eq!(of("a;b;c"), b';');
+        assert_eq!(of(""), b',');
+    }
+}

@@ -1,0 +1,37 @@
+//! What the values of a topic suggest about their units.
+
+use super::remark::{Remark, Subject};
+use crate::units::Units;
+use bb_core::payload::{FluidPressure, Imu, MagneticField};
+use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, RecordingError};
+
+const PRESSURE: &str = "sensor_msgs/msg/FluidPressure";
+
+/// Takes in a message, if its type is one whose units can be judged.
+pub(super) fn take(units: &mut Units, message: &BagMessage) -> Result<(), RecordingError> {
+    if units.is_full() {
+        return Ok(());
+    }
+    match &*message.schema {
+        IMU => {
+            let (imu, time) = message.payload::<Imu>()?;
+            units.take_imu(time.as_unix_nanos(), imu.angular_velocity, imu.linear_acceleration);
+        }
+        MAGNETIC_FIELD => units.take_field(&message.payload::<MagneticField>()?.0.magnetic_field),
+        PRESSURE => units.take_pressure(message.payload::<FluidPressure>()?.0.fluid_pressure),
+        _ => {}
+    }
+    Ok(())
+}
+
+/// What looks wrong.
+pub(super) fn remarks(units: &Units) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    if units.not_finite() > 0 {
+        let text = format!("{} messages hold NaN or infinity", units.not_finite());
+        remarks.push(Remark::new(Subject::Values, text));
+    }
+    let units = units.of_imu().into_iter().chain(units.of_field()).chain(units.of_pressure());
+    remarks.extend(units.map(|text| Remark::new(Subject::Unit, text)));
+    remarks
+}

@@ -1,0 +1,92 @@
+//! The truth over time, of the body.
+
+use super::messages::{Time, Told};
+use crate::navigation::data::Truth;
+use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use bb_estimators::navigation::LocalFrame;
+
+/// The truth is not interpolated over longer gaps.
+const LONGEST_GAP_NS: i64 = 100_000_000;
+
+/// In the order of time.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TrueTrack {
+    points: Vec<(Time, Truth)>,
+}
+
+impl TrueTrack {
+    /// Of what was told of a part of the body at `imu_from_part`. What is no number, or no rotation, is left out. Positions on the
+    /// Earth are those in the frame, of the part.
+    pub(super) fn new(told: &[(Time, Told)], imu_from_part: &Isometry3<f64>, frame: Option<&LocalFrame>) -> Self {
+        // A program that does not know the velocity leaves it zero.
+        let tells_velocity = told.iter().any(|(_, told)| match told {
+            Told::Moving(_, [linear, _]) => *linear != Vector3::zeros(),
+            _ => false,
+        });
+        let mut points: Vec<(Time, Truth)> = Vec::with_capacity(told.len());
+        for (time, told) in told {
+            let truth = match told {
+                Told::Pose(pose) => of_pose(pose, imu_from_part),
+                Told::Moving(pose, [linear, angular]) => of_pose(pose, imu_from_part).map(|truth| {
+                    let swing = angular.cross(&imu_from_part.inverse().translation.vector);
+                    let turned = pose.rotation * (linear + swing);
+                    let velocity = (tells_velocity && is_finite(&turned)).then_some(turned);
+                    Truth { velocity, ..truth }
+                }),
+                Told::OnEarth(at) => frame.zip(at.as_ref()).map(|(frame, at)| {
+                    let position = frame.position(at);
+                    Truth { position, world_from_body: None, velocity: None }
+                }),
+            };
+            let Some(truth) = truth.filter(|truth| is_finite(&truth.position)) else { continue };
+            if points.last().is_none_or(|(last, _)| last < time) {
+                points.push((*time, truth));
+            }
+        }
+        Self { points }
+    }
+
+    pub(super) fn points(&self) -> &[(Time, Truth)] {
+        &self.points
+    }
+
+    /// At a time; none before the first and after the last, and in gaps.
+    pub(super) fn at(&self, time: Time) -> Option<Truth> {
+        let next = self.points.partition_point(|(known, _)| *known < time);
+        let (after_ns, after) = self.points.get(next)?;
+        if *after_ns == time {
+            return Some(*after);
+        }
+        let (before_ns, before) = self.points.get(next.checked_sub(1)?)?;
+        let gap_ns = after_ns - before_ns;
+        if gap_ns > LONGEST_GAP_NS {
+            return None;
+        }
+        let part = (time - before_ns) as f64 / gap_ns as f64;
+        let between = |from: &Vector3<f64>, to: &Vector3<f64>| from + (to - from) * part;
+        let turned = |from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>| from.try_slerp(to, part, 1e-9);
+        Some(Truth {
+            position: between(&before.position, &after.position),
+            world_from_body: before.world_from_body.zip(after.world_from_body).and_then(|(a, b)| turned(&a, &b)),
+            velocity: before.velocity.zip(after.velocity).map(|(from, to)| between(&from, &to)),
+        })
+    }
+}
+
+fn of_pose(world_from_part: &Isometry3<f64>, imu_from_part: &Isometry3<f64>) -> Option<Truth> {
+    let world_from_imu = isometry(world_from_part)? * imu_from_part.inverse();
+    let world_from_body = Some(world_from_imu.rotation);
+    Some(Truth { position: world_from_imu.translation.vector, world_from_body, velocity: None })
+}
+
+/// A pose, if it is one.
+pub(super) fn isometry(pose: &Isometry3<f64>) -> Option<Isometry3<f64>> {
+    let (position, quaternion) = (pose.translation, pose.rotation.into_inner());
+    let is_rotation = (quaternion.norm() - 1.0).abs() < 0.1;
+    (is_rotation && is_finite(&position.vector))
+        .then(|| Isometry3::from_parts(position, UnitQuaternion::new_normalize(quaternion)))
+}
+
+fn is_finite(vector: &Vector3<f64>) -> bool {
+    vector.iter().all(|x| x.is_finite())
+}

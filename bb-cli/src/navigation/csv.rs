@@ -1,0 +1,181 @@
+//! A data set as CSV files with one prefix: `_imu`, `_keyframes`, `_truth`, `_init`, `_noise`, and whichever there are of
+//! `_vio`, `_anchor` and `_gps`.
+
+use super::data::{DataSet, Keyframe, Noise, Sample, Truth, nanoseconds};
+use bb_core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use bb_estimators::navigation::{AbsolutePose, GnssPosition, RelativePose, Start};
+use std::collections::HashMap;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+impl DataSet {
+    /// Reads the files of a prefix, `folder/name` for `folder/name_imu.csv` and the others.
+    ///
+    /// # Errors
+    ///
+    /// Which file cannot be read, or in which line what is wrong.
+    pub fn read(prefix: &Path) -> Result<Self, String> {
+        let samples = Rows::read(prefix, "imu", 8)?;
+        let keyframes = Rows::read(prefix, "keyframes", 5)?;
+        let truth = Rows::read(prefix, "truth", 11)?;
+        let init = Rows::read(prefix, "init", 21)?;
+        let noise = Rows::read(prefix, "noise", 5)?;
+        let samples = samples.map(|row| {
+            let sample = Sample { angular_velocity: row.vector(1), specific_force: row.vector(4), dt: row.0[7] };
+            (sample.dt > 0.0).then_some(sample).ok_or("column dt must be positive")
+        })?;
+        let keyframes = keyframes.map(|row| {
+            let truth = truth.rows.get(row.index(3)?).ok_or("column truth_row is beyond the truth")?;
+            let sample = row.index(2)?;
+            if sample > samples.len() {
+                return Err("column imu_start is beyond the samples");
+            }
+            let known = |value: f64| value.is_finite();
+            Ok(Keyframe {
+                time_s: row.0[1],
+                sample,
+                scored: row.0[4] > 0.0,
+                is_referred_to: false,
+                truth: Some(Truth {
+                    position: truth.vector(1),
+                    world_from_body: known(truth.0[4]).then(|| truth.orientation(4)),
+                    velocity: known(truth.0[8]).then(|| truth.vector(8)),
+                }),
+            })
+        })?;
+        if keyframes.len() < 2 || keyframes.windows(2).any(|pair| pair[0].sample > pair[1].sample) {
+            return Err(format!("{}_keyframes.csv: needs two keyframes or more, in order", prefix.display()));
+        }
+        let start = init.first(|row| {
+            let (rotation, position, velocity) = (row.0[16], row.0[17], row.0[18]);
+            let first_ns = nanoseconds(keyframes[0].time_s);
+            let velocity = (row.vector(7), velocity);
+            Start {
+                gyroscope_bias: row.vector(10),
+                gyroscope_bias_deviation: row.0[19],
+                accelerometer_bias: row.vector(13),
+                accelerometer_bias_deviation: row.0[20],
+                ..Start::at(first_ns, (row.vector(0), position), velocity, (row.orientation(3), rotation))
+            }
+        })?;
+        let noise = noise.first(|row| Noise {
+            gyroscope: row.0[0],
+            gyroscope_bias: row.0[1],
+            accelerometer: row.0[2],
+            accelerometer_bias: row.0[3],
+            gravity: row.0[4],
+        })?;
+        let relative = Rows::read_if_there(prefix, "vio", 12)?.map(|row| {
+            let (translation, rotation) = ((row.vector(3), row.0[11]), (row.orientation(6), row.0[10]));
+            Ok((row.index(1)? as u64, RelativePose::new(row.index(0)? as u64, translation, rotation)))
+        })?;
+        let anchors = Rows::read_if_there(prefix, "anchor", 11)?.map(|row| {
+            let (position, orientation) = ((row.vector(2), row.0[9]), (row.orientation(5), row.0[10]));
+            Ok((row.index(0)? as u64, AbsolutePose::new(position, orientation)))
+        })?;
+        let fixes = Rows::read_if_there(prefix, "gps", 7)?
+            .map(|row| Ok((row.index(0)? as u64, GnssPosition::new(row.vector(2), row.0[5], row.0[6]))))?;
+        let data = Self {
+            prefix: prefix.to_owned(),
+            samples,
+            keyframes,
+            start,
+            noise: Some(noise),
+            relative: relative.into_iter().collect(),
+            anchors: anchors.into_iter().collect(),
+            fixes: fixes.into_iter().collect(),
+            velocities: HashMap::new(),
+            fixes_beside_relative: false,
+            antenna: Vector3::zeros(),
+        };
+        Ok(data.referred())
+    }
+}
+
+/// Time, angular velocity and specific force.
+pub(crate) type Inertial = (f64, Vector3<f64>, Vector3<f64>);
+
+/// The samples of a file as `_imu`: s, rad/s, m/s².
+///
+/// # Errors
+///
+/// It cannot be read, or in which line what is wrong.
+pub(crate) fn inertial(file: &Path) -> Result<Vec<Inertial>, String> {
+    let rows = Rows::of_file(file.to_owned(), 7)?;
+    if rows.rows.is_empty() {
+        return Err(format!("{}: there is no such file, or it has no row", file.display()));
+    }
+    rows.map(|row| Ok((row.0[0], row.vector(1), row.vector(4))))
+}
+
+/// The numbers of a file, a header row left out.
+struct Rows {
+    file: PathBuf,
+    rows: Vec<Row>,
+}
+
+struct Row(Vec<f64>);
+
+impl Rows {
+    fn read(prefix: &Path, what: &str, columns: usize) -> Result<Self, String> {
+        let rows = Self::read_if_there(prefix, what, columns)?;
+        if rows.rows.is_empty() {
+            return Err(format!("{}: there is no such file, or it has no row", rows.file.display()));
+        }
+        Ok(rows)
+    }
+
+    fn read_if_there(prefix: &Path, what: &str, columns: usize) -> Result<Self, String> {
+        let mut file = prefix.as_os_str().to_owned();
+        file.push(format!("_{what}.csv"));
+        Self::of_file(PathBuf::from(file), columns)
+    }
+
+    fn of_file(file: PathBuf, columns: usize) -> Result<Self, String> {
+        let text = match std::fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Self { file, rows: Vec::new() }),
+            Err(error) => return Err(format!("{}: {error}", file.display())),
+        };
+        let mut rows = Vec::new();
+        for (index, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
+            let fault = |fault: String| format!("{}, line {}: {fault}", file.display(), index + 1);
+            let numbers: Result<Vec<f64>, _> = line.split(',').map(|cell| cell.trim().parse()).collect();
+            let numbers = numbers.map_err(|error| fault(format!("{error}")))?;
+            if numbers.len() < columns {
+                return Err(fault(format!("{} columns, but must be {columns}", numbers.len())));
+            }
+            rows.push(Row(numbers));
+        }
+        Ok(Self { file, rows })
+    }
+
+    fn map<T>(&self, read: impl Fn(&Row) -> Result<T, &'static str>) -> Result<Vec<T>, String> {
+        let located = |(index, row): (usize, &Row)| {
+            read(row).map_err(|fault| format!("{}, row {}: {fault}", self.file.display(), index + 1))
+        };
+        self.rows.iter().enumerate().map(located).collect()
+    }
+
+    fn first<T>(&self, read: impl Fn(&Row) -> T) -> Result<T, String> {
+        self.rows.first().map(read).ok_or_else(|| format!("{}: has no row", self.file.display()))
+    }
+}
+
+impl Row {
+    fn vector(&self, first: usize) -> Vector3<f64> {
+        Vector3::new(self.0[first], self.0[first + 1], self.0[first + 2])
+    }
+
+    /// w, x, y, z.
+    fn orientation(&self, first: usize) -> UnitQuaternion<f64> {
+        let [w, x, y, z] = [0, 1, 2, 3].map(|i| self.0[first + i]);
+        UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+    }
+
+    fn index(&self, column: usize) -> Result<usize, &'static str> {
+        let number = self.0[column];
+        let is_index = (0.0..1e12).contains(&number) && number.fract() == 0.0;
+        is_index.then_some(number as usize).ok_or("an index is not a whole number")
+    }
+}

@@ -1,0 +1,233 @@
+//! The part of a recording in which the IMU lies still and nothing is missing.
+
+use super::{AXES, Sample};
+use std::ops::Range;
+
+/// What is longer between two samples, in periods, is a gap.
+const GAP: f64 = 1.5;
+
+/// Motion is looked for in windows of this length, s.
+const WINDOW_S: f64 = 1.0;
+
+/// A window whose samples vary so many times as much as usual is motion, and one whose mean differs from that of the one before by
+/// so many times what a sample usually varies by: no bias walks so fast.
+const MORE: f64 = 4.0;
+
+/// A gyroscope that reads more does not lie still, rad/s.
+const TURNING: f64 = 0.2;
+
+/// The least, s.
+const LEAST_S: f64 = 10.0;
+
+/// A sensor of fewer levels is not told from one that is saturated.
+const LEVELS: usize = 20;
+
+/// The part of the samples at one end of the range that only saturation explains.
+const AT_THE_END: f64 = 0.1;
+
+/// The longest part in which the IMU lies still.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Still {
+    pub(super) samples: Range<usize>,
+    pub(super) period_s: f64,
+    /// After the first sample of the recording, s.
+    pub(super) from_s: f64,
+    pub(super) seconds: f64,
+    /// What is not as it should be.
+    pub(super) warnings: Vec<String>,
+}
+
+/// # Errors
+///
+/// There is no such part that is long enough; in words.
+pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
+    let (Some(first), true) = (samples.first(), samples.len() >= 2) else {
+        return Err(format!("{} samples are too few", samples.len()));
+    };
+    let at = |index: usize| {
+        samples.get(index).map_or(0.0, |sample: &Sample| (sample.time_ns - first.time_ns) as f64 * 1e-9)
+    };
+    let mut periods: Vec<_> = samples.windows(2).map(|pair| pair[1].time_ns - pair[0].time_ns).collect();
+    periods.sort_unstable();
+    let usual = periods[periods.len() / 2];
+    if usual <= 0 {
+        return Err("the stamps of the samples do not grow".into());
+    }
+    let mut warnings = Vec::new();
+    let mut breaks = gaps(samples, usual, &at, &mut warnings);
+    let window = ((WINDOW_S * 1e9 / usual as f64) as usize).max(8);
+    moved(samples, window, &at, &mut breaks, &mut warnings);
+    breaks.sort_by_key(|part| part.start);
+    let longest = longest(samples.len(), &breaks);
+    let (from_s, to_s) = (at(longest.start), at(longest.end.saturating_sub(1)));
+    let seconds = to_s - from_s;
+    let why = warnings.first().map(|warning| format!(" ({warning})")).unwrap_or_default();
+    if seconds < LEAST_S {
+        return Err(format!(
+            "at most {seconds:.1} s are at rest without a gap, and {LEAST_S:.0} s are the least{why}; record ten minutes for \
+             the noise density, three hours for the random walk"
+        ));
+    }
+    if !breaks.is_empty() {
+        warnings.push(format!("taken from {from_s:.1} to {to_s:.1} s, the longest part at rest without a gap"));
+    }
+    let part = samples.get(longest.clone()).unwrap_or_default();
+    turning(part)?;
+    warnings.extend((0..AXES.len()).filter_map(|axis| saturated(part, axis)));
+    let period_s = seconds / (part.len().saturating_sub(1).max(1)) as f64;
+    Ok(Still { samples: longest, period_s, from_s, seconds, warnings })
+}
+
+/// Where a part ends and the next begins, as ranges of samples that belong to neither.
+fn gaps(
+    samples: &[Sample],
+    usual: i64,
+    at: &dyn Fn(usize) -> f64,
+    warnings: &mut Vec<String>,
+) -> Vec<Range<usize>> {
+    let mut breaks = Vec::new();
+    let (mut gaps, mut back, mut numbers) = ((0, 0.0, 0.0), (0, 0.0), (0, 0.0));
+    for (index, pair) in samples.windows(2).enumerate() {
+        let period = pair[1].time_ns - pair[0].time_ns;
+        if period <= 0 {
+            back = (back.0 + 1, if back.0 == 0 { at(index + 1) } else { back.1 });
+            breaks.push(index + 1..index + 1);
+        } else if period as f64 > GAP * usual as f64 {
+            if gaps.0 == 0 {
+                gaps = (0, period as f64 * 1e-9, at(index));
+            }
+            gaps.0 += 1;
+            breaks.push(index + 1..index + 1);
+        }
+    }
+    for (index, sample) in samples.iter().enumerate() {
+        if !sample.axes.iter().all(|value| value.is_finite()) {
+            numbers = (numbers.0 + 1, if numbers.0 == 0 { at(index) } else { numbers.1 });
+            breaks.push(index..index + 1);
+        }
+    }
+    if gaps.0 > 0 {
+        warnings.push(format!("{} gaps, the first of {:.3} s after {:.2} s", gaps.0, gaps.1, gaps.2));
+    }
+    if back.0 > 0 {
+        warnings.push(format!("the time runs back {} times, first at {:.2} s", back.0, back.1));
+    }
+    if numbers.0 > 0 {
+        warnings.push(format!("{} samples are no numbers, the first at {:.2} s", numbers.0, numbers.1));
+    }
+    breaks
+}
+
+/// Adds the windows in which an axis moves.
+fn moved(
+    samples: &[Sample],
+    window: usize,
+    at: &dyn Fn(usize) -> f64,
+    breaks: &mut Vec<Range<usize>>,
+    warnings: &mut Vec<String>,
+) {
+    for (axis, name) in AXES.iter().enumerate() {
+        let moments: Vec<_> = samples.chunks(window).map(|chunk| moments(chunk, axis)).collect();
+        let median = |values: &mut Vec<f64>| {
+            values.retain(|value| value.is_finite());
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(0.0)
+        };
+        let usual = median(&mut moments.iter().map(|(_, deviation)| *deviation).collect());
+        if usual <= 0.0 {
+            continue;
+        }
+        let mut worst: Option<(usize, f64)> = None;
+        let mut count = 0;
+        for (index, (mean, deviation)) in moments.iter().enumerate() {
+            let before =
+                index.checked_sub(1).and_then(|before| moments.get(before)).map_or(*mean, |(mean, _)| *mean);
+            let more = deviation.max((mean - before).abs()) / usual;
+            if more > MORE {
+                breaks.push(index * window..((index + 1) * window).min(samples.len()));
+                count += 1;
+                if worst.is_none_or(|(_, most)| most < more) {
+                    worst = Some((index, more));
+                }
+            }
+        }
+        if let Some((index, more)) = worst {
+            warnings.push(format!(
+                "{name} moves in {count} of {} windows of a second, most at {:.1} s, where it varies {more:.0} times as much \
+                 as usual",
+                moments.len(),
+                at(index * window)
+            ));
+        }
+    }
+}
+
+fn moments(samples: &[Sample], axis: usize) -> (f64, f64) {
+    let values = || samples.iter().map(|sample| sample.axes[axis]).filter(|value| value.is_finite());
+    let count = values().count().max(1) as f64;
+    let mean = values().sum::<f64>() / count;
+    let variance = values().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count;
+    (mean, variance.sqrt())
+}
+
+/// The longest range that none of these overlaps.
+fn longest(count: usize, breaks: &[Range<usize>]) -> Range<usize> {
+    let (mut longest, mut from) = (0..0, 0);
+    for part in breaks.iter().chain([&(count..count)]) {
+        if part.start > from && part.start - from > longest.len() {
+            longest = from..part.start;
+        }
+        from = from.max(part.end);
+    }
+    longest
+}
+
+fn turning(samples: &[Sample]) -> Result<(), String> {
+    for (axis, name) in AXES.iter().enumerate().take(3) {
+        let (mean, _) = moments(samples, axis);
+        if mean.abs() > TURNING {
+            return Err(format!("{name} reads {mean:.2} rad/s on average: the IMU turns, or is not in rad/s"));
+        }
+    }
+    Ok(())
+}
+
+/// What is to be said of an axis that stays at the end of its range.
+fn saturated(samples: &[Sample], axis: usize) -> Option<String> {
+    let mut values: Vec<_> = samples.iter().map(|sample| sample.axes[axis]).collect();
+    values.sort_by(f64::total_cmp);
+    let count = values.len();
+    let mut levels = 1 + values.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    if levels < 2 {
+        return None; // Constant, which is an error of the axis.
+    }
+    levels = levels.min(LEVELS + 1);
+    let name = AXES[axis];
+    if levels <= 4 {
+        return Some(format!("{name} has {levels} values only: its resolution hides its noise"));
+    }
+    if levels <= LEVELS {
+        return None;
+    }
+    for (end, value) in [("largest", values.last()?), ("smallest", values.first()?)] {
+        let share = values.iter().filter(|other| *other == value).count() as f64 / count as f64;
+        if share > AT_THE_END {
+            let percent = share * 100.0;
+            return Some(format!("{name} is saturated: {percent:.0} % of its samples are the {end}, {value}"));
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_part_is_found() {
+        assert_eq!(longest(10, &[]), 0..10);
+        assert_eq!(longest(10, &[3..3, 4..6]), 6..10);
+        assert_eq!(longest(10, &[0..9, 2..4]), 9..10);
+        assert_eq!(longest(10, &[0..5, 5..10]), 0..0);
+    }
+}

@@ -1,0 +1,190 @@
+//! Lines over two axes, and what they are called beside them.
+
+use super::Drawn;
+use super::line::Line;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Of labels, in pixels.
+const FONT: (&str, u32) = ("sans-serif", 14);
+
+/// The key of a line in the legend, its distance to what is beside it, and the height of a row; pixels.
+const KEY: i32 = 18;
+const SPACE: i32 = 8;
+const ROW: i32 = 20;
+
+/// Around the axes, pixels.
+const MARGIN: u32 = 6;
+const X_LABELS: u32 = 42;
+const Y_LABELS: u32 = 70;
+
+/// What is drawn: one time axis, or a plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame<'a> {
+    pub(super) title: &'a str,
+    pub(super) x_axis: &'a str,
+    pub(super) y_axis: &'a str,
+    pub(super) lines: &'a [Line],
+    pub(super) scale: Scale,
+    /// Of a panel's.
+    pub(super) height: u32,
+}
+
+/// How numbers become places on both axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Alike everywhere, each axis by itself.
+    Linear,
+    /// Alike on both axes: a map.
+    Square,
+    /// By powers of ten; what is not positive is left out.
+    Logarithmic,
+}
+
+impl Frame<'_> {
+    fn shown(&self) -> impl Iterator<Item = &Line> {
+        self.lines.iter().filter(|line| !line.runs.is_empty())
+    }
+
+    /// A run of points as the axes have them.
+    fn placed<'p>(&self, run: &'p [(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + 'p {
+        let is_logarithmic = self.scale == Scale::Logarithmic;
+        run.iter().filter(move |(x, y)| !is_logarithmic || (*x > 0.0 && *y > 0.0)).map(move |(x, y)| {
+            match is_logarithmic {
+                true => (x.log10(), y.log10()),
+                false => (*x, *y),
+            }
+        })
+    }
+
+    /// The room for the legend, in pixels.
+    pub(super) fn legend_width<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> u32 {
+        let font = FONT.into_font().into_text_style(area);
+        let width = |line: &Line| area.estimate_text_size(&line.label, &font).map_or(0, |(width, _)| width);
+        let widest = self.shown().map(width).max().unwrap_or(0);
+        // The estimate is rough: a tenth more.
+        widest + widest / 10 + (KEY + 3 * SPACE).unsigned_abs()
+    }
+
+    /// Draws it, with the legend in the `legend_width` pixels at the right, beside the data.
+    pub(super) fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, legend_width: u32) -> Drawn<B> {
+        let area = match self.title.is_empty() {
+            true => area.clone(),
+            false => area.titled(self.title, ("sans-serif", 17))?,
+        };
+        let width = area.dim_in_pixel().0;
+        let (area, legend) = area.split_horizontally(width.saturating_sub(legend_width));
+        self.draw_legend(&legend)?;
+
+        let points = self.shown().flat_map(|line| &line.runs).flat_map(|run| self.placed(run));
+        let (mut start, mut end, mut low, mut high) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
+        for (x, y) in points {
+            (start, end) = (start.min(x), end.max(x));
+            (low, high) = (low.min(y), high.max(y));
+        }
+        if start > end {
+            (start, end, low, high) = (0.0, 1.0, 0.0, 1.0);
+        } else if start == end {
+            (start, end) = (start - 0.5, end + 0.5);
+        }
+        let margin = match high - low {
+            0.0 if high == 0.0 => 1.0,
+            0.0 => high.abs() * 0.1,
+            span => span * 0.05,
+        };
+        let (mut low, mut high) = (low - margin, high + margin);
+        if self.scale == Scale::Square {
+            let (width, height) = area.dim_in_pixel();
+            let part = |pixels: u32, taken: u32| f64::from(pixels.saturating_sub(taken).max(1));
+            let (width, height) = (part(width, Y_LABELS + 2 * MARGIN), part(height, X_LABELS + 2 * MARGIN));
+            let per_pixel = ((end - start) / width).max((high - low) / height);
+            let widened = |from: f64, to: f64, span: f64| (0.5 * (from + to - span), 0.5 * (from + to + span));
+            (start, end) = widened(start, end, per_pixel * width);
+            (low, high) = widened(low, high, per_pixel * height);
+        }
+        let mut chart = ChartBuilder::on(&area)
+            .margin(MARGIN)
+            .x_label_area_size(X_LABELS)
+            .y_label_area_size(Y_LABELS)
+            .build_cartesian_2d(start..end, low..high)?;
+        let (x_span, span) = (end - start, high - low);
+        let label = |value: f64, span: f64| match self.scale {
+            Scale::Logarithmic => power(value),
+            _ => tick(value, span),
+        };
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .x_desc(self.x_axis)
+            .y_desc(self.y_axis)
+            .x_label_formatter(&|value| label(*value, x_span))
+            .y_label_formatter(&|value| label(*value, span))
+            .label_style(FONT)
+            .draw()?;
+        for line in self.shown() {
+            let style = stroke(line);
+            for run in &line.runs {
+                // Thick lines have spikes at sharp turns; dots do not. A single point is no line.
+                if line.width > 1 || run.len() == 1 {
+                    chart.draw_series(self.placed(run).map(|point| Circle::new(point, 2, style.filled())))?;
+                } else {
+                    chart.draw_series(LineSeries::new(self.placed(run), style))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_legend<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn<B> {
+        let font = FONT.into_font().into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
+        for (row, line) in (0..).zip(self.shown()) {
+            let middle = ROW * row + ROW;
+            area.draw(&PathElement::new([(SPACE, middle), (SPACE + KEY, middle)], stroke(line)))?;
+            area.draw(&Text::new(line.label.clone(), (2 * SPACE + KEY, middle), font.clone()))?;
+        }
+        Ok(())
+    }
+}
+
+fn stroke(line: &Line) -> ShapeStyle {
+    let (red, green, blue) = line.colour;
+    RGBColor(red, green, blue).stroke_width(line.width)
+}
+
+/// A number at an axis of this span, with as many digits as tell it from its neighbours.
+fn tick(value: f64, span: f64) -> String {
+    let decimals = (1.0 - span.log10()).ceil();
+    match decimals {
+        ..=0.0 if span < 1e6 => format!("{value:.0}"),
+        0.0..=4.0 => format!("{value:.*}", decimals as usize),
+        _ if value.abs() < span * 1e-9 => "0".to_owned(),
+        _ => format!("{value:.1e}"),
+    }
+}
+
+/// Ten to this power.
+fn power(exponent: f64) -> String {
+    let value = 10_f64.powf(exponent);
+    match exponent.fract().abs() < 1e-6 {
+        true => format!("{value:.0e}"),
+        false => format!("{value:.1e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_have_the_digits_that_tell_them_apart() {
+        assert_eq!(tick(-90.0, 360.0), "-90");
+        assert_eq!(tick(0.5, 2.0), "0.5");
+        assert_eq!(tick(20.0, 22.0), "20");
+        assert_eq!(tick(0.001, 0.01), "0.001");
+        assert_eq!(tick(4.5e-5, 2e-5), "4.5e-5");
+        assert_eq!(tick(0.0, 2e-5), "0");
+        assert_eq!(tick(3e7, 1e8), "3.0e7");
+        assert_eq!((power(-3.0), power(-2.5)), ("1e-3".to_owned(), "3.2e-3".to_owned()));
+    }
+}

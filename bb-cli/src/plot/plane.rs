@@ -1,0 +1,65 @@
+//! Lines over two quantities, and pictures with them.
+
+use super::frame::{Frame, Scale};
+use super::line::Line;
+use super::panel::Panel;
+use std::path::Path;
+
+/// Lines over two quantities: a map, or a spectrum.
+#[derive(Clone, Debug)]
+pub struct Plane {
+    /// Above it; may be empty.
+    pub title: String,
+    /// What is along, with its unit.
+    pub x_axis: String,
+    /// What is upwards, with its unit.
+    pub y_axis: String,
+    /// How both axes are divided.
+    pub scale: Scale,
+    /// Those without a point are left out.
+    pub lines: Vec<Line>,
+}
+
+impl Plane {
+    fn frame(&self, height: u32) -> Frame<'_> {
+        let Self { title, x_axis, y_axis, scale, lines } = self;
+        Frame { title, x_axis, y_axis, lines, scale: *scale, height }
+    }
+}
+
+/// What a [`Sheet`] has.
+#[derive(Clone, Debug)]
+pub enum Part {
+    /// As high as so many panels.
+    Plane(Plane, u32),
+    /// Over time.
+    Panel(Panel),
+}
+
+/// Planes and panels below one another, with a title.
+#[derive(Clone, Debug)]
+pub struct Sheet {
+    /// Above them.
+    pub title: String,
+    /// From the top.
+    pub parts: Vec<Part>,
+    /// Width, and height of a panel, in pixels.
+    pub panel_size: (u32, u32),
+}
+
+impl Sheet {
+    /// Writes it, an SVG or a PNG by the file's name.
+    ///
+    /// # Errors
+    /// It cannot be written there.
+    pub fn write(&self, file: &Path) -> Result<(), String> {
+        let mut frames = Vec::with_capacity(self.parts.len());
+        for part in &self.parts {
+            frames.push(match part {
+                Part::Plane(plane, height) => plane.frame(*height),
+                Part::Panel(panel) => panel.frame(),
+            });
+        }
+        super::write(file, &self.title, &frames, self.panel_size)
+    }
+}

@@ -1,0 +1,172 @@
+//! Whether a truth that no filter agrees with is one in another convention.
+
+use bb_core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use bb_estimators::attitude::{ErrorStatistics, OrientationError};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
+
+use crate::filters::Axes;
+
+/// An error above it, rad, makes the convention doubtful,
+const DOUBTFUL: f64 = 20.0 * PI / 180.0;
+/// and another convention is named if its error is below that, and so many times smaller.
+const CLEARER: f64 = 3.0;
+/// Conventions whose errors differ by less than this, rad, are not told apart.
+const ALIKE: f64 = 0.5 * PI / 180.0;
+/// A verdict needs so many samples.
+const FEWEST: u64 = 3;
+
+/// A convention by which `world_from_body` may have been written instead, and how that is turned back.
+struct Convention {
+    name: &'static str,
+    enu_from_body: fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>,
+}
+
+const CONVENTIONS: [Convention; 9] = [
+    Convention { name: "inverse, `body_from_world`", enu_from_body: |read| read.inverse() },
+    Convention { name: "in north, east, down", enu_from_body: |read| enu_from_ned() * read },
+    Convention {
+        name: "in north, east, down, of a body whose axes are forward, right, down",
+        enu_from_body: |read| enu_from_ned() * read * frd_from_flu(),
+    },
+    Convention {
+        name: "inverse, `body_from_world`, with a world of north, east, down",
+        enu_from_body: |read| enu_from_ned() * read.inverse(),
+    },
+    Convention {
+        name: "inverse, `body_from_world`, with a world of north, east, down and a body of forward, right, down",
+        enu_from_body: |read| enu_from_ned() * read.inverse() * frd_from_flu(),
+    },
+    Convention { name: "in north, west, up", enu_from_body: |read| enu_from_nwu() * read },
+    Convention {
+        name: "of a body whose axes are forward, right, down",
+        enu_from_body: |read| read * frd_from_flu(),
+    },
+    Convention {
+        name: "in quaternions of the order w, x, y, z where x, y, z, w is read",
+        enu_from_body: |read| quaternion(read.i, read.j, read.k, read.w),
+    },
+    Convention {
+        name: "in quaternions of the order x, y, z, w where w, x, y, z is read",
+        enu_from_body: |read| quaternion(read.k, read.w, read.i, read.j),
+    },
+];
+
+fn quaternion(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+}
+
+fn enu_from_ned() -> UnitQuaternion<f64> {
+    quaternion(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0)
+}
+
+fn enu_from_nwu() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2)
+}
+
+fn frd_from_flu() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI)
+}
+
+/// The errors of one filter against the truth as it is read, and in each other convention.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Truths {
+    as_read: ErrorStatistics,
+    others: [ErrorStatistics; CONVENTIONS.len()],
+}
+
+/// A convention that fits much better than the one that the truth is read by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Verdict {
+    pub(crate) name: &'static str,
+    /// The root mean square error as the truth is read, rad.
+    pub(crate) as_read: f64,
+    /// And in the other convention, rad.
+    pub(crate) otherwise: f64,
+}
+
+impl Truths {
+    /// Takes in an estimate beside the truth as it is read.
+    pub(crate) fn add(&mut self, estimate: &UnitQuaternion<f64>, truth: &UnitQuaternion<f64>) {
+        self.as_read.add(OrientationError::between(estimate, truth));
+        for (errors, convention) in self.others.iter_mut().zip(&CONVENTIONS) {
+            errors.add(OrientationError::between(estimate, &(convention.enu_from_body)(truth)));
+        }
+    }
+
+    /// The convention that fits best, if the truth as it is read does not fit; with six axes by the inclination alone.
+    pub(crate) fn verdict(&self, axes: Axes) -> Option<Verdict> {
+        let rms = |errors: &ErrorStatistics| {
+            errors.rms().map(|rms| if axes == Axes::Six { rms.inclination } else { rms.total })
+        };
+        let as_read = rms(&self.as_read).filter(|as_read| *as_read > DOUBTFUL && self.as_read.count() >= FEWEST)?;
+        let others = self.others.iter().zip(&CONVENTIONS).filter_map(|(errors, convention)| {
+            Some(Verdict { name: convention.name, as_read, otherwise: rms(errors)? })
+        });
+        let others: Vec<Verdict> = others.collect();
+        let least = others.iter().map(|other| other.otherwise).reduce(f64::min)?;
+        // With six axes, or little motion, some are alike but for noise: the first of those is the likeliest.
+        let best = others.into_iter().find(|other| other.otherwise <= least + ALIKE)?;
+        (best.otherwise < DOUBTFUL && best.otherwise * CLEARER < as_read).then_some(best)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of a truth that was written by `write`, beside estimates that are right within a degree or two.
+    fn said(write: impl Fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>, axes: Axes) -> Option<&'static str> {
+        let mut truths = Truths::default();
+        for index in 0..200 {
+            let angle = f64::from(index) * 0.05;
+            let truth =
+                UnitQuaternion::from_euler_angles(0.8 * angle.sin(), 0.5 * (1.7 * angle).cos(), 0.4 * angle);
+            let estimate = UnitQuaternion::from_euler_angles(0.02 * angle.cos(), 0.01, 0.02) * truth;
+            truths.add(&estimate, &write(truth));
+        }
+        truths.verdict(axes).map(|verdict| verdict.name)
+    }
+
+    #[test]
+    fn each_convention_is_told() {
+        let (ned, flu) = (enu_from_ned().inverse(), frd_from_flu().inverse());
+        let writes: [&dyn Fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>; CONVENTIONS.len()] = [
+            &|truth| truth.inverse(),
+            &|truth| ned * truth,
+            &|truth| ned * truth * flu,
+            &|truth| (ned * truth).inverse(),
+            &|truth| (ned * truth * flu).inverse(),
+            &|truth| enu_from_nwu().inverse() * truth,
+            &|truth| truth * flu,
+            // What is w, x, y, z is read as x, y, z, w; and the other way round.
+            &|truth| quaternion(truth.k, truth.w, truth.i, truth.j),
+            &|truth| quaternion(truth.i, truth.j, truth.k, truth.w),
+        ];
+        for (convention, write) in CONVENTIONS.iter().zip(writes) {
+            assert_eq!(said(write, Axes::Nine), Some(convention.name));
+        }
+        assert_eq!(said(|truth| truth.inverse(), Axes::Six), Some(CONVENTIONS[0].name));
+        assert_eq!(said(|truth| ned * truth, Axes::Six), Some(CONVENTIONS[1].name));
+    }
+
+    /// About one level axis, the inverse and others have the same inclination but for the noise.
+    #[test]
+    fn of_conventions_that_fit_alike_the_first_is_named() {
+        let mut truths = Truths::default();
+        for index in 0..200 {
+            let angle = f64::from(index) * 0.03;
+            let truth = UnitQuaternion::from_scaled_axis(Vector3::x() * angle);
+            let estimate = UnitQuaternion::from_euler_angles(0.001, 0.001 * angle.cos(), 0.0) * truth;
+            truths.add(&estimate, &truth.inverse());
+        }
+        assert_eq!(truths.verdict(Axes::Six).map(|verdict| verdict.name), Some(CONVENTIONS[0].name));
+    }
+
+    #[test]
+    fn a_truth_that_fits_or_that_nothing_explains_is_not_doubted() {
+        assert_eq!(said(|truth| truth, Axes::Nine), None);
+        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.8);
+        assert_eq!(said(|truth| turned * truth, Axes::Nine), None, "a world whose x axis is not east");
+        assert_eq!(said(|truth| turned * truth, Axes::Six), None);
+    }
+}

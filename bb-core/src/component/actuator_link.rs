@@ -1,0 +1,74 @@
+//! Commands to an actuator by path.
+
+use super::Permit;
+use crate::event::Safety;
+use crate::message::Payload;
+use std::fmt;
+use std::sync::Arc;
+
+/// Sends commands of type `T` to one actuator.
+pub struct ActuatorLink<T: Payload> {
+    accepts: Arc<dyn Accepts<T>>,
+    permit: Permit,
+}
+
+impl<T: Payload> ActuatorLink<T> {
+    pub(super) fn new(accepts: Arc<dyn Accepts<T>>, permit: Permit) -> Self {
+        Self { accepts, permit }
+    }
+
+    /// Sends a command; it has been carried out when this returns.
+    ///
+    /// # Errors
+    /// The robot is not armed, the command holds a NaN, the actuator has failed, or the command that obtained this link has
+    /// ended.
+    pub fn send(&self, command: T) -> Result<(), ActuatorError> {
+        self.accepts.accept(command, &self.permit)
+    }
+}
+
+impl<T: Payload> fmt::Debug for ActuatorLink<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ActuatorLink").finish_non_exhaustive()
+    }
+}
+
+/// Why an actuator has not carried out a command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ActuatorError {
+    /// The robot is not armed.
+    NotArmed(Safety),
+    /// The command that sent this has ended or was cancelled: its handles are dead.
+    Cancelled,
+    /// The command holds a NaN or an infinity.
+    NonFinite,
+    /// The actuator has failed and does not run.
+    Stopped,
+    /// The actuator has failed at this command.
+    Failed(String),
+    /// The actuator's own code has sent this, and would wait for itself.
+    Inside,
+}
+
+impl fmt::Display for ActuatorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotArmed(safety) => write!(f, "the robot is not armed ({safety})"),
+            Self::Cancelled => f.write_str("the command that sent this has ended or was cancelled"),
+            Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
+            Self::Stopped => f.write_str("the actuator has failed and does not run"),
+            Self::Failed(message) => write!(f, "the actuator failed: {message}"),
+            Self::Inside => {
+                f.write_str("the actuator's own code cannot send to it, since it would wait for itself")
+            }
+        }
+    }
+}
+
+impl std::error::Error for ActuatorError {}
+
+/// An actuator that takes commands of type `T`.
+pub(crate) trait Accepts<T>: Send + Sync {
+    fn accept(&self, command: T, permit: &Permit) -> Result<(), ActuatorError>;
+}

@@ -1,0 +1,136 @@
+//! Descriptions of options, and conversions from their literals.
+
+use crate::declaration::{Dimension, Range};
+use std::time::Duration;
+
+/// What is known of one option.
+#[derive(Clone, Copy, Debug)]
+pub struct OptionField {
+    /// Its name.
+    pub name: &'static str,
+    /// Its doc comment.
+    pub doc: &'static str,
+    /// Whether it must be given.
+    pub required: bool,
+    /// Its dimension, where a unit is stated.
+    pub dimension: Option<Dimension>,
+    /// The unit it was stated in.
+    pub unit: &'static str,
+    /// The numbers accepted, in SI.
+    pub range: Option<Range>,
+}
+
+/// A type that an option given as a text can have: any that is `From<&'static str>`, as `String` and `PathBuf` are.
+#[diagnostic::on_unimplemented(message = "expected `{Self}`, found a text", label = "a text, not `{Self}`")]
+pub trait FromText {
+    /// Converts the text.
+    fn from_text(text: &'static str) -> Self;
+}
+
+#[diagnostic::do_not_recommend]
+impl<T: From<&'static str>> FromText for T {
+    fn from_text(text: &'static str) -> Self {
+        text.into()
+    }
+}
+
+/// A type that an option given as a number with a unit can have; a time may also be a `Duration`.
+#[diagnostic::on_unimplemented(
+    message = "a number with a unit cannot be `{Self}`",
+    label = "has a unit",
+    note = "an option with a unit is an `f64`, an `f32`, a `Duration`, or an `Option` of one of these"
+)]
+pub trait FromQuantity {
+    /// From its value in SI.
+    fn from_quantity(value: f64) -> Self;
+    /// Its value in SI, if it has one.
+    fn to_quantity(&self) -> Option<f64>;
+    /// The value for `null`, if the type has one.
+    fn none() -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+    /// From a text in the SI unit, where an `f64` would be less exact.
+    fn from_exact(_text: &str) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+    /// Its value in SI as decimal digits, where an `f64` would be less exact.
+    fn to_exact(&self) -> Option<String> {
+        None
+    }
+}
+
+impl FromQuantity for f64 {
+    fn from_quantity(value: f64) -> Self {
+        value
+    }
+
+    fn to_quantity(&self) -> Option<f64> {
+        Some(*self)
+    }
+}
+
+impl FromQuantity for f32 {
+    fn from_quantity(value: f64) -> Self {
+        value as Self
+    }
+
+    fn to_quantity(&self) -> Option<f64> {
+        Some(f64::from(*self))
+    }
+}
+
+impl FromQuantity for Duration {
+    /// Negative times are 0, and too long ones the longest there is.
+    fn from_quantity(seconds: f64) -> Self {
+        let longest = if seconds > 0.0 { Self::MAX } else { Self::ZERO };
+        Self::try_from_secs_f64(seconds).unwrap_or(longest)
+    }
+
+    fn to_quantity(&self) -> Option<f64> {
+        Some(self.as_secs_f64())
+    }
+
+    /// Of seconds with up to nine decimal places.
+    fn from_exact(text: &str) -> Option<Self> {
+        let (seconds, fraction) = text.split_once('.').unwrap_or((text, ""));
+        let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+        if fraction.len() > 9 || !are_digits(seconds) || !are_digits(fraction) {
+            return None;
+        }
+        let nanos = format!("{fraction:0<9}").parse().ok()?;
+        Some(Self::new(seconds.parse().ok()?, nanos))
+    }
+
+    fn to_exact(&self) -> Option<String> {
+        let text = format!("{}.{:09}", self.as_secs(), self.subsec_nanos());
+        Some(text.trim_end_matches('0').trim_end_matches('.').to_owned())
+    }
+}
+
+impl<T: FromQuantity> FromQuantity for Option<T> {
+    fn from_quantity(value: f64) -> Self {
+        Some(T::from_quantity(value))
+    }
+
+    fn to_quantity(&self) -> Option<f64> {
+        self.as_ref().and_then(T::to_quantity)
+    }
+
+    fn none() -> Option<Self> {
+        Some(None)
+    }
+
+    fn from_exact(text: &str) -> Option<Self> {
+        T::from_exact(text).map(Some)
+    }
+
+    fn to_exact(&self) -> Option<String> {
+        self.as_ref().and_then(T::to_exact)
+    }
+}

@@ -1,0 +1,155 @@
+//! Messages and topics whose payload type is erased.
+
+use super::queue::Queue;
+use super::statistics::{SubscriberStatistics, TopicStatistics};
+use crate::message::{DecodeError, Payload, Schema, Stamp, Stamped};
+use crate::time::WallTime;
+use std::any::Any;
+use std::fmt;
+use std::sync::Arc;
+
+/// A message whose payload's type is erased; [`downcast`](Self::downcast) gives it back. Clones are the same message.
+#[derive(Clone)]
+pub struct DynamicMessage {
+    path: &'static str,
+    message: Arc<dyn AnyMessage>,
+}
+
+/// What a message can do for those who do not know its payload.
+pub(super) trait AnyMessage: Send + Sync {
+    fn payload_name(&self) -> &'static str;
+    fn type_name(&self) -> &'static str;
+    fn stamp(&self) -> Stamp;
+    fn as_any(&self) -> &dyn Any;
+    fn fmt_payload(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
+    fn encode(&self, bytes: &mut Vec<u8>);
+    fn schema(&self) -> Schema;
+    fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool;
+    fn ros_schema(&self) -> Option<Schema>;
+    fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool;
+    fn ros_companion(&self) -> Option<(&'static str, Schema)>;
+    fn at_wall_time(&self, time: WallTime) -> Arc<dyn AnyMessage>;
+    fn is_exact_as_ros(&self) -> bool;
+    fn to_json(&self) -> String;
+    /// A topic for its payload.
+    fn new_topic(&self, path: &'static str) -> Arc<dyn AnyTopic>;
+    /// Whether the topic is one for its payload.
+    fn fits(&self, topic: &dyn AnyTopic) -> bool;
+}
+
+impl DynamicMessage {
+    pub(crate) fn new<T: Payload>(path: &'static str, message: &Stamped<T>) -> Self {
+        Self { path, message: Arc::new(message.clone()) }
+    }
+
+    pub(super) fn message(&self) -> &dyn AnyMessage {
+        &*self.message
+    }
+
+    /// The path it was published at.
+    pub fn path(&self) -> &'static str {
+        self.path
+    }
+
+    /// The name of its payload's type.
+    pub fn payload_name(&self) -> &'static str {
+        self.message.payload_name()
+    }
+
+    /// When it was measured, in which frame, and where.
+    pub fn stamp(&self) -> Stamp {
+        self.message.stamp()
+    }
+
+    /// The message, if its payload is a `T`.
+    pub fn downcast<T: Payload>(&self) -> Option<&Stamped<T>> {
+        self.message.as_any().downcast_ref()
+    }
+
+    /// Appends the message with its stamp, bit for bit, as CDR that [`schema`](Self::schema) describes and
+    /// [`codec::decode`](crate::message::codec::decode) reads as a `Stamped<T>`.
+    pub fn encode(&self, bytes: &mut Vec<u8>) {
+        self.message.encode(bytes);
+    }
+
+    /// What a program that does not know the payload needs to read it.
+    pub fn schema(&self) -> Schema {
+        self.message.schema()
+    }
+
+    /// Appends the message as ROS writes it; returns `false` and appends nothing if ROS has no message for its payload. The monotonic
+    /// time and the origin are not in it.
+    pub fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool {
+        self.message.encode_as_ros(bytes)
+    }
+
+    /// ROS's definition, if ROS has a message for its payload.
+    pub fn ros_schema(&self) -> Option<Schema> {
+        self.message.ros_schema()
+    }
+
+    /// Appends the second message of ROS; returns `false` and appends nothing if there is none.
+    pub fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool {
+        self.message.encode_companion(bytes)
+    }
+
+    /// The last part of the topic and the definition of a second message, if ROS has two for its payload.
+    pub fn ros_companion(&self) -> Option<(&'static str, Schema)> {
+        self.message.ros_companion()
+    }
+
+    /// The same with another wall time.
+    pub fn at_wall_time(&self, time: WallTime) -> Self {
+        Self { path: self.path, message: self.message.at_wall_time(time) }
+    }
+
+    /// Whether payload and wall time can be read back from ROS's layout bit for bit.
+    pub fn is_exact_as_ros(&self) -> bool {
+        self.message.is_exact_as_ros()
+    }
+
+    /// The message with its stamp as JSON, for dashboards. See [`codec::to_json`](crate::message::codec::to_json).
+    pub fn to_json(&self) -> String {
+        self.message.to_json()
+    }
+}
+
+impl fmt::Debug for DynamicMessage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} ", self.path, self.stamp().monotonic_time)?;
+        self.message.fmt_payload(f)
+    }
+}
+
+/// What all topics have in common.
+pub trait AnyTopic: Any + Send + Sync {
+    /// Its path.
+    fn path(&self) -> &'static str;
+    /// The name of its payload's type.
+    fn payload_name(&self) -> &'static str;
+    /// Makes the definitions of its messages: the exact one, and those of ROS if it has any.
+    #[doc(hidden)]
+    fn schemas(&self) -> fn() -> Vec<Schema>;
+    /// Everybody who listens.
+    fn subscribers(&self) -> Vec<SubscriberStatistics>;
+    /// Hands every message to `tap` as well.
+    #[doc(hidden)]
+    fn tap(&self, tap: &Tap);
+    /// A message from its bytes, as [`DynamicMessage::encode`] has made them.
+    #[doc(hidden)]
+    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
+    /// Publishes a message if its payload is this topic's; else does nothing and returns `false`.
+    fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
+    /// Itself, to be downcast to its type.
+    #[doc(hidden)]
+    fn as_any(&self) -> &dyn Any;
+    /// What it has counted.
+    fn statistics(&self) -> TopicStatistics;
+    /// Tells all subscribers that no more will come.
+    fn close(&self);
+}
+
+/// The queue of such a subscriber, for a topic to hand messages to.
+#[doc(hidden)]
+#[derive(Clone, Debug)]
+pub struct Tap(pub(super) Arc<Queue<DynamicMessage>>);

@@ -1,0 +1,36 @@
+//! The subscribers of one topic.
+
+use super::any::DynamicMessage;
+use super::queue::Queue;
+use crate::message::Stamped;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+/// The list that a topic holds.
+pub(super) struct Subscribers<T> {
+    /// Replaced as a whole, so that a publisher takes a list along and holds no lock while it wakes subscribers, who may
+    /// subscribe and unsubscribe on that thread. A queue that is dropped with its list is abandoned, and so runs no
+    /// user's code.
+    pub(super) queues: Arc<[Arc<Queue<Stamped<T>>>]>,
+    /// Those who do not know the payload.
+    pub(super) taps: Arc<[Arc<Queue<DynamicMessage>>]>,
+    pub(super) closed: bool,
+}
+
+impl<T> Subscribers<T> {
+    pub(super) fn count(&self) -> usize {
+        self.queues.len() + self.taps.len()
+    }
+}
+
+/// Takes `queue` off the list of its topic, if that is still there.
+pub(super) fn leave<T>(topic: &Weak<Mutex<Subscribers<T>>>, queue: &Arc<Queue<Stamped<T>>>) {
+    if let Some(subscribers) = topic.upgrade() {
+        let mut subscribers = lock(&subscribers);
+        let others = subscribers.queues.iter().filter(|other| !Arc::ptr_eq(other, queue)).map(Arc::clone);
+        subscribers.queues = others.collect();
+    }
+}
+
+pub(super) fn lock<T>(subscribers: &Mutex<Subscribers<T>>) -> MutexGuard<'_, Subscribers<T>> {
+    subscribers.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,127 @@
+//! Messages and topics of a known payload as implementations of the interfaces of erased ones.
+
+use super::any::{AnyMessage, AnyTopic, DynamicMessage, Tap};
+use super::statistics::{SubscriberStatistics, TopicStatistics};
+use super::subscribers::lock;
+use super::topic::Topic;
+use crate::message::codec::{encode, encode_as_ros, encode_companion, is_exact_as_ros, to_json};
+use crate::message::{DecodeError, Payload, Schema, Stamp, Stamped};
+use crate::time::WallTime;
+use std::any::Any;
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+impl<T: Payload> AnyMessage for Stamped<T> {
+    fn payload_name(&self) -> &'static str {
+        T::NAME
+    }
+    fn type_name(&self) -> &'static str {
+        std::any::type_name::<T>()
+    }
+    fn stamp(&self) -> Stamp {
+        Stamped::stamp(self)
+    }
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+    fn fmt_payload(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(&self.payload, f)
+    }
+    fn encode(&self, bytes: &mut Vec<u8>) {
+        encode(self, bytes);
+    }
+    fn schema(&self) -> Schema {
+        Self::schema()
+    }
+    fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool {
+        encode_as_ros(self, bytes)
+    }
+    fn ros_schema(&self) -> Option<Schema> {
+        Self::ros_schema()
+    }
+    fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool {
+        encode_companion(self, bytes)
+    }
+    fn ros_companion(&self) -> Option<(&'static str, Schema)> {
+        Self::ros_companion()
+    }
+    fn at_wall_time(&self, wall_time: WallTime) -> Arc<dyn AnyMessage> {
+        Arc::new(Self { wall_time, ..self.clone() })
+    }
+    fn is_exact_as_ros(&self) -> bool {
+        is_exact_as_ros(self)
+    }
+    fn to_json(&self) -> String {
+        to_json(self)
+    }
+    fn new_topic(&self, path: &'static str) -> Arc<dyn AnyTopic> {
+        Arc::new(Topic::<T>::new(path))
+    }
+    fn fits(&self, topic: &dyn AnyTopic) -> bool {
+        topic.as_any().is::<Topic<T>>()
+    }
+}
+
+impl<T: Payload> AnyTopic for Topic<T> {
+    fn path(&self) -> &'static str {
+        self.path
+    }
+
+    fn payload_name(&self) -> &'static str {
+        T::NAME
+    }
+
+    fn schemas(&self) -> fn() -> Vec<Schema> {
+        || {
+            let ros = Stamped::<T>::ros_schema();
+            let companion = Stamped::<T>::ros_companion().map(|(_, schema)| schema);
+            [Stamped::<T>::schema()].into_iter().chain(ros).chain(companion).collect()
+        }
+    }
+
+    fn subscribers(&self) -> Vec<SubscriberStatistics> {
+        let subscribers = lock(&self.subscribers);
+        let typed = subscribers.queues.iter().map(|queue| queue.statistics(true));
+        let taps = subscribers.taps.iter().filter(|tap| !tap.is_abandoned());
+        typed.chain(taps.map(|tap| tap.statistics(false))).collect()
+    }
+
+    fn tap(&self, tap: &Tap) {
+        let mut subscribers = lock(&self.subscribers);
+        if !subscribers.closed {
+            // Those that were dropped leave the list here too: nothing may ever be published at this topic.
+            let others = subscribers.taps.iter().filter(|other| !other.is_abandoned());
+            subscribers.taps = others.chain([&tap.0]).map(Arc::clone).collect();
+            self.listening.store(subscribers.count(), Ordering::Release);
+        }
+    }
+
+    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError> {
+        let message: Stamped<T> = crate::message::codec::decode(bytes)?;
+        Ok(DynamicMessage::new(self.path, &message))
+    }
+
+    fn publish_dynamic(&self, message: &DynamicMessage) -> bool {
+        let message = message.downcast();
+        message.inspect(|message| self.publish(message)).is_some()
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn statistics(&self) -> TopicStatistics {
+        TopicStatistics {
+            path: self.path,
+            payload: T::NAME,
+            published: self.published.load(Ordering::Relaxed),
+            lost: self.lost.load(Ordering::Relaxed),
+            subscribers: self.subscribers().len(),
+        }
+    }
+
+    fn close(&self) {
+        self.close_all();
+    }
+}

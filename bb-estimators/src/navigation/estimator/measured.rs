@@ -1,0 +1,86 @@
+//! Payloads as measurements, with where their sensor is in the body.
+
+use crate::navigation::geodesy::{Geodetic, LocalFrame};
+use crate::navigation::math::skew;
+use crate::navigation::measurement::{AbsolutePose, BodyVelocity, GnssPosition, isotropic};
+use bb_core::payload::{GnssFix, GnssStatus, Odometry, Pose};
+use nalgebra::{Isometry3, Matrix3, Vector3};
+
+/// Standard deviation of a height that a fix does not tell, m.
+const UNKNOWN_HEIGHT: f64 = 1e4;
+
+impl Geodetic {
+    /// Where a fix is, at `height` (m) if it does not tell; none if it has no position.
+    pub fn of_fix(fix: &GnssFix, height: f64) -> Option<Self> {
+        let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
+        let height = position.altitude.unwrap_or(height);
+        Some(Self { latitude: position.latitude_rad, longitude: position.longitude_rad, height })
+    }
+}
+
+impl GnssPosition {
+    /// A fix in a frame, of an antenna at `lever_arm` in the body (m), none if it has no position. `deviation` is that of a fix that tells none,
+    /// horizontal, m; vertical it is twice as much.
+    pub fn of_fix(fix: &GnssFix, frame: &LocalFrame, lever_arm: Vector3<f64>, deviation: f64) -> Option<Self> {
+        let geodetic = Geodetic::of_fix(fix, frame.origin().height)?;
+        let deviations = Vector3::new(1.0, 1.0, 2.0) * deviation;
+        let unknown = || Matrix3::from_diagonal(&deviations.component_mul(&deviations));
+        let mut covariance = fix.position_covariance.unwrap_or_else(unknown);
+        if fix.position.is_some_and(|position| position.altitude.is_none()) {
+            covariance[(2, 2)] = UNKNOWN_HEIGHT * UNKNOWN_HEIGHT;
+        }
+        Some(Self { position: frame.position(&geodetic), covariance, lever_arm })
+    }
+}
+
+impl BodyVelocity {
+    /// The velocity that an odometry has counted in its own frame. `deviation` is that of one that tells none, m/s.
+    pub fn of_odometry(odometry: &Odometry, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
+        // One number stands for all axes: the mean of their variances.
+        let covariance = odometry.twist.covariance;
+        let variance = covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).trace() / 3.0);
+        let deviation = variance.filter(|variance| *variance > 0.0).map_or(deviation, f64::sqrt);
+        Self {
+            velocity: odometry.twist.linear,
+            deviation,
+            body_from_sensor: body_from_sensor.rotation,
+            lever_arm: body_from_sensor.translation.vector,
+        }
+    }
+}
+
+impl AbsolutePose {
+    /// The pose of the body, from that of a sensor in it. `deviation` is that of the position of one that tells none, m; of its
+    /// orientation it is a tenth, in rad.
+    pub fn of_pose(pose: &Pose, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
+        let world_from_body = pose.world_from_body * body_from_sensor.rotation.inverse();
+        let arm = world_from_body * body_from_sensor.translation.vector;
+        let (position, rotation) = match pose.covariance {
+            Some(covariance) => {
+                let block = |first: usize| covariance.fixed_view::<3, 3>(first, first).into_owned();
+                // Of the orientation it is the covariance of a small rotation of the sensor.
+                let of_sensor = pose.world_from_body.to_rotation_matrix().into_inner();
+                (block(0), of_sensor * block(3) * of_sensor.transpose())
+            }
+            None => (isotropic(deviation), isotropic(0.1 * deviation)),
+        };
+        Self {
+            position: pose.position - arm,
+            world_from_body,
+            position_covariance: position + skew(&arm) * rotation * skew(&arm).transpose(),
+            rotation_covariance: rotation,
+        }
+    }
+
+    /// The same pose in another world.
+    pub(super) fn moved(&self, new_from_old: &Isometry3<f64>) -> Self {
+        let turn = new_from_old.rotation.to_rotation_matrix().into_inner();
+        let turned = |covariance: &Matrix3<f64>| turn * covariance * turn.transpose();
+        Self {
+            position: new_from_old.transform_point(&self.position.into()).coords,
+            world_from_body: new_from_old.rotation * self.world_from_body,
+            position_covariance: turned(&self.position_covariance),
+            rotation_covariance: turned(&self.rotation_covariance),
+        }
+    }
+}

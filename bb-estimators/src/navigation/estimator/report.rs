@@ -1,0 +1,161 @@
+//! What there is to say of the filter.
+
+use super::filter::Filter;
+use super::input::Mounting;
+use super::world::World;
+use crate::navigation::math::skew;
+use crate::navigation::state::{GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY};
+use crate::navigation::stream::Counts;
+use bb_core::Payload;
+use bb_core::payload::{Odometry, Pose, Twist};
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+/// What the filter knows beside the odometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
+pub struct NavigationStatus {
+    /// What the accelerometer reads more than the specific force, axes of the link, m/s².
+    pub accelerometer_bias: Vector3<f64>,
+    /// What the gyroscope reads more than the angular velocity, axes of the link, rad/s.
+    pub gyroscope_bias: Vector3<f64>,
+    /// For how long the horizontal position has not been corrected by one in the world, s.
+    pub dead_reckoning_s: f64,
+    /// Standard deviation of the horizontal position, in the direction where it is least known, m.
+    pub horizontal_deviation: f64,
+    /// Fixes that were fused, and that were refused.
+    pub gnss: Verdicts,
+    /// The same for velocities of the odometry.
+    pub odometry: Verdicts,
+    /// The same for poses.
+    pub pose: Verdicts,
+    /// The same for relative poses.
+    pub relative: Verdicts,
+    /// The same for the magnetic field.
+    pub magnetic_field: Verdicts,
+    /// The same for pressures.
+    pub pressure: Verdicts,
+    /// Scale of the wheels, less 1; 0 where it is no state.
+    pub wheel_scale: f64,
+    /// Scale of relative poses, less 1; 0 where it is no state.
+    pub relative_scale: f64,
+    /// How far the GNSS antenna is from where it is declared, axes of the link, m; 0 where it is no state.
+    pub gnss_lever_arm: Vector3<f64>,
+    /// How late fixes are beyond their stamps, s; 0 where it is no state.
+    pub gnss_delay: f64,
+    /// Magnetic field of the robot itself, axes of the link, T; 0 where it is no state.
+    pub hard_iron: Vector3<f64>,
+    /// What the barometric height reads more than the height, m; 0 where it is no state.
+    pub barometer_bias: f64,
+    /// How often samples of the IMU were missing for longer than a sample may take.
+    pub gaps: u32,
+}
+
+/// What became of a sensor's measurements since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub struct Verdicts {
+    /// They have corrected the estimate.
+    pub fused: u64,
+    /// The gate refused them: too far from what was expected.
+    pub refused: u64,
+    /// They were not finite, or came too late or from the future.
+    pub invalid: u64,
+}
+
+impl From<&Counts> for Verdicts {
+    fn from(counts: &Counts) -> Self {
+        Self {
+            fused: counts.fused + counts.weighed_down,
+            refused: counts.gate,
+            invalid: counts.invalid + counts.late + counts.future,
+        }
+    }
+}
+
+/// Pose and motion of the link.
+pub(super) fn odometry_of<S: States, const N: usize>(
+    filter: &Filter<S, N>,
+    world: &World,
+    mounting: &Mounting,
+) -> Option<Odometry> {
+    let estimate = filter.estimate()?;
+    let covariance = filter.eskf().covariance();
+    let block = |row: usize, column: usize| covariance.fixed_view::<3, 3>(row, column).into_owned();
+    let rotation = estimate.rotation();
+    let link = mounting.link();
+    let arm = rotation * link;
+    // The link's origin: errors of the body's, and of where the rotation takes it, θ × R l.
+    let from_rotation = -skew(&arm);
+    let position = block(POSITION, POSITION)
+        + block(POSITION, ROTATION) * from_rotation.transpose()
+        + from_rotation * block(ROTATION, POSITION)
+        + from_rotation * block(ROTATION, ROTATION) * from_rotation.transpose();
+    let position_rotation = block(POSITION, ROTATION) + from_rotation * block(ROTATION, ROTATION);
+    let first_from_frame = world.first_from_frame();
+    let turned = first_from_frame.rotation.to_rotation_matrix().into_inner();
+    // Rotations of the body, as a pose has them.
+    let to_body = rotation.transpose();
+    let pose = Pose {
+        position: first_from_frame.transform_point(&(estimate.position + arm).into()).coords,
+        world_from_body: first_from_frame.rotation * estimate.world_from_body,
+        covariance: Some(symmetric(
+            turned * position * turned.transpose(),
+            turned * position_rotation * to_body.transpose(),
+            to_body * block(ROTATION, ROTATION) * to_body.transpose(),
+        )),
+    };
+    // Rᵀ v + ω × l: errors of v, of R by Rᵀ [v]ₓ, and of the gyroscope's bias by [l]ₓ.
+    let of_rotation = to_body * skew(&estimate.velocity);
+    let of_bias = skew(&link);
+    let linear = to_body * block(VELOCITY, VELOCITY) * to_body.transpose()
+        + to_body * block(VELOCITY, ROTATION) * of_rotation.transpose()
+        + of_rotation * block(ROTATION, VELOCITY) * to_body.transpose()
+        + of_rotation * block(ROTATION, ROTATION) * of_rotation.transpose()
+        + to_body * block(VELOCITY, GYROSCOPE_BIAS) * of_bias.transpose()
+        + of_bias * block(GYROSCOPE_BIAS, VELOCITY) * to_body.transpose()
+        + of_rotation * block(ROTATION, GYROSCOPE_BIAS) * of_bias.transpose()
+        + of_bias * block(GYROSCOPE_BIAS, ROTATION) * of_rotation.transpose()
+        + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS) * of_bias.transpose();
+    let linear_angular = -(to_body * block(VELOCITY, GYROSCOPE_BIAS)
+        + of_rotation * block(ROTATION, GYROSCOPE_BIAS)
+        + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS));
+    let twist = Twist {
+        linear: to_body * estimate.velocity + estimate.angular_velocity.cross(&link),
+        angular: estimate.angular_velocity,
+        covariance: Some(symmetric(linear, linear_angular, block(GYROSCOPE_BIAS, GYROSCOPE_BIAS))),
+    };
+    Some(Odometry { pose, twist })
+}
+
+/// What else the filter knows.
+pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Option<NavigationStatus> {
+    let estimate = filter.estimate()?;
+    let [gnss, odometry, _, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
+    Some(NavigationStatus {
+        accelerometer_bias: estimate.accelerometer_bias,
+        gyroscope_bias: estimate.gyroscope_bias,
+        dead_reckoning_s: filter.eskf().dead_reckoning_s(),
+        horizontal_deviation: filter.horizontal_deviation(),
+        gnss,
+        odometry,
+        pose,
+        relative,
+        magnetic_field,
+        pressure,
+        wheel_scale: estimate.scalar::<S>(Optional::WheelScale),
+        relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
+        gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),
+        gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),
+        hard_iron: estimate.vector::<S>(Optional::HardIron),
+        barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
+        gaps: filter.eskf().gaps(),
+    })
+}
+
+/// The matrix of these blocks and the transpose of the second, symmetric to the last bit.
+fn symmetric(first: Matrix3<f64>, between: Matrix3<f64>, second: Matrix3<f64>) -> Matrix6<f64> {
+    let mut matrix = Matrix6::zeros();
+    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&(0.5 * (first + first.transpose())));
+    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&between);
+    matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&between.transpose());
+    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&(0.5 * (second + second.transpose())));
+    matrix
+}

@@ -1,0 +1,185 @@
+//! The filter once it has started, whatever its states.
+
+use super::filter::{Filter, Measured};
+use super::health::{Limits, Watch};
+use super::height::Heights;
+use super::input::{Mounting, NavigationInputs};
+use super::options::NavigationOptions;
+use super::report::{NavigationStatus, odometry_of, status_of};
+use super::world::World;
+use crate::navigation::eskf::{ImuMean, Start};
+use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::history::History;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{NAVIGATION, Navigation, Optional, States, Wheeled, offset};
+use bb_core::Fault;
+use bb_core::payload::Odometry;
+use std::any::TypeId;
+use std::fmt::Debug;
+
+/// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
+const SAMPLES: usize = 512;
+const MEASUREMENTS: usize = 128;
+/// Each is a filter with all its states: more would be many hundred kilobytes.
+const STATES: usize = 8;
+type Past<S, const N: usize> = History<Filter<S, N>, SAMPLES, MEASUREMENTS, STATES>;
+
+/// How far ahead of the IMU a measurement may be stamped, ns.
+const LONGEST_LEAD_NS: i64 = 500_000_000;
+
+/// What the estimator needs of a filter.
+pub(super) trait Core: Debug + Send {
+    /// Takes a sample, and what else has come.
+    fn take(
+        &mut self,
+        sample: &ImuMean,
+        inputs: &NavigationInputs<'_>,
+        options: &NavigationOptions,
+        mounting: &Mounting,
+    ) -> Result<(), Refusal>;
+
+    /// The frame that outputs are in; none without satellites.
+    fn frame(&self) -> Option<LocalFrame>;
+
+    /// Pose and motion of the link.
+    fn odometry(&self, mounting: &Mounting) -> Option<Odometry>;
+
+    /// What else it knows.
+    fn status(&self) -> Option<NavigationStatus>;
+
+    /// Why the estimate is not to be trusted, if it is not.
+    fn divergence(&mut self) -> Option<&'static str>;
+}
+
+#[derive(Debug)]
+struct Running<S: States, const N: usize> {
+    past: Past<S, N>,
+    world: World,
+    heights: Heights,
+    watch: Watch,
+}
+
+/// A filter that has started.
+///
+/// With states that come with this crate it is compiled with this crate, with the optimisation that is set for that, and not
+/// with the robot, which may be a debug build.
+pub(super) fn started<S: States + Send + 'static, const N: usize>(
+    options: &NavigationOptions,
+    start: &Start,
+    world: World,
+    limits: Limits,
+) -> Result<Box<dyn Core>, Fault> {
+    let states = TypeId::of::<S>();
+    if states == TypeId::of::<Navigation>() {
+        plain(options, start, world, limits)
+    } else if states == TypeId::of::<Wheeled>() {
+        wheeled(options, start, world, limits)
+    } else {
+        running::<S, N>(options, start, world, limits)
+    }
+}
+
+fn plain(options: &NavigationOptions, start: &Start, world: World, limits: Limits) -> Result<Box<dyn Core>, Fault> {
+    running::<Navigation, NAVIGATION>(options, start, world, limits)
+}
+
+fn wheeled(
+    options: &NavigationOptions,
+    start: &Start,
+    world: World,
+    limits: Limits,
+) -> Result<Box<dyn Core>, Fault> {
+    running::<Wheeled, { Wheeled::DIMENSION }>(options, start, world, limits)
+}
+
+fn running<S: States + Send + 'static, const N: usize>(
+    options: &NavigationOptions,
+    start: &Start,
+    world: World,
+    limits: Limits,
+) -> Result<Box<dyn Core>, Fault> {
+    let filter = Filter::<S, N>::new(options, start)?;
+    let past = Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
+    Ok(Box::new(Running { past, world, heights: Heights::default(), watch: Watch::new(limits) }))
+}
+
+impl<S: States, const N: usize> Running<S, N> {
+    fn fuse(&mut self, time_ns: i64, measured: Measured) {
+        if let Err(refusal) = self.past.update(time_ns, &measured) {
+            tracing::debug!(%refusal, sensor = measured.name(), "measurement refused");
+        }
+    }
+}
+
+impl<S: States + Send, const N: usize> Core for Running<S, N> {
+    fn take(
+        &mut self,
+        sample: &ImuMean,
+        inputs: &NavigationInputs<'_>,
+        options: &NavigationOptions,
+        mounting: &Mounting,
+    ) -> Result<(), Refusal> {
+        self.past.propagate(sample)?;
+        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
+            && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
+        {
+            self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
+        }
+        if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
+            let time_ns = odometry.monotonic_time.as_nanos();
+            if offset::<S>(Optional::WheelScale).is_some() {
+                let (speed, sideways) = mounting.wheels(&odometry.payload, options);
+                self.fuse(time_ns, Measured::Wheels(speed));
+                self.fuse(time_ns, Measured::Sideways(sideways));
+            } else {
+                self.fuse(time_ns, Measured::Odometry(mounting.velocity(&odometry.payload, options)));
+            }
+        }
+        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
+            let measured = self.world.pose(&pose.payload, options, mounting);
+            self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
+        }
+        if let Some(relative) = inputs.relative.filter(|relative| relative.is_new()) {
+            let end_ns = relative.end.as_nanos();
+            let measured = mounting.relative_pose(&relative.payload, options);
+            self.fuse(end_ns, Measured::Relative(measured, end_ns));
+        }
+        if let Some(field) = inputs.magnetic_field.filter(|field| field.is_new()) {
+            let measured = mounting.magnetic_heading(&field.payload, options);
+            self.fuse(field.monotonic_time.as_nanos(), Measured::MagneticField(measured));
+        }
+        if let Some(pressure) = inputs.pressure.filter(|pressure| pressure.is_new())
+            && let Some(at) = self.past.now().estimate()
+        {
+            let drop = self.world.drop(&at.position);
+            if let Some(height) = self.heights.of_pressure(&pressure.payload, at, drop, options, mounting) {
+                self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
+            }
+        }
+        if let Some(new_from_old) = self.past.now().position().and_then(|position| self.world.moves_on(&position)) {
+            // What is in the history belongs to the world that is left.
+            let mut filter = self.past.now().clone();
+            filter.move_world(&new_from_old)?;
+            self.past = Past::new(filter, LONGEST_LEAD_NS)?;
+        }
+        Ok(())
+    }
+
+    fn frame(&self) -> Option<LocalFrame> {
+        self.world.first()
+    }
+
+    fn odometry(&self, mounting: &Mounting) -> Option<Odometry> {
+        odometry_of(self.past.now(), &self.world, mounting)
+    }
+
+    fn status(&self) -> Option<NavigationStatus> {
+        status_of(self.past.now())
+    }
+
+    fn divergence(&mut self) -> Option<&'static str> {
+        let filter = self.past.now();
+        let counts = filter.counts();
+        filter.sight(&counts).and_then(|sight| self.watch.look(&sight))
+    }
+}

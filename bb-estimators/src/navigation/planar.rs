@@ -1,0 +1,58 @@
+//! An extended Kalman filter for robots that drive on a plane.
+//!
+//! Position, heading and velocity from a gyroscope and wheels, corrected by satellites, headings and poses; the bias of the
+//! gyroscope and the scale of the wheels are estimated with them. It is a quarter of the work of [`Eskf`](super::Eskf), needs no
+//! accelerometer, and starts while the robot moves. What it cannot do is a slope: the world is flat, and the body upright.
+//!
+//! S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics", 2005, section 5.3 (motion on an arc); P. D. Groves, "Principles of GNSS,
+//! Inertial, and Multisensor Integrated Navigation Systems", 2nd edition, 2013, chapter 3 and section 16.3.
+//!
+//! # States
+//!
+//! | index | what | unit |
+//! |---|---|---|
+//! | [`POSITION`], 2 | of the body's origin, in the world: x east, y north | m |
+//! | [`HEADING`] | of the body's x axis, from the world's counter-clockwise | rad |
+//! | [`VELOCITY`], 2 | of the body's origin, in the body: x forward, y left | m/s |
+//! | [`GYROSCOPE_BIAS`] | what the gyroscope reads more than the yaw rate | rad/s |
+//! | [`WHEEL_SCALE`] | scale of the wheels' velocity, less 1 | |
+//!
+//! Errors are what truth is more than the estimate. Wheels correct the filter, they do not drive it: they may slip, stall or come
+//! late, and their scale is known no better than the pressure of a tyre.
+//!
+//! ```
+//! use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart, WheelVelocity};
+//! use bb_estimators::navigation::{ImuMean, Stream};
+//! use nalgebra::{Vector2, Vector3};
+//!
+//! let mut filter = PlanarEkf::new(PlanarParams::default())?;
+//! let (mut wheels, mut gnss) = (Stream::default(), Stream::default());
+//! filter.start(&PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.0, 0.1), (Vector2::new(1.0, 0.0), 0.1)))?;
+//! for i in 1..=500 {
+//!     // Of a sample, the rotation about z counts.
+//!     let (angular_velocity, specific_force) = (Vector3::zeros(), Vector3::zeros());
+//!     filter.propagate(&ImuMean { time_ns: i * 10_000_000, angular_velocity, specific_force })?;
+//!     filter.update(&mut wheels, &WheelVelocity::new(Vector2::new(1.0, 0.0), 0.05))?;
+//! }
+//! filter.update(&mut gnss, &PlanarPosition::new(Vector2::new(5.0, 0.0), 0.5))?;
+//! let estimate = filter.estimate().ok_or("the filter has started")?;
+//! assert!((estimate.position.x - 5.0).abs() < 0.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod estimate;
+#[cfg(feature = "runtime")]
+mod estimator;
+mod filter;
+mod measurement;
+mod params;
+mod propagation;
+#[cfg(test)]
+mod tests;
+
+pub use estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, WHEEL_SCALE};
+#[cfg(feature = "runtime")]
+pub use estimator::{PlanarEstimator, PlanarInputs, PlanarOptions, PlanarOutput, PlanarOutputs, PlanarStatus};
+pub use filter::{PlanarEkf, PlanarStart};
+pub use measurement::{PlanarHeading, PlanarMeasurement, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
+pub use params::PlanarParams;

@@ -1,0 +1,159 @@
+//! What the declared filter takes, and where its sensors are.
+
+use super::options::PlanarOptions;
+use crate::navigation::eskf::ImuMean;
+use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
+use bb_core::message::Stamped;
+use bb_core::payload::{GnssFix, Imu, Odometry, Orientation, Pose};
+use bb_core::{Context, Fault, Input, Inputs};
+use nalgebra::{Isometry3, Matrix2, Matrix3, UnitQuaternion, Vector2, Vector3};
+
+/// How far the z axis of a sensor of the plane may be from the link's, cosine.
+const UPRIGHT: f64 = 0.999;
+
+/// The inputs of [`PlanarEstimator`](super::PlanarEstimator).
+#[derive(Clone, Copy, Debug, Inputs)]
+pub struct PlanarInputs<'a> {
+    /// The inertial sensor, mounted in any direction: the driver. Of it the yaw rate is used.
+    pub imu: Input<'a, Imu>,
+    /// Satellite navigation.
+    pub gnss: Option<Input<'a, GnssFix>>,
+    /// Wheels: of an odometry, the velocity and the yaw rate are used.
+    pub odometry: Option<Input<'a, Odometry>>,
+    /// Poses in the world, from a map or a tracking system.
+    pub pose: Option<Input<'a, Pose>>,
+    /// An orientation in the world, of a compass or an attitude filter: the heading is used.
+    pub orientation: Option<Input<'a, Orientation>>,
+}
+
+/// Where the sensors are.
+///
+/// The body of the filter is the frame of the odometry, where wheels do not move sideways; without one, the link.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mounting {
+    pub(super) body_from_link: Isometry3<f64>,
+    body_from_imu: UnitQuaternion<f64>,
+    antenna: Option<Vector2<f64>>,
+    body_from_pose: Option<Isometry3<f64>>,
+    body_from_orientation: UnitQuaternion<f64>,
+}
+
+impl Mounting {
+    /// As the robot declares them.
+    pub(super) fn of(context: &Context) -> Result<Self, Fault> {
+        // Of inputs that the robot does not declare, there is none.
+        let optional = |name: &str| context.frame_from_input(name).ok();
+        let link_from_body = optional("odometry").unwrap_or_else(Isometry3::identity);
+        if (link_from_body.rotation * Vector3::z()).z < UPRIGHT {
+            return Err(Fault::new(
+                "the frame of the input `odometry` is not level: its z axis must be that of the link where the planar filter is \
+                 declared",
+            ));
+        }
+        let body_from_link = link_from_body.inverse();
+        Ok(Self {
+            body_from_link,
+            body_from_imu: body_from_link.rotation * context.frame_from_driver()?.rotation,
+            antenna: optional("gnss").map(|gnss| (body_from_link * gnss).translation.vector.xy()),
+            body_from_pose: optional("pose").map(|pose| body_from_link * pose),
+            body_from_orientation: optional("orientation")
+                .map_or(UnitQuaternion::identity(), |sensor| body_from_link.rotation * sensor.rotation),
+        })
+    }
+
+    pub(super) fn has_gnss(&self) -> bool {
+        self.antenna.is_some()
+    }
+
+    /// Whether something measures the position in the world.
+    pub(super) fn has_positions(&self) -> bool {
+        self.has_gnss() || self.body_from_pose.is_some()
+    }
+
+    /// The sample in the axes of the body.
+    pub(super) fn sample(&self, imu: &Stamped<Imu>) -> ImuMean {
+        ImuMean {
+            time_ns: imu.monotonic_time.as_nanos(),
+            angular_velocity: self.body_from_imu * imu.angular_velocity,
+            specific_force: self.body_from_imu * imu.linear_acceleration,
+        }
+    }
+
+    /// The antenna in the body, m.
+    pub(super) fn antenna(&self) -> Vector2<f64> {
+        self.antenna.unwrap_or_else(Vector2::zeros)
+    }
+
+    /// A fix that is at `position` in the world.
+    pub(super) fn position(&self, position: &Vector3<f64>, covariance: &Matrix3<f64>) -> PlanarPosition {
+        let covariance = covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        PlanarPosition { position: position.xy(), covariance, lever_arm: self.antenna() }
+    }
+
+    /// The velocity and the yaw rate that wheels have counted.
+    pub(super) fn wheels(&self, odometry: &Odometry, options: &PlanarOptions) -> (WheelVelocity, YawRate) {
+        let square = |x: f64| x * x;
+        let known = |variance: f64| Some(variance).filter(|variance| *variance > 0.0);
+        let covariance = odometry.twist.covariance;
+        let variance = |i: usize| covariance.and_then(|covariance| known(covariance[(i, i)]));
+        let of_velocity = |i: usize| variance(i).unwrap_or(square(options.odometry_deviation));
+        let mut velocity = odometry.twist.linear.xy();
+        let mut noise = Matrix2::new(of_velocity(0), 0.0, 0.0, of_velocity(1));
+        if options.omnidirectional {
+            let between = covariance.map_or(0.0, |covariance| 0.5 * (covariance[(0, 1)] + covariance[(1, 0)]));
+            (noise[(0, 1)], noise[(1, 0)]) = (between, between);
+        } else {
+            velocity.y = 0.0;
+            noise[(1, 1)] = square(options.sideways_deviation);
+        }
+        let deviation = variance(5).map_or(options.yaw_rate_deviation, f64::sqrt);
+        let velocity = WheelVelocity { velocity, covariance: noise, lever_arm: Vector2::zeros() };
+        (velocity, YawRate { rate: odometry.twist.angular.z, deviation })
+    }
+
+    /// A pose of its sensor, as one of the body.
+    pub(super) fn pose(&self, pose: &Pose, options: &PlanarOptions) -> PlanarPose {
+        let body_from_sensor = self.body_from_pose.unwrap_or_else(Isometry3::identity);
+        let world_from_body = pose.world_from_body * body_from_sensor.rotation.inverse();
+        let heading = heading(&world_from_body);
+        let arm = (UnitQuaternion::from_euler_angles(0.0, 0.0, heading) * body_from_sensor.translation.vector).xy();
+        let square = |x: f64| x * x;
+        let (position, of_heading) = match pose.covariance {
+            Some(covariance) => {
+                let rotation = covariance.fixed_view::<3, 3>(3, 3).into_owned();
+                (covariance.fixed_view::<2, 2>(0, 0).into_owned(), about_up(&pose.world_from_body, &rotation))
+            }
+            None => (Matrix2::identity() * square(options.pose_deviation), square(0.1 * options.pose_deviation)),
+        };
+        // The body's origin is where the heading says: it errs with that.
+        let by_heading = Vector2::new(arm.y, -arm.x);
+        let mut covariance = Matrix3::zeros();
+        let own = position + by_heading * by_heading.transpose() * of_heading;
+        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&own);
+        covariance.fixed_view_mut::<2, 1>(0, 2).copy_from(&(by_heading * of_heading));
+        covariance.fixed_view_mut::<1, 2>(2, 0).copy_from(&(by_heading * of_heading).transpose());
+        covariance[(2, 2)] = of_heading;
+        PlanarPose { position: pose.position.xy() - arm, heading, covariance }
+    }
+
+    /// The heading of the body that an orientation of its sensor shows.
+    pub(super) fn heading(&self, orientation: &Orientation, options: &PlanarOptions) -> PlanarHeading {
+        let world_from_body = orientation.world_from_body * self.body_from_orientation.inverse();
+        let variance = orientation.covariance.map(|covariance| about_up(&orientation.world_from_body, &covariance));
+        let deviation =
+            variance.filter(|variance| *variance > 0.0).map_or(options.orientation_deviation, f64::sqrt);
+        PlanarHeading { heading: heading(&world_from_body), deviation }
+    }
+}
+
+/// The heading of the x axis, rad.
+pub(super) fn heading(world_from_body: &UnitQuaternion<f64>) -> f64 {
+    let ahead = world_from_body * Vector3::x();
+    ahead.y.atan2(ahead.x)
+}
+
+/// The variance about the vertical, of the covariance of a small rotation of the body, rad².
+fn about_up(world_from_body: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) -> f64 {
+    let up = world_from_body.inverse() * Vector3::z();
+    up.dot(&(covariance * up))
+}

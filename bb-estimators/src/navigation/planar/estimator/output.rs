@@ -1,0 +1,166 @@
+//! What the declared filter emits.
+
+use super::filter::Filter;
+use super::input::Mounting;
+use crate::navigation::estimator::Verdicts;
+use crate::navigation::planar::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, STATES, VELOCITY, WHEEL_SCALE, left};
+use bb_core::payload::{Odometry, Pose, Twist};
+use bb_core::{Outputs, Payload};
+use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector2, Vector3};
+
+/// Variance of what is known by the plane, m², rad² and their squares a second: height, roll and pitch. Not 0, so that the
+/// covariance can be inverted.
+const PLANE: f64 = 1e-6;
+
+/// An output that can be made of the filter after a sample.
+#[diagnostic::on_unimplemented(
+    message = "a planar filter cannot emit `{Self}`",
+    label = "not an output of planar filters",
+    note = "it emits `Odometry`, or `PlanarOutputs`"
+)]
+#[expect(private_interfaces, reason = "implemented here alone")]
+pub trait PlanarOutput: Outputs + Sized {
+    /// What there is to emit.
+    #[doc(hidden)]
+    fn of(filter: &Filter, mounting: &Mounting) -> Option<Self>;
+}
+
+/// What the filter knows beside the odometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
+pub struct PlanarStatus {
+    /// What the gyroscope reads more than the yaw rate, rad/s.
+    pub gyroscope_bias: f64,
+    /// Scale of the wheels' velocity, less 1: `measured = (1 + s) true`.
+    pub wheel_scale: f64,
+    /// Standard deviation of the heading, rad.
+    pub heading_deviation: f64,
+    /// Standard deviation of the gyroscope's bias, rad/s.
+    pub gyroscope_bias_deviation: f64,
+    /// Standard deviation of the wheels' scale.
+    pub wheel_scale_deviation: f64,
+    /// For how long the position has not been corrected by one in the world, s.
+    pub dead_reckoning_s: f64,
+    /// Standard deviation of the position, in the direction where it is least known, m.
+    pub horizontal_deviation: f64,
+    /// Fixes that were fused, and that were refused.
+    pub gnss: Verdicts,
+    /// The same for velocities of the odometry.
+    pub odometry: Verdicts,
+    /// The same for yaw rates of the odometry.
+    pub yaw_rate: Verdicts,
+    /// The same for poses.
+    pub pose: Verdicts,
+    /// The same for orientations.
+    pub orientation: Verdicts,
+    /// How often samples of the IMU were missing for longer than a sample may take.
+    pub gaps: u32,
+}
+
+/// The outputs of `PlanarEkf<PlanarOutputs>`: `output odometry;`, `output status;`.
+#[derive(Clone, Copy, Debug, Default, Outputs)]
+pub struct PlanarOutputs {
+    /// Pose in the world and motion of the link, with every sample.
+    pub odometry: Option<Odometry>,
+    /// What else the filter knows, with every sample.
+    pub status: Option<PlanarStatus>,
+}
+
+#[expect(private_interfaces, reason = "implemented here alone")]
+impl PlanarOutput for Odometry {
+    fn of(filter: &Filter, mounting: &Mounting) -> Option<Self> {
+        let estimate = filter.ekf().estimate()?;
+        // The link in the body.
+        let link = mounting.body_from_link;
+        let in_body = link.translation.vector.xy();
+        let world_from_body = estimate.world_from_body();
+        let arm = world_from_body * in_body;
+        let link_from_body = link.rotation.inverse();
+        let position = estimate.position + arm;
+        let velocity = link_from_body * estimate.velocity_at(&in_body).push(0.0);
+        let up = Vector3::z() * estimate.yaw_rate;
+        Some(Self {
+            pose: Pose {
+                position: position.push(0.0),
+                world_from_body: UnitQuaternion::from_euler_angles(0.0, 0.0, estimate.heading) * link.rotation,
+                covariance: Some(pose_covariance(filter.ekf().covariance(), &arm)),
+            },
+            twist: Twist {
+                linear: velocity,
+                angular: up,
+                covariance: Some(twist_covariance(filter.ekf().covariance(), &link_from_body, &in_body)),
+            },
+        })
+    }
+}
+
+/// Of the pose, with the link's origin at `arm` from the body's, in the world.
+fn pose_covariance(covariance: &SMatrix<f64, STATES, STATES>, arm: &Vector2<f64>) -> Matrix6<f64> {
+    // x, y and yaw of the link by the errors of the filter.
+    let mut by_errors = SMatrix::<f64, 6, STATES>::zeros();
+    let by_heading = left(arm);
+    for i in 0..2 {
+        by_errors[(i, POSITION + i)] = 1.0;
+        by_errors[(i, HEADING)] = by_heading[i];
+    }
+    by_errors[(5, HEADING)] = 1.0;
+    on_the_plane(&by_errors, covariance, [2, 3, 4])
+}
+
+/// Of the twist, with the link's origin at `link` in the body.
+fn twist_covariance(
+    covariance: &SMatrix<f64, STATES, STATES>,
+    link_from_body: &UnitQuaternion<f64>,
+    link: &Vector2<f64>,
+) -> Matrix6<f64> {
+    let mut by_errors = SMatrix::<f64, 6, STATES>::zeros();
+    let turn = link_from_body.to_rotation_matrix();
+    let by_rate = left(link);
+    for i in 0..2 {
+        for j in 0..2 {
+            by_errors[(i, VELOCITY + j)] = turn[(i, j)];
+            by_errors[(i, GYROSCOPE_BIAS)] -= turn[(i, j)] * by_rate[j];
+        }
+    }
+    by_errors[(5, GYROSCOPE_BIAS)] = -1.0;
+    on_the_plane(&by_errors, covariance, [2, 3, 4])
+}
+
+/// `J P Jᵀ`, symmetric to the last bit, with the components that the plane tells.
+fn on_the_plane(
+    by_errors: &SMatrix<f64, 6, STATES>,
+    covariance: &SMatrix<f64, STATES, STATES>,
+    known: [usize; 3],
+) -> Matrix6<f64> {
+    let product = by_errors * covariance * by_errors.transpose();
+    let mut matrix = 0.5 * (product + product.transpose());
+    for i in known {
+        matrix[(i, i)] = PLANE;
+    }
+    matrix
+}
+
+#[expect(private_interfaces, reason = "implemented here alone")]
+impl PlanarOutput for PlanarOutputs {
+    fn of(filter: &Filter, mounting: &Mounting) -> Option<Self> {
+        let ekf = filter.ekf();
+        let estimate = ekf.estimate()?;
+        let deviation = |state: usize| ekf.covariance()[(state, state)].sqrt();
+        let [gnss, odometry, yaw_rate, pose, orientation] = filter.counts().map(Verdicts::from);
+        let status = PlanarStatus {
+            gyroscope_bias: estimate.gyroscope_bias,
+            wheel_scale: estimate.wheel_scale,
+            heading_deviation: deviation(HEADING),
+            gyroscope_bias_deviation: deviation(GYROSCOPE_BIAS),
+            wheel_scale_deviation: deviation(WHEEL_SCALE),
+            dead_reckoning_s: ekf.dead_reckoning_s(),
+            horizontal_deviation: filter.deviation(),
+            gnss,
+            odometry,
+            yaw_rate,
+            pose,
+            orientation,
+            gaps: ekf.gaps(),
+        };
+        Some(Self { odometry: Some(Odometry::of(filter, mounting)?), status: Some(status) })
+    }
+}

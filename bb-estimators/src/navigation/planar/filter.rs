@@ -1,0 +1,278 @@
+//! The filter: samples of the gyroscope move it, measurements correct it.
+
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
+
+use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, WHEEL_SCALE};
+use super::measurement::PlanarMeasurement;
+use super::params::PlanarParams;
+use super::propagation::Transition;
+use crate::attitude::ParamsError;
+use crate::navigation::covariance::{Covariance, MOST_ROTATION, MOST_VARIANCE};
+use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S, seconds_between};
+use crate::navigation::fused::Fused;
+use crate::navigation::fusion::{Weighed, prepared};
+use crate::navigation::math::{exp, wrapped};
+use crate::navigation::measurement::Linearised;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::stream::{Gate, Stream};
+use crate::params::Params as _;
+
+/// The largest variances of position, heading and velocity.
+const LIMITS: [f64; 5] = [MOST_VARIANCE, MOST_VARIANCE, MOST_ROTATION, MOST_VARIANCE, MOST_VARIANCE];
+
+/// A variance that is taken as known, where 0 would make the matrix singular.
+const KNOWN: f64 = 1e-24;
+
+/// What is known when a filter starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanarStart {
+    /// When, nanoseconds since any fixed moment.
+    pub time_ns: i64,
+    /// Of the body's origin, in the world, m.
+    pub position: Vector2<f64>,
+    /// Of the body's x axis, from the world's counter-clockwise, rad; any number of turns.
+    pub heading: f64,
+    /// Of the body's origin, in the body, m/s.
+    pub velocity: Vector2<f64>,
+    /// Of the gyroscope, rad/s.
+    pub gyroscope_bias: f64,
+    /// Covariance of the position, m².
+    pub position_covariance: Matrix2<f64>,
+    /// Standard deviation of the heading, rad.
+    pub heading_deviation: f64,
+    /// Standard deviation of a component of the velocity, m/s.
+    pub velocity_deviation: f64,
+    /// Standard deviation of the gyroscope's bias, rad/s.
+    pub gyroscope_bias_deviation: f64,
+}
+
+impl PlanarStart {
+    /// A pose and a velocity in the body that are known up to standard deviations, m, rad, m/s. The gyroscope's bias is zero up
+    /// to 0.02 rad/s.
+    pub fn at(
+        time_ns: i64,
+        position: (Vector2<f64>, f64),
+        heading: (f64, f64),
+        velocity: (Vector2<f64>, f64),
+    ) -> Self {
+        Self {
+            time_ns,
+            position: position.0,
+            heading: heading.0,
+            velocity: velocity.0,
+            gyroscope_bias: 0.0,
+            position_covariance: Matrix2::identity() * (position.1 * position.1),
+            heading_deviation: heading.1,
+            velocity_deviation: velocity.1,
+            gyroscope_bias_deviation: 0.02,
+        }
+    }
+
+    fn state(&self, params: &PlanarParams) -> Result<(PlanarEstimate, Covariance<STATES>), Refusal> {
+        let square = |x: f64| (x * x).max(KNOWN);
+        let mut covariance = Covariance::new();
+        for i in 0..2 {
+            covariance.forget(VELOCITY + i, square(self.velocity_deviation));
+            covariance.forget(POSITION + i, self.position_covariance[(i, i)]);
+        }
+        let between = 0.5 * (self.position_covariance[(0, 1)] + self.position_covariance[(1, 0)]);
+        covariance.rows_mut()[POSITION][POSITION + 1] = between;
+        covariance.rows_mut()[POSITION + 1][POSITION] = between;
+        covariance.forget(HEADING, square(self.heading_deviation));
+        covariance.forget(GYROSCOPE_BIAS, square(self.gyroscope_bias_deviation));
+        covariance.forget(WHEEL_SCALE, square(params.wheel_scale.deviation));
+        let estimate = PlanarEstimate {
+            time_ns: self.time_ns,
+            position: self.position,
+            heading: wrapped(self.heading),
+            velocity: self.velocity,
+            gyroscope_bias: self.gyroscope_bias,
+            wheel_scale: 0.0,
+            yaw_rate: 0.0,
+        };
+        if !estimate.is_finite() {
+            return Err(Refusal::NonFinite);
+        }
+        if !covariance.is_positive_definite() {
+            return Err(Refusal::Noise);
+        }
+        Ok((estimate, covariance))
+    }
+}
+
+/// The filter; see the [module](super).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanarEkf {
+    params: PlanarParams,
+    estimate: Option<PlanarEstimate>,
+    covariance: Covariance<STATES>,
+    resets: u32,
+    gaps: u32,
+    /// When the position was last corrected by one of the world.
+    fixed_ns: i64,
+}
+
+impl PlanarEkf {
+    /// Makes a filter that has not started.
+    ///
+    /// # Errors
+    ///
+    /// The first parameter outside its accepted range, by name.
+    pub fn new(params: PlanarParams) -> Result<Self, ParamsError> {
+        params.check()?;
+        Ok(Self { params, estimate: None, covariance: Covariance::new(), resets: 0, gaps: 0, fixed_ns: 0 })
+    }
+
+    /// The parameters that the filter was made with.
+    pub fn params(&self) -> &PlanarParams {
+        &self.params
+    }
+
+    /// Starts, or starts afresh.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if a covariance is not positive definite. The filter
+    /// is then as it was.
+    pub fn start(&mut self, start: &PlanarStart) -> Result<(), Refusal> {
+        let (estimate, covariance) = start.state(&self.params)?;
+        self.resets = self.resets.wrapping_add(1);
+        self.fixed_ns = start.time_ns;
+        self.estimate = Some(estimate);
+        self.covariance = covariance;
+        Ok(())
+    }
+
+    /// Moves the filter over one sample; of its angular velocity, in axes of the body, the rotation about z counts.
+    ///
+    /// A sample that covers more than [`PlanarParams::longest_sample`] is a gap: the robot is taken to go straight on, up to
+    /// the noise that the parameters give a gap.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time stands still or runs
+    /// back, or the gap is longer than a minute. The filter is then as it was.
+    pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
+        sample.check()?;
+        let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
+        let is_gap = dt > self.params.longest_sample;
+        if dt > LONGEST_GAP_S {
+            return Err(Refusal::Gap { seconds: dt });
+        }
+        estimate.time_ns = sample.time_ns;
+        estimate.yaw_rate = if is_gap { 0.0 } else { sample.angular_velocity.z - estimate.gyroscope_bias };
+        let densities = if is_gap { self.params.gap_densities() } else { self.params.densities() };
+        Transition::advance(estimate, dt).apply(self.covariance.rows_mut(), &densities);
+        self.gaps = self.gaps.wrapping_add(u32::from(is_gap));
+        let scale = self.params.wheel_scale;
+        if scale.time_s != f64::INFINITY {
+            let factor = exp(-dt / scale.time_s);
+            estimate.wheel_scale *= factor;
+            let variance = scale.deviation * scale.deviation * (1.0 - factor * factor);
+            self.covariance.decay(WHEEL_SCALE, factor, variance.max(KNOWN));
+        }
+        self.covariance.bound(&LIMITS);
+        Ok(())
+    }
+
+    /// Corrects the filter by a measurement that was taken at its present time.
+    ///
+    /// `stream` is that of the sensor: its gate decides, and its counts and statistics tell of it.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`], which the stream has counted; the filter is then as it was.
+    pub fn update<M: PlanarMeasurement<D>, const D: usize>(
+        &mut self,
+        stream: &mut Stream,
+        measurement: &M,
+    ) -> Result<Fused, Refusal> {
+        let result = self.fuse(stream, measurement);
+        stream.count(&result);
+        result
+    }
+
+    fn fuse<M: PlanarMeasurement<D>, const D: usize>(
+        &mut self,
+        stream: &Stream,
+        measurement: &M,
+    ) -> Result<Fused, Refusal> {
+        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
+        let mut model = Linearised::new();
+        measurement.linearise(estimate, &mut model)?;
+        let model = prepared(model, stream)?;
+        let weighed = Weighed::new(&mut self.covariance, stream, &model, Gate::Closed)?;
+        let corrected = estimate.corrected(&weighed.innovation.mean());
+        if !corrected.is_finite() {
+            weighed.undo(&mut self.covariance);
+            return Err(Refusal::NonFinite);
+        }
+        *estimate = corrected;
+        self.covariance.update(&weighed.innovation);
+        let sees_position = |row: &[f64; STATES]| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0;
+        if model.jacobian.iter().any(sees_position) {
+            self.fixed_ns = corrected.time_ns;
+        }
+        Ok(weighed.fused())
+    }
+
+    /// What is estimated, at the end of the last sample; none before the start.
+    pub fn estimate(&self) -> Option<&PlanarEstimate> {
+        self.estimate.as_ref()
+    }
+
+    /// The estimate moved on to `time_ns` with the last yaw rate, for an output between samples. The filter stays as it is.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] if the filter has not started, or the time is before its own or more than a sample after it.
+    pub fn predicted(&self, time_ns: i64) -> Result<PlanarEstimate, Refusal> {
+        let mut estimate = self.estimate.ok_or(Refusal::NotStarted)?;
+        if time_ns == estimate.time_ns {
+            return Ok(estimate);
+        }
+        let dt = seconds_between(estimate.time_ns, time_ns)?;
+        if dt > self.params.longest_sample {
+            return Err(Refusal::Gap { seconds: dt });
+        }
+        Transition::advance(&mut estimate, dt);
+        estimate.time_ns = time_ns;
+        Ok(estimate)
+    }
+
+    /// Covariance of all errors, in the order of the [states](super). Symmetric to the last bit.
+    pub fn covariance(&self) -> &SMatrix<f64, STATES, STATES> {
+        self.covariance.matrix()
+    }
+
+    /// Covariance of the pose: position in the world, m², then heading, rad².
+    pub fn pose_covariance(&self) -> Matrix3<f64> {
+        self.covariance.matrix().fixed_view::<3, 3>(POSITION, POSITION).into_owned()
+    }
+
+    /// Whether the covariance is positive definite now, by a Cholesky decomposition.
+    pub fn is_consistent(&self) -> bool {
+        self.covariance.is_positive_definite()
+    }
+
+    /// How often rounding had made the covariance indefinite, and variances were raised.
+    pub fn repairs(&self) -> u64 {
+        self.covariance.repairs()
+    }
+
+    /// How often the filter was started.
+    pub fn resets(&self) -> u32 {
+        self.resets
+    }
+
+    /// For how long the position has not been corrected by one in the world, s. 0 before the start.
+    pub fn dead_reckoning_s(&self) -> f64 {
+        self.estimate.map_or(0.0, |estimate| estimate.time_ns.saturating_sub(self.fixed_ns) as f64 * 1e-9)
+    }
+
+    /// How many gaps were bridged.
+    pub fn gaps(&self) -> u32 {
+        self.gaps
+    }
+}

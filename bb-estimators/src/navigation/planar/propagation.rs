@@ -1,0 +1,148 @@
+//! One sample of the gyroscope: an arc, exact while the velocity in the body and the yaw rate are constant.
+//!
+//! With `R` from body to world at the start of the sample, ω constant over it, φ = ω dt and `V(φ) = ∫₀¹ R(s φ) ds`:
+//!
+//! * `p⁺ = p + d`, with `d = R V v dt`
+//! * `ψ⁺ = ψ + φ`
+//!
+//! and for the errors, with `ω_true = ω - δb` and `J` the turn by a quarter:
+//!
+//! * `δp⁺ = δp + J d δψ + R V dt δv - R ∂V/∂φ v dt² δb`
+//! * `δψ⁺ = δψ - dt δb`
+
+#![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
+use core::f64::consts::PI;
+
+#[cfg(test)]
+use nalgebra::SMatrix;
+use nalgebra::{Matrix2, Vector2};
+
+use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, left};
+use super::params::Densities;
+use crate::navigation::math::{cos, sin, wrapped};
+
+/// Below this angle, rad, the integral over an arc is a series.
+const SERIES: f64 = 1e-2;
+
+/// The errors from [`HEADING`] on that the position integrates: heading, velocity and the gyroscope's bias.
+const SOURCES: usize = GYROSCOPE_BIAS + 1 - HEADING;
+
+/// What a sample does to the errors: the blocks of the transition that are neither zero nor the identity.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Transition {
+    /// Of the position error by heading, velocity and bias, row by row; its first column is J d.
+    position: [[f64; SOURCES]; 2],
+    /// R in the middle of the sample, where noise comes in on average.
+    rotation: Matrix2<f64>,
+    dt: f64,
+}
+
+impl Transition {
+    /// Moves the estimate over `dt` seconds with the yaw rate that it holds.
+    #[inline]
+    pub(super) fn advance(estimate: &mut PlanarEstimate, dt: f64) -> Self {
+        let turn = estimate.yaw_rate * dt;
+        let (arc, by_turn) = arc(turn);
+        let world_from_body = estimate.world_from_body();
+        let by_velocity = world_from_body * arc * dt;
+        let way = by_velocity * estimate.velocity;
+        let sideways = left(&way);
+        let by_bias = world_from_body * by_turn * estimate.velocity * (-dt * dt);
+        let rotation = PlanarEstimate { heading: estimate.heading + 0.5 * turn, ..*estimate }.world_from_body();
+        estimate.position += way;
+        estimate.heading += turn;
+        if !(-PI..=PI).contains(&estimate.heading) {
+            estimate.heading = wrapped(estimate.heading);
+        }
+        let row = |i: usize| [sideways[i], by_velocity[(i, 0)], by_velocity[(i, 1)], by_bias[i]];
+        Self { position: [row(0), row(1)], rotation, dt }
+    }
+
+    /// `P ← Φ P Φᵀ + Q`, symmetric to the last bit.
+    #[inline]
+    pub(super) fn apply(&self, p: &mut [[f64; STATES]; STATES], densities: &Densities) {
+        // Φ P: what a row takes from are rows below it, which are not yet changed.
+        for i in 0..2 {
+            for (k, factor) in self.position[i].iter().enumerate() {
+                for j in 0..STATES {
+                    p[POSITION + i][j] += factor * p[HEADING + k][j];
+                }
+            }
+        }
+        for j in 0..STATES {
+            p[HEADING][j] -= self.dt * p[GYROSCOPE_BIAS][j];
+        }
+        // (Φ P) Φᵀ: of the columns only the first three change.
+        for row in p.iter_mut() {
+            for i in 0..2 {
+                for (k, factor) in self.position[i].iter().enumerate() {
+                    row[POSITION + i] += factor * row[HEADING + k];
+                }
+            }
+            row[HEADING] -= self.dt * row[GYROSCOPE_BIAS];
+        }
+        self.add_noise(p, densities);
+        for i in 0..STATES {
+            for j in i + 1..STATES {
+                p[j][i] = p[i][j];
+            }
+        }
+    }
+
+    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on what integrates it. The upper triangle alone.
+    #[inline]
+    fn add_noise(&self, p: &mut [[f64; STATES]; STATES], densities: &Densities) {
+        let dt = self.dt;
+        let acceleration = densities.acceleration.map(|density| density * dt);
+        // The heading errs by half of it on average over the sample, and so does the way.
+        let heading = densities.gyroscope * dt;
+        let sideways = Vector2::new(self.position[0][0], self.position[1][0]);
+        let (forward, left) = (self.rotation.column(0), self.rotation.column(1));
+        for i in 0..2 {
+            for j in i..2 {
+                let turned = forward[i] * forward[j] * acceleration[0] + left[i] * left[j] * acceleration[1];
+                p[POSITION + i][POSITION + j] +=
+                    turned * (dt * dt / 3.0) + sideways[i] * sideways[j] * (heading / 3.0);
+            }
+            p[POSITION + i][HEADING] += sideways[i] * (0.5 * heading);
+            p[POSITION + i][VELOCITY] += forward[i] * acceleration[0] * (0.5 * dt);
+            p[POSITION + i][VELOCITY + 1] += left[i] * acceleration[1] * (0.5 * dt);
+            p[VELOCITY + i][VELOCITY + i] += acceleration[i];
+        }
+        p[HEADING][HEADING] += heading;
+        p[GYROSCOPE_BIAS][GYROSCOPE_BIAS] += densities.bias * dt;
+    }
+
+    /// The whole transition.
+    #[cfg(test)]
+    pub(super) fn matrix(&self) -> SMatrix<f64, STATES, STATES> {
+        let mut matrix = SMatrix::<f64, STATES, STATES>::identity();
+        for i in 0..2 {
+            for k in 0..SOURCES {
+                matrix[(POSITION + i, HEADING + k)] = self.position[i][k];
+            }
+        }
+        matrix[(HEADING, GYROSCOPE_BIAS)] = -self.dt;
+        matrix
+    }
+}
+
+/// `V(φ) = ∫₀¹ R(s φ) ds` and its derivative by φ.
+fn arc(turn: f64) -> (Matrix2<f64>, Matrix2<f64>) {
+    let s = turn * turn;
+    let [along, across, along_turn, across_turn] = if turn.abs() < SERIES {
+        [
+            1.0 - s / 6.0 * (1.0 - s / 20.0),
+            turn / 2.0 * (1.0 - s / 12.0 * (1.0 - s / 30.0)),
+            -turn / 3.0 * (1.0 - s / 10.0),
+            0.5 - s / 8.0 * (1.0 - s / 18.0),
+        ]
+    } else {
+        let (sin, cos) = (sin(turn), cos(turn));
+        let (along, across) = (sin / turn, (1.0 - cos) / turn);
+        [along, across, (cos - along) / turn, (sin - across) / turn]
+    };
+    let matrix = |along: f64, across: f64| Matrix2::new(along, -across, across, along);
+    (matrix(along, across), matrix(along_turn, across_turn))
+}

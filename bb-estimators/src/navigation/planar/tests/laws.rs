@@ -1,0 +1,184 @@
+//! What holds for the filter, whatever comes.
+
+use core::f64::consts::{PI, TAU};
+
+use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
+use proptest::prelude::*;
+
+use super::super::{
+    GYROSCOPE_BIAS, HEADING, PlanarEkf, PlanarHeading, PlanarParams, PlanarPose, PlanarPosition, PlanarStart,
+    STATES, VELOCITY, WheelVelocity, YawRate,
+};
+use super::{sample, started, vector};
+use crate::navigation::math::wrapped;
+use crate::navigation::{Fused, History, ImuMean, Refusal, Replayed, Stream, StreamParams};
+
+/// Three seconds with wheels, fixes, headings and poses; the world is turned and shifted.
+fn drive(turn: f64, shift: Vector2<f64>) -> PlanarEkf {
+    let rotation = Rotation2::new(turn);
+    let to_world = |point: Vector2<f64>| rotation * point + shift;
+    let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+    let start =
+        PlanarStart::at(0, (to_world(Vector2::zeros()), 2.0), (0.3 + turn, 0.2), (Vector2::new(2.0, 0.0), 0.5));
+    filter.start(&start).unwrap();
+    let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+    let noise = Matrix2::new(1.0, 0.4, 0.4, 2.0);
+    for i in 1..=300 {
+        filter.propagate(&sample(i)).unwrap();
+        let t = i as f64 * 0.01;
+        if i % 5 == 0 {
+            let velocity = Vector2::new(2.0 + 0.2 * t.sin(), 0.03);
+            let lever_arm = Vector2::new(0.2, -0.1);
+            filter.update(&mut stream, &WheelVelocity { lever_arm, ..WheelVelocity::new(velocity, 0.1) }).unwrap();
+            filter.update(&mut stream, &YawRate { rate: 0.4 * (0.7 * t).sin() + 0.01, deviation: 0.05 }).unwrap();
+        }
+        if i % 50 == 0 {
+            let covariance = rotation * noise * rotation.inverse();
+            let position = to_world(Vector2::new(2.0 * t, 0.3 * t * t));
+            let fix = PlanarPosition { position, covariance, lever_arm: Vector2::new(-0.5, 0.2) };
+            filter.update(&mut stream, &fix).unwrap();
+            filter.update(&mut stream, &PlanarHeading { heading: turn + 0.3 + 7.0 * TAU, deviation: 0.2 }).unwrap();
+            let mut covariance = nalgebra::Matrix3::identity();
+            covariance[(2, 2)] = 0.1;
+            filter.update(&mut stream, &PlanarPose { position, heading: turn + 0.4, covariance }).unwrap();
+        }
+    }
+    filter
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn the_worlds_heading_and_origin_do_not_matter(turn in -6.0..6.0, shift in vector(1000.0)) {
+        let (plain, moved) = (drive(0.0, Vector2::zeros()), drive(turn, shift));
+        let rotation = Rotation2::new(turn);
+        let turned = |filter: &PlanarEkf, rotation: &Rotation2<f64>| -> Matrix2<f64> {
+            let block = filter.covariance().fixed_view::<2, 2>(0, 0).into_owned();
+            rotation * block * rotation.inverse()
+        };
+        prop_assert!((turned(&plain, &rotation) - turned(&moved, &Rotation2::identity())).amax() < 1e-8);
+        for state in [HEADING, VELOCITY, VELOCITY + 1, GYROSCOPE_BIAS] {
+            let at = (state, state);
+            prop_assert!((plain.covariance()[at] - moved.covariance()[at]).abs() < 1e-9);
+        }
+        let (plain, moved) = (plain.estimate().unwrap(), moved.estimate().unwrap());
+        prop_assert!((rotation * plain.position + shift - moved.position).norm() < 1e-8);
+        prop_assert!(wrapped(plain.heading + turn - moved.heading).abs() < 1e-9);
+        prop_assert!((plain.velocity - moved.velocity).norm() < 1e-9);
+        prop_assert!((plain.gyroscope_bias - moved.gyroscope_bias).abs() < 1e-10);
+        prop_assert!((plain.wheel_scale - moved.wheel_scale).abs() < 1e-10);
+    }
+
+    #[test]
+    fn what_is_refused_changes_nothing_and_is_counted(
+        numbers in proptest::collection::vec(
+            prop_oneof![any::<f64>(), -10.0..10.0, Just(f64::NAN), Just(f64::INFINITY)], 12,
+        ),
+        time_ns in any::<i64>(),
+    ) {
+        let mut filter = started();
+        for i in 1..20 {
+            filter.propagate(&sample(i)).unwrap();
+        }
+        let mut stream = Stream::default();
+        let pair = |from: usize| Vector2::new(numbers[from], numbers[from + 1]);
+        let angular_velocity = Vector3::new(numbers[0], numbers[1], numbers[2]);
+        let before = filter;
+        if filter.propagate(&ImuMean { time_ns, angular_velocity, specific_force: Vector3::repeat(numbers[3]) }).is_err() {
+            prop_assert_eq!(&filter, &before);
+        }
+        let mut updates = 0;
+        let mut law = |filter: &mut PlanarEkf, update: &dyn Fn(&mut PlanarEkf, &mut Stream) -> bool| {
+            let before = *filter;
+            updates += 1;
+            update(filter, &mut stream) || *filter == before
+        };
+        let fix = PlanarPosition { lever_arm: pair(6), ..PlanarPosition::new(pair(4), numbers[8]) };
+        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &fix).is_ok()));
+        let wheels = WheelVelocity { lever_arm: pair(2), ..WheelVelocity::new(pair(9), numbers[0]) };
+        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &wheels).is_ok()));
+        let heading = PlanarHeading { heading: numbers[11], deviation: numbers[5] };
+        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &heading).is_ok()));
+        let rate = YawRate { rate: numbers[7], deviation: numbers[1] };
+        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &rate).is_ok()));
+        let estimate = filter.estimate().unwrap();
+        prop_assert!(estimate.position.iter().all(|x| x.is_finite()) && filter.is_consistent());
+        prop_assert!((-PI..=PI).contains(&estimate.heading));
+        prop_assert_eq!(filter.covariance(), &filter.covariance().transpose());
+        let counts = stream.counts();
+        prop_assert_eq!(counts.fused + counts.gate + counts.invalid, updates);
+    }
+
+    /// Fixes at the end of a sample each, which arrive so many samples later: to the last bit as in order.
+    #[test]
+    fn late_and_out_of_order_is_as_in_order(
+        fixes in proptest::collection::btree_map(1..119_i64, (0..60_i64, -9.0..9.0), 1..30),
+    ) {
+        const SAMPLES: i64 = 120;
+        let drive = |delayed: i64| {
+            let start = Fixed { filter: started(), stream: Stream::default() };
+            let mut history = History::<_, 150, 50, 6>::new(start, 0).unwrap();
+            for i in 1..=SAMPLES {
+                history.propagate(&sample(i)).unwrap();
+                for (taken, (delay, value)) in &fixes {
+                    if (taken + delayed * delay).min(SAMPLES) == i {
+                        let fix = PlanarPosition::new(Vector2::new(*value, -value), 1.0);
+                        let result = history.update(taken * 10_000_000, &fix);
+                        assert!(matches!(result, Ok(_) | Err(Refusal::Gate { .. })), "{result:?}");
+                    }
+                }
+            }
+            history.now().clone()
+        };
+        prop_assert_eq!(drive(0), drive(1));
+    }
+
+    /// Of measurements that are nearly exact and of others that say nearly nothing, in any order.
+    #[test]
+    fn the_covariance_stays_positive_definite(
+        steps in proptest::collection::vec((0..5_u8, -8.0..3.0), 100..400),
+    ) {
+        let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+        filter.start(&PlanarStart::at(0, (Vector2::zeros(), 1e5), (0.0, 3.0), (Vector2::zeros(), 1e3))).unwrap();
+        let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+        for (i, (kind, exponent)) in (1..).zip(steps) {
+            filter.propagate(&sample(i)).unwrap();
+            let deviation = 10_f64.powf(exponent);
+            let fused = match kind {
+                0 => filter.update(&mut stream, &PlanarPosition::new(Vector2::zeros(), deviation)),
+                1 => filter.update(&mut stream, &WheelVelocity::new(Vector2::zeros(), deviation)),
+                2 => filter.update(&mut stream, &YawRate { rate: 0.0, deviation }),
+                3 => filter.update(&mut stream, &PlanarHeading { heading: 0.0, deviation }),
+                _ => continue,
+            };
+            prop_assert!(fused.is_ok(), "{fused:?}");
+            prop_assert!(filter.is_consistent(), "after {i} samples");
+        }
+        prop_assert_eq!(filter.repairs(), 0);
+        prop_assert_eq!(filter.covariance(), &filter.covariance().transpose());
+        prop_assert_eq!(filter.covariance().nrows(), STATES);
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Fixed {
+    filter: PlanarEkf,
+    stream: Stream,
+}
+
+impl Replayed for Fixed {
+    type Measurement = PlanarPosition;
+
+    fn time_ns(&self) -> Option<i64> {
+        self.filter.estimate().map(|estimate| estimate.time_ns)
+    }
+
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.filter.propagate(sample)
+    }
+
+    fn update(&mut self, measurement: &PlanarPosition) -> Result<Fused, Refusal> {
+        self.filter.update(&mut self.stream, measurement)
+    }
+}

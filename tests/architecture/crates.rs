@@ -1,0 +1,49 @@
+//! The crates and the arrows between them.
+
+use super::{read, root};
+
+#[test]
+fn arrows_between_crates_point_one_way() {
+    let depends = |krate: &str, on: &str| {
+        let manifest = read(&format!("{krate}/Cargo.toml"));
+        let dependencies = manifest.split("[dependencies]").nth(1).unwrap_or("");
+        let dependencies = dependencies.split("\n[").next().unwrap_or("");
+        dependencies.lines().any(|line| line.starts_with(on))
+    };
+    assert!(depends("bb-core", "bb-macros"));
+    for (krate, on) in [
+        ("bb-macros", "bb-core"),
+        ("bb-macros", "bb-estimators"),
+        ("bb-core", "bb-estimators"),
+        ("bb-core", "bb-cli"),
+        ("bb-core", "bb-mcap"),
+        ("bb-core", "bb-metrics"),
+        ("bb-estimators", "bb-macros"),
+        ("bb-estimators", "bb-cli"),
+        ("bb-estimators", "bb-mcap"),
+        ("bb-estimators", "bb-metrics"),
+        ("integrations/mcap", "bb-macros"),
+        ("integrations/mcap", "bb-estimators"),
+        ("integrations/mcap", "bb-metrics"),
+        ("integrations/mcap", "bb-cli"),
+        ("integrations/metrics", "bb-macros"),
+        ("integrations/metrics", "bb-estimators"),
+        ("integrations/metrics", "bb-mcap"),
+        ("integrations/metrics", "bb-cli"),
+    ] {
+        assert!(!depends(krate, on), "{krate} must not depend on {on}");
+    }
+}
+
+/// What a user may leave out is in `integrations/`, so that the top level is what the project is.
+#[test]
+fn the_top_level_is_the_project() {
+    let entries = std::fs::read_dir(root()).expect("it is the checkout");
+    let mut crates: Vec<_> = entries
+        .flatten()
+        .filter(|entry| entry.path().join("Cargo.toml").exists())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    crates.sort();
+    assert_eq!(crates, ["bb-cli", "bb-core", "bb-estimators", "bb-macros", "benches", "examples", "tests"]);
+}

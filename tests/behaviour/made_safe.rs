@@ -1,0 +1,435 @@
+//! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
+
+use crate::components::{Number, within};
+use bb_core::prelude::*;
+use bb_core::{ArmError, DisarmError, Live};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// The devices of these tests are there once.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// How many motors turn.
+static TURNING: AtomicI32 = AtomicI32::new(0);
+/// How often a motor was made.
+static MADE: AtomicU32 = AtomicU32::new(0);
+/// What the motor made first, and the later ones, do in `init`.
+static FIRST: AtomicU32 = AtomicU32::new(WORKS);
+static LATER: AtomicU32 = AtomicU32::new(WORKS);
+/// Whether a brake holds.
+static HOLDS: AtomicBool = AtomicBool::new(true);
+
+const WORKS: u32 = 0;
+const FAILS: u32 = 1;
+const PANICS: u32 = 2;
+const FAILS_FOR_GOOD: u32 = 3;
+/// It works until it is read.
+const FAILS_WHEN_READ: u32 = 4;
+
+fn alone() -> MutexGuard<'static, ()> {
+    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    TURNING.store(0, Ordering::SeqCst);
+    MADE.store(0, Ordering::SeqCst);
+    FIRST.store(WORKS, Ordering::SeqCst);
+    LATER.store(WORKS, Ordering::SeqCst);
+    HOLDS.store(true, Ordering::SeqCst);
+    alone
+}
+
+fn turning() -> i32 {
+    TURNING.load(Ordering::SeqCst)
+}
+
+/// Turns from `init` on, until it is made safe; fails once it does not turn.
+#[derive(Debug)]
+pub(crate) struct Lidar {
+    turns: Arc<AtomicBool>,
+    fails: bool,
+}
+
+impl Sensor for Lidar {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let turns = Arc::new(AtomicBool::new(true));
+        TURNING.fetch_add(1, Ordering::SeqCst);
+        let stops = Arc::clone(&turns);
+        context.on_disarm(move || {
+            if stops.swap(false, Ordering::SeqCst) {
+                TURNING.fetch_sub(1, Ordering::SeqCst);
+            }
+            Ok(())
+        });
+        let way = if MADE.fetch_add(1, Ordering::SeqCst) == 0 { &FIRST } else { &LATER };
+        match way.load(Ordering::SeqCst) {
+            FAILS => Err(Fault::new("no handshake")),
+            PANICS => panic!("no handshake"),
+            FAILS_FOR_GOOD => Err(Fault::permanent("no handshake")),
+            way => Ok(Self { turns, fails: way == FAILS_WHEN_READ }),
+        }
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if self.fails || !self.turns.load(Ordering::SeqCst) {
+            return Err(Fault::new("it does not turn"));
+        }
+        Ok(Reading::nothing())
+    }
+}
+
+/// Takes 300 ms to be made safe.
+#[derive(Debug)]
+pub(crate) struct Brake;
+
+impl Sensor for Brake {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        context.on_disarm(|| {
+            std::thread::sleep(Duration::from_millis(300));
+            if HOLDS.load(Ordering::SeqCst) { Ok(()) } else { Err(Fault::new("it slips")) }
+        });
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot Scanner;
+    link base {
+        sensor lidar: Lidar() { rate: 100 Hz; }
+        sensor brake: Brake() { rate: 10 Hz; }
+    }
+}
+
+#[test]
+fn what_is_started_while_the_robot_is_disarmed_is_made_safe_as_well() {
+    let _alone = alone();
+    within(60, || {
+        // The lidar's own callback stops it at once, it fails and restarts, while the brake takes its time.
+        let robot = Scanner::builder().start().expect("it starts");
+        assert_eq!(robot.arm(), Ok(()));
+        assert_eq!((robot.disarm(), turning()), (Ok(()), 0));
+        assert!(MADE.load(Ordering::SeqCst) > 1, "it was restarted meanwhile");
+        let report = robot.stop();
+        assert_eq!((report.safety, turning()), (Safety::Disarmed, 0));
+    });
+}
+
+/// A scanner whose first backoff is short.
+fn start() -> Result<bb_core::Running<Scanner>, StartError> {
+    let mut builder = Scanner::builder();
+    builder.supervision().first_backoff = Duration::from_millis(20);
+    builder.start()
+}
+
+#[test]
+fn what_an_init_has_started_that_fails_is_made_safe() {
+    let _alone = alone();
+    within(60, || {
+        for way in [FAILS, PANICS, FAILS_FOR_GOOD] {
+            MADE.store(0, Ordering::SeqCst);
+            FIRST.store(way, Ordering::SeqCst);
+            assert!(start().is_err() && turning() == 0, "{way}");
+        }
+        for way in [FAILS, PANICS, FAILS_FOR_GOOD] {
+            MADE.store(0, Ordering::SeqCst);
+            FIRST.store(FAILS_WHEN_READ, Ordering::SeqCst);
+            LATER.store(way, Ordering::SeqCst);
+            let robot = start().expect("it starts");
+            assert_eq!(robot.arm(), Ok(()));
+            while MADE.load(Ordering::SeqCst) < 2 {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            std::thread::sleep(Duration::from_millis(50));
+            assert_eq!(robot.safety(), Safety::Armed, "{way}: the fault of one component is no danger");
+            assert_eq!((robot.disarm(), turning()), (Ok(()), 0), "{way}");
+            assert_eq!((robot.stop().safety, turning()), (Safety::Disarmed, 0), "{way}");
+        }
+    });
+}
+
+/// Arms after 200 ms.
+#[derive(Debug)]
+pub(crate) struct Check;
+
+impl Command for Check {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+    const ROLE: Role = Role::Arming;
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.sleep(Duration::from_millis(200)).await;
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Blocks for 400 ms.
+#[derive(Debug)]
+pub(crate) struct Block;
+
+impl Command for Block {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        std::thread::sleep(Duration::from_millis(400));
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Registers callbacks, over and over.
+#[derive(Debug)]
+pub(crate) struct Guards;
+
+impl Command for Guards {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        (0..50).for_each(|_| context.on_disarm(|| Ok(())));
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Where to go. It takes long to find out.
+#[derive(Clone, Debug, Payload)]
+pub(crate) struct Far {
+    metres: f64,
+}
+
+impl Default for Far {
+    fn default() -> Self {
+        std::thread::sleep(Duration::from_millis(200));
+        Self { metres: 5.0 }
+    }
+}
+
+/// How often `go` ran.
+static WENT: AtomicU32 = AtomicU32::new(0);
+
+/// Goes there.
+#[derive(Debug)]
+pub(crate) struct Go;
+
+impl Command for Go {
+    type Options = NoOptions;
+    type Arguments = Far;
+    type Output = ();
+
+    async fn run(_: NoOptions, far: Far, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        WENT.fetch_add(far.metres as u32, Ordering::SeqCst);
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Has another command go.
+#[derive(Debug)]
+pub(crate) struct Mission;
+
+impl Command for Mission {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.bus().start_command("command/go", "")?;
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Commanded;
+    commands {
+        category other { concurrency: 3; }
+        check: Check;
+        block: Block { allowed_states: [idle]; category: other; }
+        guards: Guards { allowed_states: [idle]; category: other; }
+        go: Go { allowed_states: [idle, executing]; category: other; }
+        mission: Mission { allowed_states: [idle]; category: other; }
+    }
+    link base { sensor brake: Brake() { rate: 10 Hz; } }
+}
+
+#[test]
+fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let mut simulation = Commanded::builder().simulate()?;
+    let check = simulation.command(commanded::command::check, NoArguments)?;
+    simulation.run_for(Duration::from_millis(100));
+    assert_eq!((simulation.disarm(), simulation.safety()), (Ok(()), Safety::Disarmed));
+    simulation.run_for(Duration::from_secs(1));
+    assert_eq!(simulation.safety(), Safety::Disarmed);
+    assert!(check.try_result().is_some_and(|result| result.is_err()), "it was cancelled");
+    drop(simulation);
+
+    let robot = Commanded::builder().start()?;
+    assert_eq!(robot.arm(), Ok(()));
+    let _block = robot.command(commanded::command::block, NoArguments)?;
+    std::thread::sleep(Duration::from_millis(20));
+    assert_eq!(robot.disarm(), Ok(()));
+    // Both wait for the code that blocks.
+    let live = robot.live();
+    let arms = std::thread::spawn(move || live.arm());
+    let check = robot.command(commanded::command::check, NoArguments)?;
+    std::thread::sleep(Duration::from_millis(50));
+    assert_eq!((robot.disarm(), robot.safety()), (Ok(()), Safety::Disarmed));
+    assert_eq!(arms.join().map_err(|_| "it does not panic")?, Err(ArmError::Cancelled));
+    std::thread::sleep(Duration::from_millis(600));
+    assert_eq!(robot.safety(), Safety::Disarmed);
+    assert!(check.try_result().is_some_and(|result| result.is_err()), "it was cancelled");
+    Ok(())
+}
+
+#[test]
+fn a_command_may_register_callbacks_while_it_is_cancelled() {
+    let _alone = alone();
+    within(120, || {
+        let robot = Commanded::builder().start().expect("it starts");
+        assert_eq!(robot.arm(), Ok(()));
+        for round in 0..3_000_u32 {
+            if let Ok(running) = robot.command(commanded::command::guards, NoArguments) {
+                (0..(round % 64) * 20).for_each(|_| std::hint::spin_loop());
+                running.cancel();
+            }
+        }
+        assert_eq!(robot.safety(), Safety::Armed);
+    });
+}
+
+#[test]
+fn a_command_that_was_cancelled_while_it_made_arguments_starts_nothing() -> Result<(), Box<dyn std::error::Error>> {
+    let _alone = alone();
+    let robot = Commanded::builder().start()?;
+    assert_eq!(robot.arm(), Ok(()));
+    let mission = robot.command(commanded::command::mission, NoArguments)?;
+    std::thread::sleep(Duration::from_millis(60));
+    mission.cancel();
+    std::thread::sleep(Duration::from_millis(400));
+    assert_eq!(WENT.load(Ordering::SeqCst), 0);
+    // The same one goes if nobody cancels it.
+    robot.command(commanded::command::mission, NoArguments)?.wait()?;
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(WENT.load(Ordering::SeqCst), 5);
+    Ok(())
+}
+
+#[test]
+fn force_forgives_nothing_once_the_robot_stops() {
+    let _alone = alone();
+    HOLDS.store(false, Ordering::SeqCst);
+    within(60, || {
+        for first in [true, false] {
+            let robot = Commanded::builder().start().expect("it starts");
+            assert_eq!(robot.arm(), Ok(()));
+            let live = robot.live();
+            let forces = std::thread::spawn(move || {
+                std::thread::sleep(Duration::from_millis(if first { 0 } else { 100 }));
+                live.force_disarm()
+            });
+            std::thread::sleep(Duration::from_millis(if first { 100 } else { 0 }));
+            assert_eq!(robot.stop().safety, Safety::Error);
+            assert!(forces.join().expect("it does not panic").is_err());
+        }
+    });
+}
+
+#[test]
+fn each_disarm_reports_its_own_callbacks() {
+    let _alone = alone();
+    HOLDS.store(false, Ordering::SeqCst);
+    within(60, || {
+        let robot = Commanded::builder().start().expect("it starts");
+        assert_eq!(robot.arm(), Ok(()));
+        let live: Live<Commanded> = robot.live();
+        let disarms = std::thread::spawn(move || live.disarm());
+        std::thread::sleep(Duration::from_millis(150));
+        // Its callback has read that the brake slips by the time the next one begins.
+        while robot.safety() == Safety::Disarming {
+            std::thread::sleep(Duration::from_micros(100));
+        }
+        HOLDS.store(true, Ordering::SeqCst);
+        assert_eq!(robot.force_disarm(), Ok(()));
+        let why = disarms.join().expect("it does not panic").expect_err("the brake slips");
+        let expected = "not everything could be made safe: `sensor/base/brake`: disarming failed: it slips";
+        assert_eq!(why.to_string(), expected);
+    });
+}
+
+/// What `disarm` and `arm` return to a callback.
+type Said = (Result<(), DisarmError>, Result<(), ArmError>);
+
+static SAID: Mutex<Vec<Said>> = Mutex::new(Vec::new());
+
+/// The robot that is called.
+static ROBOT: Mutex<Option<Live<Calling>>> = Mutex::new(None);
+
+/// Calls the robot from its callback.
+#[derive(Debug)]
+pub(crate) struct Calls;
+
+impl Sensor for Calls {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        context.on_disarm(|| {
+            let robot = ROBOT.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            if let Some(robot) = robot {
+                SAID.lock().unwrap_or_else(PoisonError::into_inner).push((robot.disarm(), robot.arm()));
+            }
+            Ok(())
+        });
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot Calling;
+    link base { sensor calls: Calls() { rate: 10 Hz; } }
+}
+
+#[test]
+fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> Result<(), Box<dyn std::error::Error>>
+{
+    let _alone = alone();
+    let lines = Arc::new(Mutex::new(Vec::new()));
+    let sink = Arc::clone(&lines);
+    let mut builder = Calling::builder();
+    builder.journal(move |line| sink.lock().unwrap_or_else(PoisonError::into_inner).push(line));
+    let called = |robot| *ROBOT.lock().unwrap_or_else(PoisonError::into_inner) = robot;
+    let mut simulation = builder.simulate()?;
+    called(Some(simulation.live()));
+    assert_eq!(simulation.arm(), Ok(()));
+    assert_eq!(simulation.disarm(), Ok(()));
+    simulation.run_for(Duration::from_millis(100));
+    assert_eq!(simulation.stop().safety, Safety::Disarmed);
+    let robot = Calling::builder().start()?;
+    called(Some(robot.live()));
+    assert_eq!((robot.arm(), robot.disarm()), (Ok(()), Ok(())));
+    robot.stop();
+    called(None);
+    let said = std::mem::take(&mut *SAID.lock().unwrap_or_else(PoisonError::into_inner));
+    // On virtual time and in real time, at the disarming and at the stop.
+    let during = (Err(DisarmError::Callback), Err(ArmError::Disarming));
+    let stopping = (Err(DisarmError::Callback), Err(ArmError::Stopping));
+    assert_eq!(said, [during.clone(), stopping.clone(), during, stopping]);
+
+    let mut replay = Calling::builder().replay()?;
+    assert_eq!((replay.arm(), replay.disarm()), (Err(ArmError::Replay), Err(DisarmError::Replay)));
+    replay.play(std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner)))?;
+    assert_eq!(replay.stop().safety, Safety::Disarmed);
+    Ok(())
+}
