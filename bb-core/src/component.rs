@@ -22,6 +22,7 @@ mod record;
 mod sensor;
 mod service;
 pub(crate) mod setting;
+mod template;
 
 pub(crate) use crate::fault::Fault;
 pub use actuator::Actuator;
@@ -52,3 +53,4 @@ pub use record::RequestCodec;
 pub use sensor::{Next, Reading, Sensor};
 pub use service::Service;
 pub(crate) use setting::{Setting, SettingKind, quantity};
+pub(crate) use template::Template;

@@ -13,6 +13,7 @@ mod command;
 mod commands;
 mod effects;
 mod execution;
+mod hanging;
 mod health;
 mod hooks;
 mod machine;
@@ -27,5 +28,6 @@ mod topics;
 
 pub use command::{CommandStatistics, Prepared};
 pub use execution::{CommandError, Execution};
+pub(crate) use hanging::Hanging;
 pub(crate) use system::{ComponentOrder, Control, Declared, Islands, Parts, Summary, Wired};
 pub(crate) use topics::SystemTopics;

@@ -5,6 +5,7 @@ mod admission;
 mod backlog;
 mod count;
 mod counters;
+mod emission;
 mod entry;
 mod environment;
 mod health;
@@ -17,6 +18,7 @@ mod timers;
 mod turn;
 
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
+pub(crate) use emission::{Emitting, blame, contained, contained_outside};
 pub(crate) use entry::{HealthReport, NodeEntry, Report};
 pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Mode, Overseer};
@@ -24,7 +26,7 @@ pub use island::{
     Act, Island, IslandOf, IslandState, IslandWiring, Key, Member, act, alone, enter, feed, island as island_of,
     receive, start,
 };
-pub(crate) use island::{AnyIsland, CallError, Replayed, take_turn};
+pub(crate) use island::{AnyIsland, CallError, Replayed, publish, take_turn};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
 pub(crate) use running::Next;

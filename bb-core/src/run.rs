@@ -10,6 +10,7 @@ mod handle;
 mod host;
 mod live;
 mod machine;
+mod occupied;
 mod replay;
 mod report;
 mod running;

@@ -12,6 +12,6 @@ pub(crate) use agenda::Agenda;
 pub(crate) use bell::Bell;
 pub(crate) use deadlines::Deadlines;
 pub(crate) use door::Door;
-pub(crate) use pool::Pool;
+pub(crate) use pool::{Lane, Pool};
 pub(crate) use sleeper::{Alarm, Sleeper};
 pub(crate) use stop::StopSignal;

@@ -47,6 +47,8 @@ pub enum ActuatorError {
     Stopped,
     /// The actuator has failed at this command.
     Failed(String),
+    /// The actuator's own code has sent this, and would wait for itself.
+    Inside,
 }
 
 impl fmt::Display for ActuatorError {
@@ -57,6 +59,9 @@ impl fmt::Display for ActuatorError {
             Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
             Self::Stopped => f.write_str("the actuator has failed and does not run"),
             Self::Failed(message) => write!(f, "the actuator failed: {message}"),
+            Self::Inside => {
+                f.write_str("the actuator's own code cannot send to it, since it would wait for itself")
+            }
         }
     }
 }

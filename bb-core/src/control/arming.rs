@@ -99,7 +99,7 @@ impl Control {
         let waits_for = disarming.map(|disarming| (disarming.generation, Arc::clone(&disarming.outcome)));
         step.finish();
         let Some((generation, outcome)) = waits_for else { return Ok(()) };
-        if hooks::is_inside(self.id()) {
+        if hooks::is_waited_for(self.id()) {
             return Err(DisarmError::Callback);
         }
         if self.0.mode == Mode::Real {

@@ -1,7 +1,7 @@
 //! Commands with their options, whatever their types.
 
 use super::task::{RunningFuture, Value};
-use crate::component::{Binding, Command, CommandContext, Options, Outcome};
+use crate::component::{Binding, Command, CommandContext, Outcome, Template};
 use crate::declaration::{ParameterValues, Role};
 use crate::event::Refusal;
 use crate::fault::Fault;
@@ -9,7 +9,6 @@ use crate::message::Field;
 use crate::message::codec::{Shape, from_json, to_json};
 use std::any::Any;
 use std::fmt;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What a command has done since the start.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -62,25 +61,23 @@ pub(super) trait AnyCommand: Send + Sync {
 pub struct Prepared(pub(super) Box<dyn AnyCommand>);
 
 struct OfType<C: Command> {
-    /// Options may be sent, and need not be shared.
-    options: Mutex<C::Options>,
+    /// An error if they cannot be copied.
+    options: Result<Template<C::Options>, String>,
     binding: Binding<C::Options>,
 }
 
 impl Prepared {
     /// The command `C` with its options.
     pub fn new<C: Command>(options: &C::Options, binding: Binding<C::Options>) -> Self {
-        Self(Box::new(OfType::<C> { options: Mutex::new(options.clone()), binding }))
+        let options = Template::new(options).map_err(|fault| fault.to_string());
+        Self(Box::new(OfType::<C> { options, binding }))
     }
 }
 
 impl<C: Command> OfType<C> {
     fn bound(&self, parameters: &ParameterValues) -> Result<C::Options, String> {
-        // A copy of their own, so that no user code runs under the lock but their `clone`, which nobody else waits for.
-        let options = lock(&self.options).clone();
-        let bound = self.binding.bound(&options, parameters)?;
-        bound.validate()?;
-        Ok(bound)
+        let options = self.options.as_ref().map_err(String::clone)?;
+        options.bound(&self.binding, parameters)
     }
 }
 
@@ -131,10 +128,6 @@ impl<C: Command> AnyCommand for OfType<C> {
         let result = result.downcast::<C::Output>().map_err(|_| Fault::new("its result has another type"))?;
         Ok(to_json(&*result))
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl fmt::Debug for Prepared {

@@ -205,7 +205,7 @@ impl Step<'_> {
         self.control.0.declared.commands.get(command)
     }
 
-    fn role(&self, command: usize) -> Role {
+    pub(super) fn role(&self, command: usize) -> Role {
         self.control.0.commands.get(command).map_or(Role::Plain, |command| command.0.role())
     }
 
@@ -255,6 +255,7 @@ impl Step<'_> {
         let control = self.control.clone();
         let slot = Arc::new(Slot::new(id, number, control.downgrade()));
         let permit = Permit::revocable();
+        let lane = self.lane(number, health.is_some());
         let task = (control.0.mode != Mode::Replay).then(|| {
             let (permit, weak) = (permit.clone(), control.downgrade());
             let starter = move || {
@@ -267,12 +268,12 @@ impl Step<'_> {
                     health,
                     hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _, id)),
                     host,
-                    sleeper: control.0.sleeper.clone(),
+                    sleeper: control.0.sleeper.in_lane(lane),
                     permit,
                 };
                 prepared.0.start(arguments, &control.parameters(), context)
             };
-            Arc::new(Task::new(id, control.downgrade(), Box::new(starter)))
+            Arc::new(Task::new(id, lane, control.downgrade(), Box::new(starter)))
         });
         self.effects.begun.extend(task.clone());
         if let Some(timeout) = declared.timeout_nanos

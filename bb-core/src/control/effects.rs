@@ -10,9 +10,11 @@ use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyErro
 use crate::fault::{discard, wake};
 use crate::node::Mode;
 use crate::pubsub::Wakers;
+use crate::schedule::Lane;
 use crate::telemetry::TelemetryEvent;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// See the [module](self).
 #[derive(Default)]
@@ -98,27 +100,16 @@ impl Effects {
         if let Some((generation, hooks)) = without_thread {
             control.run_hooks(generation, hooks);
         }
-        let mut wakers_of_results = Vec::new();
-        let mut dropped = dropped;
+        // Each of these may block for ever, and is a job of its own.
+        wakers.into_wakers().for_each(|waker| control.run_apart(move || wake(waker)));
         for (slot, result) in results {
             let (waker, late) = slot.set(result);
-            wakers_of_results.extend(waker);
-            dropped.extend(late);
+            waker.into_iter().for_each(|waker| control.run_apart(move || wake(waker)));
+            late.into_iter().for_each(|late| control.run_apart(move || discard(late)));
         }
+        dropped.into_iter().for_each(|value| control.run_apart(move || discard(value)));
+        forgotten.into_iter().for_each(|hook| control.run_apart(move || discard(hook)));
         drop(wired);
-        let has_code =
-            !wakers.is_empty() || !wakers_of_results.is_empty() || !dropped.is_empty() || !forgotten.is_empty();
-        let code = move || {
-            wakers.run();
-            wakers_of_results.into_iter().for_each(wake);
-            dropped.into_iter().for_each(discard);
-            forgotten.into_iter().for_each(discard);
-        };
-        match control.0.mode {
-            Mode::Real if has_code => control.0.pool.submit(code),
-            Mode::Real => {}
-            Mode::Virtual | Mode::Replay => code(),
-        }
         for task in cancelled {
             task.cancel();
         }
@@ -129,10 +120,18 @@ impl Effects {
 }
 
 impl Control {
+    /// Runs user code where it harms nobody.
+    fn run_apart(&self, code: impl FnOnce() + Send + 'static) {
+        match self.0.mode {
+            Mode::Real => self.0.pool.submit(Lane::Wakers, code),
+            Mode::Virtual | Mode::Replay => code(),
+        }
+    }
+
     /// Has a command polled.
     pub(super) fn run_task(&self, task: Arc<Task>) {
         match self.0.mode {
-            Mode::Real => self.0.pool.submit(move || task.run()),
+            Mode::Real => self.0.pool.submit(task.lane(), move || task.run()),
             Mode::Virtual | Mode::Replay => lock(&self.0.ready).push_back(task),
         }
     }
@@ -172,8 +171,17 @@ impl Control {
         self.hook_returned(generation, Some(index), error);
     }
 
-    /// On virtual time: runs the disarm callbacks that wait, in order, on the calling thread; true if there were any.
+    /// The calling thread runs an actuator's code, which disarming waits for, as long as what this returns lives.
+    pub(crate) fn enter_actuator(&self) -> hooks::InActuator {
+        hooks::InActuator::new(self.id())
+    }
+
+    /// On virtual time: runs the disarm callbacks that wait, in order, on the calling thread; true if there were any. None runs
+    /// inside code that they would wait for.
     pub(crate) fn run_pending_hooks(&self) -> bool {
+        if hooks::is_waited_for(self.id()) {
+            return false;
+        }
         let Some((generation, all)) = lock(&self.0.pending_hooks).pop_front() else { return false };
         if all.is_empty() {
             self.hook_returned(generation, None, None);
@@ -195,9 +203,17 @@ impl Control {
         match self.0.mode {
             Mode::Real => {
                 let control = self.clone();
-                self.0.pool.submit(move || control.write_logs());
+                self.0.pool.submit(Lane::Robot, move || control.write_logs());
             }
             Mode::Virtual | Mode::Replay => self.write_logs(),
+        }
+    }
+
+    /// Waits until loggers have the lines that were written so far, `longest` at most.
+    pub(crate) fn wait_for_lines(&self, longest: Duration) {
+        let deadline = Instant::now() + longest;
+        while lock(&self.0.reporter.0).is_running && Instant::now() < deadline {
+            std::thread::sleep(Duration::from_micros(100));
         }
     }
 
@@ -210,16 +226,13 @@ impl Control {
             };
             let skipped = std::mem::take(&mut reports.skipped);
             drop(reports);
-            let written = crate::fault::guarded(|| {
+            // A logger that panics cannot be told so.
+            let _ = crate::fault::guarded(|| {
                 if skipped > 0 {
                     tracing::warn!(skipped, "lines of this log were dropped: the logger blocked");
                 }
                 write_log(&log);
             });
-            if written.is_err() {
-                // A logger that panics cannot be told so.
-                continue;
-            }
             if let Some(telemetry) = &self.0.telemetry {
                 let robot = self.0.origin.robot;
                 match log {

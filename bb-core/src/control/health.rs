@@ -4,8 +4,7 @@ use super::budgets::Verdict;
 use super::effects::Log;
 use super::step::Step;
 use super::system::{ComponentOrder, Control};
-use crate::declaration::ParameterValues;
-use crate::declaration::Supervisor;
+use crate::declaration::{EstimatorDeclaration, ParameterValues, Supervisor};
 use crate::event::{HealthReason, HealthState, HealthTransition, SafetyError};
 use crate::journal::Event;
 use crate::node::{BindTarget, Check, HealthReport, Mode, NodeEntry, Overseer, Report};
@@ -19,6 +18,13 @@ impl Overseer for Control {
             return;
         }
         self.process_report(estimator, report);
+    }
+
+    fn output_failed(&self, declared: &'static EstimatorDeclaration, message: String) {
+        // A replay's journal has it.
+        if self.0.mode != Mode::Replay {
+            self.component_failed(declared.path, declared.supervisor, message, true);
+        }
     }
 
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget) {
@@ -247,7 +253,6 @@ mod tests {
     use super::*;
     use crate::control::system::{Declared, Parts};
     use crate::control::topics::SystemTopics;
-    use crate::declaration::EstimatorDeclaration;
     use crate::lifecycle::Supervision;
     use crate::message::Origin;
     use crate::node::SharedNode;

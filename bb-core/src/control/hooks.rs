@@ -93,6 +93,33 @@ pub(super) fn is_inside(robot: usize) -> bool {
     INSIDE.get() == robot
 }
 
+thread_local! {
+    /// Of which robot the calling thread runs an actuator's code, which its disarm callback waits for; 0 for none.
+    static IN_ACTUATOR: Cell<usize> = const { Cell::new(0) };
+}
+
+/// Whether the calling thread runs code that disarming waits for, so that it must not wait for that.
+pub(super) fn is_waited_for(robot: usize) -> bool {
+    is_inside(robot) || IN_ACTUATOR.get() == robot
+}
+
+/// The calling thread runs an actuator's code as long as this lives.
+pub(crate) struct InActuator {
+    before: usize,
+}
+
+impl InActuator {
+    pub(super) fn new(robot: usize) -> Self {
+        Self { before: IN_ACTUATOR.replace(robot) }
+    }
+}
+
+impl Drop for InActuator {
+    fn drop(&mut self) {
+        IN_ACTUATOR.set(self.before);
+    }
+}
+
 /// Runs a disarm callback on the calling thread; what went wrong.
 pub(super) fn run(robot: usize, path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
     let before = INSIDE.replace(robot);

@@ -44,6 +44,9 @@ impl Control {
     ) -> Result<(), ParameterError> {
         let Some(declared) = self.0.declared.parameters.get(number) else { return Ok(()) };
         declared.check(&value)?;
+        if let Some(journal) = &self.0.journal {
+            journal.wait_for_room();
+        }
         let refuse = |message: String| ParameterError { path: declared.path.to_owned(), message };
         // Whether options would be valid is user code, so it is asked without the lock; again if another parameter was set
         // meanwhile.

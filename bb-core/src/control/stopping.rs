@@ -86,9 +86,9 @@ impl Control {
 
     /// Wakes what sleeps until now: on the pool, or on virtual time here; true if anything did.
     pub(crate) fn wake_sleepers(&self, now: MonotonicTime) -> bool {
-        let Some(waker) = self.0.sleeper.take(now) else { return false };
+        let Some((lane, waker)) = self.0.sleeper.take(now) else { return false };
         match self.0.mode {
-            Mode::Real => self.0.pool.submit(move || crate::fault::wake(waker)),
+            Mode::Real => self.0.pool.submit(lane, move || crate::fault::wake(waker)),
             Mode::Virtual | Mode::Replay => crate::fault::wake(waker),
         }
         true

@@ -86,6 +86,8 @@ pub(super) struct Inner {
     pub(super) limits: Deadlines<Limit>,
     pub(super) pool: Pool,
     pub(super) reporter: Reporter,
+    /// How many commands have begun at the last instant of virtual time at which one did.
+    pub(super) begun: Mutex<(MonotonicTime, u32)>,
     /// Commands to be polled, on virtual time.
     pub(super) ready: Mutex<VecDeque<Arc<Task>>>,
     /// Disarm callbacks to be run by the loop of a simulation.
@@ -290,6 +292,7 @@ impl Control {
             pool: Pool::new(move || alarm.ring()),
             bell,
             reporter: Reporter::default(),
+            begun: Mutex::new((MonotonicTime::MAX, 0)),
             ready: Mutex::default(),
             pending_hooks: Mutex::default(),
             reports: Mutex::default(),

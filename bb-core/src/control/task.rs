@@ -3,6 +3,7 @@
 use super::system::WeakControl;
 use crate::component::Outcome;
 use crate::fault::{Fault, caught, discard};
+use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
@@ -21,6 +22,7 @@ pub(super) type Starter = Box<dyn FnOnce() -> Result<RunningFuture, Fault> + Sen
 /// One execution's future.
 pub(super) struct Task {
     id: u64,
+    lane: Lane,
     control: WeakControl,
     state: Mutex<State>,
 }
@@ -32,6 +34,8 @@ struct State {
     is_cancelled: bool,
     /// When it was polled last, and how often at that instant.
     polled: (MonotonicTime, u32),
+    /// When the thread that is inside its code entered it.
+    entered: Option<MonotonicTime>,
 }
 
 enum Code {
@@ -45,16 +49,21 @@ enum Code {
 /// Polls at one instant of virtual time before a command is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
+/// Commands that may begin at one instant of virtual time: one that starts itself, or two that start each other, would keep
+/// time from going on.
+pub(super) const MOST_AT_ONCE: u32 = 100_000;
+
 impl Task {
-    pub(super) fn new(id: u64, control: WeakControl, starter: Starter) -> Self {
+    pub(super) fn new(id: u64, lane: Lane, control: WeakControl, starter: Starter) -> Self {
         let state = State {
             code: Code::New(starter),
             is_scheduled: false,
             is_woken: false,
             is_cancelled: false,
             polled: (MonotonicTime::MAX, 0),
+            entered: None,
         };
-        Self { id, control, state: Mutex::new(state) }
+        Self { id, lane, control, state: Mutex::new(state) }
     }
 
     /// Has it polled.
@@ -88,7 +97,15 @@ impl Task {
         state.is_scheduled = false;
         let code = std::mem::replace(&mut state.code, Code::Polled);
         let is_cancelled = state.is_cancelled;
+        if !matches!(code, Code::Polled | Code::Done) {
+            state.entered = Some(control.clock().now());
+        }
         drop(state);
+        if matches!(code, Code::New(_)) && !is_cancelled && control.begins_too_often() {
+            discard(code);
+            self.lock().code = Code::Done;
+            return control.ended(self.id, Err(too_often(control.clock().now())));
+        }
         let ended = match code {
             // Another thread polls it, or it has ended: a wake that came late.
             Code::Polled | Code::Done => {
@@ -172,9 +189,27 @@ impl Task {
         matches!(self.lock().code, Code::Polled)
     }
 
+    /// When the thread that is inside its code entered it.
+    pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
+        let state = self.lock();
+        state.entered.filter(|_| matches!(state.code, Code::Polled))
+    }
+
+    /// Which threads of the pool run it.
+    pub(super) fn lane(&self) -> Lane {
+        self.lane
+    }
+
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn too_often(now: MonotonicTime) -> Fault {
+    Fault::new(format!(
+        "{MOST_AT_ONCE} commands were started at {now}, and virtual time cannot go on: await `CommandContext::sleep` before \
+         one starts another"
+    ))
 }
 
 impl Wake for Task {

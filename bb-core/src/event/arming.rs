@@ -29,7 +29,8 @@ pub enum DisarmError {
     Failed(Vec<SafetyError>),
     /// The safety state is `error`, and this disarm was not forced, or hardware reported an error meanwhile.
     Error,
-    /// A disarm callback called: the robot is being disarmed, and the callback must not wait for itself.
+    /// A disarm callback or an actuator's own code called: the robot is being disarmed, and the caller must not wait for
+    /// itself.
     Callback,
     /// The robot is being disarmed, and the thread that limits its time is gone.
     Unfinished,
@@ -64,7 +65,9 @@ impl fmt::Display for DisarmError {
                 Ok(())
             }
             Self::Error => f.write_str("the safety state is `error`"),
-            Self::Callback => f.write_str("a disarm callback cannot wait for the robot to be disarmed"),
+            Self::Callback => {
+                f.write_str("a disarm callback or an actuator's own code cannot wait for the robot to be disarmed")
+            }
             Self::Unfinished => f.write_str("the robot is still being disarmed"),
             Self::Replay => f.write_str("the robot is replayed"),
         }

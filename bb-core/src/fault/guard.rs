@@ -57,8 +57,9 @@ pub(crate) fn retire<C>(mut component: C, panicked: bool, close: impl FnOnce(&mu
     closed.and(dropped).err()
 }
 
+/// What a panic says.
 #[cold]
-fn of_panic(panic: Box<dyn Any + Send>) -> Fault {
+pub(crate) fn of_panic(panic: Box<dyn Any + Send>) -> Fault {
     let message = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let message = message.or_else(|| panic.downcast_ref::<String>().cloned());
     // The payload of a panic may itself panic when it is dropped, and so may the payload of that panic, which is leaked.

@@ -4,7 +4,7 @@ use super::{Entry, Event};
 use crate::fault::guarded;
 use crate::time::MonotonicTime;
 use std::fmt;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -20,7 +20,11 @@ const BATCH: usize = 1 << 10;
 /// How often the thread looks.
 const PERIOD: Duration = Duration::from_millis(2);
 
-/// How long outside producers wait for a sink that hangs. Then the journal ends there: it never has a gap.
+/// Lines that wait at most, whoever writes them. Estimators and the control state do not wait for the sink.
+const MOST: usize = 4 * CAPACITY;
+
+/// How long outside producers wait for a sink that is too slow. One that takes no line for so long while [`CAPACITY`] wait
+/// hangs. Then the journal ends there: it never has a gap.
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 /// The writing end. Clones are the same journal.
@@ -31,6 +35,8 @@ struct Inner {
     queue: Mutex<Queue>,
     /// How many lines wait: read without the lock.
     waiting: AtomicUsize,
+    /// How many lines the sink has taken: whether it goes on is seen by it.
+    taken: AtomicU64,
     arrived: Condvar,
     room: Condvar,
     sink: Sink,
@@ -46,8 +52,17 @@ struct Queue {
     is_draining: bool,
     has_begun: bool,
     is_closed: bool,
-    /// The sink hung: no more lines are taken.
-    has_ended: bool,
+    /// While too many lines wait: how many the sink had taken when that was last seen to change, and when.
+    stalled: Option<(u64, Instant)>,
+    /// Why no more lines are taken: the sink hung.
+    ended: Option<Ended>,
+}
+
+/// How a journal ended before the run.
+#[derive(Debug)]
+struct Ended {
+    message: String,
+    is_reported: bool,
 }
 
 impl Journal {
@@ -61,11 +76,13 @@ impl Journal {
             is_draining: false,
             has_begun: false,
             is_closed: false,
-            has_ended: false,
+            stalled: None,
+            ended: None,
         };
         Self(Arc::new(Inner {
             queue: Mutex::new(queue),
             waiting: AtomicUsize::new(0),
+            taken: AtomicU64::new(0),
             arrived: Condvar::new(),
             room: Condvar::new(),
             sink,
@@ -80,10 +97,14 @@ impl Journal {
         queue.has_begun = true;
     }
 
-    /// Writes a line of an entry that sees this offset of the wall clock; its number. Never waits for the sink.
+    /// Writes a line of an entry that sees this offset of the wall clock; its number, or 0 if the journal has ended. Never
+    /// waits for the sink.
     pub(crate) fn write(&self, time: MonotonicTime, wall_offset_nanos: i64, event: Event) -> u64 {
         let mut queue = self.0.lock();
-        if queue.is_closed || queue.has_ended {
+        if queue.lines.len() >= CAPACITY {
+            self.0.judge(&mut queue);
+        }
+        if queue.is_closed || queue.ended.is_some() {
             return 0;
         }
         if queue.wall_offset_nanos != wall_offset_nanos {
@@ -123,6 +144,21 @@ impl Journal {
     pub(crate) fn close(&self) {
         self.0.lock().is_closed = true;
         self.0.arrived.notify_all();
+        self.0.room.notify_all();
+    }
+
+    /// Whether its sink hung, so that it ends before the run.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.0.lock().ended.is_some()
+    }
+
+    /// Looks whether the sink hangs while nobody writes. What is wrong, once; then the journal has ended.
+    pub(crate) fn look(&self) -> Option<String> {
+        let mut queue = self.0.lock();
+        self.0.judge(&mut queue);
+        let ended = queue.ended.as_mut().filter(|ended| !ended.is_reported)?;
+        ended.is_reported = true;
+        Some(ended.message.clone())
     }
 
     /// Waits until the sink has what was written, `longest` at most; false if it does not.
@@ -131,8 +167,8 @@ impl Journal {
         loop {
             self.0.flush();
             let queue = self.0.lock();
-            if queue.lines.is_empty() && !queue.is_draining {
-                return !queue.has_ended;
+            if queue.ended.is_some() || (queue.lines.is_empty() && !queue.is_draining) {
+                return queue.ended.is_none();
             }
             let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
@@ -140,12 +176,6 @@ impl Journal {
             }
             drop(self.0.room.wait_timeout(queue, left));
         }
-    }
-
-    /// Whether the sink hung, so that the journal ended before the run.
-    #[cfg(test)]
-    pub(crate) fn has_ended(&self) -> bool {
-        self.0.lock().has_ended
     }
 }
 
@@ -189,6 +219,8 @@ impl Inner {
                 if let Err(fault) = guarded(|| (self.sink)(line)) {
                     tracing::error!(%fault, "the journal's sink failed");
                 }
+                // One thread at a time is here: a plain store instead of an atomic addition.
+                self.taken.store(self.taken.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
             }
             queue = self.lock();
             queue.spare = lines;
@@ -202,17 +234,43 @@ impl Inner {
     fn wait_for_room(&self) {
         let deadline = Instant::now() + LONGEST_WAIT;
         let mut queue = self.lock();
-        while queue.lines.len() >= CAPACITY && !queue.has_ended && !queue.is_closed {
+        loop {
+            self.judge(&mut queue);
             let left = deadline.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                queue.has_ended = true;
-                let line = queue.next;
-                // A logger may block for as long as the sink does.
-                drop(queue);
-                tracing::error!(line, "the journal's sink hangs: the journal ends here");
-                break;
+            if queue.lines.len() < CAPACITY || queue.ended.is_some() || queue.is_closed || left.is_zero() {
+                return;
             }
             queue = self.room.wait_timeout(queue, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Ends the journal if its sink hangs, or is so slow that too many lines wait. It is reported by [`Journal::look`]: a
+    /// logger may block for as long as the sink does.
+    #[cold]
+    fn judge(&self, queue: &mut Queue) {
+        if queue.ended.is_some() {
+            return;
+        }
+        if queue.lines.len() < CAPACITY {
+            queue.stalled = None;
+            return;
+        }
+        let (taken, now) = (self.taken.load(Ordering::Relaxed), Instant::now());
+        let (_, since) = *queue.stalled.get_or_insert((taken, now));
+        let why = if queue.stalled.is_some_and(|(seen, _)| seen != taken) {
+            queue.stalled = Some((taken, now));
+            None
+        } else if now.duration_since(since) >= LONGEST_WAIT {
+            Some("hangs")
+        } else {
+            None
+        };
+        let why = why.or((queue.lines.len() >= MOST).then_some("is too slow"));
+        if let Some(why) = why {
+            let line = queue.next;
+            let message = format!("its sink {why}, and it ends before line {line}");
+            queue.ended = Some(Ended { message, is_reported: false });
+            self.room.notify_all();
         }
     }
 
@@ -263,8 +321,8 @@ mod tests {
         assert!(matches!(lines[40_002].event, Event::WallClock { offset_nanos: 6 }));
     }
 
-    #[test]
-    fn a_sink_that_hangs_ends_the_journal_without_a_gap() {
+    /// A journal whose sink hangs at the first line, until what is returned beside it is dropped.
+    fn hanging() -> (Journal, std::sync::mpsc::Sender<()>) {
         let (release, hang) = std::sync::mpsc::channel::<()>();
         let hang = Mutex::new(hang);
         let count = Arc::new(AtomicUsize::new(0));
@@ -280,12 +338,57 @@ mod tests {
         while count.load(Ordering::SeqCst) == 0 {
             std::thread::yield_now();
         }
+        (journal, release)
+    }
+
+    /// Writes so many lines; how many were taken.
+    fn fill(journal: &Journal, lines: usize) -> usize {
+        (0..lines).filter(|_| journal.write(MonotonicTime::ZERO, 0, Event::Arm) > 0).count()
+    }
+
+    #[test]
+    fn a_sink_that_hangs_ends_the_journal_without_a_gap() {
+        let (journal, _release) = hanging();
         for _ in 0..=CAPACITY {
             journal.wait_for_room();
             journal.write(MonotonicTime::ZERO, 0, Event::Arm);
         }
-        assert!(journal.has_ended());
+        assert!(journal.look().is_some_and(|message| message.starts_with("its sink hangs")));
+        assert_eq!(journal.look(), None, "it is said once");
         assert_eq!(journal.write(MonotonicTime::ZERO, 0, Event::Stop), 0);
-        drop(release);
+    }
+
+    #[test]
+    fn whoever_writes_the_journal_of_a_sink_that_hangs_ends_and_its_memory_is_bounded() {
+        let (journal, _release) = hanging();
+        // Nobody here waits for room.
+        let written = fill(&journal, 2 * MOST);
+        assert!(written <= MOST, "{written}");
+        assert!(journal.look().is_some_and(|message| message.contains("it ends before line")));
+    }
+
+    #[test]
+    fn a_sink_that_hangs_is_noticed_when_nobody_writes() {
+        let (journal, _release) = hanging();
+        fill(&journal, CAPACITY + 2);
+        let start = Instant::now();
+        while journal.look().is_none() {
+            assert!(start.elapsed() < Duration::from_secs(20));
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert!(start.elapsed() + Duration::from_millis(100) > LONGEST_WAIT);
+    }
+
+    #[test]
+    fn a_sink_that_is_slow_does_not_end_the_journal_as_long_as_it_goes_on() {
+        let (journal, release) = hanging();
+        fill(&journal, CAPACITY + BATCH);
+        assert!(journal.0.lock().lines.len() >= CAPACITY);
+        let start = Instant::now();
+        while start.elapsed() < LONGEST_WAIT + Duration::from_secs(1) {
+            release.send(()).expect("the sink is there");
+            std::thread::sleep(Duration::from_millis(100));
+            assert_eq!(journal.look(), None);
+        }
     }
 }

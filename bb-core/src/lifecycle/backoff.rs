@@ -14,11 +14,16 @@ pub struct Supervision {
     pub max_restarts: usize,
     /// See [`Self::max_restarts`]. Default: 5 s.
     pub within: Duration,
-    /// How long the first restart of a component waits; each further one in a row twice as long. Default: 10 ms.
+    /// How long the first restart of a component waits, 100 µs at least; each further one in a row twice as long. Default:
+    /// 10 ms.
     pub first_backoff: Duration,
     /// The longest wait. Default: 1 s.
     pub longest_backoff: Duration,
 }
+
+/// The shortest wait, so that time goes on between: on virtual time, a component that fails again and again would keep it from
+/// doing so.
+const SHORTEST: Duration = Duration::from_micros(100);
 
 impl Default for Supervision {
     fn default() -> Self {
@@ -35,7 +40,7 @@ impl Supervision {
     /// How long restart number `attempt` in a row waits, from 0.
     fn backoff(&self, attempt: u32) -> Duration {
         let factor = 1_u32.checked_shl(attempt).unwrap_or(u32::MAX);
-        self.first_backoff.saturating_mul(factor).min(self.longest_backoff)
+        self.first_backoff.saturating_mul(factor).min(self.longest_backoff).max(SHORTEST)
     }
 }
 
@@ -78,5 +83,7 @@ mod tests {
         now = now + Duration::from_secs(6);
         assert_eq!(failures.add(now, &supervision).duration_since(now).as_millis(), 10);
         assert_eq!(supervision.backoff(200), Duration::from_secs(1));
+        let zero = Supervision { first_backoff: Duration::ZERO, longest_backoff: Duration::ZERO, ..supervision };
+        assert_eq!([zero.backoff(0), zero.backoff(9)], [SHORTEST; 2]);
     }
 }

@@ -9,18 +9,21 @@ use crate::time::MonotonicTime;
 
 /// What a component is made of, at the start and at every restart.
 pub(crate) struct Recipe<O> {
-    pub(crate) options: O,
-    pub(crate) binding: Binding<O>,
+    /// An error if they could not be copied, which keeps the robot from starting.
+    options: Result<O, String>,
+    binding: Binding<O>,
 }
 
 impl<O: Options> Recipe<O> {
     pub(crate) fn new(options: &O, binding: Binding<O>) -> Self {
-        Self { options: options.clone(), binding }
+        let options = caught(|| Ok(options.clone())).map_err(|failed| failed.fault.to_string());
+        Self { options, binding }
     }
 
     /// The options with the values of parameters, validated.
-    pub(crate) fn bound(&self, parameters: &ParameterValues) -> Result<O, Fault> {
-        self.binding.bound(&self.options, parameters).map_err(Fault::new)
+    fn bound(&self, parameters: &ParameterValues) -> Result<O, Fault> {
+        let options = self.options.as_ref().map_err(|message| Fault::new(message.clone()))?;
+        self.binding.bound(options, parameters).map_err(Fault::new)
     }
 }
 

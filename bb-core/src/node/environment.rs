@@ -2,14 +2,14 @@
 
 use super::entry::Report;
 use super::shared::SharedNode;
-use crate::component::{Binding, Guardian, Options};
+use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
 use crate::fault::Fault;
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
 use crate::message::{Origin, Payload, Stamped};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
-use crate::schedule::{Agenda, Door, Pool};
+use crate::schedule::{Agenda, Door, Lane, Pool};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use std::collections::{HashMap, VecDeque};
@@ -21,6 +21,8 @@ use std::time::Instant;
 /// The robot as its estimators see it: the control state takes note of what they report, without waiting for anything.
 pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
+    /// The code of an output of that estimator has panicked where it was handed on.
+    fn output_failed(&self, declared: &'static EstimatorDeclaration, message: String);
     /// Takes note that the options of the component at `path` are bound to these parameters. `estimator` is told of new
     /// values by entries, others by what they registered.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
@@ -44,6 +46,9 @@ pub(crate) enum BindTarget {
     /// Nobody: a command takes its options when it starts.
     Nobody,
 }
+
+/// Drains the island of that number.
+type Drain = Box<dyn Fn(&Environment, usize) + Send + Sync>;
 
 /// How a robot runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,9 +87,9 @@ struct Inner {
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
     /// One bit, by which a thread knows which robots' islands it is inside.
-    bit: u64,
+    bit: RobotBit,
     /// Drains an island, once the robot is wired.
-    drain: OnceLock<Box<dyn Fn(usize) + Send + Sync>>,
+    drain: OnceLock<Drain>,
     /// Islands with entries that wait, on virtual time.
     posted: Mutex<VecDeque<usize>>,
     refusal: Mutex<Option<Refusal>>,
@@ -98,6 +103,34 @@ struct Inner {
     replayed: ReplayedOutputs,
     /// Islands whose estimators have stopped.
     retired: (Mutex<usize>, Condvar),
+}
+
+/// The bit of a robot: one that no other robot of the process has, as long as there are fewer than 64 of them. Those beyond share
+/// the last one.
+#[derive(Debug)]
+struct RobotBit(u64);
+
+/// The bits that robots have, but the last.
+static TAKEN: AtomicU64 = AtomicU64::new(SHARED_BIT);
+const SHARED_BIT: u64 = 1 << 63;
+
+impl RobotBit {
+    fn take() -> Self {
+        let free = |taken: u64| !taken & taken.wrapping_add(1);
+        let before = TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |taken| match free(taken) {
+            0 => None,
+            free => Some(taken | free),
+        });
+        Self(before.map_or(SHARED_BIT, free))
+    }
+}
+
+impl Drop for RobotBit {
+    fn drop(&mut self) {
+        if self.0 != SHARED_BIT {
+            TAKEN.fetch_and(!self.0, Ordering::Relaxed);
+        }
+    }
 }
 
 /// Outputs of islands in a replay: publisher and checksum, in order.
@@ -131,7 +164,6 @@ pub(crate) struct EnvironmentParts {
 
 impl Environment {
     pub(crate) fn new(parts: EnvironmentParts, nodes: Box<[SharedNode]>) -> Self {
-        static ROBOTS: AtomicU64 = AtomicU64::new(0);
         let EnvironmentParts {
             mode,
             clock,
@@ -157,7 +189,7 @@ impl Environment {
             journal,
             telemetry,
             start,
-            bit: 1 << (ROBOTS.fetch_add(1, Ordering::Relaxed) % 64),
+            bit: RobotBit::take(),
             drain: OnceLock::new(),
             posted: Mutex::default(),
             refusal: Mutex::default(),
@@ -192,6 +224,11 @@ impl Environment {
         })
     }
 
+    /// Keeps the robot from starting, unless another component does so already.
+    pub(crate) fn refuse(&self, path: &'static str, fault: Fault) {
+        lock(&self.0.refusal).get_or_insert(Refusal { path, fault });
+    }
+
     /// What kept the robot from starting, if anything did.
     pub(crate) fn take_refusal(&self) -> Option<Refusal> {
         lock(&self.0.refusal).take()
@@ -207,12 +244,11 @@ impl Environment {
         target: BindTarget,
     ) {
         if !binding.parameters.is_empty() {
-            // Options may be sent, and need not be shared.
-            let options = Mutex::new(options.clone());
-            let check = move |values: &ParameterValues| {
-                let options = lock(&options).clone();
-                binding.bound(&options, values).map(drop)
+            let template = match Template::new(options) {
+                Ok(template) => template,
+                Err(fault) => return self.refuse(path, fault),
             };
+            let check = move |values: &ParameterValues| template.bound(&binding, values).map(drop);
             self.0.overseer.bind(path, binding.parameters, Box::new(check), target);
         }
     }
@@ -237,7 +273,7 @@ impl Environment {
     }
 
     /// Says how an island is drained, once the robot is wired.
-    pub(crate) fn set_drain(&self, drain: impl Fn(usize) + Send + Sync + 'static) {
+    pub(crate) fn set_drain(&self, drain: impl Fn(&Self, usize) + Send + Sync + 'static) {
         // It is set once.
         let _ = self.0.drain.set(Box::new(drain));
     }
@@ -247,7 +283,7 @@ impl Environment {
         match self.0.mode {
             Mode::Real => {
                 let environment = self.clone();
-                self.0.pool.submit(move || environment.drain(island));
+                self.0.pool.submit(Lane::Robot, move || environment.drain(island));
             }
             Mode::Virtual => lock(&self.0.posted).push_back(island),
             Mode::Replay => {}
@@ -256,7 +292,7 @@ impl Environment {
 
     pub(crate) fn drain(&self, island: usize) {
         if let Some(drain) = self.0.drain.get() {
-            drain(island);
+            drain(self, island);
         }
     }
 
@@ -341,7 +377,7 @@ impl Environment {
 
     #[inline]
     pub(crate) fn bit(&self) -> u64 {
-        self.0.bit
+        self.0.bit.0
     }
 
     #[inline]

@@ -117,7 +117,10 @@ impl<E: Estimator> Node<E> {
     ) -> Self {
         let shared = environment.node(number);
         let declaration = shared.declaration();
-        environment.add_fact(format!("options of {}: {options:?}", declaration.path));
+        match caught(|| Ok(format!("options of {}: {options:?}", declaration.path))) {
+            Ok(fact) => environment.add_fact(fact),
+            Err(failed) => environment.refuse(declaration.path, failed.fault),
+        }
         environment.bind(declaration.path, options, binding, BindTarget::Estimator(number));
         let mut node = Self {
             declaration,

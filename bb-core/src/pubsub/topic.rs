@@ -91,12 +91,22 @@ impl<T: Payload> Topic<T> {
             return line;
         }
         let mut wakers = Wakers::default();
-        let order = self.order.lock().unwrap_or_else(PoisonError::into_inner);
-        let line = write();
-        self.publish_deferred(message, &mut wakers);
-        drop(order);
-        wakers.run();
-        line
+        // Copies are made before: the payload's `clone` is user code, and another publisher must not wait for it.
+        let mut copies = self.copies(message);
+        loop {
+            let order = self.order.lock().unwrap_or_else(PoisonError::into_inner);
+            if !self.has_still(&copies.listeners) {
+                drop(order);
+                copies = self.copies(message);
+                continue;
+            }
+            let line = write();
+            self.published.fetch_add(1, Ordering::Relaxed);
+            self.enqueue(copies, &mut wakers);
+            drop(order);
+            wakers.run();
+            return line;
+        }
     }
 
     /// Only enqueues `message`: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's
@@ -125,32 +135,78 @@ impl<T: Payload> Topic<T> {
 
     #[cold]
     fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) {
-        let (queues, taps) = {
-            let mut subscribers = lock(&self.subscribers);
-            if subscribers.taps.iter().any(|tap| tap.is_abandoned()) {
-                subscribers.taps =
-                    subscribers.taps.iter().filter(|tap| !tap.is_abandoned()).map(Arc::clone).collect();
-            }
-            // Subscriptions that were dropped have left the list by themselves; here the count follows it.
-            self.listening.store(subscribers.count(), Ordering::Release);
-            (Arc::clone(&subscribers.queues), Arc::clone(&subscribers.taps))
-        };
+        let Listeners { queues, taps } = self.listeners();
         let bytes = counted_bytes(message);
-        let mut lost = 0;
-        for queue in queues.iter() {
-            lost += queue.push(message.clone(), bytes, wakers);
+        let typed: u64 = queues.iter().map(|queue| queue.push(message.clone(), bytes, wakers)).sum();
+        let untyped = match &*taps {
+            [] => 0,
+            taps => tap_all(taps, DynamicMessage::new(self.path, message), bytes, wakers),
+        };
+        self.count_lost(typed + untyped);
+    }
+
+    /// Those who listen now.
+    fn listeners(&self) -> Listeners<T> {
+        let mut subscribers = lock(&self.subscribers);
+        if subscribers.taps.iter().any(|tap| tap.is_abandoned()) {
+            subscribers.taps = subscribers.taps.iter().filter(|tap| !tap.is_abandoned()).map(Arc::clone).collect();
         }
-        if let Some((last, others)) = taps.split_last() {
-            let message = DynamicMessage::new(self.path, message);
-            for tap in others {
-                lost += tap.push(message.clone(), bytes, wakers);
-            }
-            lost += last.push(message, bytes, wakers);
+        // Subscriptions that were dropped have left the list by themselves; here the count follows it.
+        self.listening.store(subscribers.count(), Ordering::Release);
+        Listeners { queues: Arc::clone(&subscribers.queues), taps: Arc::clone(&subscribers.taps) }
+    }
+
+    fn has_still(&self, listeners: &Listeners<T>) -> bool {
+        let subscribers = lock(&self.subscribers);
+        Arc::ptr_eq(&listeners.queues, &subscribers.queues) && Arc::ptr_eq(&listeners.taps, &subscribers.taps)
+    }
+
+    fn copies(&self, message: &Stamped<T>) -> Copies<T> {
+        let listeners = self.listeners();
+        let mut typed = listeners.queues.iter().map(|_| message.clone());
+        let (first, more) = (typed.next(), typed.collect());
+        let untyped = (!listeners.taps.is_empty()).then(|| DynamicMessage::new(self.path, message));
+        Copies { bytes: counted_bytes(message), first, more, untyped, listeners }
+    }
+
+    /// Hands out copies; no code of the payload runs.
+    fn enqueue(&self, copies: Copies<T>, wakers: &mut Wakers) {
+        let Copies { listeners, first, more, untyped, bytes } = copies;
+        let typed = listeners.queues.iter().zip(first.into_iter().chain(more));
+        let mut lost: u64 = typed.map(|(queue, message)| queue.push(message, bytes, wakers)).sum();
+        if let Some(message) = untyped {
+            lost += tap_all(&listeners.taps, message, bytes, wakers);
         }
+        self.count_lost(lost);
+    }
+
+    fn count_lost(&self, lost: u64) {
         if lost > 0 {
             self.lost.fetch_add(lost, Ordering::Relaxed);
         }
     }
+}
+
+/// Those who listen at one time.
+struct Listeners<T> {
+    queues: Arc<[Arc<Queue<Stamped<T>>>]>,
+    taps: Arc<[Arc<Queue<DynamicMessage>>]>,
+}
+
+/// A message for each of them.
+struct Copies<T> {
+    listeners: Listeners<T>,
+    /// One subscriber alone needs no allocation.
+    first: Option<Stamped<T>>,
+    more: Vec<Stamped<T>>,
+    untyped: Option<DynamicMessage>,
+    bytes: usize,
+}
+
+fn tap_all(taps: &[Arc<Queue<DynamicMessage>>], message: DynamicMessage, bytes: usize, wakers: &mut Wakers) -> u64 {
+    let Some((last, others)) = taps.split_last() else { return 0 };
+    let lost: u64 = others.iter().map(|tap| tap.push(message.clone(), bytes, wakers)).sum();
+    lost + last.push(message, bytes, wakers)
 }
 
 impl<T> Drop for Topic<T> {

@@ -55,6 +55,13 @@ impl Wakers {
         drop(self);
     }
 
+    /// The wakers one by one, for those who wake each on its own; the messages are dropped here.
+    pub(crate) fn into_wakers(mut self) -> impl Iterator<Item = Waker> {
+        self.evicted.drain(..).for_each(discard);
+        let (first, more) = (std::mem::take(&mut self.first), std::mem::take(&mut self.more));
+        first.into_iter().flatten().chain(more)
+    }
+
     fn run_all(&mut self) {
         self.first.iter_mut().filter_map(Option::take).chain(self.more.drain(..)).for_each(wake);
         self.evicted.drain(..).for_each(discard);

@@ -1,5 +1,9 @@
 //! A running actuator: whether it may move, and what becomes of it when it fails.
 
+mod held;
+
+use self::held::Held;
+use super::occupied::Occupied;
 use super::source::Assembly;
 use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Permit};
 use crate::control::{ComponentOrder, Control};
@@ -11,6 +15,7 @@ use crate::lifecycle::{AfterFault, AsActuator, Recipe, Slot};
 use crate::message::{Finite, Frame, Payload, Stamp};
 use crate::node::{BindTarget, Environment, Mode};
 use crate::pubsub::{AnyTopic, DynamicMessage, Topic, Wakers};
+use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
@@ -31,6 +36,8 @@ struct Inner<A: Actuator> {
     topic: Topic<A::Command>,
     /// What its supervisor and parameters tell it.
     orders: Mutex<Vec<Order>>,
+    /// When its code was entered.
+    occupied: Occupied,
     /// Held while its code runs: nothing that must not wait for user code takes it.
     state: Mutex<State<A>>,
 }
@@ -39,6 +46,15 @@ struct State<A: Actuator> {
     slot: Slot<AsActuator<A>>,
     /// It has failed, and could not be made safe then.
     is_unsafe: bool,
+    /// On virtual time: what the control state is to be told once the lock is released. Loggers, handlers of telemetry and
+    /// subscribers are told of it on this thread, and may disarm the robot, which takes the lock.
+    told: Vec<Told>,
+}
+
+/// What the control state is told.
+enum Told {
+    Failed { message: String, panicked: bool },
+    Unsafe(String),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +94,8 @@ impl<A: Actuator> ActuatorNode<A> {
             control,
             topic: Topic::new(declaration.path),
             orders: Mutex::default(),
-            state: Mutex::new(State { slot, is_unsafe: false }),
+            occupied: Occupied::new(),
+            state: Mutex::new(State { slot, is_unsafe: false, told: Vec::new() }),
         });
         // Weak, since the control state that keeps these is kept by the actuator.
         let told = Arc::downgrade(&inner);
@@ -123,16 +140,38 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
             journal.wait_for_room();
         }
         let mut wakers = Wakers::default();
-        let done = self.carry_out(command, permit, &mut wakers);
+        let done = self.alone(|state| self.carry_out(state, command, permit, &mut wakers));
         wakers.run();
-        done
+        done.unwrap_or(Err(ActuatorError::Inside))
     }
 }
 
 impl<A: Actuator> Inner<A> {
-    fn carry_out(&self, command: A::Command, permit: &Permit, wakers: &mut Wakers) -> Result<(), ActuatorError> {
+    /// Runs `run` while no other code of the actuator runs; none if it was called by code of the actuator itself, which would
+    /// wait for itself.
+    fn alone<T>(&self, run: impl FnOnce(&mut State<A>) -> T) -> Option<T> {
+        let held = Held::new(std::ptr::from_ref(self).addr())?;
         let mut state = lock(&self.state);
-        self.obey(&mut state);
+        let result = {
+            // Disarming would wait for this as well.
+            let _within = self.control.enter_actuator();
+            run(&mut state)
+        };
+        let told = std::mem::take(&mut state.told);
+        drop(state);
+        drop(held);
+        told.into_iter().for_each(|told| self.tell_now(told));
+        Some(result)
+    }
+
+    fn carry_out(
+        &self,
+        state: &mut State<A>,
+        command: A::Command,
+        permit: &Permit,
+        wakers: &mut Wakers,
+    ) -> Result<(), ActuatorError> {
+        self.obey(state);
         // Under the lock that disarming takes as well: nothing moves once that has returned.
         let safety = self.control.safety_now();
         if safety != Safety::Armed {
@@ -143,7 +182,7 @@ impl<A: Actuator> Inner<A> {
         }
         let clock = self.environment.clock();
         let now = clock.now();
-        self.restart_if_due(&mut state, now);
+        self.restart_if_due(state, now);
         let Some(AsActuator(actuator)) = state.slot.running() else { return Err(ActuatorError::Stopped) };
         let stamp = Stamp {
             monotonic_time: now,
@@ -152,9 +191,13 @@ impl<A: Actuator> Inner<A> {
             origin: self.environment.origin(),
         };
         let message = stamp.message(command);
-        if let Err(failed) = caught(|| actuator.handle_command(&message)) {
+        let handled = {
+            let _entered = self.occupied.enter(clock);
+            caught(|| actuator.handle_command(&message))
+        };
+        if let Err(failed) = handled {
             let text = failed.fault.to_string();
-            self.fail(&mut state, &failed, now);
+            self.fail(state, &failed, now);
             return Err(ActuatorError::Failed(text));
         }
         if let Some(journal) = self.environment.journal() {
@@ -170,14 +213,18 @@ impl<A: Actuator> Inner<A> {
     fn tell(this: &Weak<Self>, order: Order) {
         let Some(inner) = this.upgrade() else { return };
         let mut orders = lock(&inner.orders);
-        if !orders.contains(&order) {
-            orders.push(order);
+        if orders.contains(&order) {
+            // It waits for the actuator's code already.
+            return;
         }
+        orders.push(order);
         drop(orders);
         match inner.environment.mode() {
             Mode::Real => {
                 let pool = inner.environment.pool().clone();
-                pool.submit(move || inner.obey(&mut lock(&inner.state)));
+                pool.submit(Lane::Robot, move || {
+                    inner.alone(|state| inner.obey(state));
+                });
             }
             Mode::Virtual => {
                 let now = inner.environment.clock().now();
@@ -194,9 +241,13 @@ impl<A: Actuator> Inner<A> {
             match order {
                 Order::Options => {
                     let parameters = self.control.parameters();
-                    match self.control.replacing_hooks(self.declaration.path, false, || {
-                        state.slot.change(&self.context, &parameters)
-                    }) {
+                    let changed = {
+                        let _entered = self.occupied.enter(self.environment.clock());
+                        self.control.replacing_hooks(self.declaration.path, false, || {
+                            state.slot.change(&self.context, &parameters)
+                        })
+                    };
+                    match changed {
                         Ok(true) => {}
                         Ok(false) => self.remake(state, now),
                         Err(failed) => self.fail(state, &failed, now),
@@ -218,7 +269,11 @@ impl<A: Actuator> Inner<A> {
     fn make(&self, state: &mut State<A>, now: MonotonicTime) {
         let parameters = self.control.parameters();
         let (path, slot) = (self.declaration.path, &mut state.slot);
-        match self.control.replacing_hooks(path, true, || slot.make(&self.context, &parameters)) {
+        let made = {
+            let _entered = self.occupied.enter(self.environment.clock());
+            self.control.replacing_hooks(path, true, || slot.make(&self.context, &parameters))
+        };
+        match made {
             Ok(()) => {
                 // A logger may block, and disarming needs the lock that is held here.
                 let path = self.declaration.path;
@@ -231,7 +286,7 @@ impl<A: Actuator> Inner<A> {
 
     fn log(&self, write: impl FnOnce() + Send + 'static) {
         match self.environment.mode() {
-            Mode::Real => self.environment.pool().submit(write),
+            Mode::Real => self.environment.pool().submit(Lane::Wakers, write),
             Mode::Virtual | Mode::Replay => write(),
         }
     }
@@ -248,13 +303,30 @@ impl<A: Actuator> Inner<A> {
         if let Err(failed) = caught(|| actuator.disarm()) {
             state.is_unsafe = true;
             let message = format!("it has failed and could not be made safe: {}", failed.fault);
-            self.control.note_hardware_error(self.declaration.path, message);
+            self.tell_control(state, Told::Unsafe(message));
+        }
+    }
+
+    fn tell_control(&self, state: &mut State<A>, told: Told) {
+        match self.environment.mode() {
+            Mode::Real => self.tell_now(told),
+            Mode::Virtual | Mode::Replay => state.told.push(told),
+        }
+    }
+
+    fn tell_now(&self, told: Told) {
+        let ActuatorDeclaration { path, supervisor, .. } = *self.declaration;
+        match told {
+            Told::Failed { message, panicked } => {
+                self.control.component_failed(path, supervisor, message, panicked)
+            }
+            Told::Unsafe(message) => self.control.note_hardware_error(path, message),
         }
     }
 
     fn fail(&self, state: &mut State<A>, failed: &Failed, now: MonotonicTime) {
-        let ActuatorDeclaration { path, supervisor, .. } = *self.declaration;
-        self.control.component_failed(path, supervisor, failed.fault.to_string(), failed.panicked);
+        let message = failed.fault.to_string();
+        self.tell_control(state, Told::Failed { message, panicked: failed.panicked });
         self.make_safe(state);
         if let AfterFault::RestartAt(at) = state.slot.fail(failed, now) {
             self.control.wake_at(at, Waker::from(Arc::new(Due(Weak::clone(&self.this)))));
@@ -263,14 +335,16 @@ impl<A: Actuator> Inner<A> {
 
     /// The disarm callback.
     fn disarm(&self) -> Result<(), Fault> {
-        let mut state = lock(&self.state);
-        if let Some(AsActuator(actuator)) = state.slot.running() {
-            return actuator.disarm();
-        }
-        if state.is_unsafe {
-            return Err(Fault::new("it has failed, could not be made safe then, and cannot be reached"));
-        }
-        Ok(())
+        let disarmed = self.alone(|state| {
+            if let Some(AsActuator(actuator)) = state.slot.running() {
+                return actuator.disarm();
+            }
+            if state.is_unsafe {
+                return Err(Fault::new("it has failed, could not be made safe then, and cannot be reached"));
+            }
+            Ok(())
+        });
+        disarmed.unwrap_or_else(|| Err(Fault::new("its own code cannot wait for it to be disarmed")))
     }
 }
 
@@ -280,9 +354,10 @@ struct Due<A: Actuator>(Weak<Inner<A>>);
 impl<A: Actuator> Wake for Due<A> {
     fn wake(self: Arc<Self>) {
         if let Some(inner) = self.0.upgrade() {
-            let mut state = lock(&inner.state);
-            inner.obey(&mut state);
-            inner.restart_if_due(&mut state, inner.environment.clock().now());
+            inner.alone(|state| {
+                inner.obey(state);
+                inner.restart_if_due(state, inner.environment.clock().now());
+            });
         }
     }
 }
@@ -304,6 +379,9 @@ pub trait AnyActuator {
     /// Stops it once it is free; false if it is still busy after `timeout`.
     #[doc(hidden)]
     fn terminate(&self, timeout: Duration) -> bool;
+    /// When its code was entered, if a thread is inside.
+    #[doc(hidden)]
+    fn entered_at(&self) -> Option<MonotonicTime>;
 }
 
 impl<A: Actuator> AnyActuator for ActuatorNode<A> {
@@ -330,13 +408,20 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
 
     fn terminate(&self, timeout: Duration) -> bool {
         let Some(mut state) = lock_within(&self.0.state, timeout) else { return false };
-        let fault = state.slot.retire();
+        let fault = {
+            let _entered = self.0.occupied.enter(self.0.environment.clock());
+            state.slot.retire()
+        };
         state.slot.stop();
         drop(state);
         if let Some(fault) = fault {
             self.0.control.note_fault(self.0.declaration.path, fault.to_string());
         }
         true
+    }
+
+    fn entered_at(&self) -> Option<MonotonicTime> {
+        self.0.occupied.entered_at()
     }
 }
 

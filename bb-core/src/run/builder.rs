@@ -11,10 +11,11 @@ use crate::component::{Fault, Host};
 use crate::control::{Control, Declared, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterType, ParameterValues};
 use crate::event::ParameterValue;
+use crate::fault::caught;
 use crate::journal::{Entry, Event, Journal, Sink};
 use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
-use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
+use crate::node::{Environment, EnvironmentParts, Mode, SharedNode, contained};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
 use crate::schedule::Agenda;
 use crate::telemetry::{Telemetry, TelemetryEvent};
@@ -222,10 +223,14 @@ impl<R: Robot> Builder<R> {
         control.set_host(&host);
         control.set_islands(Box::new(WiredIslands::<R>(Arc::clone(&place))));
         let drained = Arc::clone(&place);
-        environment.set_drain(move |island| {
+        environment.set_drain(move |environment, island| {
             let wiring: Option<Arc<R::Wiring>> = drained.get().and_then(std::sync::Weak::upgrade);
             if let (Some(wiring), Some(find)) = (wiring, R::ISLANDS.get(island)) {
-                find(&wiring).drain(&wiring);
+                let island = find(&wiring);
+                // Nobody's that is known: that of a payload in an inbox, say.
+                if let Err(failed) = contained(environment, || island.drain(&wiring)) {
+                    tracing::error!(fault = %failed.fault, "an island was left");
+                }
             }
         });
         let mut facts = describe::<R>(&self.topics, &control);
@@ -235,25 +240,34 @@ impl<R: Robot> Builder<R> {
             control: control.clone(),
             host: HostHandle(Arc::clone(&host)),
         };
-        let wiring = Arc::new(R::wire(self.topics, &self.options, &assembly));
-        // It is set once.
-        let _ = place.set(Arc::downgrade(&wiring));
-        let is_replay = mode == Mode::Replay;
-        let sources = if is_replay { Vec::new() } else { R::sources(&wiring, &self.options, &assembly) };
-        if let Some(refusal) = environment.take_refusal() {
-            // What the others have started in `init` is made safe.
+        // What the others have started in `init` is made safe.
+        let abandon = |path, fault| {
             control.begin_stop();
             control.wait_until_disarmed();
             control.forget_all_hooks();
             control.pool().close();
-            return Err(StartError::component(refusal.path, refusal.fault));
+            StartError::component(path, fault)
+        };
+        let (topics, options) = (self.topics, &self.options);
+        let is_replay = mode == Mode::Replay;
+        let wired = caught(|| {
+            let wiring = Arc::new(R::wire(topics, options, &assembly));
+            // It is set once.
+            let _ = place.set(Arc::downgrade(&wiring));
+            let sources = if is_replay { Vec::new() } else { R::sources(&wiring, options, &assembly) };
+            Ok((wiring, sources))
+        });
+        if let Some(refusal) = environment.take_refusal() {
+            return Err(abandon(refusal.path, refusal.fault));
         }
+        // Each component's code is guarded on its own, with its path; this is for what no one has thought of.
+        let (wiring, sources) = wired.map_err(|failed| abandon(R::NAME, failed.fault))?;
         if let Some(journal) = &journal {
             let declaration = facts.iter().cloned().chain(environment.facts()).collect();
             let begin = Event::Begin { declaration, wall_offset_nanos, is_virtual: mode == Mode::Virtual };
             journal.begin(start, begin);
             if mode == Mode::Real {
-                journal.start().map_err(|error| StartError::component("journal", Fault::from(error)))?;
+                journal.start().map_err(|error| abandon("journal", Fault::from(error)))?;
             }
         }
         for fact in facts {

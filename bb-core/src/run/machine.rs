@@ -8,9 +8,11 @@ use crate::component::{Actuator, Bus, Command, Fault, HandleCall, HandleCast, Ho
 use crate::control::{Control, Execution, Summary};
 use crate::declaration::{ParameterError, ParameterType};
 use crate::event::{ComponentFault, Refusal};
-use crate::journal::RequestKind;
+use crate::journal::{Journal, RequestKind};
 use crate::message::Stamp;
-use crate::node::{AnyIsland, CallError, Environment, Node, NodeEntry, Replayed, Turn, know_calls, know_casts};
+use crate::node::{
+    AnyIsland, CallError, Environment, Node, NodeEntry, Replayed, Turn, contained_outside, know_calls, know_casts,
+};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::MonotonicTime;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,6 +30,10 @@ pub(super) struct Machine<R: Robot> {
     /// What it had done when it ended.
     pub(super) last_report: OnceLock<Report>,
 }
+
+/// How long the journal's sink may take for the last lines, and how long at least, whatever else has used up the time.
+const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
+const LEAST_WAIT: Duration = Duration::from_millis(200);
 
 /// One-way requests that may wait for an estimator; one more is refused.
 const MOST_CASTS: u32 = 1024;
@@ -65,7 +71,8 @@ impl<R: Robot> Machine<R> {
             origin: self.environment.origin(),
             ..Stamp::default()
         };
-        sensor.publish(&self.wiring, stamp, payload, clock.now());
+        let publish = || sensor.publish(&self.wiring, stamp, payload, clock.now());
+        contained_outside(&self.environment, publish);
     }
 
     pub(super) fn call<V: Visitable<R>, Q>(
@@ -90,7 +97,7 @@ impl<R: Robot> Machine<R> {
         let now = self.environment.clock().now();
         let number = estimator.number();
         let visit = Visit { estimator: number, request: recorded, call: &mut call, error: &mut error };
-        estimator.visit(&self.wiring, now, visit);
+        contained_outside(&self.environment, || estimator.visit(&self.wiring, now, visit));
         let path = self.environment.node(estimator.number()).declaration().path;
         response.unwrap_or_else(|| {
             Err(Fault::new(match error {
@@ -231,8 +238,8 @@ impl<R: Robot> Machine<R> {
     }
 
     /// Ends the journal after the last entry of the control state, tells subscribers that no more will come, and makes the
-    /// last report.
-    pub(super) fn end(&self) {
+    /// last report. The journal's sink may take until `deadline` for the last lines.
+    pub(super) fn end(&self, deadline: Instant) {
         let summary = self.control.end(|summary| {
             if let Some(journal) = self.environment.journal() {
                 journal.close();
@@ -245,10 +252,8 @@ impl<R: Robot> Machine<R> {
             }
         }
         let mut report = self.report_of(summary);
-        if let Some(journal) = self.environment.journal()
-            && !journal.hand_over(Duration::from_secs(1))
-        {
-            report.add_fault(self.fault("journal", "its sink hung, and it ends before the run".to_owned()));
+        if let Some(message) = self.environment.journal().and_then(|journal| hand_over(journal, deadline)) {
+            report.add_fault(self.fault("journal", message));
         }
         // It is set once.
         let _ = self.last_report.set(report);
@@ -260,11 +265,14 @@ impl<R: Robot> Machine<R> {
         self.control.pool().close();
     }
 
-    /// On virtual time, after something was done from outside: hands lines of the journal to its sink.
+    /// On virtual time, after something was done from outside: runs disarm callbacks that an actuator's own code has left, and
+    /// hands lines of the journal to its sink.
     pub(super) fn settle(&self) {
-        if self.control.is_virtual()
-            && let Some(journal) = self.environment.journal()
-        {
+        if !self.control.is_virtual() {
+            return;
+        }
+        while self.control.run_pending_hooks() {}
+        if let Some(journal) = self.environment.journal() {
             journal.flush();
         }
     }
@@ -301,4 +309,12 @@ impl<R: Robot> Machine<R> {
         self.control.note_fault(path, message.clone());
         ComponentFault { path, message }
     }
+}
+
+/// Waits until the journal's sink has the last lines; what is wrong if it does not take them, unless that was said before.
+fn hand_over(journal: &Journal, deadline: Instant) -> Option<String> {
+    let longest = HAND_OVER_WITHIN.min(deadline.saturating_duration_since(Instant::now())).max(LEAST_WAIT);
+    let in_time = journal.hand_over(longest);
+    let late = || "its sink did not take the last lines in time: it ends before the run".to_owned();
+    journal.look().or_else(|| (!in_time && !journal.has_ended()).then(late))
 }

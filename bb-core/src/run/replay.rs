@@ -105,7 +105,7 @@ impl<R: Robot> Replay<R> {
             machine.control.disarmed(Vec::new());
         }
         self.retire();
-        machine.end();
+        machine.end(std::time::Instant::now());
         self.live.report()
     }
 

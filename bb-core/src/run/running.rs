@@ -22,6 +22,12 @@ pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 /// How long it may take at least, once disarm callbacks have used up their time.
 const GRACE: Duration = Duration::from_millis(500);
 
+/// Within this time after the call, whatever hangs, the robot has stopped: all above, and the last lines of the journal.
+const BACK_WITHIN: Duration = Duration::from_millis(5800);
+
+/// How long loggers may take for the last lines: a program that ends after `stop` does not say otherwise what was not safe.
+const LINES_WITHIN: Duration = Duration::from_millis(150);
+
 impl<R: Robot> Running<R> {
     pub(super) fn start(machine: Machine<R>, sources: Vec<Box<dyn Source>>) -> Result<Self, StartError> {
         let mut running = Self { live: Live(Arc::new(machine)), sources: Vec::new() };
@@ -86,7 +92,8 @@ impl<R: Robot> Running<R> {
         }
         machine.terminate_actuators(deadline);
         machine.close_door(deadline);
-        machine.end();
+        machine.end(start + BACK_WITHIN);
+        machine.control.wait_for_lines(LINES_WITHIN);
     }
 }
 

@@ -171,6 +171,9 @@ impl<R: Robot> Simulation<R> {
         if machine.control.take_orders() {
             self.obey();
         }
+        if self.live.0.control.stop_signal().is_set() {
+            self.stop_sources();
+        }
         self.live.0.settle();
     }
 
@@ -184,6 +187,13 @@ impl<R: Robot> Simulation<R> {
         self.due = due.collect();
     }
 
+    fn stop_sources(&mut self) {
+        self.due.clear();
+        for mut source in self.sources.drain(..) {
+            source.terminate();
+        }
+    }
+
     fn shut_down(&mut self) {
         let machine = Arc::clone(&self.live.0);
         if machine.has_ended.load(Ordering::Acquire) {
@@ -192,16 +202,13 @@ impl<R: Robot> Simulation<R> {
         self.catch_up();
         machine.control.begin_stop();
         machine.control.stop_signal().set();
-        self.due.clear();
-        for mut source in self.sources.drain(..) {
-            source.terminate();
-        }
+        self.stop_sources();
         machine.close_door(std::time::Instant::now() + super::running::STOP_WITHIN);
         // One thread runs all of this, so that nothing can be busy elsewhere.
         machine.retire_quietly();
         machine.terminate_actuators(std::time::Instant::now());
         machine.settle();
-        machine.end();
+        machine.end(std::time::Instant::now() + super::running::STOP_WITHIN);
     }
 }
 

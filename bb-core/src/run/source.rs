@@ -2,16 +2,17 @@
 //! of what it gives, and of itself when it fails.
 
 use super::Robot;
+use super::occupied::{Entered, Occupied};
 use crate::component::{Binding, Next};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
 use crate::fault::{Failed, Fault, Then, caught};
 use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
 use crate::message::{Stamp, Stamped};
-use crate::node::{BindTarget, Environment};
+use crate::node::{BindTarget, Environment, blame};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::Thread;
 
@@ -64,8 +65,7 @@ struct Shared {
     readings: AtomicU64,
     skipped: AtomicU64,
     restarts: AtomicU64,
-    /// When its code was entered; the earliest instant if it is not inside.
-    entered_nanos: AtomicI64,
+    occupied: Occupied,
     stopped: Mutex<Option<String>>,
 }
 
@@ -99,9 +99,6 @@ pub struct SourceStatistics {
     pub stopped: Option<String>,
 }
 
-/// No code of the source runs.
-const OUTSIDE: i64 = i64::MIN;
-
 impl SharedSource {
     fn new(path: &'static str, has_rate: bool) -> Self {
         Self(Arc::new(Shared {
@@ -111,7 +108,7 @@ impl SharedSource {
             readings: AtomicU64::new(0),
             skipped: AtomicU64::new(0),
             restarts: AtomicU64::new(0),
-            entered_nanos: AtomicI64::new(OUTSIDE),
+            occupied: Occupied::new(),
             stopped: Mutex::default(),
         }))
     }
@@ -145,13 +142,11 @@ impl SharedSource {
 
     /// When its code was entered, if it is inside.
     pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
-        let nanos = self.0.entered_nanos.load(Ordering::Acquire);
-        (nanos != OUTSIDE).then(|| MonotonicTime::from_nanos(nanos))
+        self.0.occupied.entered_at()
     }
 
     fn enter(&self, clock: &Clock) -> Entered<'_> {
-        self.0.entered_nanos.store(clock.now().as_nanos(), Ordering::Release);
-        Entered(self)
+        self.0.occupied.enter(clock)
     }
 
     pub(super) fn statistics(&self) -> SourceStatistics {
@@ -162,15 +157,6 @@ impl SharedSource {
             restarts: self.0.restarts.load(Ordering::Relaxed),
             stopped: lock(&self.0.stopped).clone(),
         }
-    }
-}
-
-/// The source's code runs as long as this lives.
-struct Entered<'a>(&'a SharedSource);
-
-impl Drop for Entered<'_> {
-    fn drop(&mut self) {
-        self.0.0.entered_nanos.store(OUTSIDE, Ordering::Release);
     }
 }
 
@@ -261,8 +247,8 @@ where
         self.environment.clock()
     }
 
-    /// Reads it once, publishes what it gave, and says when to read it next.
-    fn read(&mut self, due: MonotonicTime) -> Result<Option<MonotonicTime>, Fault> {
+    /// Reads it once, publishes what it gave, and says when to read it next; `next` is what it said of that.
+    fn read(&mut self, due: MonotonicTime, next: &mut Next) -> Result<Option<MonotonicTime>, Fault> {
         let now = self.clock().now();
         let Some(component) = self.slot.running() else { return Ok(None) };
         self.shared.0.readings.fetch_add(1, Ordering::Relaxed);
@@ -279,6 +265,7 @@ where
                 frame: self.declaration.frame,
                 origin: self.environment.origin(),
             };
+            *next = reading.next;
             // One that was left behind may come back after the robot has stopped.
             if let Some(_inside) = self.environment.door().enter() {
                 (self.publish)(&self.wiring, &stamp.message(payload), now);
@@ -447,7 +434,14 @@ where
             }
             return;
         }
-        match caught(|| self.read(due)) {
+        let mut next = Next::AtRate;
+        let read = match caught(|| self.read(due, &mut next)) {
+            Ok(read) => Ok(read),
+            // If somebody else's code has failed, it has given its reading.
+            Err(failed) => blame(&self.environment, failed)
+                .and_then(|()| self.next_due(next, due, self.clock().now()).map_err(Failed::from)),
+        };
+        match read {
             Ok(next) => self.due = next,
             Err(failed) => self.fail(failed),
         }

@@ -7,6 +7,7 @@ use super::{Robot, Source, StartError};
 use crate::component::Fault;
 use crate::declaration::WorkerDeclaration;
 use crate::fault::guarded;
+use crate::node::contained;
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -106,8 +107,9 @@ fn spawn(path: &'static str, run: impl FnOnce() + Send + 'static) -> Result<Thre
 
 /// A panic that no component has caught, in the code of a payload say, must not end a thread that serves others.
 fn survive<R: Robot>(machine: &Machine<R>, path: &'static str, run: impl FnOnce()) {
-    if let Err(fault) = guarded(run) {
-        machine.fault(path, fault.to_string());
+    let done = contained(&machine.environment, run);
+    if let Err(failed) = done {
+        machine.fault(path, failed.fault.to_string());
     }
 }
 

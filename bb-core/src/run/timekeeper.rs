@@ -2,6 +2,8 @@
 
 use super::Robot;
 use super::machine::Machine;
+use crate::control::Hanging;
+use crate::journal::Journal;
 use crate::time::MonotonicTime;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -18,8 +20,8 @@ const LOOK_PERIOD: Duration = Duration::from_millis(100);
 /// A callback that has not returned for so long hangs.
 const HANGS_AFTER: Duration = Duration::from_secs(1);
 
-/// The same for a sensor or a service without a rate, which may wait for its device: as long as the robot waits for it when it
-/// stops.
+/// The same for a command, which may block its thread, and for a sensor or a service without a rate, which may wait for its
+/// device: as long as the robot waits for it when it stops.
 const WAITS_TOO_LONG: Duration = Duration::from_secs(5);
 
 /// What was seen of an island the last time.
@@ -35,6 +37,8 @@ pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
     let clock = machine.environment.clock();
     let mut seen = vec![Seen::default(); R::ISLANDS.len()];
     let mut reported = vec![None; machine.shared_sources().len()];
+    let mut reported_actuators = vec![None; R::ACTUATORS.len()];
+    let mut reported_commands = Vec::new();
     let mut wall_read = Instant::now();
     let mut looked = Instant::now();
     while !machine.has_ended.load(Ordering::Acquire) {
@@ -56,6 +60,9 @@ pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
             looked = Instant::now();
             look(machine, &mut seen, now);
             look_at_sources(machine, &mut reported, now);
+            look_at_actuators(machine, &mut reported_actuators, now);
+            look_at_commands(machine, &mut reported_commands, now);
+            look_at_queues(machine);
         }
         let relief = control.pool().relieve();
         let due = [
@@ -82,7 +89,7 @@ fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
             seen.is_reported = true;
             let path = machine.path_of_busy(island);
             let since = now.duration_since(island.entered_at());
-            machine.fault(path, format!("hangs: its code was entered {since:.1?} ago and has not returned"));
+            machine.fault(path, hangs(since));
         }
     }
 }
@@ -90,16 +97,54 @@ fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
 /// The same of sensors and services. `reported`: when the code of each was entered, of which it was reported that it hangs.
 fn look_at_sources<R: Robot>(machine: &Machine<R>, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (source, reported) in machine.shared_sources().iter().zip(reported) {
-        let entered = source.entered_at();
         let longest = if source.has_rate() { HANGS_AFTER } else { WAITS_TOO_LONG };
-        let Some(since) = entered.map(|entered| now.duration_since(entered)).filter(|since| *since >= longest)
-        else {
-            continue;
-        };
-        if *reported != entered {
-            *reported = entered;
-            let message = format!("hangs: its code was entered {since:.1?} ago and has not returned");
-            machine.fault(source.path(), message);
+        report_hanging(machine, source.path(), source.entered_at(), longest, reported, now);
+    }
+}
+
+/// The same of actuators.
+fn look_at_actuators<R: Robot>(machine: &Machine<R>, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
+    for (actuator, reported) in R::all_actuators(&machine.wiring).into_iter().zip(reported) {
+        report_hanging(machine, actuator.path(), actuator.entered_at(), HANGS_AFTER, reported, now);
+    }
+}
+
+/// The same of commands: of each the first execution that hangs. `reported`: those that were.
+fn look_at_commands<R: Robot>(machine: &Machine<R>, reported: &mut Vec<u64>, now: MonotonicTime) {
+    let hanging = machine.control.hanging(now, WAITS_TOO_LONG);
+    for Hanging { path, first, duration } in &hanging {
+        if !reported.contains(first) {
+            machine.fault(path, hangs(*duration));
         }
     }
+    *reported = hanging.iter().map(|hanging| hanging.first).collect();
+}
+
+/// Reports that the pool has no threads left for some jobs, and that the journal has ended.
+fn look_at_queues<R: Robot>(machine: &Machine<R>) {
+    while let Some(message) = machine.control.pool().report() {
+        machine.fault("pool", message);
+    }
+    if let Some(message) = machine.environment.journal().and_then(Journal::look) {
+        machine.fault("journal", message);
+    }
+}
+
+fn report_hanging<R: Robot>(
+    machine: &Machine<R>,
+    path: &'static str,
+    entered: Option<MonotonicTime>,
+    longest: Duration,
+    reported: &mut Option<MonotonicTime>,
+    now: MonotonicTime,
+) {
+    let Some(duration) = entered.map(|entered| now.duration_since(entered)) else { return };
+    if duration >= longest && *reported != entered {
+        *reported = entered;
+        machine.fault(path, hangs(duration));
+    }
+}
+
+fn hangs(since: Duration) -> String {
+    format!("hangs: its code was entered {since:.1?} ago and has not returned")
 }

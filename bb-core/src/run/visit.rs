@@ -4,7 +4,7 @@ use super::Robot;
 use crate::component::Estimator;
 use crate::journal::{Event, Request};
 use crate::message::Stamp;
-use crate::node::{CallError, IslandState, Member, Node, Turn, take_turn};
+use crate::node::{CallError, IslandState, Member, Node, Turn, publish, take_turn};
 use crate::time::MonotonicTime;
 
 /// What is called with an estimator, and the slot for what it emits.
@@ -32,7 +32,7 @@ pub fn visit<M: Member>(
     let called = M::State::find(wiring).call(wiring, now, line, |state, turn| {
         let mut emitted = None;
         if let Some(stamp) = call(M::node(state), turn, &mut emitted) {
-            M::publish(wiring, state, &mut emitted, stamp, turn);
+            publish::<M>(wiring, state, &mut emitted, stamp, turn);
         }
         take_turn::<M>(state, wiring, turn);
     });

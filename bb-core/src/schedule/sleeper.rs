@@ -1,6 +1,6 @@
 //! Futures that wait for a time, in the order of their times and then of their numbers.
 
-use super::Bell;
+use super::{Bell, Lane};
 use crate::time::MonotonicTime;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,11 +11,13 @@ use std::task::Waker;
 pub(crate) struct Sleeper {
     alarms: Arc<Mutex<Alarms>>,
     bell: Bell,
+    /// Where what is set through this clone is woken.
+    lane: Lane,
 }
 
 #[derive(Debug, Default)]
 struct Alarms {
-    set: BTreeMap<Alarm, Waker>,
+    set: BTreeMap<Alarm, (Lane, Waker)>,
     next_number: u64,
 }
 
@@ -24,7 +26,12 @@ pub(crate) type Alarm = (MonotonicTime, u64);
 
 impl Sleeper {
     pub(crate) fn new(bell: Bell) -> Self {
-        Self { alarms: Arc::default(), bell }
+        Self { alarms: Arc::default(), bell, lane: Lane::Robot }
+    }
+
+    /// The same for alarms that are woken in another lane than the robot's own.
+    pub(crate) fn in_lane(&self, lane: Lane) -> Self {
+        Self { lane, ..self.clone() }
     }
 
     /// Sets an alarm in place of `set`, the one that was set before, if any.
@@ -32,7 +39,7 @@ impl Sleeper {
         let mut alarms = self.lock();
         let alarm = set.unwrap_or((time, alarms.next_number));
         alarms.next_number += 1;
-        let replaced = alarms.set.insert(alarm, waker);
+        let replaced = alarms.set.insert(alarm, (self.lane, waker));
         let is_first = alarms.set.first_key_value().is_some_and(|(first, _)| *first == alarm);
         // The lock is released first: dropping a waker may run user code.
         drop(alarms);
@@ -53,7 +60,7 @@ impl Sleeper {
     }
 
     /// Takes the waker of the first alarm whose time has come.
-    pub(crate) fn take(&self, now: MonotonicTime) -> Option<Waker> {
+    pub(crate) fn take(&self, now: MonotonicTime) -> Option<(Lane, Waker)> {
         let mut alarms = self.lock();
         alarms.set.first_entry().filter(|first| first.key().0 <= now).map(|first| first.remove())
     }

@@ -4,7 +4,7 @@
 use super::{Island, IslandState, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, Outputs, TakenAt};
 use crate::message::{Payload, Stamp, Stamped};
-use crate::node::{AnyIsland, Next, Node, NodeEntry, Turn};
+use crate::node::{AnyIsland, Emitting, Next, Node, NodeEntry, Turn};
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 
@@ -83,11 +83,25 @@ pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
 ) {
     let mut emitted = None;
     if let Some(stamp) = M::node(island).receive::<F>(input, message, turn, &mut emitted) {
-        M::publish(wiring, island, &mut emitted, stamp, turn);
+        publish::<M>(wiring, island, &mut emitted, stamp, turn);
     }
     if M::node(island).is_unfinished() {
         take_turn::<M>(island, wiring, turn);
     }
+}
+
+/// Publishes what an estimator has emitted; a panic in there is its output's.
+#[inline]
+pub(crate) fn publish<M: Member>(
+    wiring: &WiringOf<M>,
+    island: &mut M::State,
+    emitted: &mut Option<OutputOf<M>>,
+    stamp: Stamp,
+    turn: &Turn<'_>,
+) {
+    let emitting = Emitting::new(M::NUMBER);
+    M::publish(wiring, island, emitted, stamp, turn);
+    emitting.done();
 }
 
 /// Does something with an estimator; false if it cannot emit that message.
@@ -98,7 +112,7 @@ pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, 
         Act::Handle(entry, turn) => {
             let mut emitted = None;
             if let Next::Emitted(stamp) = M::node(island).handle(entry, turn, &mut emitted) {
-                M::publish(wiring, island, &mut emitted, stamp, turn);
+                publish::<M>(wiring, island, &mut emitted, stamp, turn);
             }
             take_turn::<M>(island, wiring, turn);
         }
@@ -109,7 +123,7 @@ pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, 
             if emitted.is_none() {
                 return false;
             }
-            M::publish(wiring, island, &mut emitted, message.stamp(), turn);
+            publish::<M>(wiring, island, &mut emitted, message.stamp(), turn);
         }
     }
     true
@@ -123,7 +137,7 @@ pub(crate) fn take_turn<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, 
         match M::node(island).turn(turn, &mut emitted) {
             Next::Idle => return,
             Next::Quiet => {}
-            Next::Emitted(stamp) => M::publish(wiring, island, &mut emitted, stamp, turn),
+            Next::Emitted(stamp) => publish::<M>(wiring, island, &mut emitted, stamp, turn),
         }
     }
 }

@@ -71,6 +71,8 @@ impl Overseer for Nobody {
 
     fn report(&self, _: usize, _: Report) {}
 
+    fn output_failed(&self, _: &'static crate::declaration::EstimatorDeclaration, _: String) {}
+
     fn bind(&self, _: &'static str, _: &'static [usize], _: Check, _: BindTarget) {}
 
     fn parameters(&self) -> ParameterValues {

@@ -1,0 +1,57 @@
+//! Commands that do not come back, and those that keep virtual time from going on.
+
+use super::step::Step;
+use super::system::Control;
+use super::task::MOST_AT_ONCE;
+use crate::declaration::Role;
+use crate::node::Mode;
+use crate::schedule::Lane;
+use crate::time::MonotonicTime;
+use std::sync::PoisonError;
+use std::time::Duration;
+
+/// Executions that have not come back from their code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Hanging {
+    /// The path of the command.
+    pub(crate) path: &'static str,
+    /// The number of the first of these executions.
+    pub(crate) first: u64,
+    /// How long it is inside its code.
+    pub(crate) duration: Duration,
+}
+
+impl Control {
+    /// Of each command, the first execution that is inside its code for `longest` or longer.
+    pub(crate) fn hanging(&self, now: MonotonicTime, longest: Duration) -> Vec<Hanging> {
+        let state = self.lock();
+        let mut hanging: Vec<Hanging> = Vec::new();
+        for execution in &state.executions {
+            let Some(entered) = execution.task.as_ref().and_then(|task| task.entered_at()) else { continue };
+            let Some(declared) = self.0.declared.commands.get(execution.command) else { continue };
+            let duration = now.duration_since(entered);
+            if duration >= longest && hanging.iter().all(|other| other.path != declared.path) {
+                hanging.push(Hanging { path: declared.path, first: execution.id, duration });
+            }
+        }
+        hanging
+    }
+
+    /// Counts a command that begins; whether too many have begun at this instant of virtual time.
+    pub(super) fn begins_too_often(&self) -> bool {
+        if self.0.mode != Mode::Virtual {
+            return false;
+        }
+        let now = self.0.clock.now();
+        let mut begun = self.0.begun.lock().unwrap_or_else(PoisonError::into_inner);
+        *begun = if begun.0 == now { (now, begun.1.saturating_add(1)) } else { (now, 1) };
+        begun.1 > MOST_AT_ONCE
+    }
+}
+
+impl Step<'_> {
+    /// Which threads of the pool run a command.
+    pub(super) fn lane(&self, command: usize, of_health: bool) -> Lane {
+        if of_health || self.role(command) == Role::Disarming { Lane::Safety } else { Lane::Commands }
+    }
+}

@@ -1,0 +1,37 @@
+//! Whose code a thread is inside, and since when.
+
+use crate::time::{Clock, MonotonicTime};
+use std::sync::atomic::{AtomicI64, Ordering};
+
+/// When the code of a component was entered: for the report of one that hangs.
+#[derive(Debug)]
+pub(super) struct Occupied(AtomicI64);
+
+/// No code of it runs.
+const OUTSIDE: i64 = i64::MIN;
+
+impl Occupied {
+    pub(super) fn new() -> Self {
+        Self(AtomicI64::new(OUTSIDE))
+    }
+
+    /// When its code was entered, if a thread is inside.
+    pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
+        let nanos = self.0.load(Ordering::Acquire);
+        (nanos != OUTSIDE).then(|| MonotonicTime::from_nanos(nanos))
+    }
+
+    pub(super) fn enter(&self, clock: &Clock) -> Entered<'_> {
+        self.0.store(clock.now().as_nanos(), Ordering::Release);
+        Entered(self)
+    }
+}
+
+/// The code of a component runs as long as this lives.
+pub(super) struct Entered<'a>(&'a Occupied);
+
+impl Drop for Entered<'_> {
+    fn drop(&mut self) {
+        self.0.0.store(OUTSIDE, Ordering::Release);
+    }
+}
