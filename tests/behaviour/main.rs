@@ -1,5 +1,6 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
+mod absurd_fixes;
 mod attitude;
 mod bad_journals;
 mod by_path;

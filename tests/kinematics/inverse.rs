@@ -140,6 +140,23 @@ fn what_the_target_leaves_free_goes_to_the_posture() -> Result<(), KinematicsErr
 }
 
 #[test]
+fn a_posture_never_takes_a_solution_away() -> Result<(), KinematicsError> {
+    let arm = ur5();
+    let chain = arm.kinematics.chain(arm.base, arm.tip)?;
+    let mut random = Uniform::new(11);
+    for number in 0..300 {
+        // Within and far beyond the limits.
+        let posture = random.position(&arm).iter().map(|position| position * 3.0).collect();
+        let start = random.position(&arm);
+        let target = chain.transform(&start)?;
+        let params = InverseParams { posture, ..InverseParams::default() };
+        let solved = solver(&arm, params).solve(&Target::Pose(target), &start).map(|solution| solution.iterations);
+        assert!(solved.as_ref().is_ok_and(|iterations| *iterations <= 61), "{number}: {solved:?}");
+    }
+    Ok(())
+}
+
+#[test]
 fn a_joint_of_more_weight_moves_less() -> Result<(), KinematicsError> {
     let arm = panda();
     let chain = arm.kinematics.chain(arm.base, arm.tip)?;

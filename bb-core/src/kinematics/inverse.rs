@@ -165,7 +165,8 @@ impl InverseKinematics {
         finite("start", start)?;
         let is_finite = match target {
             Target::Pose(pose) => {
-                pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|part| part.is_finite())
+                let is_rotation = (pose.rotation.coords.norm() - 1.0).abs() < 1e-6;
+                is_rotation && pose.translation.vector.iter().all(|part| part.is_finite())
             }
             Target::Position(position) => position.iter().all(|part| part.is_finite()),
         };
@@ -176,21 +177,24 @@ impl InverseKinematics {
         self.clamp();
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
         let (mut iterations, mut restarts) = (0, 0);
-        let (mut best, mut best_cost) = (None, f64::INFINITY);
+        let (mut best, mut best_cost, mut has_reached) = (None, f64::INFINITY, false);
         let (mut reference, mut since, mut polished) = (f64::INFINITY, 0, 0);
         loop {
             let error = self.error(target)?;
             let cost = 0.5 * error.vector.norm_squared();
             let is_reached = error.position <= self.params.position_tolerance
                 && error.rotation <= self.params.rotation_tolerance;
-            if is_reached || cost < best_cost {
+            if is_reached || (!has_reached && cost < best_cost) {
+                has_reached |= is_reached;
                 best_cost = cost;
                 self.best.copy_from_slice(&self.positions);
                 best = Some((error.position, error.rotation));
             }
-            let is_polishing = is_reached && !self.params.posture.is_empty() && polished < POLISH;
-            if is_reached && !is_polishing {
-                let (position_error, rotation_error) = (error.position, error.rotation);
+            let is_polishing =
+                !self.params.posture.is_empty() && polished < POLISH && iterations < self.params.max_iterations;
+            if has_reached && !is_polishing {
+                // A step towards the posture may have left the target: what counts is the last position there.
+                let (position_error, rotation_error) = best.unwrap_or((error.position, error.rotation));
                 return Ok(Solution {
                     positions: &self.best,
                     position_error,
@@ -204,13 +208,13 @@ impl InverseKinematics {
                 return Err(KinematicsError::NotConverged { position_error, rotation_error, iterations });
             }
             iterations += 1;
-            polished += u32::from(is_reached);
+            polished += u32::from(has_reached);
             if cost < 0.25 * reference {
                 (reference, since) = (cost, 0);
             } else {
                 since += 1;
             }
-            if since > PATIENCE && !is_reached && polished == 0 {
+            if since > PATIENCE && !has_reached {
                 restarts += 1;
                 (reference, since) = (f64::INFINITY, 0);
                 self.scatter(&mut random);

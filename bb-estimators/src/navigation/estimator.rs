@@ -6,7 +6,7 @@ mod filter;
 pub(super) mod health;
 mod height;
 mod input;
-mod measured;
+pub(super) mod measured;
 mod options;
 mod output;
 mod report;
@@ -160,8 +160,13 @@ pub struct EskfEstimator<O = Odometry, S: States = Navigation, const N: usize = 
     options: NavigationOptions,
     mounting: Mounting,
     phase: Phase,
+    /// Samples of the IMU.
+    refused_in_a_row: u32,
     types: PhantomData<fn(S) -> O>,
 }
+
+/// So many samples of the IMU that are refused in a row are no estimate.
+pub(super) const MOST_REFUSED: u32 = 50;
 
 #[derive(Debug)]
 enum Phase {
@@ -185,7 +190,7 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
         let mounting = Mounting::of(context)?;
         states::check::<S>(&mounting)?;
         let phase = Phase::Aligning(Box::new(Aligning::new(&options, None)));
-        Ok(Self { options, mounting, phase, types: PhantomData })
+        Ok(Self { options, mounting, phase, refused_in_a_row: 0, types: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
@@ -206,6 +211,10 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
             }
             Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
                 Ok(()) => {
+                    self.refused_in_a_row = 0;
+                    if !running.is_sound() {
+                        return Err(Fault::new("its estimate is no number"));
+                    }
                     let reply: Reply<O> = O::of(running.as_ref(), &self.mounting).into();
                     Ok(match running.divergence() {
                         Some(reason) => reply.diverged(reason),
@@ -220,7 +229,13 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
                 }
                 Err(refusal) => {
                     tracing::debug!(%refusal, "sample refused");
-                    Ok(Reply::none())
+                    self.refused_in_a_row += 1;
+                    let is_deaf = self.refused_in_a_row >= MOST_REFUSED;
+                    Ok(if is_deaf {
+                        Reply::none().diverged("it refuses every sample of the IMU")
+                    } else {
+                        Reply::none()
+                    })
                 }
             },
         }

@@ -55,7 +55,9 @@ impl Watch {
         if self.limits.dead_reckoning_s.is_some_and(|longest_s| sight.dead_reckoning_s > longest_s) {
             return Some("the position was dead-reckoned for too long");
         }
-        (sight.deviation > self.limits.deviation).then_some("the position is too uncertain")
+        // Of a deviation that is no number, nothing is known.
+        let is_certain = sight.deviation <= self.limits.deviation;
+        (!is_certain).then_some("the position is too uncertain")
     }
 }
 

@@ -4,17 +4,31 @@ use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::skew;
 use crate::navigation::measurement::{AbsolutePose, BodyVelocity, GnssPosition, isotropic};
 use bb_core::payload::{GnssFix, GnssStatus, Odometry, Pose};
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 
 /// Standard deviation of a height that a fix does not tell, m.
 const UNKNOWN_HEIGHT: f64 = 1e4;
 
+/// Heights that something on or above the Earth has, m.
+const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
+
+/// A covariance, if it tells something: all zeros stand for unknown in ROS, and no noise has a variance of zero or less.
+pub(in crate::navigation) fn told<const D: usize>(
+    covariance: Option<SMatrix<f64, D, D>>,
+) -> Option<SMatrix<f64, D, D>> {
+    covariance.filter(|covariance| (0..D).all(|i| covariance[(i, i)] > 0.0 && covariance[(i, i)].is_finite()))
+}
+
 impl Geodetic {
-    /// Where a fix is, at `height` (m) if it does not tell; none if it has no position.
+    /// Where a fix is, at `height` (m) if it does not tell; none if it has no position, or one that is nowhere near the Earth.
     pub fn of_fix(fix: &GnssFix, height: f64) -> Option<Self> {
         let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
         let height = position.altitude.unwrap_or(height);
-        Some(Self { latitude: position.latitude_rad, longitude: position.longitude_rad, height })
+        let (latitude, longitude) = (position.latitude_rad, position.longitude_rad);
+        let is_there = latitude.abs() <= core::f64::consts::FRAC_PI_2
+            && longitude.abs() <= core::f64::consts::TAU
+            && HEIGHTS.contains(&height);
+        is_there.then_some(Self { latitude, longitude, height })
     }
 }
 
@@ -25,7 +39,7 @@ impl GnssPosition {
         let geodetic = Geodetic::of_fix(fix, frame.origin().height)?;
         let deviations = Vector3::new(1.0, 1.0, 2.0) * deviation;
         let unknown = || Matrix3::from_diagonal(&deviations.component_mul(&deviations));
-        let mut covariance = fix.position_covariance.unwrap_or_else(unknown);
+        let mut covariance = told(fix.position_covariance).unwrap_or_else(unknown);
         if fix.position.is_some_and(|position| position.altitude.is_none()) {
             covariance[(2, 2)] = UNKNOWN_HEIGHT * UNKNOWN_HEIGHT;
         }
@@ -55,7 +69,7 @@ impl AbsolutePose {
     pub fn of_pose(pose: &Pose, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
         let world_from_body = pose.world_from_body * body_from_sensor.rotation.inverse();
         let arm = world_from_body * body_from_sensor.translation.vector;
-        let (position, rotation) = match pose.covariance {
+        let (position, rotation) = match told(pose.covariance) {
             Some(covariance) => {
                 let block = |first: usize| covariance.fixed_view::<3, 3>(first, first).into_owned();
                 // Of the orientation it is the covariance of a small rotation of the sensor.

@@ -29,6 +29,8 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 
 /// What the estimator needs of a filter.
 pub(super) trait Core: Debug + Send {
+    /// Whether all that is emitted is a number, and no variance is negative.
+    fn is_sound(&self) -> bool;
     /// Takes a sample, and what else has come.
     fn take(
         &mut self,
@@ -156,13 +158,26 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
                 self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
             }
         }
-        if let Some(new_from_old) = self.past.now().position().and_then(|position| self.world.moves_on(&position)) {
+        let mut world = self.world;
+        if let Some(new_from_old) = self.past.now().position().and_then(|position| world.moves_on(&position)) {
             // What is in the history belongs to the world that is left.
             let mut filter = self.past.now().clone();
             filter.move_world(&new_from_old)?;
             self.past = Past::new(filter, LONGEST_LEAD_NS)?;
+            self.world = world;
         }
         Ok(())
+    }
+
+    fn is_sound(&self) -> bool {
+        let eskf = self.past.now().eskf();
+        eskf.estimate().is_none_or(|estimate| {
+            let numbers =
+                estimate.position.iter().chain(&estimate.velocity).chain(estimate.world_from_body.coords.iter());
+            let variances = (0..NAVIGATION).map(|i| eskf.covariance()[(i, i)]);
+            numbers.copied().all(f64::is_finite)
+                && variances.into_iter().all(|variance| variance.is_finite() && variance >= 0.0)
+        })
     }
 
     fn frame(&self) -> Option<LocalFrame> {

@@ -14,6 +14,7 @@ use self::aligning::Aligning;
 use self::filter::{Filter, Measured};
 use self::input::Mounting;
 use crate::navigation::eskf::ImuMean;
+use crate::navigation::estimator::MOST_REFUSED;
 use crate::navigation::estimator::health::{Limits, Watch};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::history::History;
@@ -73,6 +74,8 @@ pub struct PlanarEstimator<O = Odometry> {
     options: PlanarOptions,
     mounting: Mounting,
     phase: Phase,
+    /// Samples of the IMU.
+    refused_in_a_row: u32,
     output: PhantomData<fn() -> O>,
 }
 
@@ -101,7 +104,13 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
         if options.heading_from_course && !mounting.has_gnss() {
             return Err(Fault::new("`heading_from_course` needs the input `gnss`"));
         }
-        Ok(Self { options, mounting, phase: Phase::Aligning(Box::new(Aligning::new(None))), output: PhantomData })
+        Ok(Self {
+            options,
+            mounting,
+            phase: Phase::Aligning(Box::new(Aligning::new(None))),
+            refused_in_a_row: 0,
+            output: PhantomData,
+        })
     }
 
     fn handle_input(&mut self, inputs: PlanarInputs<'_>) -> Result<Reply<O>, Fault> {
@@ -125,7 +134,13 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
                 Ok(Reply::none())
             }
             Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
-                Ok(()) => Ok(running.reply(&self.mounting)),
+                Ok(()) => {
+                    self.refused_in_a_row = 0;
+                    if !running.past.now().is_sound() {
+                        return Err(Fault::new("its estimate is no number"));
+                    }
+                    Ok(running.reply(&self.mounting))
+                }
                 Err(Refusal::Gap { .. }) => {
                     tracing::info!("no sample for too long: it starts again");
                     self.phase = Phase::Aligning(Box::new(Aligning::new(running.frame)));
@@ -133,7 +148,13 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
                 }
                 Err(refusal) => {
                     tracing::debug!(%refusal, "sample refused");
-                    Ok(Reply::none())
+                    self.refused_in_a_row += 1;
+                    let is_deaf = self.refused_in_a_row >= MOST_REFUSED;
+                    Ok(if is_deaf {
+                        Reply::none().diverged("it refuses every sample of the IMU")
+                    } else {
+                        Reply::none()
+                    })
                 }
             },
         }

@@ -5,7 +5,7 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::health::{Sight, largest_deviation};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
-use crate::navigation::planar::estimate::POSITION;
+use crate::navigation::planar::estimate::{POSITION, PlanarEstimate};
 use crate::navigation::planar::filter::{PlanarEkf, PlanarStart};
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use crate::navigation::refusal::Refusal;
@@ -62,6 +62,18 @@ impl Filter {
         let covariance = self.ekf.covariance();
         let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
+    }
+
+    /// Whether all that is emitted is a number, and no variance is negative.
+    pub(super) fn is_sound(&self) -> bool {
+        let covariance = self.ekf.covariance();
+        let variances =
+            (0..covariance.nrows()).all(|i| covariance[(i, i)].is_finite() && covariance[(i, i)] >= 0.0);
+        let is_number = |estimate: &PlanarEstimate| {
+            estimate.position.iter().chain(&estimate.velocity).all(|x| x.is_finite())
+                && estimate.heading.is_finite()
+        };
+        variances && self.ekf.estimate().is_none_or(is_number)
     }
 
     /// What became of the measurements: satellites, velocities and yaw rates of the odometry, poses, orientations.

@@ -2,6 +2,7 @@
 
 use super::options::PlanarOptions;
 use crate::navigation::eskf::ImuMean;
+use crate::navigation::estimator::measured::told;
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use bb_core::message::Stamped;
 use bb_core::payload::{GnssFix, Imu, Odometry, Orientation, Pose};
@@ -118,7 +119,7 @@ impl Mounting {
         let heading = heading(&world_from_body);
         let arm = (UnitQuaternion::from_euler_angles(0.0, 0.0, heading) * body_from_sensor.translation.vector).xy();
         let square = |x: f64| x * x;
-        let (position, of_heading) = match pose.covariance {
+        let (position, of_heading) = match told(pose.covariance) {
             Some(covariance) => {
                 let rotation = covariance.fixed_view::<3, 3>(3, 3).into_owned();
                 (covariance.fixed_view::<2, 2>(0, 0).into_owned(), about_up(&pose.world_from_body, &rotation))
