@@ -1,1 +1,3 @@
-//! Benchmarks; each is a bench target of this crate.
+//! Benchmarks; each is a bench target of this crate. What they share is here.
+
+pub mod callgrind;

@@ -1,12 +1,11 @@
-//! Instructions per update: this program runs itself under callgrind, for a short and a long run over the same samples
-//! in motion, and takes the difference.
+//! Instructions per update, over the same samples in motion; `bb_benches::callgrind` says how they are counted.
 
 use crate::pairs::{PAIRS, Pair};
 use crate::{Side, in_motion, start};
+use bb_benches::callgrind::per_step;
 use std::error::Error;
 use std::hint::black_box;
 use std::path::Path;
-use std::process::Command;
 
 const SHORT: usize = 2000;
 const LONG: usize = 12_000;
@@ -43,16 +42,9 @@ pub fn run(count: &Count) -> Result<(), Box<dyn Error>> {
 
 /// Instructions per update, with reading the orientation after each.
 pub fn instructions(pair: &Pair, side: Side, file: &Path) -> Result<f64, Box<dyn Error>> {
-    let counted = |updates: usize| -> Result<f64, Box<dyn Error>> {
-        let side = if side == Side::Ours { "ours" } else { "peer" };
-        let mut valgrind = Command::new("valgrind");
-        valgrind.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(std::env::current_exe()?);
-        valgrind.args([COUNT, pair.name, side, &updates.to_string()]).arg(file);
-        let output = valgrind.output().map_err(|error| format!("valgrind cannot be run: {error}; install it"))?;
-        let said = String::from_utf8_lossy(&output.stderr);
-        let collected = said.lines().find_map(|line| line.split_once("Collected : "));
-        let (_, collected) = collected.ok_or_else(|| format!("valgrind counted nothing: {said}"))?;
-        Ok(collected.trim().parse()?)
-    };
-    Ok((counted(LONG)? - counted(SHORT)?) / (LONG - SHORT) as f64)
+    let side = if side == Side::Ours { "ours" } else { "peer" };
+    let file = file.to_str().ok_or_else(|| format!("{}: a name that is not UTF-8", file.display()))?;
+    per_step(&[], SHORT, LONG, |updates| {
+        [COUNT, pair.name, side, &updates.to_string(), file].map(String::from).to_vec()
+    })
 }
