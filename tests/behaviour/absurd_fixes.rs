@@ -43,7 +43,7 @@ fn rests(first: &GnssFix, then: &GnssFix) -> Result<[Vec<Odometry>; 2], StartErr
         let time = MonotonicTime::ZERO + Duration::from_millis(millis);
         if millis % 200 == 0 {
             let fix = if millis < 5_000 { first } else { then };
-            simulation.publish(cart::sensor::base::gnss, time, fix.clone());
+            simulation.publish(cart::sensor::base::gnss, time, *fix);
         }
         let at_rest = Imu::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 9.80665));
         simulation.publish(cart::sensor::base::imu, time, at_rest);

@@ -4,6 +4,7 @@ use super::engine::Engine;
 use super::event::EventKind;
 use super::factor::ProvidedFactor;
 use super::fallback::{Fallback, Watchdog};
+use super::input::check_position;
 use super::label::{SourceLabel, Sources};
 use super::output::{EstimatorOutput, FrameIds, Quality};
 use super::params::{StateEstimatorConfig, StateEstimatorParams, ns};
@@ -95,6 +96,8 @@ impl Emission {
         params: &StateEstimatorParams,
     ) -> Option<EstimatorOutput> {
         let (position, turn) = engine.world()?.local(&pose.position);
+        // What was led off the Earth is no estimate.
+        check_position(&position).ok()?;
         let covariance = turned_pose(&turn, &pose.covariance);
         let label = sources.label(pose.time_ns, params);
         let anchor_age_ms = sources.age_ns(pose.time_ns).map(|age_ns| age_ns.unsigned_abs() / 1_000_000);

@@ -25,6 +25,12 @@ use crate::navigation::refusal::Refusal;
 /// For how long an estimate is distrusted after something that does not fit, s.
 const DISTRUST: f64 = 1.0;
 
+/// So many positions in a row must fit before an estimate is trusted that positions had to overrule.
+const CONFIRMATIONS: u32 = 5;
+
+/// Normalised innovation squared over the dimension up to which a position fits.
+const FITS: f64 = 3.0;
+
 /// Farther from the origin nothing is, m.
 const FARTHEST: f64 = 1e7;
 
@@ -52,6 +58,8 @@ pub(super) struct Engine<F: ProvidedFactor> {
     is_anchor_degraded: bool,
     /// From when to when the estimate is distrusted.
     degraded_ns: Option<(i64, i64)>,
+    /// How many positions must still fit.
+    unconfirmed: u32,
     left: Option<(Pose, Sources)>,
 }
 
@@ -89,6 +97,7 @@ impl<F: ProvidedFactor> Engine<F> {
             nis: None,
             is_anchor_degraded: false,
             degraded_ns: None,
+            unconfirmed: 0,
             left: None,
         })
     }
@@ -333,7 +342,17 @@ impl<F: ProvidedFactor> Engine<F> {
             return Err(Refusal::NotStarted.into());
         }
         let result = self.strategy.measure(measured);
-        if let (true, Some(now_ns)) = (self.strategy.refused_in_a_row() >= STORM, self.now_ns) {
+        let is_position = !matches!(measured, Measured::Relative(_));
+        let is_storm = self.strategy.refused_in_a_row() >= STORM;
+        match &result {
+            Ok(fused) if is_position && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
+            Ok(fused) if is_position && fused.nis <= FITS * fused.dimension as f64 => {
+                self.unconfirmed = self.unconfirmed.saturating_sub(1);
+            }
+            _ if is_position && self.unconfirmed > 0 => self.unconfirmed = CONFIRMATIONS,
+            _ => {}
+        }
+        if let (true, Some(now_ns)) = (is_storm || self.unconfirmed > 0, self.now_ns) {
             self.distrust(now_ns);
         }
         let fused = result?;

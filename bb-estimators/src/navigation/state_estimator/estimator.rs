@@ -357,7 +357,9 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     fn pose_at(&self, time_ns: i64) -> Option<Pose> {
         let newest = self.queue.newest()?;
         let ahead_ns = time_ns.saturating_sub(newest.time_ns);
-        if ahead_ns > super::params::ns(self.config.params.longest_prediction) {
+        let is_past = ahead_ns < -super::params::ns(self.config.params.lateness);
+        if is_past || ahead_ns > super::params::ns(self.config.params.longest_prediction) {
+            // A clock that was set back is no reason to say again where it was.
             return None;
         }
         let predictor = self.queue.predictor()?;

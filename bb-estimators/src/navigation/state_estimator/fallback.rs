@@ -39,7 +39,9 @@ impl Watchdog {
             *self = Self { last_ns: Some(now_ns), ..Self::default() };
             return was_engaged.then_some(Fallback::Recovered);
         }
-        let last_ns = *self.last_ns.get_or_insert(now_ns);
+        // A clock that was set back counts from there.
+        let last_ns = self.last_ns.unwrap_or(now_ns).min(now_ns);
+        self.last_ns = Some(last_ns);
         let without_ns = now_ns.saturating_sub(last_ns);
         if !self.is_engaged && without_ns >= ns(params.fallback_after) {
             (self.is_engaged, self.is_warned) = (true, true);

@@ -190,3 +190,19 @@ fn without_an_estimate_for_three_seconds_the_fallback_engages_once_and_recovers_
         assert_eq!(levels, [Level::Error, Level::Error, Level::Info]);
     }
 }
+
+#[test]
+fn a_clock_that_is_set_back_has_no_estimate_and_engages_the_fallback() {
+    let flight = Flight::new(8, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        for sent in &flight.sent(true, true, false) {
+            sent.to(&mut estimator).unwrap();
+            estimator.tick(sent.time_ns());
+        }
+        let set_back = 8 * SECOND - 100 * SECOND;
+        assert!(estimator.predicted(set_back).is_none());
+        let outputs = (0..50).filter(|i| estimator.tick(set_back + i * SECOND / 10).is_some()).count();
+        assert_eq!((outputs, estimator.health().state), (0, HealthState::Lost));
+    }
+}
