@@ -19,6 +19,9 @@ static LATER: AtomicU32 = AtomicU32::new(WORKS);
 /// Whether a brake holds.
 static HOLDS: AtomicBool = AtomicBool::new(true);
 
+/// Whether a motor registers what stops it before it is started, or after.
+static REGISTERS_FIRST: AtomicBool = AtomicBool::new(false);
+
 const WORKS: u32 = 0;
 const FAILS: u32 = 1;
 const PANICS: u32 = 2;
@@ -52,15 +55,25 @@ impl Sensor for Lidar {
     type Output = Number;
 
     fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        let turns = Arc::new(AtomicBool::new(true));
-        TURNING.fetch_add(1, Ordering::SeqCst);
+        let turns = Arc::new(AtomicBool::new(false));
         let stops = Arc::clone(&turns);
-        context.on_disarm(move || {
+        let stop = move || {
             if stops.swap(false, Ordering::SeqCst) {
                 TURNING.fetch_sub(1, Ordering::SeqCst);
             }
             Ok(())
-        });
+        };
+        let is_first = REGISTERS_FIRST.load(Ordering::SeqCst);
+        if is_first {
+            context.on_disarm(stop.clone());
+            // Meanwhile the callback may run.
+            std::thread::sleep(Duration::from_millis(30));
+        }
+        turns.store(true, Ordering::SeqCst);
+        TURNING.fetch_add(1, Ordering::SeqCst);
+        if !is_first {
+            context.on_disarm(stop);
+        }
         let way = if MADE.fetch_add(1, Ordering::SeqCst) == 0 { &FIRST } else { &LATER };
         match way.load(Ordering::SeqCst) {
             FAILS => Err(Fault::new("no handshake")),
@@ -111,13 +124,18 @@ robot! {
 fn what_is_started_while_the_robot_is_disarmed_is_made_safe_as_well() {
     let _alone = alone();
     within(60, || {
-        // The lidar's own callback stops it at once, it fails and restarts, while the brake takes its time.
-        let robot = Scanner::builder().start().expect("it starts");
-        assert_eq!(robot.arm(), Ok(()));
-        assert_eq!((robot.disarm(), turning()), (Ok(()), 0));
-        assert!(MADE.load(Ordering::SeqCst) > 1, "it was restarted meanwhile");
-        let report = robot.stop();
-        assert_eq!((report.safety, turning()), (Safety::Disarmed, 0));
+        for registers_first in [false, true] {
+            MADE.store(0, Ordering::SeqCst);
+            REGISTERS_FIRST.store(registers_first, Ordering::SeqCst);
+            // The lidar's own callback stops it at once, it fails and restarts, while the brake takes its time.
+            let robot = Scanner::builder().start().expect("it starts");
+            assert_eq!(robot.arm(), Ok(()));
+            assert_eq!((robot.disarm(), turning()), (Ok(()), 0), "{registers_first}");
+            assert!(MADE.load(Ordering::SeqCst) > 1, "it was restarted meanwhile");
+            let report = robot.stop();
+            assert_eq!((report.safety, turning()), (Safety::Disarmed, 0), "{registers_first}");
+        }
+        REGISTERS_FIRST.store(false, Ordering::SeqCst);
     });
 }
 

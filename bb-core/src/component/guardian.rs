@@ -30,7 +30,7 @@ impl SafetyLink {
 
     /// Registers a callback that makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
     /// own, and must return within 5 s; one that fails or takes longer leads to the safety state `error`. A restart of the
-    /// component replaces what it registered before.
+    /// component replaces what it registered before, and so does a `handle_options` that registers any.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         if let Some(guardian) = &self.guardian {
             guardian.on_disarm(self.path, None, Arc::new(hook));

@@ -27,6 +27,11 @@ impl State {
         self.executions.iter().any(|execution| matches!(execution.phase, Phase::Lingering))
     }
 
+    /// How many disarmings have ended.
+    fn ended_disarmings(&self) -> u64 {
+        self.generation - u64::from(self.disarming.is_some())
+    }
+
     pub(super) fn is_disarming(&self, generation: u64) -> bool {
         self.disarming.as_ref().is_some_and(|disarming| disarming.generation == generation)
     }
@@ -175,6 +180,10 @@ impl Control {
             return crate::fault::discard(hook);
         }
         if step.state.has_ended || step.state.is_stopped() {
+            if !step.state.has_ended && execution.is_none() {
+                // Once the component is made, it runs again.
+                step.state.hooks.add(path, DisarmHook::clone(&hook), is_kept);
+            }
             drop(step);
             if let Some(SafetyError { path, message }) = self.run_within(path, &hook) {
                 self.note_hardware_error(path, message);
@@ -236,8 +245,14 @@ impl Control {
         always: bool,
         make: impl FnOnce() -> Result<T, E>,
     ) -> Result<T, E> {
-        let first = self.lock().hooks.next();
+        let (first, disarmings) = {
+            let state = self.lock();
+            (state.hooks.next(), state.ended_disarmings())
+        };
         let made = make();
+        if made.is_ok() {
+            self.run_again(path, first, disarmings);
+        }
         let mut state = self.lock();
         let is_replaced = made.is_ok() && (always || state.hooks.any_since(path, first));
         let gone =
@@ -249,6 +264,33 @@ impl Control {
             gone.into_iter().for_each(crate::fault::discard);
         }
         made
+    }
+
+    /// If the robot was disarmed while a component was made, what it had registered by then may have run before its hardware
+    /// was started: it runs once more.
+    fn run_again(&self, path: &'static str, first: u64, disarmings: u64) {
+        let mut step = self.step();
+        let hooks = step.state.hooks.all_since(path, first);
+        let has_begun = step.state.generation != disarmings;
+        let was_disarmed = has_begun && step.state.machine.safety != Safety::Armed;
+        if hooks.is_empty() || !(was_disarmed || step.state.is_stopped()) {
+            return;
+        }
+        if let Some(disarming) = &mut step.state.disarming {
+            let numbered: Vec<NumberedHook> =
+                (disarming.begun..).zip(hooks).map(|(index, hook)| (index, path, hook)).collect();
+            disarming.begun += numbered.len();
+            disarming.left.extend(numbered.iter().map(|(index, path, _)| (*index, *path)));
+            step.effects.hooks = Some((disarming.generation, numbered));
+            return step.finish();
+        }
+        drop(step);
+        for hook in hooks {
+            if let Some(SafetyError { path, message }) = self.run_within(path, &hook) {
+                self.note_hardware_error(path, message);
+            }
+            crate::fault::discard(hook);
+        }
     }
 
     /// What an `init` has started that failed then is made safe. A callback that fails stays for the next disarming: a device

@@ -61,6 +61,12 @@ impl Hooks {
         self.all.iter().any(|hook| hook.path == path && hook.number >= number)
     }
 
+    /// Those that the component at `path` has registered from `number` on.
+    pub(super) fn all_since(&self, path: &str, number: u64) -> Vec<DisarmHook> {
+        let since = self.all.iter().filter(|hook| hook.path == path && hook.number >= number);
+        since.map(|hook| DisarmHook::clone(&hook.run)).collect()
+    }
+
     /// Takes those of a component out that were registered before `number`, or since; to be dropped without a lock.
     pub(super) fn take(&mut self, path: &str, number: u64, before: bool) -> Vec<DisarmHook> {
         let taken =
