@@ -56,7 +56,7 @@ fn said(path: &Path) -> String {
 fn what_is_not_a_bag() {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"));
     assert_eq!(said(&directory.join("none.mcap")), "no such file; check the path");
-    assert!(said(directory).starts_with("not a file; name the .mcap file"));
+    assert!(said(directory).starts_with("not a file; name the .mcap or .db3 file itself"));
     #[cfg(not(feature = "sqlite"))]
     assert!(said(&file("sqlite.db3", b"SQLite format 3\0....")).contains("`ros2 bag convert`"));
     assert!(said(&file("text.mcap", b"t,gx,gy,gz\n0,1,2,3\n")).starts_with("not an MCAP file: it does not start"));
