@@ -25,7 +25,7 @@ Examples:
 #[derive(Debug, Args)]
 pub(crate) struct NoiseArguments {
     /// ROS 2 bags in MCAP, folders of them, or CSV files of t (s), angular velocity (rad/s) and specific force (m/s²), with a
-    /// header row. The IMU lies still, for three hours if its random walk is to be seen.
+    /// header row. The IMU is at rest, for three hours if its random walk is to be seen.
     #[arg(value_name = "BAG", required = true)]
     paths: Vec<PathBuf>,
     /// The topic of the IMU, where several fit (sensor_msgs/Imu).

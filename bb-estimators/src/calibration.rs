@@ -38,7 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`sensor_noise`] finds white noise, bias instability and random walk of a sensor that lies still, by its Allan deviation.
+//! [`sensor_noise`] finds white noise, bias instability and random walk of a sensor at rest, by its Allan deviation.
 //!
 //! It builds without the standard library and does not allocate; who gathers rests, fields and samples does.
 

@@ -113,7 +113,7 @@ fn a_chain_of_fixed_joints_is_a_constant() -> Result<(), KinematicsError> {
     assert_eq!(chain.joints(), 0);
     let nail = chain.transform(&kinematics.neutral())?;
     assert!((nail.translation.vector - Vector3::new(0.0, 0.0, 0.1)).norm() < 1e-15);
-    // Between links that one joint carries together, only what lies between them moves them.
+    // Between links that one joint carries together, only the joints between them move them.
     assert_eq!(kinematics.chain(link("head")?, link("tip")?)?.joints(), 2);
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The part of a recording in which the IMU lies still and nothing is missing.
+//! The part of a recording in which the IMU is at rest and nothing is missing.
 
 use super::{AXES, Sample};
 use std::ops::Range;
@@ -25,7 +25,7 @@ const LEVELS: usize = 20;
 /// The part of the samples at one end of the range that only saturation explains.
 const AT_THE_END: f64 = 0.1;
 
-/// The longest part in which the IMU lies still.
+/// The longest part in which the IMU is at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Still {
     pub(super) samples: Range<usize>,

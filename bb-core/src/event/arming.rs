@@ -32,7 +32,8 @@ pub enum DisarmError {
     /// A disarm callback or an actuator's own code called: the robot is being disarmed, and the caller must not wait for
     /// itself.
     Callback,
-    /// The robot is being disarmed, and the thread that limits its time is gone.
+    /// The robot is still being disarmed: its time limit has not been enforced yet, or another thread of a simulation runs the
+    /// callbacks.
     Unfinished,
     /// The robot is replayed: its journal says when it is disarmed.
     Replay,

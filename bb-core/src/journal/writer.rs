@@ -20,7 +20,7 @@ const BATCH: usize = 1 << 10;
 /// How often the thread looks.
 const PERIOD: Duration = Duration::from_millis(2);
 
-/// Lines that wait at most, whoever writes them. Estimators and the control state do not wait for the sink.
+/// The most lines that wait, from any writer. Estimators and the control state do not wait for the sink.
 const MOST: usize = 4 * CAPACITY;
 
 /// How long outside producers wait for a sink that is too slow. One that takes no line for so long while [`CAPACITY`] wait

@@ -30,7 +30,7 @@ impl Kinematics {
     /// The chain from `base` to `tip`, any two links.
     ///
     /// # Errors
-    /// A link is none of this robot.
+    /// A link does not belong to this robot.
     pub fn chain(&self, base: LinkId, tip: LinkId) -> Result<Chain, KinematicsError> {
         let (base, tip) = (self.placement(base)?, self.placement(tip)?);
         let (mut of_base, mut of_tip) = (self.ancestors(base.body), self.ancestors(tip.body));

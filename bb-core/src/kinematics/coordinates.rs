@@ -57,7 +57,7 @@ fn turned((w, z): (f64, f64), isometry: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(translation), UnitQuaternion::new_unchecked(rotation))
 }
 
-/// The position of a floating joint. A quaternion without a direction is none: everything below is NaN.
+/// The position of a floating joint. The zero quaternion is no rotation: it makes everything that the joint carries NaN.
 fn free(positions: &[f64]) -> Isometry3<f64> {
     let q = positions;
     let rotation = UnitQuaternion::new_normalize(Quaternion::new(q[3], q[4], q[5], q[6]));

@@ -102,7 +102,7 @@ impl InverseKinematics {
     /// For the chain from `base` to `tip`.
     ///
     /// # Errors
-    /// A link is none of this robot; weights or a posture of another length, or not finite, or a weight that is not positive.
+    /// A link does not belong to this robot; weights or a posture of another length, or not finite, or a weight that is not positive.
     pub fn new(
         kinematics: &Kinematics,
         base: LinkId,

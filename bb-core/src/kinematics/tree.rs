@@ -139,7 +139,7 @@ impl Frames {
     /// `root_from_link`.
     ///
     /// # Errors
-    /// The link is none of this robot.
+    /// The link does not belong to this robot.
     pub fn root_from_link(&self, link: LinkId) -> Result<Isometry3<f64>, KinematicsError> {
         let placement = self.kinematics.placement(link)?;
         let body_from_link = &placement.body_from_link;
@@ -149,7 +149,7 @@ impl Frames {
     /// `base_from_tip`, of any two links.
     ///
     /// # Errors
-    /// A link is none of this robot.
+    /// A link does not belong to this robot.
     pub fn transform(&self, base: LinkId, tip: LinkId) -> Result<Isometry3<f64>, KinematicsError> {
         Ok(self.root_from_link(base)?.inv_mul(&self.root_from_link(tip)?))
     }
@@ -157,7 +157,7 @@ impl Frames {
     /// How a link moves.
     ///
     /// # Errors
-    /// The link is none of this robot.
+    /// The link does not belong to this robot.
     pub fn motion(&self, link: LinkId) -> Result<LinkMotion, KinematicsError> {
         let placement = self.kinematics.placement(link)?;
         let motion = placement.body.map_or(LinkMotion::REST, |body| self.states[body].motion);

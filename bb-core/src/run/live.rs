@@ -146,7 +146,7 @@ impl<R: Robot> Live<R> {
         self.settled(|machine| machine.control.arm(&Permit::UNLIMITED))
     }
 
-    /// Disarms the robot: commands are cancelled, and whoever owns hardware makes it safe, within 5 s.
+    /// Disarms the robot: commands are cancelled, and the owners of hardware make it safe, within 5 s.
     ///
     /// # Errors
     /// What could not be made safe; the safety state is `error` then.

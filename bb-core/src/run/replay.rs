@@ -25,7 +25,6 @@ pub struct Replay<R: Robot> {
     last: u64,
     has_begun: bool,
     is_virtual: bool,
-    /// The line before had the robot disarmed, which on virtual time succeeds at once unless the next line says otherwise.
     /// The last request of each island that the journal does not hold, by line and type.
     unrecorded: HashMap<usize, (u64, String)>,
 }

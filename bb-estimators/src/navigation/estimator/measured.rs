@@ -12,7 +12,7 @@ const UNKNOWN_HEIGHT: f64 = 1e4;
 /// Heights that something on or above the Earth has, m.
 const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
 
-/// A covariance, if it tells something: all zeros stand for unknown in ROS, and no noise has a variance of zero or less.
+/// A covariance, if it tells something: in ROS all zeros mean unknown, and no noise has a variance of zero or less.
 pub(in crate::navigation) fn told<const D: usize>(
     covariance: Option<SMatrix<f64, D, D>>,
 ) -> Option<SMatrix<f64, D, D>> {
@@ -50,7 +50,7 @@ impl GnssPosition {
 impl BodyVelocity {
     /// The velocity that an odometry has counted in its own frame. `deviation` is that of one that tells none, m/s.
     pub fn of_odometry(odometry: &Odometry, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
-        // One number stands for all axes: the mean of their variances.
+        // One deviation for all axes: from the mean of their variances.
         let covariance = odometry.twist.covariance;
         let variance = covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).trace() / 3.0);
         let deviation = variance.filter(|variance| *variance > 0.0).map_or(deviation, f64::sqrt);

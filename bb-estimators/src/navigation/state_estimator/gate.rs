@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::input::GpsHealth;
 use super::params::{StateEstimatorParams, ns};
 
-/// How the gate stands.
+/// The state of the gate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GateState {
     /// Fixes are used while the receiver is reported stable.
