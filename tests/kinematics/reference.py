@@ -6,12 +6,11 @@
 import json
 import sys
 
-import numpy as np
-
 try:
+    import numpy as np
     import pinocchio as pin
-except ImportError:
-    print("kinematics: skipped: no package `pin`")
+except ImportError as missing:
+    print(f"kinematics: skipped: Python has no {missing.name}, which the package `pin` brings")
     sys.exit(77)
 
 KINDS = ["fixed", "revolute", "continuous", "prismatic", "planar", "floating"]
