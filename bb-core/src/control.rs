@@ -7,8 +7,10 @@
 //! as `Effects` and run without the lock, on threads of its own or of the pool: each may block for ever,
 //! and harms only itself.
 
+mod apart;
 mod arming;
 mod budgets;
+mod callback;
 mod command;
 mod commands;
 mod effects;
@@ -16,6 +18,7 @@ mod execution;
 mod hanging;
 mod health;
 mod hooks;
+mod inside;
 mod machine;
 #[cfg(all(test, loom))]
 mod model;

@@ -143,9 +143,10 @@ impl CommandContext {
         !self.permit.is_valid()
     }
 
-    /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs; it is removed when the
-    /// command ends. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one
-    /// that fails or takes longer leads to the safety state `error`.
+    /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs. It is removed when the
+    /// code of the command has returned. If the robot was disarmed in the meantime, it runs once more then, for what the code
+    /// has started since. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that
+    /// fails or takes longer leads to the safety state `error`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.hooks.add(Arc::new(hook));
     }

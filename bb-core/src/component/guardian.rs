@@ -9,7 +9,7 @@ pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
 
 /// Keeps disarm callbacks and takes note of hardware errors; the runtime implements it.
 pub(crate) trait Guardian: Send + Sync {
-    /// Adds a callback of the component at `path`, or of that execution of the command there, which must not have ended.
+    /// Adds a callback of the component at `path`, or of that execution of the command there.
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook);
     fn hardware_error(&self, path: &'static str, message: String);
 }
@@ -30,7 +30,8 @@ impl SafetyLink {
 
     /// Registers a callback that makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
     /// own, and must return within 5 s; one that fails or takes longer leads to the safety state `error`. A restart of the
-    /// component replaces what it registered before, and so does a `handle_options` that registers any.
+    /// component replaces what it registered before; a `handle_options` that registers any replaces those of the previous
+    /// `handle_options`, and keeps those of `init`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         if let Some(guardian) = &self.guardian {
             guardian.on_disarm(self.path, None, Arc::new(hook));
@@ -52,7 +53,7 @@ impl fmt::Debug for SafetyLink {
     }
 }
 
-/// The disarm callbacks of one execution of a command: they end with it.
+/// The disarm callbacks of one execution of a command: they are kept until its code has returned.
 pub(crate) struct OwnHooks {
     path: &'static str,
     guardian: Arc<dyn Guardian>,
@@ -64,7 +65,7 @@ impl OwnHooks {
         Self { path, guardian, execution }
     }
 
-    /// Nothing happens once the execution has ended.
+    /// Once the code of the execution has returned, it is run at once, and not kept.
     pub(crate) fn add(&self, hook: DisarmHook) {
         self.guardian.on_disarm(self.path, Some(self.execution), hook);
     }

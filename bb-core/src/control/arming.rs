@@ -1,11 +1,11 @@
 //! Arming, disarming, and what leads to the safety state `error`.
 
-use super::effects::Effects;
-use super::hooks;
+use super::callback::Reason;
+use super::inside;
 use super::machine::IDLE;
 use super::step::Step;
-use super::system::{Control, Disarming, Limit, NumberedHook, Phase, State};
-use crate::component::{DisarmHook, Guardian, Permit};
+use super::system::{Control, Disarming, Limit, Phase, State};
+use crate::component::Permit;
 use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
@@ -28,7 +28,7 @@ impl State {
     }
 
     /// How many disarmings have ended.
-    fn ended_disarmings(&self) -> u64 {
+    pub(super) fn ended_disarmings(&self) -> u64 {
         self.generation - u64::from(self.disarming.is_some())
     }
 
@@ -37,7 +37,7 @@ impl State {
     }
 
     /// Whether it was disarmed for the last time.
-    fn is_stopped(&self) -> bool {
+    pub(super) fn is_stopped(&self) -> bool {
         self.is_stopping && self.disarming.is_none()
     }
 
@@ -104,7 +104,7 @@ impl Control {
         let waits_for = disarming.map(|disarming| (disarming.generation, Arc::clone(&disarming.outcome)));
         step.finish();
         let Some((generation, outcome)) = waits_for else { return Ok(()) };
-        if hooks::is_waited_for(self.id()) {
+        if inside::is_waited_for(self.id()) {
             return Err(DisarmError::Callback);
         }
         if self.0.mode == Mode::Real {
@@ -124,11 +124,34 @@ impl Control {
         step.finish();
     }
 
-    /// A disarm callback has returned; `None` if there was none to run.
-    pub(super) fn hook_returned(&self, generation: u64, index: Option<usize>, error: Option<SafetyError>) {
+    /// Whether somebody waits for a callback to run for that reason.
+    pub(super) fn is_wanted(&self, reason: Reason, number: u64) -> bool {
+        let state = self.lock();
+        match reason {
+            Reason::Disarming(generation) => {
+                let disarming = state.disarming.as_ref().filter(|disarming| disarming.generation == generation);
+                disarming.is_some_and(|disarming| disarming.left.iter().any(|(other, _)| *other == number))
+            }
+            Reason::Apart(key) => state.is_apart(key, number),
+        }
+    }
+
+    /// A disarm callback has returned.
+    pub(super) fn callback_returned(&self, reason: Reason, number: u64, error: Option<SafetyError>) {
+        match reason {
+            Reason::Disarming(generation) => self.hook_returned(generation, Some(number), error),
+            Reason::Apart(key) => self.apart_returned(key, number, error),
+        }
+    }
+
+    /// The same of one that runs because the robot is disarmed; `None` if there was none to run.
+    pub(super) fn hook_returned(&self, generation: u64, number: Option<u64>, error: Option<SafetyError>) {
         let mut step = self.step();
         let Some(disarming) = step.state.disarming_of(generation) else { return };
-        disarming.left.retain(|(other, _)| Some(*other) != index);
+        // It is there as often as it was asked for.
+        if let Some(index) = disarming.left.iter().position(|(other, _)| Some(*other) == number) {
+            disarming.left.remove(index);
+        }
         disarming.errors.extend(error);
         if disarming.left.is_empty() {
             let errors = std::mem::take(&mut disarming.errors);
@@ -142,9 +165,7 @@ impl Control {
         let Some(disarming) = step.state.disarming_of(generation) else { return };
         let late = std::mem::take(&mut disarming.left).into_iter();
         let mut errors = std::mem::take(&mut disarming.errors);
-        errors.extend(
-            late.map(|(_, path)| SafetyError { path, message: "did not come back from disarming in time".into() }),
-        );
+        errors.extend(late.map(|(_, path)| late_at(path)));
         step.disarmed(errors);
     }
 
@@ -169,157 +190,16 @@ impl Control {
         step.finish();
     }
 
-    /// Remembers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
-    /// for the last time, it is run at once.
-    fn remember(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook, is_kept: bool) {
-        let mut step = self.step();
-        if let Some(id) = execution
-            && !step.state.executions.iter().any(|other| other.id == id && matches!(other.phase, Phase::Running))
-        {
-            drop(step);
-            return crate::fault::discard(hook);
-        }
-        if step.state.has_ended || step.state.is_stopped() {
-            if !step.state.has_ended && execution.is_none() {
-                // Once the component is made, it runs again.
-                step.state.hooks.add(path, DisarmHook::clone(&hook), is_kept);
-            }
-            drop(step);
-            if let Some(SafetyError { path, message }) = self.run_within(path, &hook) {
-                self.note_hardware_error(path, message);
-            }
-            return crate::fault::discard(hook);
-        }
-        match execution {
-            Some(id) => step.state.hooks.add_of_execution(path, id, DisarmHook::clone(&hook)),
-            None => step.state.hooks.add(path, DisarmHook::clone(&hook), is_kept),
-        }
-        // One that a callback registers is for the next time.
-        if !hooks::is_inside(self.id())
-            && let Some(disarming) = &mut step.state.disarming
-        {
-            let (generation, index) = (disarming.generation, disarming.begun);
-            disarming.begun += 1;
-            disarming.left.push((index, path));
-            step.effects.hooks = Some((generation, vec![(index, path, hook)]));
-        }
-        step.finish();
-    }
-
-    /// Runs a callback outside of a disarming; what went wrong.
-    fn run_within(&self, path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
-        if self.0.mode != Mode::Real || cfg!(loom) {
-            return hooks::run(self.id(), path, hook);
-        }
-        let (returned, waits) = std::sync::mpsc::channel();
-        let (robot, run) = (self.id(), DisarmHook::clone(hook));
-        let thread = std::thread::Builder::new().name(format!("disarm {path}")).spawn(move || {
-            let error = hooks::run(robot, path, &run);
-            crate::fault::discard(run);
-            let _ = returned.send(error);
-        });
-        if thread.is_err() {
-            return hooks::run(self.id(), path, hook);
-        }
-        let late = |_| Some(SafetyError { path, message: "did not come back from disarming in time".into() });
-        waits.recv_timeout(DISARM_WITHIN).unwrap_or_else(late)
-    }
-
     /// Of a robot that has ended: what they own is closed, and what they hold of the robot no longer keeps it alive.
     pub(crate) fn forget_all_hooks(&self) {
         let gone = self.lock().hooks.take_all();
         gone.into_iter().for_each(crate::fault::discard);
     }
-
-    /// The same for an actuator's own `disarm`, which restarts do not replace.
-    pub(crate) fn on_disarm_always(&self, path: &'static str, hook: DisarmHook) {
-        self.remember(path, None, hook, true);
-    }
-
-    /// Runs `make`, which makes the component at `path` or changes it. What it registers replaces what was registered before,
-    /// once it has succeeded; `always` even if it registers nothing. There is no time between in which its hardware would not
-    /// be made safe.
-    pub(crate) fn replacing_hooks<T, E>(
-        &self,
-        path: &'static str,
-        always: bool,
-        make: impl FnOnce() -> Result<T, E>,
-    ) -> Result<T, E> {
-        let (first, disarmings) = {
-            let state = self.lock();
-            (state.hooks.next(), state.ended_disarmings())
-        };
-        let made = make();
-        if made.is_ok() {
-            self.run_again(path, first, disarmings);
-        }
-        let mut state = self.lock();
-        let is_replaced = made.is_ok() && (always || state.hooks.any_since(path, first));
-        let gone =
-            if is_replaced || made.is_err() { state.hooks.take(path, first, is_replaced) } else { Vec::new() };
-        drop(state);
-        if made.is_err() {
-            self.make_safe(path, gone);
-        } else {
-            gone.into_iter().for_each(crate::fault::discard);
-        }
-        made
-    }
-
-    /// If the robot was disarmed while a component was made, what it had registered by then may have run before its hardware
-    /// was started: it runs once more.
-    fn run_again(&self, path: &'static str, first: u64, disarmings: u64) {
-        let mut step = self.step();
-        let hooks = step.state.hooks.all_since(path, first);
-        let has_begun = step.state.generation != disarmings;
-        let was_disarmed = has_begun && step.state.machine.safety != Safety::Armed;
-        if hooks.is_empty() || !(was_disarmed || step.state.is_stopped()) {
-            return;
-        }
-        if let Some(disarming) = &mut step.state.disarming {
-            let numbered: Vec<NumberedHook> =
-                (disarming.begun..).zip(hooks).map(|(index, hook)| (index, path, hook)).collect();
-            disarming.begun += numbered.len();
-            disarming.left.extend(numbered.iter().map(|(index, path, _)| (*index, *path)));
-            step.effects.hooks = Some((disarming.generation, numbered));
-            return step.finish();
-        }
-        drop(step);
-        for hook in hooks {
-            if let Some(SafetyError { path, message }) = self.run_within(path, &hook) {
-                self.note_hardware_error(path, message);
-            }
-            crate::fault::discard(hook);
-        }
-    }
-
-    /// What an `init` has started that failed then is made safe. A callback that fails stays for the next disarming: a device
-    /// that is unplugged is no danger, but one that cannot be stopped is.
-    fn make_safe(&self, path: &'static str, hooks: Vec<DisarmHook>) {
-        if hooks.is_empty() {
-            return;
-        }
-        let (failed, safe): (Vec<_>, Vec<_>) =
-            hooks.into_iter().partition(|hook| self.run_within(path, hook).is_some());
-        let earlier = self.lock().hooks.replace_leftovers(path, failed);
-        safe.into_iter().chain(earlier).for_each(crate::fault::discard);
-    }
 }
 
-/// In a replay, the journal says what components have reported, and there is no hardware.
-impl Guardian for Control {
-    fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
-        match self.0.mode {
-            Mode::Replay => crate::fault::discard(hook),
-            Mode::Real | Mode::Virtual => self.remember(path, execution, hook, false),
-        }
-    }
-
-    fn hardware_error(&self, path: &'static str, message: String) {
-        if self.0.mode != Mode::Replay {
-            self.note_hardware_error(path, message);
-        }
-    }
+/// The disarm callback of a component did not come back.
+pub(super) fn late_at(path: &'static str) -> SafetyError {
+    SafetyError { path, message: "did not come back from disarming in time".to_owned() }
 }
 
 impl Step<'_> {
@@ -374,8 +254,10 @@ impl Step<'_> {
     pub(super) fn begin_disarming(&mut self, by: Option<u64>, name: Option<&'static str>, force: bool) -> u64 {
         // Those of commands too, which end below.
         let hooks = if self.control.0.mode == Mode::Replay { Vec::new() } else { self.state.hooks.all() };
-        let numbered = hooks.into_iter().enumerate().map(|(index, (path, hook))| (index, path, hook));
-        let hooks: Vec<NumberedHook> = numbered.collect();
+        for execution in &mut self.state.executions {
+            let is_inside = || execution.task.as_ref().is_some_and(|task| task.is_polled());
+            execution.lingers_on |= matches!(execution.phase, Phase::Lingering) && is_inside();
+        }
         self.state.machine.safety = Safety::Disarming;
         self.state.generation += 1;
         let generation = self.state.generation;
@@ -386,14 +268,12 @@ impl Step<'_> {
             force,
             to_error: false,
             by,
-            begun: hooks.len(),
-            left: hooks.iter().map(|(index, path, _)| (*index, *path)).collect(),
+            left: hooks.iter().map(|callback| (callback.number, callback.path)).collect(),
             errors: Vec::new(),
             outcome: Arc::default(),
         });
         if self.control.0.mode != Mode::Replay {
-            let Effects { hooks: waiting, .. } = &mut self.effects;
-            *waiting = Some((generation, hooks));
+            self.effects.hooks.push((generation, hooks));
         }
         if self.control.0.mode == Mode::Real {
             self.control.0.limits.set(Limit::Disarming(generation), self.now + DISARM_WITHIN);

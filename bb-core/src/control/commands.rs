@@ -147,7 +147,7 @@ impl Control {
         let Some(index) = step.running(id) else {
             // It was cancelled meanwhile, or has timed out.
             step.effects.dropped.extend(value);
-            step.gone(id);
+            step.returned(id);
             return step.finish();
         };
         step.line(Event::Ended { execution: id, end: end.clone() });
@@ -160,7 +160,7 @@ impl Control {
     /// The future of a command that was cancelled has been dropped.
     pub(crate) fn gone(&self, id: u64) {
         let mut step = self.step();
-        step.gone(id);
+        step.returned(id);
         step.finish();
     }
 
@@ -281,9 +281,16 @@ impl Step<'_> {
         {
             self.control.0.limits.set(Limit::Execution(id), self.now.plus_nanos(timeout));
         }
-        let phase = Phase::Running;
-        let execution =
-            RunningCommand { id, command: number, health, slot: Arc::clone(&slot), permit, task, phase };
+        let execution = RunningCommand {
+            id,
+            command: number,
+            health,
+            slot: Arc::clone(&slot),
+            permit,
+            task,
+            phase: Phase::Running,
+            lingers_on: false,
+        };
         self.state.executions.push(execution);
         self.publish_phase(number, id, CommandPhase::Started, health);
         self.publish_machine(Some(declared.name));
@@ -454,17 +461,19 @@ impl Step<'_> {
         result: Result<Option<Value>, CommandError>,
         next_state: Option<&'static str>,
     ) {
+        let is_armed = self.state.machine.safety == Safety::Armed;
         let Some(execution) = self.state.executions.get_mut(index) else { return };
         let (id, command, health) = (execution.id, execution.command, execution.health);
         execution.permit.revoke();
         let slot = Arc::clone(&execution.slot);
-        let forgotten = self.state.hooks.take_of_execution(id);
-        self.effects.forgotten.extend(forgotten);
-        let Some(execution) = self.state.executions.get_mut(index) else { return };
         // One whose code has ended is gone; another one's code has yet to notice.
         let previous = std::mem::replace(&mut execution.phase, Phase::Lingering);
+        let goes_on = matches!(previous, Phase::Running)
+            && matches!(result, Err(CommandError::Cancelled | CommandError::TimedOut));
         match previous {
-            Phase::Running if result.is_err() && !matches!(result, Err(CommandError::Failed(_))) => {
+            Phase::Running if goes_on => {
+                let is_inside = execution.task.as_ref().is_some_and(|task| task.mark_cancelled());
+                execution.lingers_on |= is_inside && !is_armed;
                 self.effects.cancelled.extend(execution.task.clone());
             }
             Phase::Disarming(value, _) | Phase::Arming(value, _) => {
@@ -472,6 +481,9 @@ impl Step<'_> {
                 self.state.executions.remove(index);
             }
             Phase::Running | Phase::Lingering => drop(self.state.executions.remove(index)),
+        }
+        if !goes_on {
+            self.effects.forgotten.extend(self.state.hooks.take_of_execution(id));
         }
         self.control.0.limits.clear(Limit::Execution(id));
         self.state.machine.running = self.state.machine.running.saturating_sub(1);
@@ -502,13 +514,21 @@ impl Step<'_> {
         }
     }
 
-    /// The code of a cancelled execution has returned.
-    fn gone(&mut self, id: u64) {
+    /// The code of a cancelled execution has returned. What it may have started since is made safe before it is gone.
+    fn returned(&mut self, id: u64) {
+        if !self.makes_safe_after(id) {
+            self.gone(id);
+        }
+    }
+
+    /// A cancelled execution is gone.
+    pub(super) fn gone(&mut self, id: u64) {
         let lingering =
             |execution: &RunningCommand| execution.id == id && matches!(execution.phase, Phase::Lingering);
         let Some(index) = self.state.executions.iter().position(lingering) else { return };
         self.line(Event::Gone { execution: id });
         self.state.executions.remove(index);
+        self.effects.forgotten.extend(self.state.hooks.take_of_execution(id));
         if self.state.has_lingering() {
             return;
         }

@@ -1,11 +1,12 @@
 //! What follows from an entry of the control state and is user code: it runs without the lock, and where it harms nobody.
 
+use super::apart::Key;
+use super::callback::{Callback, Reason};
 use super::execution::CommandError;
 use super::execution::Slot;
-use super::hooks;
-use super::system::{Control, KEPT_FAULTS, NumberedHook, Wired};
+use super::inside;
+use super::system::{Control, KEPT_FAULTS, Wired};
 use super::task::{Task, Value};
-use crate::component::DisarmHook;
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
 use crate::fault::{discard, wake};
 use crate::node::Mode;
@@ -28,10 +29,13 @@ pub(super) struct Effects {
     /// Commands whose futures are to be dropped.
     pub(super) cancelled: Vec<Arc<Task>>,
     pub(super) results: Vec<(Arc<Slot>, Result<Value, CommandError>)>,
-    pub(super) hooks: Option<(u64, Vec<NumberedHook>)>,
+    /// Disarm callbacks, for the disarming of that number.
+    pub(super) hooks: Vec<(u64, Vec<Arc<Callback>>)>,
+    /// Disarm callbacks that run while nobody disarms the robot.
+    pub(super) apart: Vec<(Key, Vec<Arc<Callback>>)>,
     pub(super) dropped: Vec<Value>,
     /// Disarm callbacks of commands that have ended.
-    pub(super) forgotten: Vec<DisarmHook>,
+    pub(super) forgotten: Vec<Arc<Callback>>,
     /// Owners of the wiring, which may be the last.
     pub(super) wired: Vec<Wired>,
 }
@@ -90,15 +94,23 @@ impl Effects {
     }
 
     pub(super) fn run(self, control: &Control) {
-        let Self { wakers, logs: _, has_lines, begun, cancelled, results, hooks, dropped, forgotten, wired } = self;
+        let Self { wakers, logs: _, has_lines, begun, cancelled, results, hooks, apart, dropped, forgotten, wired } =
+            self;
         // First of all: hardware.
-        let without_thread = hooks.map(|(generation, hooks)| (generation, control.start_hooks(generation, hooks)));
+        let hooks = hooks.into_iter().map(|(generation, callbacks)| {
+            (Reason::Disarming(generation), control.start_hooks(generation, callbacks))
+        });
+        let apart =
+            apart.into_iter().map(|(key, callbacks)| (Reason::Apart(key), control.start_apart(key, callbacks)));
+        let without_thread: Vec<_> = hooks.chain(apart).collect();
         // Before anything that may block: until then, no other thread writes lines.
         if has_lines {
             control.start_writing_logs();
         }
-        if let Some((generation, hooks)) = without_thread {
-            control.run_hooks(generation, hooks);
+        for (reason, callbacks) in without_thread {
+            // Hardware that is made safe late is better than never.
+            callbacks.iter().for_each(|callback| callback.run(control, reason));
+            callbacks.into_iter().for_each(discard);
         }
         // Each of these may block for ever, and is a job of its own.
         wakers.into_wakers().for_each(|waker| control.run_apart(move || wake(waker)));
@@ -138,7 +150,7 @@ impl Control {
 
     /// Runs disarm callbacks, each on a thread of its own, and returns those for which there is none; on virtual time all wait
     /// for [`Self::run_pending_hooks`].
-    fn start_hooks(&self, generation: u64, all: Vec<NumberedHook>) -> Vec<NumberedHook> {
+    fn start_hooks(&self, generation: u64, all: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
         if self.0.mode != Mode::Real {
             lock(&self.0.pending_hooks).push_back((generation, all));
             return Vec::new();
@@ -146,47 +158,26 @@ impl Control {
         if all.is_empty() {
             self.hook_returned(generation, None, None);
         }
-        let mut left = Vec::new();
-        for (index, path, hook) in all {
-            let (control, kept) = (self.clone(), DisarmHook::clone(&hook));
-            let run = move || control.run_hook(generation, index, path, hook);
-            if spawn(format!("disarm {path}"), run).is_err() {
-                left.push((index, path, kept));
-            }
-        }
-        left
-    }
-
-    /// Runs disarm callbacks here: hardware that is made safe late is better than never.
-    fn run_hooks(&self, generation: u64, hooks: Vec<NumberedHook>) {
-        for (index, path, hook) in hooks {
-            self.run_hook(generation, index, path, hook);
-        }
-    }
-
-    fn run_hook(&self, generation: u64, index: usize, path: &'static str, hook: DisarmHook) {
-        let error = hooks::run(self.id(), path, &hook);
-        // The hook may be the last owner of what it captured.
-        discard(hook);
-        self.hook_returned(generation, Some(index), error);
+        all.into_iter().filter(|callback| !callback.start(self, Reason::Disarming(generation))).collect()
     }
 
     /// The calling thread runs an actuator's code, which disarming waits for, as long as what this returns lives.
-    pub(crate) fn enter_actuator(&self) -> hooks::InActuator {
-        hooks::InActuator::new(self.id())
+    pub(crate) fn enter_actuator(&self) -> inside::InActuator {
+        inside::InActuator::new(self.id())
     }
 
     /// On virtual time: runs the disarm callbacks that wait, in order, on the calling thread; true if there were any. None runs
     /// inside code that they would wait for.
     pub(crate) fn run_pending_hooks(&self) -> bool {
-        if hooks::is_waited_for(self.id()) {
+        if inside::is_waited_for(self.id()) {
             return false;
         }
         let Some((generation, all)) = lock(&self.0.pending_hooks).pop_front() else { return false };
         if all.is_empty() {
             self.hook_returned(generation, None, None);
         }
-        self.run_hooks(generation, all);
+        all.iter().for_each(|callback| callback.run(self, Reason::Disarming(generation)));
+        all.into_iter().for_each(discard);
         true
     }
 
@@ -243,17 +234,6 @@ impl Control {
             }
         }
     }
-}
-
-#[cfg(not(loom))]
-fn spawn(name: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    std::thread::Builder::new().name(name).spawn(run).map(drop)
-}
-
-#[cfg(loom)]
-fn spawn(_: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    loom::thread::spawn(run);
-    Ok(())
 }
 
 fn write_log(log: &Log) {

@@ -6,6 +6,7 @@ use super::step::Step;
 use super::system::{ComponentOrder, Control};
 use crate::declaration::{EstimatorDeclaration, ParameterValues, Supervisor};
 use crate::event::{HealthReason, HealthState, HealthTransition, SafetyError};
+use crate::fault::Failed;
 use crate::journal::Event;
 use crate::node::{BindTarget, Check, HealthReport, Mode, NodeEntry, Overseer, Report};
 use crate::time::MonotonicTime;
@@ -35,12 +36,17 @@ impl Overseer for Control {
         Control::parameters(self)
     }
 
-    fn replacing_hooks(&self, path: &'static str, always: bool, make: &mut dyn FnMut() -> bool) {
-        let _ = Control::replacing_hooks(self, path, always, || make().then_some(()).ok_or(()));
+    fn replacing_hooks(
+        &self,
+        path: &'static str,
+        is_made: bool,
+        make: &mut dyn FnMut() -> Result<(), Failed>,
+    ) -> Result<(), Failed> {
+        Control::replacing_hooks(self, path, is_made, make)
     }
 
     fn forget_hooks(&self, path: &'static str) {
-        let gone = self.lock().hooks.replace_leftovers(path, Vec::new());
+        let gone = self.lock().hooks.take_failed(path);
         gone.into_iter().for_each(crate::fault::discard);
     }
 }
@@ -97,8 +103,7 @@ impl Control {
     /// Something that no component did, or one that hangs: it is kept, published and logged, and nothing follows from it.
     pub(crate) fn note_fault(&self, path: &'static str, message: String) {
         let mut step = self.step();
-        step.line(Event::Noted { path, message: message.clone() });
-        step.publish_fault(path, message);
+        step.note_fault(path, message);
         step.finish();
     }
 

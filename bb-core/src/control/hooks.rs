@@ -1,9 +1,8 @@
-//! Disarm callbacks: what makes hardware safe.
+//! Disarm callbacks: what makes hardware safe, and whose they are.
 
+use super::callback::Callback;
 use crate::component::DisarmHook;
-use crate::event::SafetyError;
-use crate::fault::{Fault, caught};
-use std::cell::Cell;
+use std::sync::Arc;
 
 /// The callbacks of all components, in the order in which they were registered.
 #[derive(Default)]
@@ -13,42 +12,37 @@ pub(super) struct Hooks {
 }
 
 struct Hook {
-    path: &'static str,
-    number: u64,
-    /// It stays when the component is restarted.
-    is_kept: bool,
-    /// The execution of a command that it ends with.
-    execution: Option<u64>,
-    /// It is of an `init` that failed, and failed itself.
-    is_leftover: bool,
-    run: DisarmHook,
+    callback: Arc<Callback>,
+    owner: Owner,
+}
+
+/// When a callback is forgotten.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Owner {
+    /// Never: it is the actuator's own.
+    Actuator,
+    /// When the component is made again.
+    Component,
+    /// When the component is made again, or its options change and that registers callbacks.
+    Options,
+    /// When the code of that execution of a command has returned.
+    Execution(u64),
+    /// The `init` that registered it has failed. It is forgotten when it has made safe what that had started.
+    FailedInit,
 }
 
 impl Hooks {
-    /// Of a component; `is_kept` if a restart does not replace it.
-    pub(super) fn add(&mut self, path: &'static str, run: DisarmHook, is_kept: bool) {
-        self.push(Hook { path, number: self.next, is_kept, execution: None, is_leftover: false, run });
+    pub(super) fn add(&mut self, path: &'static str, run: DisarmHook, owner: Owner) -> Arc<Callback> {
+        let callback = self.make(path, run);
+        self.all.push(Hook { callback: Arc::clone(&callback), owner });
+        callback
     }
 
-    /// Of an execution of a command.
-    pub(super) fn add_of_execution(&mut self, path: &'static str, execution: u64, run: DisarmHook) {
-        let execution = Some(execution);
-        self.push(Hook { path, number: self.next, is_kept: false, execution, is_leftover: false, run });
-    }
-
-    /// Of an `init` that failed; those of earlier ones are taken out, to be dropped without a lock.
-    pub(super) fn replace_leftovers(&mut self, path: &'static str, left: Vec<DisarmHook>) -> Vec<DisarmHook> {
-        let earlier = self.all.extract_if(.., |hook| hook.path == path && hook.is_leftover);
-        let earlier = earlier.map(|hook| hook.run).collect();
-        for run in left {
-            self.push(Hook { path, number: self.next, is_kept: false, execution: None, is_leftover: true, run });
-        }
-        earlier
-    }
-
-    fn push(&mut self, hook: Hook) {
-        self.all.push(hook);
+    /// One that is not kept.
+    pub(super) fn make(&mut self, path: &'static str, run: DisarmHook) -> Arc<Callback> {
+        let number = self.next;
         self.next += 1;
+        Arc::new(Callback::new(number, path, run))
     }
 
     /// What is registered from now on has a number from this one on.
@@ -56,80 +50,97 @@ impl Hooks {
         self.next
     }
 
-    /// Whether the component at `path` has registered any from `number` on.
-    pub(super) fn any_since(&self, path: &str, number: u64) -> bool {
-        self.all.iter().any(|hook| hook.path == path && hook.number >= number)
+    pub(super) fn all(&self) -> Vec<Arc<Callback>> {
+        self.all.iter().map(|hook| Arc::clone(&hook.callback)).collect()
     }
 
-    /// Those that the component at `path` has registered from `number` on.
-    pub(super) fn all_since(&self, path: &str, number: u64) -> Vec<DisarmHook> {
-        let since = self.all.iter().filter(|hook| hook.path == path && hook.number >= number);
-        since.map(|hook| DisarmHook::clone(&hook.run)).collect()
+    pub(super) fn of_execution(&self, execution: u64) -> Vec<Arc<Callback>> {
+        let own = self.all.iter().filter(|hook| hook.owner == Owner::Execution(execution));
+        own.map(|hook| Arc::clone(&hook.callback)).collect()
     }
 
-    /// Takes those of a component out that were registered before `number`, or since; to be dropped without a lock.
-    pub(super) fn take(&mut self, path: &str, number: u64, before: bool) -> Vec<DisarmHook> {
-        let taken =
-            self.all.extract_if(.., |hook| hook.path == path && !hook.is_kept && (hook.number < number) == before);
-        taken.map(|hook| hook.run).collect()
+    /// The component at `path` was made, and those from `first` on are new. They, and the ones they replace, which are to be
+    /// dropped without a lock.
+    pub(super) fn made(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
+        let old = self.take(|hook| {
+            let is_replaced = matches!(hook.owner, Owner::Component | Owner::Options | Owner::FailedInit);
+            is_replaced && hook.is_of(path) && hook.callback.number < first
+        });
+        (self.since(path, first).map(|hook| Arc::clone(&hook.callback)).collect(), old)
+    }
+
+    /// The same of a component whose options have changed. What it registered when it was made is kept: a callback too many
+    /// fails loudly, and one too few does so when something burns.
+    pub(super) fn changed(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
+        let new: Vec<_> = self
+            .since(path, first)
+            .map(|hook| {
+                hook.owner = Owner::Options;
+                Arc::clone(&hook.callback)
+            })
+            .collect();
+        let is_old = |hook: &Hook| hook.is_of(path) && hook.callback.number < first && hook.owner == Owner::Options;
+        let old = if new.is_empty() { Vec::new() } else { self.take(is_old) };
+        (new, old)
+    }
+
+    /// The component at `path` could not be made. What it had registered from `first` on, and the ones of earlier failures,
+    /// which are to be dropped without a lock.
+    pub(super) fn failed(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
+        let new: Vec<_> = self
+            .since(path, first)
+            .map(|hook| {
+                hook.owner = Owner::FailedInit;
+                Arc::clone(&hook.callback)
+            })
+            .collect();
+        let is_old =
+            |hook: &Hook| hook.is_of(path) && hook.callback.number < first && hook.owner == Owner::FailedInit;
+        let old = if new.is_empty() { Vec::new() } else { self.take(is_old) };
+        (new, old)
+    }
+
+    /// Whether what an `init` of the component at `path` registered that failed then has not returned.
+    pub(super) fn hang(&self, path: &str) -> bool {
+        let mut failed = self.all.iter().filter(|hook| hook.is_of(path) && hook.owner == Owner::FailedInit);
+        failed.any(|hook| hook.callback.is_running())
+    }
+
+    fn since(&mut self, path: &str, first: u64) -> impl Iterator<Item = &mut Hook> {
+        let of_component = |hook: &&mut Hook| matches!(hook.owner, Owner::Component | Owner::Options);
+        self.all
+            .iter_mut()
+            .filter(of_component)
+            .filter(move |hook| hook.is_of(path) && hook.callback.number >= first)
+    }
+
+    fn take(&mut self, fits: impl Fn(&Hook) -> bool) -> Vec<Arc<Callback>> {
+        self.all.extract_if(.., |hook| fits(hook)).map(|hook| hook.callback).collect()
+    }
+
+    /// Takes out the one of that number; to be dropped without a lock.
+    pub(super) fn take_one(&mut self, number: u64) -> Vec<Arc<Callback>> {
+        self.take(|hook| hook.callback.number == number)
     }
 
     /// Takes out those of an execution; to be dropped without a lock.
-    pub(super) fn take_of_execution(&mut self, execution: u64) -> Vec<DisarmHook> {
-        self.all.extract_if(.., |hook| hook.execution == Some(execution)).map(|hook| hook.run).collect()
+    pub(super) fn take_of_execution(&mut self, execution: u64) -> Vec<Arc<Callback>> {
+        self.take(|hook| hook.owner == Owner::Execution(execution))
+    }
+
+    /// Takes out those of a component that is given up; to be dropped without a lock.
+    pub(super) fn take_failed(&mut self, path: &str) -> Vec<Arc<Callback>> {
+        self.take(|hook| hook.is_of(path) && hook.owner == Owner::FailedInit)
     }
 
     /// Takes out all; to be dropped without a lock.
-    pub(super) fn take_all(&mut self) -> Vec<DisarmHook> {
-        self.all.drain(..).map(|hook| hook.run).collect()
-    }
-
-    pub(super) fn all(&self) -> Vec<(&'static str, DisarmHook)> {
-        self.all.iter().map(|hook| (hook.path, DisarmHook::clone(&hook.run))).collect()
+    pub(super) fn take_all(&mut self) -> Vec<Arc<Callback>> {
+        self.take(|_| true)
     }
 }
 
-thread_local! {
-    /// Of which robot the calling thread runs a disarm callback, which must not wait for the disarming that it is a part of; 0
-    /// for none.
-    static INSIDE: Cell<usize> = const { Cell::new(0) };
-}
-
-pub(super) fn is_inside(robot: usize) -> bool {
-    INSIDE.get() == robot
-}
-
-thread_local! {
-    /// Of which robot the calling thread runs an actuator's code, which its disarm callback waits for; 0 for none.
-    static IN_ACTUATOR: Cell<usize> = const { Cell::new(0) };
-}
-
-/// Whether the calling thread runs code that disarming waits for, so that it must not wait for that.
-pub(super) fn is_waited_for(robot: usize) -> bool {
-    is_inside(robot) || IN_ACTUATOR.get() == robot
-}
-
-/// The calling thread runs an actuator's code as long as this lives.
-pub(crate) struct InActuator {
-    before: usize,
-}
-
-impl InActuator {
-    pub(super) fn new(robot: usize) -> Self {
-        Self { before: IN_ACTUATOR.replace(robot) }
+impl Hook {
+    fn is_of(&self, path: &str) -> bool {
+        self.callback.path == path
     }
-}
-
-impl Drop for InActuator {
-    fn drop(&mut self) {
-        IN_ACTUATOR.set(self.before);
-    }
-}
-
-/// Runs a disarm callback on the calling thread; what went wrong.
-pub(super) fn run(robot: usize, path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
-    let before = INSIDE.replace(robot);
-    let failed: Option<Fault> = caught(|| hook()).err().map(|failed| failed.fault);
-    INSIDE.set(before);
-    failed.map(|fault| SafetyError { path, message: format!("disarming failed: {fault}") })
 }

@@ -157,6 +157,41 @@ fn a_callback_that_fails_while_the_robot_stops() {
 }
 
 #[test]
+fn an_init_that_fails_while_the_robot_is_disarmed() {
+    let mut checker = loom::model::Builder::new();
+    checker.preemption_bound = Some(2);
+    checker.check(|| {
+        let control = control();
+        assert_eq!(control.arm(&Permit::UNLIMITED), Ok(()));
+        let motor = Motor::default();
+        let (starting, started) = (control.clone(), motor.clone());
+        let starts = thread::spawn(move || {
+            let failed = starting.replacing_hooks("motor", true, || {
+                let stopped = started.clone();
+                let disarm = move || {
+                    stopped.0.lock().expect("nobody panicked").is_safe = true;
+                    Ok(())
+                };
+                starting.on_disarm("motor", None, std::sync::Arc::new(disarm));
+                started.0.lock().expect("nobody panicked").is_safe = false;
+                Err::<(), _>(Fault::new("no handshake").into())
+            });
+            assert!(failed.is_err());
+        });
+        let _ = control.disarm(false);
+        starts.join().expect("it does not panic");
+        while control.is_disarming() {
+            thread::yield_now();
+        }
+        // Where the disarming runs the callback at that time, it runs it once more, on its own thread.
+        while control.makes_safe() {
+            thread::yield_now();
+        }
+        assert!(motor.0.lock().expect("nobody panicked").is_safe, "its callback ran after it was started");
+    });
+}
+
+#[test]
 fn a_callback_that_is_registered_while_the_robot_stops() {
     let mut checker = loom::model::Builder::new();
     checker.preemption_bound = Some(2);

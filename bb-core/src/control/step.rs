@@ -78,6 +78,12 @@ impl Step<'_> {
         self.publish(&self.control.0.topics.safety_error, error, self.now);
     }
 
+    /// See [`Control::note_fault`].
+    pub(super) fn note_fault(&mut self, path: &'static str, message: String) {
+        self.line(Event::Noted { path, message: message.clone() });
+        self.publish_fault(path, message);
+    }
+
     /// Keeps and publishes that a component has failed.
     pub(super) fn publish_fault(&mut self, path: &'static str, message: String) {
         let fault = ComponentFault { path, message };

@@ -50,7 +50,7 @@ impl Control {
         }
     }
 
-    /// The paths of commands whose code has not returned at `deadline`.
+    /// The paths of commands whose code has not returned at `deadline`, and of components whose disarm callbacks have not.
     pub(crate) fn lingering(&self, deadline: Instant) -> Vec<&'static str> {
         loop {
             let lingering = self.polled();
@@ -70,6 +70,7 @@ impl Control {
         inside
             .filter_map(|execution| self.0.declared.commands.get(execution.command))
             .map(|declared| declared.path)
+            .chain(state.apart_paths())
             .collect()
     }
 
@@ -80,6 +81,7 @@ impl Control {
             Limit::Execution(id) => self.timed_out(id),
             Limit::Arming => self.arm_timeout(),
             Limit::Disarming(generation) => self.disarm_timeout(generation),
+            Limit::Apart(key) => self.apart_timeout(key),
         }
         true
     }

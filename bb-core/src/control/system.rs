@@ -1,6 +1,8 @@
 //! The control state, and how it is entered.
 
+use super::apart::{Apart, Key};
 use super::budgets::Budgets;
+use super::callback::Callback;
 use super::command::{CommandStatistics, Prepared};
 use super::effects::Reporter;
 use super::execution::Slot;
@@ -8,7 +10,7 @@ use super::hooks::Hooks;
 use super::machine::Machine;
 use super::task::{Task, Value};
 use super::topics::SystemTopics;
-use crate::component::{DisarmHook, Host, Permit};
+use crate::component::{Host, Permit};
 use crate::declaration::{
     CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, ParameterValues, Supervisor,
 };
@@ -91,7 +93,7 @@ pub(super) struct Inner {
     /// Commands to be polled, on virtual time.
     pub(super) ready: Mutex<VecDeque<Arc<Task>>>,
     /// Disarm callbacks to be run by the loop of a simulation.
-    pub(super) pending_hooks: Mutex<VecDeque<(u64, Vec<NumberedHook>)>>,
+    pub(super) pending_hooks: Mutex<VecDeque<(u64, Vec<Arc<Callback>>)>>,
     /// What islands reported in a replay, until the journal says that it was taken note of.
     pub(super) reports: Mutex<HashMap<usize, VecDeque<Report>>>,
     pub(super) faults: Mutex<Faults>,
@@ -132,6 +134,8 @@ pub(super) enum Limit {
     Arming,
     /// How long disarm callbacks may take.
     Disarming(u64),
+    /// The same of those that run while nobody disarms the robot.
+    Apart(Key),
 }
 
 /// The control state's lock.
@@ -151,6 +155,9 @@ pub(super) struct State {
     pub(super) health: Vec<Health>,
     pub(super) components: Vec<Supervised>,
     pub(super) disarming: Option<Disarming>,
+    /// Disarm callbacks that run while nobody disarms the robot.
+    pub(super) apart: Vec<Apart>,
+    pub(super) next_apart: u64,
     /// What became of the last disarming.
     pub(super) last_disarm: Result<(), DisarmError>,
     /// How often somebody asked for the robot to be disarmed: who waits to arm it since before does not.
@@ -173,6 +180,8 @@ pub(super) struct RunningCommand {
     /// None in a replay.
     pub(super) task: Option<Arc<Task>>,
     pub(super) phase: Phase,
+    /// It was cancelled, and its code may have gone on after the disarm callbacks had run.
+    pub(super) lingers_on: bool,
 }
 
 /// How far an execution is.
@@ -225,17 +234,12 @@ pub(super) struct Disarming {
     pub(super) to_error: bool,
     /// The execution that disarms it.
     pub(super) by: Option<u64>,
-    /// How many callbacks were begun.
-    pub(super) begun: usize,
-    /// Those that have not returned.
-    pub(super) left: Vec<(usize, &'static str)>,
+    /// The numbers and paths of callbacks that have not returned, as often as they are to run.
+    pub(super) left: Vec<(u64, &'static str)>,
     /// Where those who wait for it find what became of it.
     pub(super) outcome: Arc<OnceLock<Result<(), DisarmError>>>,
     pub(super) errors: Vec<SafetyError>,
 }
-
-/// A disarm callback, its number among those that run, and the path of its component.
-pub(super) type NumberedHook = (usize, &'static str, DisarmHook);
 
 /// The newest faults, and how many there were.
 #[derive(Default)]
@@ -265,6 +269,8 @@ impl Control {
             health: vec![Health::default(); declared.estimators.len()],
             components: Vec::new(),
             disarming: None,
+            apart: Vec::new(),
+            next_apart: 0,
             last_disarm: Ok(()),
             disarms: 0,
             generation: 0,

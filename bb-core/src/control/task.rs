@@ -84,9 +84,17 @@ impl Task {
         }
     }
 
+    /// Its code is not entered any more; whether a thread is inside. For [`Self::cancel`], which cannot be called under a
+    /// lock.
+    pub(super) fn mark_cancelled(&self) -> bool {
+        let mut state = self.lock();
+        state.is_cancelled = true;
+        matches!(state.code, Code::Polled)
+    }
+
     /// Its future is dropped as soon as its code gives way.
     pub(super) fn cancel(self: &Arc<Self>) {
-        self.lock().is_cancelled = true;
+        self.mark_cancelled();
         self.schedule();
     }
 

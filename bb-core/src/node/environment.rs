@@ -4,7 +4,7 @@ use super::entry::Report;
 use super::shared::SharedNode;
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
-use crate::fault::Fault;
+use crate::fault::{Failed, Fault};
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
 use crate::message::{Origin, Payload, Stamped};
@@ -27,9 +27,14 @@ pub(crate) trait Overseer: Guardian {
     /// values by entries, others by what they registered.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
     fn parameters(&self) -> ParameterValues;
-    /// Runs `make`, which makes the component at `path` or changes it, and says whether it has succeeded. The disarm callbacks
-    /// that it registers replace those from before.
-    fn replacing_hooks(&self, path: &'static str, always: bool, make: &mut dyn FnMut() -> bool);
+    /// Runs `make`, which makes the component at `path`, or changes its options. The disarm callbacks that it registers replace
+    /// those from before.
+    fn replacing_hooks(
+        &self,
+        path: &'static str,
+        is_made: bool,
+        make: &mut dyn FnMut() -> Result<(), Failed>,
+    ) -> Result<(), Failed>;
     /// The component at `path` was left out: it guards nothing.
     fn forget_hooks(&self, path: &'static str);
 }

@@ -7,6 +7,7 @@
 use super::{Act, Island, IslandDeclaration, IslandState, IslandWiring, Key};
 use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
+use crate::fault::Failed;
 use crate::journal::Event;
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
@@ -63,8 +64,13 @@ impl Guardian for Nobody {
 }
 
 impl Overseer for Nobody {
-    fn replacing_hooks(&self, _: &'static str, _: bool, make: &mut dyn FnMut() -> bool) {
-        make();
+    fn replacing_hooks(
+        &self,
+        _: &'static str,
+        _: bool,
+        make: &mut dyn FnMut() -> Result<(), Failed>,
+    ) -> Result<(), Failed> {
+        make()
     }
 
     fn forget_hooks(&self, _: &'static str) {}

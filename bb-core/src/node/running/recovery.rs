@@ -131,15 +131,14 @@ impl<E: Estimator> Node<E> {
 fn replacing_hooks<T>(
     environment: &Environment,
     path: &'static str,
-    always: bool,
+    is_made: bool,
     make: impl FnOnce() -> Result<T, Failed>,
 ) -> Result<T, Failed> {
     let (mut make, mut made) = (Some(make), None);
-    environment.overseer().replacing_hooks(path, always, &mut || {
-        let result = make.take().map(|make| make());
-        let has_succeeded = matches!(result, Some(Ok(_)));
-        made = result;
-        has_succeeded
-    });
-    made.unwrap_or_else(|| Err(Failed::from(Fault::new("it was not made"))))
+    let not_made = || Failed::from(Fault::new("it was not made"));
+    environment.overseer().replacing_hooks(path, is_made, &mut || {
+        made = Some(make.take().ok_or_else(not_made)?()?);
+        Ok(())
+    })?;
+    made.ok_or_else(not_made)
 }

@@ -1,0 +1,295 @@
+//! Disarm callbacks that run while nobody disarms the robot: those of an `init` that failed, and those of code that may have
+//! started something after the robot was disarmed.
+//!
+//! They stay registered while they run, so that a disarming in that time runs them too and waits for them.
+
+use super::arming::{DISARM_WITHIN, late_at};
+use super::callback::{Callback, Reason};
+use super::hooks::Owner;
+use super::inside;
+use super::step::Step;
+use super::system::{Control, Limit, RunningCommand, State};
+use crate::component::{DisarmHook, Guardian};
+use crate::event::{Safety, SafetyError};
+use crate::fault::{Failed, Fault, discard};
+use crate::journal::Event;
+use crate::node::Mode;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Names some callbacks that run together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key(u64);
+
+/// Callbacks that run together.
+pub(super) struct Apart {
+    key: Key,
+    path: &'static str,
+    why: Why,
+    /// The numbers of those that have not returned.
+    left: Vec<u64>,
+}
+
+/// Why callbacks run, which decides what follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Why {
+    /// An `init` has failed: a device that is unplugged is no danger. Each that succeeds is forgotten; one that fails is a
+    /// fault, and stays for the next disarming.
+    FailedInit,
+    /// Something may have been started on a robot that is disarmed: what cannot be made safe is a hardware error.
+    Started,
+    /// The same by a cancelled command, which is gone once they have returned.
+    Lingered(u64),
+}
+
+impl State {
+    /// Whether a callback is to run for `key`.
+    pub(super) fn is_apart(&self, key: Key, number: u64) -> bool {
+        self.apart.iter().any(|apart| apart.key == key && apart.left.contains(&number))
+    }
+
+    /// The paths of components whose callbacks run.
+    pub(super) fn apart_paths(&self) -> impl Iterator<Item = &'static str> {
+        self.apart.iter().map(|apart| apart.path)
+    }
+}
+
+impl Control {
+    /// Remembers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
+    /// for the last time, it is run at once.
+    fn remember(&self, path: &'static str, execution: Option<u64>, code: DisarmHook) {
+        let owner = execution.map_or(Owner::Component, Owner::Execution);
+        self.remember_as(path, owner, code);
+    }
+
+    /// The same for an actuator's own `disarm`, which restarts do not replace.
+    pub(crate) fn on_disarm_always(&self, path: &'static str, code: DisarmHook) {
+        self.remember_as(path, Owner::Actuator, code);
+    }
+
+    fn remember_as(&self, path: &'static str, owner: Owner, code: DisarmHook) {
+        let mut step = self.step();
+        let is_known = match owner {
+            Owner::Execution(id) => step.state.executions.iter().any(|execution| execution.id == id),
+            _ => true,
+        };
+        if step.state.has_ended || !is_known {
+            let callback = step.state.hooks.make(path, code);
+            if !is_known && !step.state.has_ended {
+                let message = "it registered a disarm callback when it had ended; that was run at once";
+                step.note_fault(path, message.to_owned());
+            }
+            let key = step.run_apart(path, vec![callback], Why::Started);
+            step.finish();
+            return self.wait_apart(key);
+        }
+        let callback = step.state.hooks.add(path, code, owner);
+        let mut key = None;
+        if step.state.is_stopped() {
+            key = step.run_apart(path, vec![callback], Why::Started);
+        } else if !inside::is_callback(self.id()) {
+            // One that a callback registers is for the next time.
+            step.join_disarming(vec![callback]);
+        }
+        step.lingers_on(owner);
+        step.finish();
+        self.wait_apart(key);
+    }
+
+    /// Runs `make`, which makes the component at `path`, or changes its options. What it registers replaces what was
+    /// registered before, once it has succeeded. There is no time between in which its hardware would not be made safe.
+    ///
+    /// As long as callbacks of an earlier attempt have not returned, there is no further one: the device is still held by
+    /// them.
+    pub(crate) fn replacing_hooks<T>(
+        &self,
+        path: &'static str,
+        is_made: bool,
+        make: impl FnOnce() -> Result<T, Failed>,
+    ) -> Result<T, Failed> {
+        let (first, disarmings) = {
+            let state = self.lock();
+            if state.hooks.hang(path) {
+                return Err(Fault::new("a disarm callback of its last attempt to start has not returned").into());
+            }
+            (state.hooks.next(), state.ended_disarmings())
+        };
+        let made = make();
+        let mut step = self.step();
+        let hooks = &mut step.state.hooks;
+        let (new, old) = match made {
+            Ok(_) if is_made => hooks.made(path, first),
+            Ok(_) => hooks.changed(path, first),
+            Err(_) => hooks.failed(path, first),
+        };
+        let key = match made {
+            Ok(_) => step.run_again(path, new, disarmings),
+            Err(_) => step.run_apart(path, new, Why::FailedInit),
+        };
+        step.finish();
+        self.wait_apart(key);
+        old.into_iter().for_each(discard);
+        made
+    }
+
+    /// Waits until the callbacks have returned, or their time is over. A disarming that begins meanwhile runs them too, and
+    /// the caller may be in its way.
+    fn wait_apart(&self, key: Option<Key>) {
+        let Some(key) = key else { return };
+        if self.0.mode != Mode::Real || cfg!(loom) {
+            return;
+        }
+        let is_over = |state: &State| state.apart.iter().all(|apart| apart.key != key) || state.disarming.is_some();
+        if !self.wait_until(DISARM_WITHIN + Duration::from_millis(500), is_over) {
+            // Even the thread that keeps time is gone.
+            self.apart_timeout(key);
+        }
+    }
+
+    /// Whether callbacks run though nobody disarms the robot.
+    #[cfg(loom)]
+    pub(super) fn makes_safe(&self) -> bool {
+        !self.lock().apart.is_empty()
+    }
+
+    /// Runs callbacks, each on a thread of its own; those for which there is none. On virtual time they run here.
+    pub(super) fn start_apart(&self, key: Key, callbacks: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
+        if self.0.mode != Mode::Real || cfg!(loom) {
+            return callbacks;
+        }
+        callbacks.into_iter().filter(|callback| !callback.start(self, Reason::Apart(key))).collect()
+    }
+
+    /// A callback has returned that ran apart.
+    pub(super) fn apart_returned(&self, key: Key, number: u64, error: Option<SafetyError>) {
+        let mut step = self.step();
+        let Some(apart) = step.state.apart.iter_mut().find(|apart| apart.key == key) else { return };
+        let before = apart.left.len();
+        apart.left.retain(|other| *other != number);
+        if apart.left.len() == before {
+            return;
+        }
+        let (why, is_last) = (apart.why, apart.left.is_empty());
+        let mut safe = Vec::new();
+        match error {
+            None if why == Why::FailedInit => safe = step.state.hooks.take_one(number),
+            None => {}
+            Some(error) => step.was_not_safe(why, error),
+        }
+        if is_last {
+            step.end_apart(key);
+        }
+        step.finish();
+        safe.into_iter().for_each(discard);
+    }
+
+    /// The time of callbacks that run apart is over.
+    pub(super) fn apart_timeout(&self, key: Key) {
+        let mut step = self.step();
+        let Some(apart) = step.state.apart.iter_mut().find(|apart| apart.key == key) else { return };
+        let (path, why) = (apart.path, apart.why);
+        for _ in std::mem::take(&mut apart.left) {
+            step.was_not_safe(why, late_at(path));
+        }
+        step.end_apart(key);
+        step.finish();
+    }
+}
+
+impl Step<'_> {
+    /// If the robot was disarmed while a component was made, what it had registered by then may have run before its hardware
+    /// was started: it runs once more.
+    fn run_again(&mut self, path: &'static str, callbacks: Vec<Arc<Callback>>, disarmings: u64) -> Option<Key> {
+        let has_begun = self.state.generation != disarmings;
+        let was_disarmed = has_begun && self.state.machine.safety != Safety::Armed;
+        if !was_disarmed && !self.state.is_stopped() {
+            return None;
+        }
+        let left = self.join_disarming(callbacks);
+        self.run_apart(path, left, Why::Started)
+    }
+
+    /// The code of a cancelled command has returned. It may have started something after its callbacks had run: they run once
+    /// more, and only then it is gone. True if there are any.
+    pub(super) fn makes_safe_after(&mut self, id: u64) -> bool {
+        let lingers_on = |execution: &RunningCommand| execution.id == id && execution.lingers_on;
+        if self.state.machine.safety == Safety::Armed || !self.state.executions.iter().any(lingers_on) {
+            return false;
+        }
+        let callbacks = self.state.hooks.of_execution(id);
+        let path = callbacks.first().map_or("", |callback| callback.path);
+        self.run_apart(path, callbacks, Why::Lingered(id)).is_some()
+    }
+
+    /// A command registers a callback: if the robot is not armed, its code goes on after the robot was disarmed.
+    fn lingers_on(&mut self, owner: Owner) {
+        let Owner::Execution(id) = owner else { return };
+        if self.state.machine.safety == Safety::Armed {
+            return;
+        }
+        if let Some(execution) = self.state.executions.iter_mut().find(|execution| execution.id == id) {
+            execution.lingers_on = true;
+        }
+    }
+
+    /// Has callbacks run as a part of the disarming; they are returned if there is none.
+    fn join_disarming(&mut self, callbacks: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
+        let Some(disarming) = &mut self.state.disarming else { return callbacks };
+        disarming.left.extend(callbacks.iter().map(|callback| (callback.number, callback.path)));
+        if !callbacks.is_empty() {
+            self.effects.hooks.push((disarming.generation, callbacks));
+        }
+        Vec::new()
+    }
+
+    fn run_apart(&mut self, path: &'static str, callbacks: Vec<Arc<Callback>>, why: Why) -> Option<Key> {
+        if callbacks.is_empty() {
+            return None;
+        }
+        let key = Key(self.state.next_apart);
+        self.state.next_apart += 1;
+        let left = callbacks.iter().map(|callback| callback.number).collect();
+        self.state.apart.push(Apart { key, path, why, left });
+        if self.control.0.mode == Mode::Real {
+            self.control.0.limits.set(Limit::Apart(key), self.now + DISARM_WITHIN);
+        }
+        self.effects.apart.push((key, callbacks));
+        Some(key)
+    }
+
+    fn was_not_safe(&mut self, why: Why, error: SafetyError) {
+        let SafetyError { path, message } = error;
+        match why {
+            Why::FailedInit => self.note_fault(path, message),
+            Why::Started | Why::Lingered(_) => {
+                self.line(Event::HardwareError { path, message: message.clone() });
+                self.hardware_error(SafetyError { path, message });
+            }
+        }
+    }
+
+    fn end_apart(&mut self, key: Key) {
+        let Some(index) = self.state.apart.iter().position(|apart| apart.key == key) else { return };
+        let apart = self.state.apart.swap_remove(index);
+        self.control.0.limits.clear(Limit::Apart(key));
+        if let Why::Lingered(id) = apart.why {
+            self.gone(id);
+        }
+    }
+}
+
+/// In a replay, the journal says what components have reported, and there is no hardware.
+impl Guardian for Control {
+    fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
+        match self.0.mode {
+            Mode::Replay => discard(hook),
+            Mode::Real | Mode::Virtual => self.remember(path, execution, hook),
+        }
+    }
+
+    fn hardware_error(&self, path: &'static str, message: String) {
+        if self.0.mode != Mode::Replay {
+            self.note_hardware_error(path, message);
+        }
+    }
+}

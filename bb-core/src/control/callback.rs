@@ -1,0 +1,146 @@
+//! One disarm callback: user code, on a thread of its own, and never on two.
+
+use super::apart::Key;
+use super::inside;
+use super::system::Control;
+use crate::component::DisarmHook;
+use crate::event::SafetyError;
+use crate::fault::{caught, discard};
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// See the [module](self).
+pub(super) struct Callback {
+    /// Its number among all of the robot.
+    pub(super) number: u64,
+    /// The path of the component that registered it.
+    pub(super) path: &'static str,
+    code: DisarmHook,
+    runs: Mutex<Runs>,
+}
+
+#[derive(Default)]
+struct Runs {
+    is_running: bool,
+    /// What it was asked for while it runs: it runs once more.
+    waiting: Vec<Reason>,
+}
+
+/// What a callback runs for, and who waits for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reason {
+    /// The robot is disarmed, for the time of that number.
+    Disarming(u64),
+    /// See [`super::apart`].
+    Apart(Key),
+}
+
+impl Callback {
+    pub(super) fn new(number: u64, path: &'static str, code: DisarmHook) -> Self {
+        Self { number, path, code, runs: Mutex::default() }
+    }
+
+    /// Whether a thread runs it.
+    pub(super) fn is_running(&self) -> bool {
+        self.runs().is_running
+    }
+
+    /// Has it run on a thread of its own; false if there is no thread to be had.
+    pub(super) fn start(self: &Arc<Self>, control: &Control, reason: Reason) -> bool {
+        if !self.begin(control, reason) {
+            return true;
+        }
+        let (callback, robot) = (Arc::clone(self), control.clone());
+        let is_started = spawn(format!("disarm {}", self.path), move || {
+            callback.work(&robot, reason);
+            // It may be the last owner of what the code captured.
+            discard(callback);
+        });
+        if is_started.is_err() {
+            self.runs().is_running = false;
+        }
+        is_started.is_ok()
+    }
+
+    /// Runs it on the calling thread.
+    pub(super) fn run(&self, control: &Control, reason: Reason) {
+        if self.begin(control, reason) {
+            self.work(control, reason);
+        }
+    }
+
+    /// True if the caller is to run it. If it runs already, that thread runs it once more.
+    fn begin(&self, control: &Control, reason: Reason) -> bool {
+        let mut runs = self.runs();
+        if !std::mem::replace(&mut runs.is_running, true) {
+            return true;
+        }
+        runs.waiting.push(reason);
+        if runs.waiting.len() > 1 {
+            // It hangs: those that nobody waits for any more are not to pile up.
+            let waiting = std::mem::take(&mut runs.waiting);
+            drop(runs);
+            let wanted = waiting.into_iter().filter(|reason| control.is_wanted(*reason, self.number));
+            let wanted: Vec<_> = wanted.collect();
+            self.runs().waiting.extend(wanted);
+        }
+        false
+    }
+
+    fn work(&self, control: &Control, reason: Reason) {
+        let mut reasons = vec![reason];
+        loop {
+            let error = self.call(control.id());
+            let next = self.wanted(control);
+            for reason in std::mem::replace(&mut reasons, next) {
+                control.callback_returned(reason, self.number, error.clone());
+            }
+            if reasons.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// What it is to be run for once more; if there is nothing, it does not run any more.
+    fn wanted(&self, control: &Control) -> Vec<Reason> {
+        loop {
+            let mut runs = self.runs();
+            let mut waiting = std::mem::take(&mut runs.waiting);
+            if waiting.is_empty() {
+                runs.is_running = false;
+                return waiting;
+            }
+            drop(runs);
+            waiting.retain(|reason| control.is_wanted(*reason, self.number));
+            if !waiting.is_empty() {
+                return waiting;
+            }
+        }
+    }
+
+    fn call(&self, robot: usize) -> Option<SafetyError> {
+        let failed = inside::callback(robot, || caught(|| (self.code)()).err())?;
+        Some(SafetyError { path: self.path, message: format!("disarming failed: {}", failed.fault) })
+    }
+
+    fn runs(&self) -> MutexGuard<'_, Runs> {
+        self.runs.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(not(loom))]
+fn spawn(name: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    std::thread::Builder::new().name(name).spawn(run).map(drop)
+}
+
+#[cfg(loom)]
+fn spawn(_: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    loom::thread::spawn(run);
+    Ok(())
+}
+
+impl fmt::Debug for Callback {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Callback").field("number", &self.number).field("path", &self.path).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,175 @@
+//! Commands whose code goes on after they were cancelled: what it starts is made safe.
+
+use crate::components::{Number, within};
+use crate::disarm_first::Gate;
+use bb_core::Running;
+use bb_core::prelude::*;
+use bb_core::run::CommandError;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The devices of these tests are there once.
+static ALONE: Mutex<()> = Mutex::new(());
+
+static GATE: Gate = Gate::new();
+static TURNS: AtomicBool = AtomicBool::new(false);
+/// How often the motor was stopped.
+static STOPPED: AtomicU32 = AtomicU32::new(0);
+static WAY: AtomicU32 = AtomicU32::new(0);
+
+/// The motor is started before the code blocks.
+const BEFORE: u32 = 0;
+/// The motor is started afterwards.
+const AFTER: u32 = 1;
+/// What stops the motor is registered afterwards, too.
+const REGISTERS_AFTER: u32 = 2;
+/// That is done by a thread that the command leaves behind.
+const LEAVES_A_THREAD: u32 = 3;
+
+fn alone(way: u32) -> MutexGuard<'static, ()> {
+    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    WAY.store(way, Ordering::SeqCst);
+    TURNS.store(false, Ordering::SeqCst);
+    STOPPED.store(0, Ordering::SeqCst);
+    alone
+}
+
+fn stopped() -> (bool, u32) {
+    (TURNS.load(Ordering::SeqCst), STOPPED.load(Ordering::SeqCst))
+}
+
+fn stop() -> Result<(), Fault> {
+    TURNS.store(false, Ordering::SeqCst);
+    STOPPED.fetch_add(1, Ordering::SeqCst);
+    Ok(())
+}
+
+/// Turns a motor with a library that blocks and knows nothing of robots.
+#[derive(Debug)]
+pub(crate) struct Turn;
+
+impl Command for Turn {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        let way = WAY.load(Ordering::SeqCst);
+        if matches!(way, BEFORE | AFTER) {
+            context.on_disarm(stop);
+        }
+        TURNS.store(way == BEFORE, Ordering::SeqCst);
+        let rest = move || {
+            GATE.pass("here");
+            if way == REGISTERS_AFTER || way == LEAVES_A_THREAD {
+                context.on_disarm(stop);
+            }
+            if way == AFTER || way == REGISTERS_AFTER {
+                TURNS.store(true, Ordering::SeqCst);
+            }
+        };
+        if way == LEAVES_A_THREAD {
+            std::thread::spawn(rest);
+        } else {
+            rest();
+        }
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Turning;
+    commands {
+        category other { concurrency: 3; }
+        turn: Turn { allowed_states: [idle]; category: other; }
+        short: Turn { allowed_states: [idle]; timeout: 50 ms; }
+    }
+    link base { sensor number: External<Number>(); }
+}
+
+fn armed() -> Running<Turning> {
+    let robot = Turning::builder().start().expect("it starts");
+    assert_eq!(robot.arm(), Ok(()));
+    GATE.close("here");
+    robot
+}
+
+#[test]
+fn what_the_code_of_a_command_starts_after_the_robot_was_disarmed_is_stopped_before_it_is_armed_again() {
+    for way in [AFTER, REGISTERS_AFTER] {
+        let _alone = alone(way);
+        within(60, move || {
+            let robot = armed();
+            let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
+            GATE.wait_for(1);
+            assert_eq!(robot.disarm(), Ok(()));
+            assert_eq!(turn.wait(), Err(CommandError::Cancelled));
+            GATE.open();
+            assert_eq!(robot.arm(), Ok(()), "that waits until the code has returned");
+            let times = if way == AFTER { 2 } else { 1 };
+            assert_eq!(stopped(), (false, times), "{way}: when the robot was disarmed, and when the code returned");
+            let report = robot.stop();
+            assert_eq!(stopped(), (false, times), "{way}: what is gone is forgotten");
+            assert!(report.faults.is_empty(), "{:?}", report.faults);
+        });
+    }
+}
+
+#[test]
+fn a_command_that_blocks_beyond_its_timeout_is_made_safe_as_long_as_it_does() {
+    let _alone = alone(BEFORE);
+    within(60, || {
+        let robot = armed();
+        let turn = robot.command(turning::command::short, NoArguments).expect("it starts");
+        assert_eq!(turn.wait(), Err(CommandError::TimedOut));
+        GATE.wait_for(1);
+        assert_eq!(stopped(), (true, 0), "a timeout disarms nothing");
+        assert_eq!(robot.disarm(), Ok(()));
+        assert_eq!(stopped(), (false, 1));
+        TURNS.store(true, Ordering::SeqCst);
+        GATE.open();
+        assert_eq!(robot.arm(), Ok(()));
+        assert_eq!(stopped(), (false, 2));
+    });
+}
+
+#[test]
+fn a_command_that_is_cancelled_on_an_armed_robot_keeps_nothing() {
+    let _alone = alone(BEFORE);
+    within(60, || {
+        let robot = armed();
+        let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
+        GATE.wait_for(1);
+        turn.cancel();
+        GATE.open();
+        while robot.command(turning::command::short, NoArguments).map(|short| short.wait()).is_err() {
+            std::thread::yield_now();
+        }
+        assert_eq!(stopped().1, 0, "what a command starts is its own affair while the robot is armed");
+        assert_eq!(robot.disarm(), Ok(()));
+    });
+}
+
+#[test]
+fn a_thread_that_outlives_its_command_has_its_callback_run_at_once() {
+    let _alone = alone(LEAVES_A_THREAD);
+    within(60, || {
+        let builder = Turning::builder();
+        let faults = builder.subscribe(system::Faults);
+        let robot = builder.start().expect("it starts");
+        assert_eq!(robot.arm(), Ok(()));
+        GATE.close("here");
+        let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
+        assert_eq!(turn.wait(), Ok(()));
+        GATE.wait_for(1);
+        GATE.open();
+        let fault = faults.recv_timeout(Duration::from_secs(20)).expect("it is reported");
+        assert_eq!(fault.path, "command/turn");
+        assert_eq!(fault.message, "it registered a disarm callback when it had ended; that was run at once");
+        while stopped().1 == 0 {
+            std::thread::yield_now();
+        }
+        assert_eq!(robot.disarm(), Ok(()));
+        assert_eq!(stopped().1, 1, "it is not kept");
+    });
+}
