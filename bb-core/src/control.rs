@@ -32,5 +32,258 @@ mod topics;
 pub use command::{CommandStatistics, Prepared};
 pub use execution::{CommandError, Execution};
 pub(crate) use hanging::Hanging;
-pub(crate) use system::{ComponentOrder, Control, Declared, Islands, Parts, Summary, Wired};
 pub(crate) use topics::SystemTopics;
+
+use crate::component::{Host, Permit};
+use crate::declaration::{
+    CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, ParameterValues, Supervisor,
+};
+use crate::event::{
+    CategoryDeclaration, ComponentFault, DisarmError, HealthState, HealthTransition, Safety, SafetyError,
+};
+use crate::journal::Journal;
+use crate::lifecycle::Supervision;
+use crate::message::Origin;
+use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
+use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
+use crate::telemetry::Telemetry;
+use crate::time::{Clock, MonotonicTime};
+use crate::topology::Topology;
+use apart::Apart;
+use budgets::Budgets;
+use callback::Callback;
+use effects::Reporter;
+use execution::Slot;
+use hooks::Hooks;
+#[cfg(loom)]
+use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
+use machine::Machine;
+use std::collections::{HashMap, VecDeque};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, OnceLock, Weak};
+#[cfg(not(loom))]
+use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
+use task::{Task, Value};
+
+/// What `robot!` declares of all this.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Declared {
+    pub(crate) topology: &'static Topology,
+    pub(crate) states: &'static [&'static str],
+    pub(crate) categories: &'static [CategoryDeclaration],
+    pub(crate) commands: &'static [CommandDeclaration],
+    pub(crate) parameters: &'static [ParameterDeclaration],
+    pub(crate) estimators: &'static [EstimatorDeclaration],
+}
+
+/// What [`Control::new`] takes.
+pub(crate) struct Parts {
+    pub(crate) declared: Declared,
+    pub(crate) mode: Mode,
+    pub(crate) topics: Arc<SystemTopics>,
+    pub(crate) clock: Clock,
+    pub(crate) origin: Origin,
+    pub(crate) commands: Vec<Prepared>,
+    pub(crate) parameters: ParameterValues,
+    pub(crate) supervision: Supervision,
+    pub(crate) nodes: Box<[SharedNode]>,
+    pub(crate) journal: Option<Journal>,
+    pub(crate) telemetry: Option<Telemetry>,
+}
+
+/// The robot as a whole. Clones are the same one.
+#[derive(Clone)]
+pub(crate) struct Control(Arc<Inner>);
+
+struct Inner {
+    declared: Declared,
+    mode: Mode,
+    topics: Arc<SystemTopics>,
+    clock: Clock,
+    origin: Origin,
+    commands: Box<[Prepared]>,
+    nodes: Box<[SharedNode]>,
+    journal: Option<Journal>,
+    telemetry: Option<Telemetry>,
+    state: StateMutex<State>,
+    /// Told of every entry: for those who wait for the robot to be disarmed, or for commands to be gone.
+    changed: Condvar,
+    /// The safety state, for actuators, which ask before every command.
+    safety: AtomicU8,
+    bell: Bell,
+    sleeper: Sleeper,
+    /// When estimators are lost unless a run has been completed.
+    watch: Deadlines<usize>,
+    limits: Deadlines<Limit>,
+    pool: Pool,
+    reporter: Reporter,
+    /// How many commands have begun at the last instant of virtual time at which one did.
+    begun: Mutex<(MonotonicTime, u32)>,
+    /// Commands to be polled, on virtual time.
+    ready: Mutex<VecDeque<Arc<Task>>>,
+    /// Disarm callbacks to be run by the loop of a simulation.
+    pending_hooks: Mutex<VecDeque<(u64, Vec<Arc<Callback>>)>>,
+    /// What islands reported in a replay, until the journal says that it was taken note of.
+    reports: Mutex<HashMap<usize, VecDeque<Report>>>,
+    faults: Mutex<Faults>,
+    /// A sensor or a service was told something, on virtual time.
+    has_orders: AtomicBool,
+    /// Tells sensors and services to stop.
+    stop: StopSignal,
+    islands: OnceLock<Box<dyn Islands>>,
+    /// Weak, since the host has the control state.
+    host: OnceLock<Weak<dyn Host>>,
+}
+
+/// What the control state adds to a report.
+pub(crate) struct Summary {
+    pub(crate) commands: Vec<CommandStatistics>,
+    pub(crate) state: &'static str,
+    pub(crate) safety: Safety,
+    /// The newest.
+    pub(crate) faults: Vec<ComponentFault>,
+    pub(crate) all_faults: u64,
+}
+
+/// Where entries for estimators go.
+pub(crate) trait Islands: Send + Sync {
+    /// Adds an entry. What is returned is dropped without the lock: it may be the last owner of the wiring.
+    fn post(&self, estimator: usize, now: MonotonicTime, entry: NodeEntry) -> Option<Wired>;
+}
+
+/// Keeps a robot's wiring alive.
+pub(crate) type Wired = Arc<dyn std::any::Any + Send + Sync>;
+
+/// A time limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Limit {
+    /// The `timeout` of an execution.
+    Execution(u64),
+    /// How long an arming command waits for cancelled ones.
+    Arming,
+    /// How long disarm callbacks may take.
+    Disarming(u64),
+    /// The same of those that run while nobody disarms the robot.
+    Apart(Key),
+}
+
+/// Names some callbacks that run together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Key(u64);
+
+/// The control state's lock.
+type StateGuard<'a> = MutexGuard<'a, State>;
+
+struct State {
+    machine: Machine,
+    executions: Vec<RunningCommand>,
+    statistics: Vec<CommandStatistics>,
+    next_id: u64,
+    parameters: ParameterValues,
+    /// How often parameters were set.
+    version: u64,
+    bound: Vec<Bound>,
+    hooks: Hooks,
+    budgets: Budgets,
+    health: Vec<Health>,
+    components: Vec<Supervised>,
+    disarming: Option<Disarming>,
+    /// Disarm callbacks that run while nobody disarms the robot.
+    apart: Vec<Apart>,
+    next_apart: u64,
+    /// What became of the last disarming.
+    last_disarm: Result<(), DisarmError>,
+    /// How often somebody asked for the robot to be disarmed: who waits to arm it since before does not.
+    disarms: u64,
+    /// How often the robot was disarmed.
+    generation: u64,
+    is_stopping: bool,
+    /// The journal and the last report are made: entries that come later are neither written nor published.
+    has_ended: bool,
+}
+
+/// An execution of a command.
+struct RunningCommand {
+    id: u64,
+    /// The number of the command.
+    command: usize,
+    health: Option<HealthTransition>,
+    slot: Arc<Slot>,
+    permit: Permit,
+    /// None in a replay.
+    task: Option<Arc<Task>>,
+    phase: Phase,
+    /// It was cancelled, and its code may have gone on after the disarm callbacks had run.
+    lingers_on: bool,
+}
+
+/// How far an execution is.
+enum Phase {
+    Running,
+    /// Its code has succeeded; the robot is being disarmed by it.
+    Disarming(Option<Value>, Option<&'static str>),
+    /// Its code has succeeded; it arms the robot once cancelled commands are gone.
+    Arming(Option<Value>, Option<&'static str>),
+    /// It was cancelled or has timed out, and its code has not returned yet.
+    Lingering,
+}
+
+/// The health of an estimator as it was published, and how often it was lost.
+#[derive(Clone, Copy, Debug, Default)]
+struct Health {
+    state: HealthState,
+    epoch: u32,
+}
+
+/// A component whose options are bound to parameters.
+struct Bound {
+    path: &'static str,
+    parameters: &'static [usize],
+    check: Arc<Check>,
+    target: BindTarget,
+}
+
+/// A sensor, a service or an actuator that a supervisor looks after.
+struct Supervised {
+    path: &'static str,
+    supervisor: Supervisor,
+    order: Box<dyn Fn(ComponentOrder) + Send + Sync>,
+}
+
+/// What a supervisor tells a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ComponentOrder {
+    /// Restart.
+    Restart,
+    /// Stay stopped.
+    GiveUp,
+}
+
+/// The robot is being disarmed.
+struct Disarming {
+    generation: u64,
+    force: bool,
+    /// It ends in `error`, whatever the callbacks say.
+    to_error: bool,
+    /// The execution that disarms it.
+    by: Option<u64>,
+    /// The numbers and paths of callbacks that have not returned, as often as they are to run.
+    left: Vec<(u64, &'static str)>,
+    /// Where those who wait for it find what became of it.
+    outcome: Arc<OnceLock<Result<(), DisarmError>>>,
+    errors: Vec<SafetyError>,
+}
+
+/// The newest faults, and how many there were.
+#[derive(Default)]
+struct Faults {
+    newest: VecDeque<ComponentFault>,
+    count: u64,
+}
+
+/// Faults that are kept; of earlier ones only the number is.
+const KEPT_FAULTS: usize = 256;
+
+/// Does not keep the robot alive.
+#[derive(Clone)]
+pub(crate) struct WeakControl(Weak<Inner>);

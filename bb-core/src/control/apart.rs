@@ -8,7 +8,7 @@ use super::callback::{Callback, Reason};
 use super::hooks::Owner;
 use super::inside;
 use super::step::Step;
-use super::system::{Control, Limit, RunningCommand, State};
+use super::{Control, Key, Limit, RunningCommand, State};
 use crate::component::{DisarmHook, Guardian};
 use crate::event::{Safety, SafetyError};
 use crate::fault::{Failed, Fault, discard};
@@ -16,10 +16,6 @@ use crate::journal::Event;
 use crate::node::Mode;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Names some callbacks that run together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key(u64);
 
 /// Callbacks that run together.
 pub(super) struct Apart {

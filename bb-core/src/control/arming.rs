@@ -4,7 +4,7 @@ use super::callback::Reason;
 use super::inside;
 use super::machine::IDLE;
 use super::step::Step;
-use super::system::{Control, Disarming, Limit, Phase, State};
+use super::{Control, Disarming, Limit, Phase, State};
 use crate::component::Permit;
 use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;

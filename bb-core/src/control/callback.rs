@@ -1,8 +1,7 @@
 //! One disarm callback: user code, on a thread of its own, and never on two.
 
-use super::apart::Key;
 use super::inside;
-use super::system::Control;
+use super::{Control, Key};
 use crate::component::DisarmHook;
 use crate::event::SafetyError;
 use crate::fault::{caught, discard};

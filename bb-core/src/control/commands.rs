@@ -6,8 +6,8 @@ use super::effects::Log;
 use super::execution::{CommandError, Execution, Slot, UntypedExecution};
 use super::machine::IDLE;
 use super::step::Step;
-use super::system::{Control, Limit, Phase, RunningCommand};
 use super::task::{Ended, Task, Value};
+use super::{Control, Limit, Phase, RunningCommand};
 use crate::component::{CommandContext, CommandInfo, DynamicExecution, Outcome, OwnHooks, Permit};
 use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{

@@ -1,12 +1,11 @@
 //! What follows from an entry of the control state and is user code: it runs without the lock, and where it harms nobody.
 
-use super::apart::Key;
 use super::callback::{Callback, Reason};
 use super::execution::CommandError;
 use super::execution::Slot;
 use super::inside;
-use super::system::{Control, KEPT_FAULTS, Wired};
 use super::task::{Task, Value};
+use super::{Control, KEPT_FAULTS, Key, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
 use crate::fault::{discard, wake};
 use crate::node::Mode;

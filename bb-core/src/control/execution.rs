@@ -1,6 +1,6 @@
 //! What the caller of a command holds.
 
-use super::system::WeakControl;
+use super::WeakControl;
 use super::task::Value;
 use crate::component::AnyExecution;
 use crate::fault::Fault;

@@ -1,7 +1,7 @@
 //! Commands that do not come back, and those that keep virtual time from going on.
 
+use super::Control;
 use super::step::Step;
-use super::system::Control;
 use super::task::MOST_AT_ONCE;
 use crate::declaration::Role;
 use crate::node::Mode;

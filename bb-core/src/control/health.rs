@@ -3,7 +3,7 @@
 use super::budgets::Verdict;
 use super::effects::Log;
 use super::step::Step;
-use super::system::{ComponentOrder, Control};
+use super::{ComponentOrder, Control};
 use crate::declaration::{EstimatorDeclaration, ParameterValues, Supervisor};
 use crate::event::{HealthReason, HealthState, HealthTransition, SafetyError};
 use crate::fault::Failed;
@@ -256,8 +256,8 @@ impl Step<'_> {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::control::system::{Declared, Parts};
     use crate::control::topics::SystemTopics;
+    use crate::control::{Declared, Parts};
     use crate::lifecycle::Supervision;
     use crate::message::Origin;
     use crate::node::SharedNode;

@@ -3,8 +3,8 @@
 //! In each, a robot that was told to stop stays disarmed, what could not be made safe ends in `error`, and an actuator does not
 //! move once it was made safe.
 
-use super::system::{Control, Declared, Parts};
 use super::topics::SystemTopics;
+use super::{Control, Declared, Parts};
 use crate::component::{Guardian, Permit};
 use crate::declaration::ParameterValues;
 use crate::event::Safety;

@@ -1,6 +1,6 @@
 //! Parameters: what is set, what refuses it, who is told.
 
-use super::system::{Bound, Control};
+use super::{Bound, Control};
 use crate::component::Permit;
 use crate::declaration::{ParameterError, ParameterValues};
 use crate::event::{ParameterChange, ParameterValue};

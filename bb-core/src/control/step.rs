@@ -2,7 +2,7 @@
 
 use super::effects::{Effects, Log};
 use super::machine::Machine;
-use super::system::{Control, StateGuard};
+use super::{Control, StateGuard};
 use crate::event::{ComponentFault, SafetyError, SafetyTransition, StateTransition};
 use crate::journal::Event;
 use crate::message::{Payload, Stamp};

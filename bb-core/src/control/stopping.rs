@@ -1,7 +1,7 @@
 //! How the robot stops: it is disarmed first, whatever hangs.
 
 use super::arming::DISARM_WITHIN;
-use super::system::{Control, Limit};
+use super::{Control, Limit};
 use crate::event::Safety;
 use crate::journal::Event;
 use crate::node::Mode;

@@ -1,255 +1,31 @@
-//! The control state, and how it is entered.
+//! How the control state is made and looked at.
 
-use super::apart::{Apart, Key};
 use super::budgets::Budgets;
-use super::callback::Callback;
-use super::command::{CommandStatistics, Prepared};
+use super::command::CommandStatistics;
 use super::effects::Reporter;
-use super::execution::Slot;
 use super::hooks::Hooks;
 use super::machine::Machine;
-use super::task::{Task, Value};
 use super::topics::SystemTopics;
-use crate::component::{Host, Permit};
-use crate::declaration::{
-    CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, ParameterValues, Supervisor,
+use super::{
+    ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary, Supervised,
+    WeakControl,
 };
-use crate::event::{
-    CategoryDeclaration, ComponentFault, DisarmError, HealthState, HealthTransition, Safety, SafetyError,
-};
+use crate::component::Host;
+use crate::declaration::{CommandDeclaration, Supervisor};
+use crate::event::Safety;
 use crate::fault::Fault;
-use crate::journal::Journal;
-use crate::lifecycle::Supervision;
 use crate::message::Origin;
-use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
+use crate::node::Mode;
 use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
-use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
-use crate::topology::Topology;
 #[cfg(loom)]
-use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
-use std::collections::{HashMap, VecDeque};
+use loom::sync::{Condvar, atomic::AtomicU8};
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 #[cfg(not(loom))]
-use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
+use std::sync::{Condvar, atomic::AtomicU8};
 use std::time::Duration;
-
-/// What `robot!` declares of all this.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Declared {
-    pub(crate) topology: &'static Topology,
-    pub(crate) states: &'static [&'static str],
-    pub(crate) categories: &'static [CategoryDeclaration],
-    pub(crate) commands: &'static [CommandDeclaration],
-    pub(crate) parameters: &'static [ParameterDeclaration],
-    pub(crate) estimators: &'static [EstimatorDeclaration],
-}
-
-/// What [`Control::new`] takes.
-pub(crate) struct Parts {
-    pub(crate) declared: Declared,
-    pub(crate) mode: Mode,
-    pub(crate) topics: Arc<SystemTopics>,
-    pub(crate) clock: Clock,
-    pub(crate) origin: Origin,
-    pub(crate) commands: Vec<Prepared>,
-    pub(crate) parameters: ParameterValues,
-    pub(crate) supervision: Supervision,
-    pub(crate) nodes: Box<[SharedNode]>,
-    pub(crate) journal: Option<Journal>,
-    pub(crate) telemetry: Option<Telemetry>,
-}
-
-/// The robot as a whole. Clones are the same one.
-#[derive(Clone)]
-pub(crate) struct Control(pub(super) Arc<Inner>);
-
-pub(super) struct Inner {
-    pub(super) declared: Declared,
-    pub(super) mode: Mode,
-    pub(super) topics: Arc<SystemTopics>,
-    pub(super) clock: Clock,
-    pub(super) origin: Origin,
-    pub(super) commands: Box<[Prepared]>,
-    pub(super) nodes: Box<[SharedNode]>,
-    pub(super) journal: Option<Journal>,
-    pub(super) telemetry: Option<Telemetry>,
-    pub(super) state: StateMutex<State>,
-    /// Told of every entry: for those who wait for the robot to be disarmed, or for commands to be gone.
-    pub(super) changed: Condvar,
-    /// The safety state, for actuators, which ask before every command.
-    pub(super) safety: AtomicU8,
-    pub(super) bell: Bell,
-    pub(super) sleeper: Sleeper,
-    /// When estimators are lost unless a run has been completed.
-    pub(super) watch: Deadlines<usize>,
-    pub(super) limits: Deadlines<Limit>,
-    pub(super) pool: Pool,
-    pub(super) reporter: Reporter,
-    /// How many commands have begun at the last instant of virtual time at which one did.
-    pub(super) begun: Mutex<(MonotonicTime, u32)>,
-    /// Commands to be polled, on virtual time.
-    pub(super) ready: Mutex<VecDeque<Arc<Task>>>,
-    /// Disarm callbacks to be run by the loop of a simulation.
-    pub(super) pending_hooks: Mutex<VecDeque<(u64, Vec<Arc<Callback>>)>>,
-    /// What islands reported in a replay, until the journal says that it was taken note of.
-    pub(super) reports: Mutex<HashMap<usize, VecDeque<Report>>>,
-    pub(super) faults: Mutex<Faults>,
-    /// A sensor or a service was told something, on virtual time.
-    pub(super) has_orders: AtomicBool,
-    /// Tells sensors and services to stop.
-    pub(super) stop: StopSignal,
-    pub(super) islands: OnceLock<Box<dyn Islands>>,
-    /// Weak, since the host has the control state.
-    pub(super) host: OnceLock<Weak<dyn Host>>,
-}
-
-/// What the control state adds to a report.
-pub(crate) struct Summary {
-    pub(crate) commands: Vec<CommandStatistics>,
-    pub(crate) state: &'static str,
-    pub(crate) safety: Safety,
-    /// The newest.
-    pub(crate) faults: Vec<ComponentFault>,
-    pub(crate) all_faults: u64,
-}
-
-/// Where entries for estimators go.
-pub(crate) trait Islands: Send + Sync {
-    /// Adds an entry. What is returned is dropped without the lock: it may be the last owner of the wiring.
-    fn post(&self, estimator: usize, now: MonotonicTime, entry: NodeEntry) -> Option<Wired>;
-}
-
-/// Keeps a robot's wiring alive.
-pub(crate) type Wired = Arc<dyn std::any::Any + Send + Sync>;
-
-/// A time limit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Limit {
-    /// The `timeout` of an execution.
-    Execution(u64),
-    /// How long an arming command waits for cancelled ones.
-    Arming,
-    /// How long disarm callbacks may take.
-    Disarming(u64),
-    /// The same of those that run while nobody disarms the robot.
-    Apart(Key),
-}
-
-/// The control state's lock.
-pub(super) type StateGuard<'a> = MutexGuard<'a, State>;
-
-pub(super) struct State {
-    pub(super) machine: Machine,
-    pub(super) executions: Vec<RunningCommand>,
-    pub(super) statistics: Vec<CommandStatistics>,
-    pub(super) next_id: u64,
-    pub(super) parameters: ParameterValues,
-    /// How often parameters were set.
-    pub(super) version: u64,
-    pub(super) bound: Vec<Bound>,
-    pub(super) hooks: Hooks,
-    pub(super) budgets: Budgets,
-    pub(super) health: Vec<Health>,
-    pub(super) components: Vec<Supervised>,
-    pub(super) disarming: Option<Disarming>,
-    /// Disarm callbacks that run while nobody disarms the robot.
-    pub(super) apart: Vec<Apart>,
-    pub(super) next_apart: u64,
-    /// What became of the last disarming.
-    pub(super) last_disarm: Result<(), DisarmError>,
-    /// How often somebody asked for the robot to be disarmed: who waits to arm it since before does not.
-    pub(super) disarms: u64,
-    /// How often the robot was disarmed.
-    pub(super) generation: u64,
-    pub(super) is_stopping: bool,
-    /// The journal and the last report are made: entries that come later are neither written nor published.
-    pub(super) has_ended: bool,
-}
-
-/// An execution of a command.
-pub(super) struct RunningCommand {
-    pub(super) id: u64,
-    /// The number of the command.
-    pub(super) command: usize,
-    pub(super) health: Option<HealthTransition>,
-    pub(super) slot: Arc<Slot>,
-    pub(super) permit: Permit,
-    /// None in a replay.
-    pub(super) task: Option<Arc<Task>>,
-    pub(super) phase: Phase,
-    /// It was cancelled, and its code may have gone on after the disarm callbacks had run.
-    pub(super) lingers_on: bool,
-}
-
-/// How far an execution is.
-pub(super) enum Phase {
-    Running,
-    /// Its code has succeeded; the robot is being disarmed by it.
-    Disarming(Option<Value>, Option<&'static str>),
-    /// Its code has succeeded; it arms the robot once cancelled commands are gone.
-    Arming(Option<Value>, Option<&'static str>),
-    /// It was cancelled or has timed out, and its code has not returned yet.
-    Lingering,
-}
-
-/// The health of an estimator as it was published, and how often it was lost.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Health {
-    pub(super) state: HealthState,
-    pub(super) epoch: u32,
-}
-
-/// A component whose options are bound to parameters.
-pub(super) struct Bound {
-    pub(super) path: &'static str,
-    pub(super) parameters: &'static [usize],
-    pub(super) check: Arc<Check>,
-    pub(super) target: BindTarget,
-}
-
-/// A sensor, a service or an actuator that a supervisor looks after.
-pub(super) struct Supervised {
-    pub(super) path: &'static str,
-    pub(super) supervisor: Supervisor,
-    pub(super) order: Box<dyn Fn(ComponentOrder) + Send + Sync>,
-}
-
-/// What a supervisor tells a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ComponentOrder {
-    /// Restart.
-    Restart,
-    /// Stay stopped.
-    GiveUp,
-}
-
-/// The robot is being disarmed.
-pub(super) struct Disarming {
-    pub(super) generation: u64,
-    pub(super) force: bool,
-    /// It ends in `error`, whatever the callbacks say.
-    pub(super) to_error: bool,
-    /// The execution that disarms it.
-    pub(super) by: Option<u64>,
-    /// The numbers and paths of callbacks that have not returned, as often as they are to run.
-    pub(super) left: Vec<(u64, &'static str)>,
-    /// Where those who wait for it find what became of it.
-    pub(super) outcome: Arc<OnceLock<Result<(), DisarmError>>>,
-    pub(super) errors: Vec<SafetyError>,
-}
-
-/// The newest faults, and how many there were.
-#[derive(Default)]
-pub(super) struct Faults {
-    pub(super) newest: VecDeque<ComponentFault>,
-    pub(super) count: u64,
-}
-
-/// Faults that are kept; of earlier ones only the number is.
-pub(super) const KEPT_FAULTS: usize = 256;
 
 impl Control {
     pub(crate) fn new(parts: Parts) -> Self {
@@ -457,10 +233,6 @@ impl Control {
         self.0.host.get().and_then(Weak::upgrade).ok_or_else(|| Fault::new("the robot is gone"))
     }
 }
-
-/// Does not keep the robot alive.
-#[derive(Clone)]
-pub(crate) struct WeakControl(Weak<Inner>);
 
 impl WeakControl {
     pub(crate) fn upgrade(&self) -> Option<Control> {

@@ -1,6 +1,6 @@
 //! The future of one execution of a command: polled by the pool, or by the loop of a simulation.
 
-use super::system::WeakControl;
+use super::WeakControl;
 use crate::component::Outcome;
 use crate::fault::{Fault, caught, discard};
 use crate::schedule::Lane;

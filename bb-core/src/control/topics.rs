@@ -1,6 +1,6 @@
 //! The topics that every robot has.
 
-use super::system::Declared;
+use super::Declared;
 use crate::event::{
     CommandEvent, ComponentFault, HealthTransition, ParameterChange, SafetyError, SafetyTransition, StateTransition,
 };
