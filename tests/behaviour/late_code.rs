@@ -2,9 +2,9 @@
 
 use crate::components::{Number, within};
 use crate::disarm_first::Gate;
-use bb_core::Running;
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
+use bb_core::{ArmError, Running};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -171,5 +171,32 @@ fn a_thread_that_outlives_its_command_has_its_callback_run_at_once() {
         }
         assert_eq!(robot.disarm(), Ok(()));
         assert_eq!(stopped().1, 1, "it is not kept");
+    });
+}
+
+robot! {
+    robot Crowd;
+    commands {
+        category many { concurrency: 1000; }
+        turn: Turn { allowed_states: [idle, executing]; category: many; }
+    }
+    link base { sensor number: External<Number>(); }
+}
+
+#[test]
+fn a_cancelled_command_that_never_began_is_gone_though_others_hang_in_every_thread() {
+    let _alone = alone(AFTER);
+    within(120, || {
+        let robot = Crowd::builder().start().expect("it starts");
+        assert_eq!(robot.arm(), Ok(()));
+        GATE.close("here");
+        (0..560).for_each(|_| drop(robot.command(crowd::command::turn, NoArguments).expect("it starts")));
+        GATE.wait_for(512);
+        assert_eq!(robot.disarm(), Ok(()));
+        let Err(ArmError::Lingering(inside)) = robot.arm() else { panic!("512 threads are in their code") };
+        assert_eq!(inside.len(), 512);
+        GATE.open();
+        assert_eq!(robot.arm(), Ok(()));
+        assert!(!stopped().0);
     });
 }

@@ -84,8 +84,8 @@ impl Task {
         }
     }
 
-    /// Its code is not entered any more; whether a thread is inside. For [`Self::cancel`], which cannot be called under a
-    /// lock.
+    /// Its code is not entered any more; whether a thread is inside. Before [`Self::cancel`], which cannot be
+    /// called under a lock.
     pub(super) fn mark_cancelled(&self) -> bool {
         let mut state = self.lock();
         state.is_cancelled = true;
@@ -94,7 +94,12 @@ impl Task {
 
     /// Its future is dropped as soon as its code gives way.
     pub(super) fn cancel(self: &Arc<Self>) {
-        self.mark_cancelled();
+        let Some(control) = self.control.upgrade() else { return };
+        let mut state = self.lock();
+        state.is_cancelled = true;
+        // It may wait for a thread of its lane, which may all hang. On virtual time nothing waits for long.
+        state.is_scheduled &= control.is_virtual();
+        drop(state);
         self.schedule();
     }
 
@@ -203,9 +208,9 @@ impl Task {
         state.entered.filter(|_| matches!(state.code, Code::Polled))
     }
 
-    /// Which threads of the pool run it.
+    /// Which threads of the pool run it, or drop its future.
     pub(super) fn lane(&self) -> Lane {
-        self.lane
+        if self.lock().is_cancelled { Lane::Wakers } else { self.lane }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
