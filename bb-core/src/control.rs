@@ -14,6 +14,7 @@ mod callback;
 mod command;
 mod commands;
 mod effects;
+mod ending;
 mod execution;
 mod hanging;
 mod health;
@@ -23,6 +24,7 @@ mod machine;
 #[cfg(all(test, loom))]
 mod model;
 mod parameters;
+mod starting;
 mod step;
 mod stopping;
 mod system;
