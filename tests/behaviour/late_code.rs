@@ -134,6 +134,23 @@ fn a_command_that_blocks_beyond_its_timeout_is_made_safe_as_long_as_it_does() {
 }
 
 #[test]
+fn what_the_code_of_a_command_starts_after_the_robot_has_stopped_is_stopped_as_well() {
+    let _alone = alone(AFTER);
+    within(60, || {
+        let robot = armed();
+        let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
+        GATE.wait_for(1);
+        let report = robot.stop();
+        assert_eq!(turn.wait(), Err(CommandError::Cancelled));
+        assert!(report.faults.iter().any(|fault| fault.path == "command/turn"), "{:?}", report.faults);
+        GATE.open();
+        while stopped() != (false, 2) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
+}
+
+#[test]
 fn a_command_that_is_cancelled_on_an_armed_robot_keeps_nothing() {
     let _alone = alone(BEFORE);
     within(60, || {

@@ -190,9 +190,15 @@ impl Control {
         step.finish();
     }
 
-    /// Of a robot that has ended: what they own is closed, and what they hold of the robot no longer keeps it alive.
+    /// Of a robot that has ended: what they own is closed, and what they hold of the robot no longer keeps it alive. Those of
+    /// commands whose code has not returned run once it has.
     pub(crate) fn forget_all_hooks(&self) {
-        let gone = self.lock().hooks.take_all();
+        let gone = {
+            let state = &mut *self.lock();
+            let lingering = state.executions.iter().filter(|execution| matches!(execution.phase, Phase::Lingering));
+            let lingering: Vec<_> = lingering.map(|execution| execution.id).collect();
+            state.hooks.take_but_of(&lingering)
+        };
         gone.into_iter().for_each(crate::fault::discard);
     }
 }

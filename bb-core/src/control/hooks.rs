@@ -133,9 +133,9 @@ impl Hooks {
         self.take(|hook| hook.is_of(path) && hook.owner == Owner::FailedInit)
     }
 
-    /// Takes out all; to be dropped without a lock.
-    pub(super) fn take_all(&mut self) -> Vec<Arc<Callback>> {
-        self.take(|_| true)
+    /// Takes out all but those of these executions; to be dropped without a lock.
+    pub(super) fn take_but_of(&mut self, executions: &[u64]) -> Vec<Arc<Callback>> {
+        self.take(|hook| !matches!(hook.owner, Owner::Execution(id) if executions.contains(&id)))
     }
 }
 
