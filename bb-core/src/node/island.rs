@@ -170,6 +170,13 @@ pub(crate) enum CallError {
     Busy,
 }
 
+/// What a thread saw that looked at an island.
+struct Looked {
+    is_held: bool,
+    /// An entry waits that another thread may have left because of the look.
+    has_kept: bool,
+}
+
 type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S: IslandState> Island<S> {
@@ -502,6 +509,32 @@ impl<S: IslandState> Island<S> {
         Some(Within::new(state, wiring.environment().bit()))
     }
 
+    /// Whether a thread holds it, for one that only wants to know.
+    fn is_held(&self, wiring: &S::Wiring) -> bool {
+        let Looked { is_held, has_kept } = self.look();
+        if has_kept {
+            wiring.environment().schedule_drain(S::DECLARATION.number);
+        }
+        is_held
+    }
+
+    /// Tries the lock, and lets go at once. A thread that found it taken meanwhile has left its entry in the inbox for the one
+    /// that held it: someone else has to process it.
+    fn look(&self) -> Looked {
+        let tried = self.state.try_lock();
+        let is_held = matches!(tried, Err(TryLockError::WouldBlock));
+        // Releasing a lock is no step of a model: this is one at which others find it taken.
+        #[cfg(loom)]
+        self.pending.load(Ordering::Relaxed);
+        drop(tried);
+        // As in `leave`: either this sees the entry, or that thread has found the lock free.
+        fence(Ordering::SeqCst);
+        let has_kept =
+            !is_held && self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed);
+        Looked { is_held, has_kept }
+    }
+
+    /// Whether no thread holds it. The caller looks at the inbox afterwards: see [`Self::look`].
     fn is_free(&self) -> bool {
         !matches!(self.state.try_lock(), Err(TryLockError::WouldBlock))
     }

@@ -209,7 +209,7 @@ impl<R: Robot> Machine<R> {
 
     /// The estimator whose callback an island runs.
     pub(super) fn path_of_busy(&self, island: &dyn AnyIsland<R::Wiring>) -> &'static str {
-        let running = island.busy().and_then(|(_, estimator)| R::ESTIMATORS.get(estimator));
+        let running = island.busy(&self.wiring).and_then(|(_, estimator)| R::ESTIMATORS.get(estimator));
         running.map_or(island.declaration().name, |estimator| estimator.path)
     }
 
@@ -231,7 +231,7 @@ impl<R: Robot> Machine<R> {
             self.fault("journal", message.to_owned());
         }
         for island in self.islands().filter(|island| island.has_retired()) {
-            while !island.is_idle() && Instant::now() < deadline {
+            while !island.is_idle(&self.wiring) && Instant::now() < deadline {
                 std::thread::sleep(Duration::from_micros(100));
             }
         }
