@@ -52,6 +52,10 @@ impl Control {
 impl Step<'_> {
     /// Which threads of the pool run a command.
     pub(super) fn lane(&self, command: usize, of_health: bool) -> Lane {
-        if of_health || self.role(command) == Role::Disarming { Lane::Safety } else { Lane::Commands }
+        match self.role(command) {
+            Role::Disarming => Lane::Disarming,
+            Role::Plain | Role::Arming if of_health => Lane::Health,
+            Role::Plain | Role::Arming => Lane::Commands,
+        }
     }
 }
