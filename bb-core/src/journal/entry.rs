@@ -305,6 +305,13 @@ impl Finite for Recorded {
 impl Field for Recorded {
     const SHAPE: Shape = <Vec<u8> as Field>::SHAPE;
 
+    fn heap_bytes(&self) -> usize {
+        match self {
+            Self::Message(message) => message.bytes(),
+            Self::Bytes(bytes) => bytes.len(),
+        }
+    }
+
     fn write(&self, writer: &mut Writer<'_>) {
         match self {
             Self::Message(message) => {

@@ -13,6 +13,8 @@ use std::sync::Arc;
 pub struct DynamicMessage {
     path: &'static str,
     message: Arc<dyn AnyMessage>,
+    /// What it holds, on the heap and beside it: asked of the payload once, where no lock is held.
+    bytes: usize,
 }
 
 /// What a message can do for those who do not know its payload.
@@ -39,7 +41,13 @@ pub(super) trait AnyMessage: Send + Sync {
 
 impl DynamicMessage {
     pub(crate) fn new<T: Payload>(path: &'static str, message: &Stamped<T>) -> Self {
-        Self { path, message: Arc::new(message.clone()) }
+        let heap = if T::IS_INLINE { 0 } else { message.payload.heap_bytes() };
+        let bytes = size_of::<Stamped<T>>().saturating_add(heap);
+        Self { path, message: Arc::new(message.clone()), bytes }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
     }
 
     pub(super) fn message(&self) -> &dyn AnyMessage {
@@ -100,7 +108,7 @@ impl DynamicMessage {
 
     /// The same with another wall time.
     pub fn at_wall_time(&self, time: WallTime) -> Self {
-        Self { path: self.path, message: self.message.at_wall_time(time) }
+        Self { message: self.message.at_wall_time(time), ..*self }
     }
 
     /// Whether payload and wall time can be read back from ROS's layout bit for bit.
