@@ -5,6 +5,7 @@ mod attitude;
 mod bad_journals;
 mod by_path;
 mod callbacks;
+mod circles;
 mod command_faults;
 mod components;
 mod contention;
