@@ -303,7 +303,7 @@ impl<S: IslandState> Island<S> {
     /// Back-pressure: waits until the holder drains the inbox. Returns `false` at once if the holder hangs or if this thread
     /// is inside an island of this robot.
     fn wait_for_room(&self, wiring: &S::Wiring) -> bool {
-        if self.hangs.load(Ordering::Relaxed) || Inside::is_here(wiring.environment().bit()) {
+        if self.hangs.load(Ordering::Relaxed) || Inside::is_here(wiring.environment().mark()) {
             return false;
         }
         self.waiting.fetch_add(1, Ordering::SeqCst);
@@ -467,7 +467,7 @@ impl<S: IslandState> Island<S> {
         line: Event,
         call: impl FnOnce(&mut S, &Turn<'_>) -> T,
     ) -> Result<T, CallError> {
-        if Inside::is_here(wiring.environment().bit()) {
+        if Inside::is_here(wiring.environment().mark()) {
             return Err(CallError::Inside);
         }
         let Some(mut state) = self.hold(wiring, LONGEST_CALL) else { return Err(CallError::Busy) };
@@ -506,7 +506,7 @@ impl<S: IslandState> Island<S> {
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return None,
         };
-        Some(Within::new(state, wiring.environment().bit()))
+        Some(Within::new(state, wiring.environment().mark()))
     }
 
     /// Whether a thread holds it, for one that only wants to know.

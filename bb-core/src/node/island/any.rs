@@ -152,7 +152,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn is_inside(&self, wiring: &S::Wiring) -> bool {
-        Inside::is_here(wiring.environment().bit())
+        Inside::is_here(wiring.environment().mark())
     }
 
     fn has_retired(&self) -> bool {
