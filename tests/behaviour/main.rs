@@ -25,6 +25,7 @@ mod hardware;
 mod health;
 mod hygiene;
 mod journals;
+mod left_behind;
 mod made_safe;
 mod navigation;
 mod order;

@@ -225,10 +225,10 @@ impl Control {
         waits.recv_timeout(DISARM_WITHIN).unwrap_or_else(late)
     }
 
-    /// Of a robot that has ended: what they own is closed, and what they hold of the robot no longer keeps it alive.
-    pub(crate) fn forget_all_hooks(&self) {
-        let gone = self.lock().hooks.take_all();
-        gone.into_iter().for_each(crate::fault::discard);
+    /// Of a robot that has ended: the callbacks of all components, which the caller drops, so that what they own is closed
+    /// and what they hold of the robot no longer keeps it alive.
+    pub(crate) fn take_all_hooks(&self) -> Vec<(&'static str, DisarmHook)> {
+        self.lock().hooks.take_all()
     }
 
     /// The same for an actuator's own `disarm`, which restarts do not replace.

@@ -80,8 +80,8 @@ impl Hooks {
     }
 
     /// Takes out all; to be dropped without a lock.
-    pub(super) fn take_all(&mut self) -> Vec<DisarmHook> {
-        self.all.drain(..).map(|hook| hook.run).collect()
+    pub(super) fn take_all(&mut self) -> Vec<(&'static str, DisarmHook)> {
+        self.all.drain(..).map(|hook| (hook.path, hook.run)).collect()
     }
 
     pub(super) fn all(&self) -> Vec<(&'static str, DisarmHook)> {

@@ -7,6 +7,7 @@ use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
+use std::task::Waker;
 
 /// A message whose payload's type is erased; [`downcast`](Self::downcast) gives it back. Clones are the same message.
 #[derive(Clone)]
@@ -153,8 +154,9 @@ pub trait AnyTopic: Any + Send + Sync {
     fn as_any(&self) -> &dyn Any;
     /// What it has counted.
     fn statistics(&self) -> TopicStatistics;
-    /// Tells all subscribers that no more will come.
-    fn close(&self);
+    /// Tells all subscribers that no more will come; the tasks to wake, which is their code.
+    #[must_use = "a task that waits for a message waits for ever unless it is woken"]
+    fn close(&self) -> Vec<Waker>;
 }
 
 /// The queue of such a subscriber, for a topic to hand messages to.
