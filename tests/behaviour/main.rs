@@ -10,6 +10,7 @@ mod command_faults;
 mod components;
 mod contention;
 mod control;
+mod crowds;
 mod disarm_first;
 mod drivers;
 mod end;
