@@ -240,6 +240,13 @@ pub enum Event {
     ArmTimeout,
     /// The robot was stopped.
     Stop,
+    /// An estimator failed because the code of one of its outputs had panicked where that was handed on.
+    OutputFailed {
+        /// The estimator.
+        estimator: usize,
+        /// What happened.
+        message: String,
+    },
 }
 
 /// How long a callback took.

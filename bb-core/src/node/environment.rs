@@ -22,8 +22,8 @@ use std::time::Instant;
 /// The robot as its estimators see it: the control state takes note of what they report, without waiting for anything.
 pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
-    /// The code of an output of that estimator has panicked where it was handed on.
-    fn output_failed(&self, declared: &'static EstimatorDeclaration, message: String);
+    /// The code of an output of that estimator has panicked where it was handed on: an entry for it.
+    fn output_failed(&self, estimator: usize, message: String);
     /// Takes note that the options of the component at `path` are bound to these parameters. `estimator` is told of new
     /// values by entries, others by what they registered.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);

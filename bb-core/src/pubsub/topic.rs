@@ -78,8 +78,20 @@ impl<T: Payload> Topic<T> {
     /// at the same time.
     #[inline]
     pub fn publish_alone(&self, message: &Stamped<T>) {
-        self.published.store(self.published.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        self.count_alone();
         self.hand_out(message);
+    }
+
+    /// The same of a message that nobody listens to.
+    #[inline]
+    pub(crate) fn count_alone(&self) {
+        self.published.store(self.published.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+
+    /// Whether anybody listens.
+    #[inline]
+    pub(crate) fn is_listened_to(&self) -> bool {
+        self.listening.load(Ordering::Acquire) > 0
     }
 
     /// The same for one of several publishers, of a message that `write` writes into a journal: subscribers receive messages

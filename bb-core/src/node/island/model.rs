@@ -71,7 +71,7 @@ impl Overseer for Nobody {
 
     fn report(&self, _: usize, _: Report) {}
 
-    fn output_failed(&self, _: &'static crate::declaration::EstimatorDeclaration, _: String) {}
+    fn output_failed(&self, _: usize, _: String) {}
 
     fn bind(&self, _: &'static str, _: &'static [usize], _: Check, _: BindTarget) {}
 
