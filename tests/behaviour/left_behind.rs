@@ -165,3 +165,63 @@ fn a_robot_of_which_everything_hangs_as_it_closes_is_back_and_says_what_it_left(
         }
     });
 }
+
+static DEAD: Gate = Gate::new();
+
+/// Threads that are inside its disarm callback.
+static INSIDE: AtomicU32 = AtomicU32::new(0);
+
+/// How often it was made.
+static MADE: AtomicU32 = AtomicU32::new(0);
+
+/// A device that is dead: it starts something, fails, and does not return when it is to be made safe.
+#[derive(Debug)]
+pub(crate) struct Dead;
+
+impl Sensor for Dead {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        if MADE.fetch_add(1, Ordering::SeqCst) == 0 {
+            return Ok(Self);
+        }
+        context.on_disarm(|| {
+            INSIDE.fetch_add(1, Ordering::SeqCst);
+            DEAD.pass("here");
+            Ok(())
+        });
+        Err(Fault::new("it does not answer"))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Err(Fault::new("it is gone"))
+    }
+}
+
+robot! {
+    robot Haunted;
+    link base { sensor dead: Dead() { rate: 10 Hz; } }
+}
+
+#[test]
+fn a_device_whose_disarm_callback_hangs_at_each_retry_leaves_one_thread() {
+    within(120, || {
+        DEAD.close("here");
+        let mut builder = Haunted::builder();
+        builder.supervision().longest_backoff = Duration::from_millis(20);
+        let faults = builder.subscribe(system::Faults);
+        let running = builder.start().expect("it starts");
+        let start = std::time::Instant::now();
+        // The first is waited for, for 5 s; from then on it is tried again without one.
+        while MADE.load(Ordering::SeqCst) < 20 {
+            assert!(start.elapsed() < Duration::from_secs(60), "it is tried again");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert_eq!(INSIDE.load(Ordering::SeqCst), 1);
+        let hangs = "its disarm callback hangs, and is not run again before it has returned";
+        assert_eq!(faults.drain().filter(|fault| fault.message == hangs).count(), 1);
+        DEAD.open();
+        running.stop();
+    });
+}

@@ -9,6 +9,7 @@ use crate::component::{DisarmHook, Guardian, Permit};
 use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
+use crate::schedule::Missed;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -185,7 +186,7 @@ impl Control {
                 step.state.hooks.add(path, DisarmHook::clone(&hook), is_kept);
             }
             drop(step);
-            if let Some(SafetyError { path, message }) = self.run_within(path, &hook) {
+            if let Some(SafetyError { path, message }) = self.run_within(path, 0, &hook) {
                 self.note_hardware_error(path, message);
             }
             return crate::fault::discard(hook);
@@ -206,23 +207,31 @@ impl Control {
         step.finish();
     }
 
-    /// Runs a callback outside of a disarming; what went wrong.
-    fn run_within(&self, path: &'static str, hook: &DisarmHook) -> Option<SafetyError> {
+    /// Runs the callback of that number of a component outside of a disarming; what went wrong. One that was left behind is
+    /// not run again before it has returned: a component that is made again and again would leave a thread each time.
+    fn run_within(&self, path: &'static str, number: usize, hook: &DisarmHook) -> Option<SafetyError> {
         if self.0.mode != Mode::Real || cfg!(loom) {
             return hooks::run(self.id(), path, hook);
         }
-        let (returned, waits) = std::sync::mpsc::channel();
         let (robot, run) = (self.id(), DisarmHook::clone(hook));
-        let thread = std::thread::Builder::new().name(format!("disarm {path}")).spawn(move || {
+        let run = move || {
             let error = hooks::run(robot, path, &run);
             crate::fault::discard(run);
-            let _ = returned.send(error);
-        });
-        if thread.is_err() {
-            return hooks::run(self.id(), path, hook);
+            error
+        };
+        let error = |message: &str| Some(SafetyError { path, message: message.to_owned() });
+        match self.0.callbacks.run((path, number), format!("disarm {path}"), DISARM_WITHIN, run) {
+            Ok(error) => error,
+            Err(Missed::NoThread) => hooks::run(self.id(), path, hook),
+            Err(Missed::Late) => error("did not come back from disarming in time"),
+            Err(Missed::Hangs { is_new }) => {
+                let message = "its disarm callback hangs, and is not run again before it has returned";
+                if is_new {
+                    self.note_fault(path, message.to_owned());
+                }
+                error(message)
+            }
         }
-        let late = |_| Some(SafetyError { path, message: "did not come back from disarming in time".into() });
-        waits.recv_timeout(DISARM_WITHIN).unwrap_or_else(late)
     }
 
     /// Of a robot that has ended: the callbacks of all components, which the caller drops, so that what they own is closed
@@ -285,8 +294,8 @@ impl Control {
             return step.finish();
         }
         drop(step);
-        for hook in hooks {
-            if let Some(SafetyError { path, message }) = self.run_within(path, &hook) {
+        for (number, hook) in hooks.into_iter().enumerate() {
+            if let Some(SafetyError { path, message }) = self.run_within(path, number, &hook) {
                 self.note_hardware_error(path, message);
             }
             crate::fault::discard(hook);
@@ -299,8 +308,11 @@ impl Control {
         if hooks.is_empty() {
             return;
         }
-        let (failed, safe): (Vec<_>, Vec<_>) =
-            hooks.into_iter().partition(|hook| self.run_within(path, hook).is_some());
+        let (mut failed, mut safe) = (Vec::new(), Vec::new());
+        for (number, hook) in hooks.into_iter().enumerate() {
+            let is_safe = self.run_within(path, number, &hook).is_none();
+            if is_safe { &mut safe } else { &mut failed }.push(hook);
+        }
         let earlier = self.lock().hooks.replace_leftovers(path, failed);
         safe.into_iter().chain(earlier).for_each(crate::fault::discard);
     }

@@ -20,7 +20,7 @@ use crate::journal::Journal;
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
 use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
-use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
+use crate::schedule::{Bell, Deadlines, Pool, Sleeper, Solo, StopSignal};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::Topology;
@@ -85,6 +85,8 @@ pub(super) struct Inner {
     pub(super) watch: Deadlines<usize>,
     pub(super) limits: Deadlines<Limit>,
     pub(super) pool: Pool,
+    /// Disarm callbacks outside of a disarming, by component and number.
+    pub(super) callbacks: Solo<(&'static str, usize)>,
     pub(super) reporter: Reporter,
     /// How many commands have begun at the last instant of virtual time at which one did.
     pub(super) begun: Mutex<(MonotonicTime, u32)>,
@@ -290,6 +292,7 @@ impl Control {
             watch: Deadlines::new(bell.clone()),
             limits: Deadlines::new(bell.clone()),
             pool: Pool::new(move || alarm.ring()),
+            callbacks: Solo::default(),
             bell,
             reporter: Reporter::default(),
             begun: Mutex::new((MonotonicTime::MAX, 0)),
