@@ -6,6 +6,7 @@ mod deadlines;
 mod door;
 mod pool;
 mod sleeper;
+mod solo;
 mod stop;
 
 pub(crate) use agenda::Agenda;
@@ -14,4 +15,5 @@ pub(crate) use deadlines::Deadlines;
 pub(crate) use door::Door;
 pub(crate) use pool::{Lane, Pool};
 pub(crate) use sleeper::{Alarm, Sleeper};
+pub(crate) use solo::{Missed, Solo};
 pub(crate) use stop::StopSignal;

@@ -2,6 +2,7 @@
 
 use crate::components::{Number, within};
 use crate::disarm_first::Gate;
+use bb_core::event::RefusalReason;
 use bb_core::prelude::*;
 
 static HERE: Gate = Gate::new();
@@ -69,4 +70,59 @@ fn health_commands_that_hang_keep_none_that_disarms_from_running() {
         HERE.open();
         running.stop();
     });
+}
+
+#[test]
+fn a_command_that_hangs_is_not_started_for_ever_however_often_it_is_cancelled() {
+    within(60, || {
+        CANCELLED.close("here");
+        let running = Crowded::builder().start().expect("it starts");
+        running.arm().expect("it may be armed");
+        let start = || running.command(crowded::command::errand, NoArguments);
+        let mut started = 0;
+        let refusal = loop {
+            match start() {
+                Ok(execution) => {
+                    // Beyond that many, they wait for a thread.
+                    CANCELLED.wait_for((started + 1).min(512));
+                    execution.cancel();
+                }
+                Err(refusal) => break refusal,
+            }
+            started += 1;
+            assert!(started <= 1024, "nobody refuses it");
+        };
+        assert_eq!((started, refusal.reason), (1024, RefusalReason::Hanging));
+        let disarms = running.command(crowded::command::disarm, NoArguments).expect("it is armed");
+        assert_eq!(disarms.wait_timeout(Duration::from_secs(20)), Some(Ok(())));
+        CANCELLED.open();
+        running.arm().expect("they have returned");
+        assert!(start().is_ok());
+        running.stop();
+    });
+}
+
+static CANCELLED: Gate = Gate::new();
+
+/// Hangs as well.
+pub(crate) struct Errand;
+
+impl Command for Errand {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        CANCELLED.pass("here");
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Crowded;
+    commands {
+        disarm: Disarm;
+        errand: Errand { allowed_states: [idle, executing]; }
+    }
+    link base { sensor number: External<Number>(); }
 }

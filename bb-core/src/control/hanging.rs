@@ -4,6 +4,7 @@ use super::step::Step;
 use super::system::Control;
 use super::task::MOST_AT_ONCE;
 use crate::declaration::Role;
+use crate::event::RefusalReason;
 use crate::node::Mode;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
@@ -49,7 +50,20 @@ impl Control {
     }
 }
 
+/// Executions there may be, with those that were cancelled and whose code has not returned: one more is refused.
+const MOST_EXECUTIONS: usize = 1024;
+
+/// How many more there may be of commands that disarm the robot, or that health has started.
+const MORE_FOR_SAFETY: usize = 1024;
+
 impl Step<'_> {
+    /// Whether there may be another execution. A command that hangs and is cancelled leaves one, however often it is started.
+    pub(super) fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
+        let is_for_safety = of_health || role == Role::Disarming;
+        let most = if is_for_safety { MOST_EXECUTIONS + MORE_FOR_SAFETY } else { MOST_EXECUTIONS };
+        if self.state.executions.len() < most { Ok(()) } else { Err(RefusalReason::Hanging) }
+    }
+
     /// Which threads of the pool run a command.
     pub(super) fn lane(&self, command: usize, of_health: bool) -> Lane {
         match self.role(command) {

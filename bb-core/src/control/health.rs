@@ -255,6 +255,7 @@ mod tests {
     use super::*;
     use crate::control::system::{Declared, Parts};
     use crate::control::topics::SystemTopics;
+    use crate::declaration::EstimatorDeclaration;
     use crate::lifecycle::Supervision;
     use crate::message::Origin;
     use crate::node::SharedNode;
