@@ -181,10 +181,10 @@ impl Environment {
         path: &'static str,
         make: impl FnOnce() -> Result<C, Fault>,
     ) -> Result<C, Option<String>> {
-        let mut refusal = lock(&self.0.refusal);
-        if refusal.is_some() {
+        if lock(&self.0.refusal).is_some() {
             return Err(None);
         }
+        // No lock is held: this is user code, and so is the logger.
         make().map_err(|fault| {
             let reason = fault.to_string();
             if fault.then == crate::fault::Then::Skip {
@@ -192,7 +192,7 @@ impl Environment {
                 self.overseer().forget_hooks(path);
                 return Some(reason);
             }
-            *refusal = Some(Refusal { path, fault });
+            self.refuse(path, fault);
             None
         })
     }
