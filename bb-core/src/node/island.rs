@@ -389,6 +389,8 @@ impl<S: IslandState> Island<S> {
         if self.replayed.load(Ordering::Relaxed) {
             return;
         }
+        // Entries of control come here without having been attended to: see `attend`.
+        fence(Ordering::SeqCst);
         let mut processed = 0;
         while self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed) {
             let Some(mut state) = self.try_hold(wiring) else { return };
