@@ -1,7 +1,7 @@
 //! Commands that do not come back, and those that keep virtual time from going on.
 
 use super::step::Step;
-use super::system::Control;
+use super::system::{Control, Phase};
 use super::task::MOST_AT_ONCE;
 use crate::declaration::Role;
 use crate::event::RefusalReason;
@@ -50,18 +50,21 @@ impl Control {
     }
 }
 
-/// Executions there may be, with those that were cancelled and whose code has not returned: one more is refused.
-const MOST_EXECUTIONS: usize = 1024;
+/// Executions that were cancelled and whose code has not returned: while there are so many, no command starts. The others are
+/// bounded by the concurrency of their categories.
+const MOST_LINGERING: usize = 1024;
 
-/// How many more there may be of commands that disarm the robot, or that health has started.
+/// How many more there may be before a command that disarms the robot, or that health has started, is refused.
 const MORE_FOR_SAFETY: usize = 1024;
 
 impl Step<'_> {
-    /// Whether there may be another execution. A command that hangs and is cancelled leaves one, however often it is started.
+    /// Whether another command may start. One that hangs leaves an execution each time that it is started and cancelled.
     pub(super) fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
         let is_for_safety = of_health || role == Role::Disarming;
-        let most = if is_for_safety { MOST_EXECUTIONS + MORE_FOR_SAFETY } else { MOST_EXECUTIONS };
-        if self.state.executions.len() < most { Ok(()) } else { Err(RefusalReason::Hanging) }
+        let most = if is_for_safety { MOST_LINGERING + MORE_FOR_SAFETY } else { MOST_LINGERING };
+        let executions = self.state.executions.iter();
+        let lingering = executions.filter(|execution| matches!(execution.phase, Phase::Lingering)).count();
+        if lingering < most { Ok(()) } else { Err(RefusalReason::Hanging) }
     }
 
     /// Which threads of the pool run a command.
