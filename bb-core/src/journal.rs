@@ -17,6 +17,7 @@
 
 mod checksum;
 mod entry;
+mod queue;
 mod reader;
 mod writer;
 

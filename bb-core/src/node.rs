@@ -11,6 +11,7 @@ mod environment;
 mod health;
 mod island;
 mod latency;
+mod mark;
 mod requests;
 mod running;
 mod shared;

@@ -2,9 +2,11 @@
 //! caller ([`Simulation`]), or from a journal ([`Replay`]).
 
 pub(crate) mod actuator;
+mod apart;
 mod bound;
 mod builder;
 mod describe;
+mod ending;
 mod error;
 mod handle;
 mod host;

@@ -1,8 +1,11 @@
 //! What commands, controllers and outside code publish at paths of their own.
 
 use crate::components::{Counter, Number};
+use bb_core::journal::Event;
 use bb_core::prelude::*;
 use bb_core::{DynamicSubscription, Publisher};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// How far a mission has come.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -139,5 +142,49 @@ fn a_path_of_the_robot_is_refused() -> Result<(), StartError> {
     assert_eq!(taken, Err(expected.into()));
     assert!(bus.publisher::<Progress>("").is_err() && bus.publisher::<Progress>("sensor//x").is_err());
     assert!(bus.publisher::<Progress>("command/drive/progress").is_ok());
+    Ok(())
+}
+
+/// Publishes at a path of its own as fast as it can while the journal's sink is slow: how many messages it has got rid of.
+#[test]
+fn a_publisher_at_a_path_of_its_own_waits_for_a_journal_whose_sink_is_slow()
+-> Result<(), Box<dyn std::error::Error>> {
+    const MESSAGES: u64 = 100_000;
+    let (is_slow, published) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicU64::new(0)));
+    let (lines, slow) = (Arc::new(AtomicU64::new(0)), Arc::clone(&is_slow));
+    let written = Arc::clone(&lines);
+    let mut builder = Missionary::builder();
+    builder.journal(move |line| {
+        if slow.load(Ordering::SeqCst) {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        written.fetch_add(u64::from(matches!(line.event, Event::Own { .. })), Ordering::SeqCst);
+    });
+    let running = builder.start()?;
+    let (radio, counted) = (running.bus().publisher::<Progress>("radio/link")?, Arc::clone(&published));
+    let publishes = std::thread::spawn(move || {
+        for _ in 0..MESSAGES {
+            radio.publish(Progress { done: 0.0 });
+            counted.fetch_add(1, Ordering::SeqCst);
+        }
+    });
+    let start = std::time::Instant::now();
+    while published.load(Ordering::SeqCst) < 65_000 {
+        assert!(start.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // Time enough to publish the rest, for one that does not wait.
+    std::thread::sleep(Duration::from_millis(1000));
+    let before = published.load(Ordering::SeqCst);
+    is_slow.store(false, Ordering::SeqCst);
+    assert!(before < 70_000, "it did not wait: {before}");
+    publishes.join().expect("it does not panic");
+    let report = running.stop();
+    assert!(report.faults.is_empty(), "{:?}", report.faults);
+    // The planner's own message is one of them.
+    assert_eq!(
+        lines.load(Ordering::SeqCst),
+        MESSAGES + report.topic("mission/plan/progress").map_or(0, |topic| topic.published)
+    );
     Ok(())
 }

@@ -234,9 +234,12 @@ mod outputs {
     /// One panic of that code, and what the robot does after it.
     fn charged(code: u32) -> Result<(), Box<dyn std::error::Error>> {
         let _turn = TURN.lock();
+        let lines: Arc<Mutex<Vec<_>>> = Arc::default();
+        let sink = Arc::clone(&lines);
         let mut builder = Making::builder();
-        builder.journal(|_| {});
+        builder.journal(move |line| sink.lock().expect("it does not panic").push(line));
         let outputs = builder.subscribe(making::sensor::base::source::maker);
+        let health = builder.subscribe(system::Health);
         let mut simulation = builder.simulate()?;
         simulation.arm()?;
         simulation.run_for(Duration::from_millis(15));
@@ -250,15 +253,52 @@ mod outputs {
         assert_eq!(faults, [expected], "code {code}");
         assert_eq!(report.sources[0].restarts, 0, "the sensor has done nothing");
         assert_eq!(report.sources[0].readings, 8, "and is read at its rate");
+        assert_eq!(report.estimators[0].restarts, 1, "code {code}");
         assert!(outputs.drain().count() >= 7);
+        let transitions = |health: &Subscription<HealthTransition>| {
+            let transitions = health.drain().map(|change| (change.from, change.to, change.reason, change.time));
+            transitions.collect::<Vec<_>>()
+        };
+        let transitions_of_run = transitions(&health);
+        assert_eq!(
+            transitions_of_run.iter().map(|(_, to, reason, _)| (*to, *reason)).collect::<Vec<_>>(),
+            [(HealthState::Degraded, HealthReason::Restarted), (HealthState::Healthy, HealthReason::Recovered)]
+        );
         assert_eq!(simulation.safety(), Safety::Armed);
+        simulation.stop();
+        // Without a checksum of the output there is nothing to compare.
+        if code != 4 {
+            let builder = Making::builder();
+            let health = builder.subscribe(system::Health);
+            let mut replay = builder.replay()?;
+            replay.play(std::mem::take(&mut *lines.lock().expect("it does not panic")))?;
+            assert_eq!(replay.report().estimators[0].restarts, 1, "code {code}");
+            assert_eq!(transitions(&health), transitions_of_run);
+        }
         Ok(())
     }
 
     #[test]
-    fn a_panic_in_the_code_of_an_estimators_output_is_charged_to_the_estimator()
+    fn a_panic_in_the_code_of_an_estimators_output_is_charged_to_the_estimator_which_is_restarted()
     -> Result<(), Box<dyn std::error::Error>> {
         (1..=4).try_for_each(charged)
+    }
+
+    #[test]
+    fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Box<dyn std::error::Error>> {
+        let _turn = TURN.lock();
+        let builder = Making::builder();
+        let _outputs = builder.subscribe(making::sensor::base::source::maker);
+        let mut simulation = builder.simulate()?;
+        simulation.arm()?;
+        PANICS.store(1, Ordering::SeqCst);
+        simulation.run_for(Duration::from_secs(5));
+        PANICS.store(0, Ordering::SeqCst);
+        assert_eq!(simulation.safety(), Safety::Error);
+        let report = simulation.report();
+        let stopped = report.estimators[0].stopped.as_deref();
+        assert!(stopped.is_some_and(|why| why.contains("code 1")), "{stopped:?}");
+        Ok(())
     }
 }
 

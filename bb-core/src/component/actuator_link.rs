@@ -47,7 +47,8 @@ pub enum ActuatorError {
     Stopped,
     /// The actuator has failed at this command.
     Failed(String),
-    /// The actuator's own code has sent this, and would wait for itself.
+    /// The actuator's own code has sent this, or that of another actuator which it waits for in turn, and would wait for
+    /// itself.
     Inside,
 }
 
@@ -60,7 +61,7 @@ impl fmt::Display for ActuatorError {
             Self::Stopped => f.write_str("the actuator has failed and does not run"),
             Self::Failed(message) => write!(f, "the actuator failed: {message}"),
             Self::Inside => {
-                f.write_str("the actuator's own code cannot send to it, since it would wait for itself")
+                f.write_str("the code of an actuator cannot send to it while it waits for that actuator itself")
             }
         }
     }

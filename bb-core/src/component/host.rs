@@ -27,7 +27,7 @@ pub(crate) trait Host: Guardian {
     fn registry(&self) -> &Registry;
     /// Whether there is a journal.
     fn is_journaled(&self) -> bool;
-    /// Has something published, unless the robot has stopped.
+    /// Has something published, unless the robot has stopped; waits first while too much waits for the journal's sink.
     fn while_open(&self, publish: &mut dyn FnMut());
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage);

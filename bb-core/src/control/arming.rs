@@ -190,16 +190,15 @@ impl Control {
         step.finish();
     }
 
-    /// Of a robot that has ended: what they own is closed, and what they hold of the robot no longer keeps it alive. Those of
-    /// commands whose code has not returned run once it has.
-    pub(crate) fn forget_all_hooks(&self) {
-        let gone = {
-            let state = &mut *self.lock();
-            let lingering = state.executions.iter().filter(|execution| matches!(execution.phase, Phase::Lingering));
-            let lingering: Vec<_> = lingering.map(|execution| execution.id).collect();
-            state.hooks.take_but_of(&lingering)
-        };
-        gone.into_iter().for_each(crate::fault::discard);
+    /// Of a robot that has ended: the callbacks of all components, which the caller drops, so that what they own is closed
+    /// and what they hold of the robot no longer keeps it alive. Those of commands whose code has not returned stay, and run
+    /// once it has.
+    pub(crate) fn take_all_hooks(&self) -> Vec<(&'static str, impl Send + Sync + use<>)> {
+        let state = &mut *self.lock();
+        let lingering = state.executions.iter().filter(|execution| matches!(execution.phase, Phase::Lingering));
+        let lingering: Vec<_> = lingering.map(|execution| execution.id).collect();
+        let gone = state.hooks.take_but_of(&lingering).into_iter();
+        gone.map(|callback| (callback.path, callback)).collect()
     }
 }
 

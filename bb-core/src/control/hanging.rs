@@ -1,9 +1,10 @@
 //! Commands that do not come back, and those that keep virtual time from going on.
 
-use super::Control;
 use super::step::Step;
 use super::task::MOST_AT_ONCE;
+use super::{Control, Phase};
 use crate::declaration::Role;
+use crate::event::RefusalReason;
 use crate::node::Mode;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
@@ -49,9 +50,29 @@ impl Control {
     }
 }
 
+/// Executions that were cancelled and whose code has not returned: while there are so many, which is as many as there may be
+/// threads for commands, no command starts. The others are bounded by the concurrency of their categories.
+const MOST_LINGERING: usize = 512;
+
+/// How many more there may be before a command that disarms the robot, or that health has started, is refused.
+const MORE_FOR_SAFETY: usize = 512;
+
 impl Step<'_> {
+    /// Whether another command may start. One that hangs leaves an execution each time that it is started and cancelled.
+    pub(super) fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
+        let is_for_safety = of_health || role == Role::Disarming;
+        let most = if is_for_safety { MOST_LINGERING + MORE_FOR_SAFETY } else { MOST_LINGERING };
+        let executions = self.state.executions.iter();
+        let lingering = executions.filter(|execution| matches!(execution.phase, Phase::Lingering)).count();
+        if lingering < most { Ok(()) } else { Err(RefusalReason::Hanging) }
+    }
+
     /// Which threads of the pool run a command.
     pub(super) fn lane(&self, command: usize, of_health: bool) -> Lane {
-        if of_health || self.role(command) == Role::Disarming { Lane::Safety } else { Lane::Commands }
+        match self.role(command) {
+            Role::Disarming => Lane::Disarming,
+            Role::Plain | Role::Arming if of_health => Lane::Health,
+            Role::Plain | Role::Arming => Lane::Commands,
+        }
     }
 }

@@ -4,7 +4,7 @@ use super::budgets::Verdict;
 use super::effects::Log;
 use super::step::Step;
 use super::{ComponentOrder, Control};
-use crate::declaration::{EstimatorDeclaration, ParameterValues, Supervisor};
+use crate::declaration::{ParameterValues, Supervisor};
 use crate::event::{HealthReason, HealthState, HealthTransition, SafetyError};
 use crate::fault::Failed;
 use crate::journal::Event;
@@ -21,10 +21,12 @@ impl Overseer for Control {
         self.process_report(estimator, report);
     }
 
-    fn output_failed(&self, declared: &'static EstimatorDeclaration, message: String) {
+    fn output_failed(&self, estimator: usize, message: String) {
         // A replay's journal has it.
-        if self.0.mode != Mode::Replay {
-            self.component_failed(declared.path, declared.supervisor, message, true);
+        if self.0.mode != Mode::Replay
+            && let Some(islands) = self.0.islands.get()
+        {
+            drop(islands.post(estimator, self.0.clock.now(), NodeEntry::OutputFailed { message }));
         }
     }
 
@@ -258,6 +260,7 @@ mod tests {
     use super::*;
     use crate::control::topics::SystemTopics;
     use crate::control::{Declared, Parts};
+    use crate::declaration::EstimatorDeclaration;
     use crate::lifecycle::Supervision;
     use crate::message::Origin;
     use crate::node::SharedNode;

@@ -28,7 +28,8 @@ impl Step<'_> {
             let category = CategoryDeclaration { name: "", concurrency: 0 };
             return Err(Refusal { command: "", reason: RefusalReason::Stopping, state: "", category });
         };
-        if let Err(reason) = self.may_start(declared, self.role(number)) {
+        let role = self.role(number);
+        if let Err(reason) = self.may_start(declared, role).and_then(|()| self.has_room(role, health.is_some())) {
             let category = self.control.category(declared);
             let refusal = Refusal { command: declared.name, reason, state: self.state.machine.state(), category };
             self.effects.dropped.extend(arguments);

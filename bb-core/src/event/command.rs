@@ -67,6 +67,8 @@ pub enum RefusalReason {
     Safety,
     /// The robot is stopping.
     Stopping,
+    /// Too many executions that were cancelled have not returned from their code.
+    Hanging,
 }
 
 /// A command that was not started.
@@ -94,6 +96,9 @@ impl fmt::Display for Refusal {
             }
             RefusalReason::Safety => write!(f, "the robot is not safe, or is being disarmed"),
             RefusalReason::Stopping => write!(f, "the robot stops"),
+            RefusalReason::Hanging => {
+                write!(f, "too many commands that were cancelled have not returned from their code")
+            }
         }
     }
 }

@@ -240,6 +240,13 @@ pub enum Event {
     ArmTimeout,
     /// The robot was stopped.
     Stop,
+    /// An estimator failed because the code of one of its outputs had panicked where that was handed on.
+    OutputFailed {
+        /// The estimator.
+        estimator: usize,
+        /// What happened.
+        message: String,
+    },
 }
 
 /// How long a callback took.
@@ -304,6 +311,13 @@ impl Finite for Recorded {
 
 impl Field for Recorded {
     const SHAPE: Shape = <Vec<u8> as Field>::SHAPE;
+
+    fn heap_bytes(&self) -> usize {
+        match self {
+            Self::Message(message) => message.bytes(),
+            Self::Bytes(bytes) => bytes.len(),
+        }
+    }
 
     fn write(&self, writer: &mut Writer<'_>) {
         match self {

@@ -1,121 +1,102 @@
 //! Numbers lines, and hands them to the sink on a thread of its own.
 
+use super::queue::{Ended, LONGEST_WAIT, Queue, bytes_of};
 use super::{Entry, Event};
-use crate::fault::guarded;
+use crate::fault::{discard, guarded};
 use crate::time::MonotonicTime;
 use std::fmt;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Where lines go. It is called on a thread that runs nothing else, in the order of the lines' numbers.
+/// Where lines go. It is called on a thread that runs nothing else, in the order of the lines' numbers, and dropped there after
+/// the last one.
 pub type Sink = Arc<dyn Fn(Entry) + Send + Sync>;
 
-/// Lines that wait for the sink before outside producers have to wait for it.
-const CAPACITY: usize = 1 << 16;
-
-/// How many lines wake the thread before its time.
-const BATCH: usize = 1 << 10;
-
-/// How often the thread looks.
+/// How often the thread looks, if no batch of lines wakes it before.
 const PERIOD: Duration = Duration::from_millis(2);
-
-/// The most lines that wait, from any writer. Estimators and the control state do not wait for the sink.
-const MOST: usize = 4 * CAPACITY;
-
-/// How long outside producers wait for a sink that is too slow. One that takes no line for so long while [`CAPACITY`] wait
-/// hangs. Then the journal ends there: it never has a gap.
-const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 /// The writing end. Clones are the same journal.
 #[derive(Clone)]
 pub(crate) struct Journal(Arc<Inner>);
 
 struct Inner {
-    queue: Mutex<Queue>,
-    /// How many lines wait: read without the lock.
-    waiting: AtomicUsize,
+    state: Mutex<State>,
+    /// Whether outside producers have to wait: read without the lock.
+    is_full: AtomicBool,
     /// How many lines the sink has taken: whether it goes on is seen by it.
     taken: AtomicU64,
     arrived: Condvar,
     room: Condvar,
-    sink: Sink,
 }
 
-struct Queue {
-    lines: Vec<Entry>,
-    /// Its room is used again.
-    spare: Vec<Entry>,
-    next: u64,
-    wall_offset_nanos: i64,
+struct State {
+    queue: Queue,
+    /// None once it has got the last line.
+    sink: Option<Sink>,
+    /// A thread of its own hands lines to the sink; else whoever flushes it does.
+    has_thread: bool,
     /// A thread hands lines to the sink.
     is_draining: bool,
     has_begun: bool,
     is_closed: bool,
-    /// While too many lines wait: how many the sink had taken when that was last seen to change, and when.
-    stalled: Option<(u64, Instant)>,
-    /// Why no more lines are taken: the sink hung.
-    ended: Option<Ended>,
-}
-
-/// How a journal ended before the run.
-#[derive(Debug)]
-struct Ended {
-    message: String,
-    is_reported: bool,
+    /// The sink has got the last line, and is gone.
+    is_done: bool,
 }
 
 impl Journal {
     pub(crate) fn new(sink: Sink, wall_offset_nanos: i64) -> Self {
-        let queue = Queue {
-            lines: Vec::new(),
-            spare: Vec::new(),
-            // The first line is written last, by `begin`.
-            next: 2,
-            wall_offset_nanos,
+        let state = State {
+            queue: Queue::new(wall_offset_nanos),
+            sink: Some(sink),
+            has_thread: false,
             is_draining: false,
             has_begun: false,
             is_closed: false,
-            stalled: None,
-            ended: None,
+            is_done: false,
         };
         Self(Arc::new(Inner {
-            queue: Mutex::new(queue),
-            waiting: AtomicUsize::new(0),
+            state: Mutex::new(state),
+            is_full: AtomicBool::new(false),
             taken: AtomicU64::new(0),
             arrived: Condvar::new(),
             room: Condvar::new(),
-            sink,
         }))
     }
 
     /// Puts the first line in its place, before those of components that did something as they were made. Nothing is handed to
     /// the sink before.
     pub(crate) fn begin(&self, time: MonotonicTime, event: Event) {
-        let mut queue = self.0.lock();
-        queue.lines.insert(0, Entry { number: 1, time, event });
-        queue.has_begun = true;
+        let bytes = bytes_of(&event);
+        let mut state = self.0.lock();
+        state.queue.begin(time, event, bytes);
+        state.has_begun = true;
     }
 
     /// Writes a line of an entry that sees this offset of the wall clock; its number, or 0 if the journal has ended. Never
     /// waits for the sink.
     pub(crate) fn write(&self, time: MonotonicTime, wall_offset_nanos: i64, event: Event) -> u64 {
-        let mut queue = self.0.lock();
-        if queue.lines.len() >= CAPACITY {
-            self.0.judge(&mut queue);
+        let bytes = bytes_of(&event);
+        let mut state = self.0.lock();
+        if state.queue.is_full() {
+            self.0.judge(&mut state);
         }
-        if queue.is_closed || queue.ended.is_some() {
+        if state.is_closed || state.queue.ended.is_some() {
             return 0;
         }
+        let queue = &mut state.queue;
         if queue.wall_offset_nanos != wall_offset_nanos {
             queue.wall_offset_nanos = wall_offset_nanos;
-            queue.push(time, Event::WallClock { offset_nanos: wall_offset_nanos });
+            let line = Event::WallClock { offset_nanos: wall_offset_nanos };
+            let bytes = bytes_of(&line);
+            queue.push(time, line, bytes);
         }
-        let number = queue.push(time, event);
-        let waiting = queue.lines.len();
-        drop(queue);
-        self.0.waiting.store(waiting, Ordering::Relaxed);
-        if waiting == BATCH {
+        let (number, fills_batch) = queue.push(time, event, bytes);
+        if queue.is_full() {
+            self.0.is_full.store(true, Ordering::Relaxed);
+        }
+        drop(state);
+        if fills_batch {
             self.0.arrived.notify_one();
         }
         number
@@ -124,7 +105,7 @@ impl Journal {
     /// Outside producers call this before they begin: it waits while the sink is too far behind.
     #[inline]
     pub(crate) fn wait_for_room(&self) {
-        if self.0.waiting.load(Ordering::Relaxed) >= CAPACITY {
+        if self.0.is_full.load(Ordering::Relaxed) {
             self.0.wait_for_room();
         }
     }
@@ -137,7 +118,9 @@ impl Journal {
     /// Starts the thread that hands lines to the sink until the journal is closed.
     pub(crate) fn start(&self) -> std::io::Result<()> {
         let inner = Arc::clone(&self.0);
-        std::thread::Builder::new().name("journal".into()).spawn(move || inner.work()).map(drop)
+        std::thread::Builder::new().name("journal".into()).spawn(move || inner.work())?;
+        self.0.lock().has_thread = true;
+        Ok(())
     }
 
     /// Takes no more lines.
@@ -147,147 +130,129 @@ impl Journal {
         self.0.room.notify_all();
     }
 
-    /// Whether its sink hung, so that it ends before the run.
+    /// Whether it ended before the run, because of its sink.
     pub(crate) fn has_ended(&self) -> bool {
-        self.0.lock().ended.is_some()
+        self.0.lock().queue.ended.is_some()
     }
 
     /// Looks whether the sink hangs while nobody writes. What is wrong, once; then the journal has ended.
     pub(crate) fn look(&self) -> Option<String> {
-        let mut queue = self.0.lock();
-        self.0.judge(&mut queue);
-        let ended = queue.ended.as_mut().filter(|ended| !ended.is_reported)?;
-        ended.is_reported = true;
-        Some(ended.message.clone())
+        let mut state = self.0.lock();
+        self.0.judge(&mut state);
+        let Ended { message, is_reported } = state.queue.ended.as_mut().filter(|ended| !ended.is_reported)?;
+        *is_reported = true;
+        Some(message.clone())
     }
 
-    /// Waits until the sink has what was written, `longest` at most; false if it does not.
+    /// Waits until the sink of a journal that was closed has the last line and is gone, `longest` at most; false if it does not
+    /// have it. A journal without a thread of its own hands it over here.
     pub(crate) fn hand_over(&self, longest: Duration) -> bool {
-        let deadline = Instant::now() + longest;
-        loop {
+        if !self.0.lock().has_thread {
             self.0.flush();
-            let queue = self.0.lock();
-            if queue.ended.is_some() || (queue.lines.is_empty() && !queue.is_draining) {
-                return queue.ended.is_none();
+            self.0.finish();
+        }
+        let deadline = Instant::now() + longest;
+        let mut state = self.0.lock();
+        loop {
+            if state.is_done || state.queue.ended.is_some() {
+                return state.queue.ended.is_none();
             }
             let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return false;
             }
-            drop(self.0.room.wait_timeout(queue, left));
+            state = self.0.room.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
-    }
-}
-
-impl Queue {
-    fn push(&mut self, time: MonotonicTime, event: Event) -> u64 {
-        let number = self.next;
-        self.next += 1;
-        self.lines.push(Entry { number, time, event });
-        number
     }
 }
 
 impl Inner {
     fn work(&self) {
         loop {
-            let queue = self.lock();
-            if queue.is_closed {
-                return;
+            let state = self.lock();
+            if state.is_closed && state.queue.is_empty() {
+                break;
             }
-            if queue.lines.len() < BATCH {
-                drop(self.arrived.wait_timeout(queue, PERIOD));
+            if state.is_closed || state.queue.has_batch() {
+                drop(state);
             } else {
-                drop(queue);
+                drop(self.arrived.wait_timeout(state, PERIOD));
             }
             self.flush();
         }
+        self.finish();
     }
 
+    /// Hands out what waits. The sink is user code: nothing but its own thread waits for it.
     fn flush(&self) {
-        let mut queue = self.lock();
-        if queue.is_draining || !queue.has_begun {
+        let mut state = self.lock();
+        if state.is_draining || !state.has_begun {
             return;
         }
-        while !queue.lines.is_empty() {
-            queue.is_draining = true;
-            let spare = std::mem::take(&mut queue.spare);
-            let mut lines = std::mem::replace(&mut queue.lines, spare);
-            self.waiting.store(0, Ordering::Relaxed);
-            drop(queue);
-            for line in lines.drain(..) {
-                if let Err(fault) = guarded(|| (self.sink)(line)) {
+        let Some(sink) = state.sink.clone() else { return };
+        state.is_draining = true;
+        while let Some(mut batch) = state.queue.take() {
+            drop(state);
+            for line in batch.lines.drain(..) {
+                if let Err(fault) = guarded(|| sink(line)) {
                     tracing::error!(%fault, "the journal's sink failed");
                 }
                 // One thread at a time is here: a plain store instead of an atomic addition.
                 self.taken.store(self.taken.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
             }
-            queue = self.lock();
-            queue.spare = lines;
+            state = self.lock();
+            state.queue.handed_over(batch);
+            self.is_full.store(state.queue.is_full(), Ordering::Relaxed);
+            self.room.notify_all();
         }
-        queue.is_draining = false;
-        drop(queue);
+        state.is_draining = false;
+    }
+
+    /// After the last line: what the sink owns, such as a file, is closed here.
+    fn finish(&self) {
+        let sink = self.lock().sink.take();
+        discard(sink);
+        self.lock().is_done = true;
         self.room.notify_all();
     }
 
     #[cold]
     fn wait_for_room(&self) {
         let deadline = Instant::now() + LONGEST_WAIT;
-        let mut queue = self.lock();
+        let mut state = self.lock();
         loop {
-            self.judge(&mut queue);
+            self.judge(&mut state);
             let left = deadline.saturating_duration_since(Instant::now());
-            if queue.lines.len() < CAPACITY || queue.ended.is_some() || queue.is_closed || left.is_zero() {
+            if !state.queue.is_full() || state.queue.ended.is_some() || state.is_closed || left.is_zero() {
                 return;
             }
-            queue = self.room.wait_timeout(queue, left).unwrap_or_else(PoisonError::into_inner).0;
+            state = self.room.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
-    /// Ends the journal if its sink hangs, or is so slow that too many lines wait. It is reported by [`Journal::look`]: a
-    /// logger may block for as long as the sink does.
-    #[cold]
-    fn judge(&self, queue: &mut Queue) {
-        if queue.ended.is_some() {
-            return;
-        }
-        if queue.lines.len() < CAPACITY {
-            queue.stalled = None;
-            return;
-        }
-        let (taken, now) = (self.taken.load(Ordering::Relaxed), Instant::now());
-        let (_, since) = *queue.stalled.get_or_insert((taken, now));
-        let why = if queue.stalled.is_some_and(|(seen, _)| seen != taken) {
-            queue.stalled = Some((taken, now));
-            None
-        } else if now.duration_since(since) >= LONGEST_WAIT {
-            Some("hangs")
-        } else {
-            None
-        };
-        let why = why.or((queue.lines.len() >= MOST).then_some("is too slow"));
-        if let Some(why) = why {
-            let line = queue.next;
-            let message = format!("its sink {why}, and it ends before line {line}");
-            queue.ended = Some(Ended { message, is_reported: false });
+    fn judge(&self, state: &mut State) {
+        if state.queue.judge(self.taken.load(Ordering::Relaxed)) {
+            self.is_full.store(false, Ordering::Relaxed);
             self.room.notify_all();
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl fmt::Debug for Journal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Journal").field("waiting", &self.0.waiting).finish_non_exhaustive()
+        f.debug_struct("Journal").field("is_full", &self.0.is_full).finish_non_exhaustive()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::queue::{BATCH, CAPACITY, MOST};
     use super::*;
+    use std::sync::atomic::AtomicUsize;
 
     #[test]
     fn lines_arrive_in_order_from_many_threads_and_a_changed_wall_clock_is_a_line() {
@@ -349,7 +314,7 @@ mod tests {
     #[test]
     fn a_sink_that_hangs_ends_the_journal_without_a_gap() {
         let (journal, _release) = hanging();
-        for _ in 0..=CAPACITY {
+        for _ in 0..=CAPACITY.lines {
             journal.wait_for_room();
             journal.write(MonotonicTime::ZERO, 0, Event::Arm);
         }
@@ -362,15 +327,15 @@ mod tests {
     fn whoever_writes_the_journal_of_a_sink_that_hangs_ends_and_its_memory_is_bounded() {
         let (journal, _release) = hanging();
         // Nobody here waits for room.
-        let written = fill(&journal, 2 * MOST);
-        assert!(written <= MOST, "{written}");
+        let written = fill(&journal, 2 * MOST.lines);
+        assert!(written <= MOST.lines, "{written}");
         assert!(journal.look().is_some_and(|message| message.contains("it ends before line")));
     }
 
     #[test]
     fn a_sink_that_hangs_is_noticed_when_nobody_writes() {
         let (journal, _release) = hanging();
-        fill(&journal, CAPACITY + 2);
+        fill(&journal, CAPACITY.lines + 2);
         let start = Instant::now();
         while journal.look().is_none() {
             assert!(start.elapsed() < Duration::from_secs(20));
@@ -382,13 +347,98 @@ mod tests {
     #[test]
     fn a_sink_that_is_slow_does_not_end_the_journal_as_long_as_it_goes_on() {
         let (journal, release) = hanging();
-        fill(&journal, CAPACITY + BATCH);
-        assert!(journal.0.lock().lines.len() >= CAPACITY);
+        fill(&journal, CAPACITY.lines + BATCH.lines);
+        assert!(journal.0.lock().queue.load().lines >= CAPACITY.lines);
         let start = Instant::now();
         while start.elapsed() < LONGEST_WAIT + Duration::from_secs(1) {
             release.send(()).expect("the sink is there");
             std::thread::sleep(Duration::from_millis(100));
             assert_eq!(journal.look(), None);
+        }
+    }
+
+    /// A line of so many bytes.
+    fn large(bytes: usize) -> Event {
+        Event::Noted { path: "large", message: "x".repeat(bytes) }
+    }
+
+    #[test]
+    fn large_lines_are_bounded_by_their_bytes() {
+        const LARGE: usize = 4 << 20;
+        let (journal, release) = hanging();
+        // Nobody here waits for room. The text is not copied.
+        let written = (0..1000).filter(|_| journal.write(MonotonicTime::ZERO, 0, large(LARGE)) > 0).count();
+        assert_eq!(written, MOST.bytes / LARGE, "the line beyond is refused");
+        assert!(journal.look().is_some_and(|message| message.starts_with("its sink is too slow")));
+        drop(release);
+    }
+
+    #[test]
+    fn an_outside_producer_waits_while_large_lines_wait_and_one_that_is_larger_than_all_is_taken() {
+        let (journal, release) = hanging();
+        journal.write(MonotonicTime::ZERO, 0, large(CAPACITY.bytes));
+        let start = Instant::now();
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(300));
+                // It takes no more than what waits, and then hangs no more.
+                drop(release);
+            });
+            journal.wait_for_room();
+        });
+        assert!(start.elapsed() >= Duration::from_millis(300), "it has waited for the sink");
+        assert!(journal.write(MonotonicTime::ZERO, 0, large(2 * MOST.bytes)) > 0);
+        journal.close();
+        assert!(journal.hand_over(Duration::from_secs(20)));
+    }
+
+    /// The last line that is written is the first at which the sink hangs.
+    #[test]
+    fn a_sink_that_hangs_at_the_last_line_keeps_nobody_who_hands_it_over() {
+        let (release, hang) = std::sync::mpsc::channel::<()>();
+        let hang = Mutex::new(hang);
+        let sink = move |line: Entry| {
+            if matches!(line.event, Event::Stop) {
+                let _ = hang.lock().map(|hang| hang.recv());
+            }
+        };
+        let journal = Journal::new(Arc::new(sink), 0);
+        journal.begin(MonotonicTime::ZERO, Event::Arm);
+        journal.start().expect("a thread");
+        journal.write(MonotonicTime::ZERO, 0, Event::Stop);
+        journal.close();
+        let (done, ended) = std::sync::mpsc::channel();
+        let handed = journal.clone();
+        std::thread::spawn(move || done.send(handed.hand_over(Duration::from_millis(100))));
+        assert_eq!(ended.recv_timeout(Duration::from_secs(20)), Ok(false));
+        drop(release);
+        assert!(journal.hand_over(Duration::from_secs(20)), "it went on");
+    }
+
+    #[test]
+    fn what_a_sink_owns_is_closed_after_the_last_line_though_the_journal_is_still_held() {
+        struct File(Arc<AtomicUsize>);
+        impl Drop for File {
+            fn drop(&mut self) {
+                self.0.fetch_add(1, Ordering::SeqCst);
+            }
+        }
+        for has_thread in [false, true] {
+            let closed = Arc::new(AtomicUsize::new(0));
+            let file = File(Arc::clone(&closed));
+            let journal = Journal::new(
+                Arc::new(move |_| {
+                    let _ = &file;
+                }),
+                0,
+            );
+            journal.begin(MonotonicTime::ZERO, Event::Arm);
+            if has_thread {
+                journal.start().expect("a thread");
+            }
+            journal.close();
+            assert!(journal.hand_over(Duration::from_secs(20)));
+            assert_eq!(closed.load(Ordering::SeqCst), 1);
         }
     }
 }

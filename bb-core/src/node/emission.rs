@@ -2,8 +2,8 @@
 //! the estimator that emitted it.
 
 use super::Environment;
-use crate::declaration::EstimatorDeclaration;
-use crate::fault::{Failed, Fault, caught, of_panic};
+use super::shared::SharedNode;
+use crate::fault::{Failed, Fault, caught, guarded, of_panic};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
@@ -51,7 +51,7 @@ pub(crate) fn contained(environment: &Environment, run: impl FnOnce()) -> Result
 pub(crate) fn contained_outside(environment: &Environment, run: impl FnOnce()) {
     let Err(panic) = catch_unwind(AssertUnwindSafe(run)) else { return };
     match take_culprit(environment) {
-        Some(declared) => report(environment, declared, &of_panic(panic)),
+        Some(culprit) => report(environment, culprit, &of_panic(panic)),
         None => resume_unwind(panic),
     }
 }
@@ -60,20 +60,33 @@ pub(crate) fn contained_outside(environment: &Environment, run: impl FnOnce()) {
 #[cold]
 pub(crate) fn blame(environment: &Environment, failed: Failed) -> Result<(), Failed> {
     match take_culprit(environment).filter(|_| failed.panicked) {
-        Some(declared) => {
-            report(environment, declared, &failed.fault);
+        Some(culprit) => {
+            report(environment, culprit, &failed.fault);
             Ok(())
         }
         None => Err(failed),
     }
 }
 
-fn take_culprit(environment: &Environment) -> Option<&'static EstimatorDeclaration> {
-    CULPRIT.take().and_then(|number| environment.nodes().get(number)).map(|node| node.declaration())
+/// Hands on what an estimator has emitted at `path`, to those outside its island: a panic in there keeps nobody else from
+/// getting it.
+#[cold]
+pub(super) fn handed_on(environment: &Environment, path: &'static str, hand_on: impl FnOnce()) {
+    if let Err(failed) = guarded(hand_on) {
+        let emits = |node: &&SharedNode| node.declaration().outputs.contains(&path);
+        if let Some(node) = environment.nodes().iter().find(emits) {
+            report(environment, node.number(), &failed);
+        }
+    }
 }
 
-fn report(environment: &Environment, declared: &'static EstimatorDeclaration, fault: &Fault) {
-    environment.overseer().output_failed(declared, format!("its output {fault}"));
+fn take_culprit(environment: &Environment) -> Option<usize> {
+    CULPRIT.take().filter(|number| *number < environment.nodes().len())
+}
+
+/// The estimator fails, in the order of all that reaches it.
+fn report(environment: &Environment, estimator: usize, fault: &Fault) {
+    environment.overseer().output_failed(estimator, format!("its output {fault}"));
     // Islands that were left in haste have not looked at their inboxes.
     let mut islands: Vec<_> = environment.nodes().iter().map(|node| node.declaration().island).collect();
     islands.dedup();

@@ -31,6 +31,11 @@ pub enum NodeEntry {
         /// Handles it; none if a journal that does not hold the request is replayed.
         handle: Option<Box<dyn Any + Send>>,
     },
+    /// The code of one of its outputs has panicked where that was handed on.
+    OutputFailed {
+        /// What happened.
+        message: String,
+    },
     /// It stops.
     Retire,
 }
@@ -45,6 +50,7 @@ impl NodeEntry {
             Self::GiveUp => Event::GiveUp { estimator },
             Self::Silence { epoch, last_run } => Event::Silence { estimator, epoch: *epoch, last_run: *last_run },
             Self::Cast { request, .. } => Event::Request { estimator, request: request.clone() },
+            Self::OutputFailed { message } => Event::OutputFailed { estimator, message: message.clone() },
             Self::Retire => Event::Retire { island },
         }
     }
@@ -59,6 +65,7 @@ impl fmt::Debug for NodeEntry {
             Self::GiveUp => "GiveUp",
             Self::Silence { .. } => "Silence",
             Self::Cast { .. } => "Cast",
+            Self::OutputFailed { .. } => "OutputFailed",
             Self::Retire => "Retire",
         })
     }

@@ -1,6 +1,7 @@
 //! What the estimators, sensors and services of one run share.
 
 use super::entry::Report;
+use super::mark::{Mark, RobotMark};
 use super::shared::SharedNode;
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
@@ -21,8 +22,8 @@ use std::time::Instant;
 /// The robot as its estimators see it: the control state takes note of what they report, without waiting for anything.
 pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
-    /// The code of an output of that estimator has panicked where it was handed on.
-    fn output_failed(&self, declared: &'static EstimatorDeclaration, message: String);
+    /// The code of an output of that estimator has panicked where it was handed on: an entry for it.
+    fn output_failed(&self, estimator: usize, message: String);
     /// Takes note that the options of the component at `path` are bound to these parameters. `estimator` is told of new
     /// values by entries, others by what they registered.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
@@ -91,8 +92,8 @@ struct Inner {
     telemetry: Option<Telemetry>,
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
-    /// One bit, by which a thread knows which robots' islands it is inside.
-    bit: RobotBit,
+    /// By which a thread knows which robots' islands it is inside.
+    mark: RobotMark,
     /// Drains an island, once the robot is wired.
     drain: OnceLock<Drain>,
     /// Islands with entries that wait, on virtual time.
@@ -108,34 +109,6 @@ struct Inner {
     replayed: ReplayedOutputs,
     /// Islands whose estimators have stopped.
     retired: (Mutex<usize>, Condvar),
-}
-
-/// The bit of a robot: one that no other robot of the process has, as long as there are fewer than 64 of them. Those beyond share
-/// the last one.
-#[derive(Debug)]
-struct RobotBit(u64);
-
-/// The bits that robots have, but the last.
-static TAKEN: AtomicU64 = AtomicU64::new(SHARED_BIT);
-const SHARED_BIT: u64 = 1 << 63;
-
-impl RobotBit {
-    fn take() -> Self {
-        let free = |taken: u64| !taken & taken.wrapping_add(1);
-        let before = TAKEN.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |taken| match free(taken) {
-            0 => None,
-            free => Some(taken | free),
-        });
-        Self(before.map_or(SHARED_BIT, free))
-    }
-}
-
-impl Drop for RobotBit {
-    fn drop(&mut self) {
-        if self.0 != SHARED_BIT {
-            TAKEN.fetch_and(!self.0, Ordering::Relaxed);
-        }
-    }
 }
 
 /// Outputs of islands in a replay: publisher and checksum, in order.
@@ -194,7 +167,7 @@ impl Environment {
             journal,
             telemetry,
             start,
-            bit: RobotBit::take(),
+            mark: RobotMark::take(),
             drain: OnceLock::new(),
             posted: Mutex::default(),
             refusal: Mutex::default(),
@@ -213,10 +186,10 @@ impl Environment {
         path: &'static str,
         make: impl FnOnce() -> Result<C, Fault>,
     ) -> Result<C, Option<String>> {
-        let mut refusal = lock(&self.0.refusal);
-        if refusal.is_some() {
+        if lock(&self.0.refusal).is_some() {
             return Err(None);
         }
+        // No lock is held: this is user code, and so is the logger.
         make().map_err(|fault| {
             let reason = fault.to_string();
             if fault.then == crate::fault::Then::Skip {
@@ -224,7 +197,7 @@ impl Environment {
                 self.overseer().forget_hooks(path);
                 return Some(reason);
             }
-            *refusal = Some(Refusal { path, fault });
+            self.refuse(path, fault);
             None
         })
     }
@@ -381,8 +354,8 @@ impl Environment {
     }
 
     #[inline]
-    pub(crate) fn bit(&self) -> u64 {
-        self.0.bit.0
+    pub(crate) fn mark(&self) -> Mark {
+        self.0.mark.mark()
     }
 
     #[inline]

@@ -170,6 +170,13 @@ pub(crate) enum CallError {
     Busy,
 }
 
+/// What a thread saw that looked at an island.
+struct Looked {
+    is_held: bool,
+    /// An entry waits that another thread may have left because of the look.
+    has_kept: bool,
+}
+
 type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S: IslandState> Island<S> {
@@ -296,7 +303,7 @@ impl<S: IslandState> Island<S> {
     /// Back-pressure: waits until the holder drains the inbox. Returns `false` at once if the holder hangs or if this thread
     /// is inside an island of this robot.
     fn wait_for_room(&self, wiring: &S::Wiring) -> bool {
-        if self.hangs.load(Ordering::Relaxed) || Inside::is_here(wiring.environment().bit()) {
+        if self.hangs.load(Ordering::Relaxed) || Inside::is_here(wiring.environment().mark()) {
             return false;
         }
         self.waiting.fetch_add(1, Ordering::SeqCst);
@@ -382,6 +389,8 @@ impl<S: IslandState> Island<S> {
         if self.replayed.load(Ordering::Relaxed) {
             return;
         }
+        // Entries of control come here without having been attended to: see `attend`.
+        fence(Ordering::SeqCst);
         let mut processed = 0;
         while self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed) {
             let Some(mut state) = self.try_hold(wiring) else { return };
@@ -460,7 +469,7 @@ impl<S: IslandState> Island<S> {
         line: Event,
         call: impl FnOnce(&mut S, &Turn<'_>) -> T,
     ) -> Result<T, CallError> {
-        if Inside::is_here(wiring.environment().bit()) {
+        if Inside::is_here(wiring.environment().mark()) {
             return Err(CallError::Inside);
         }
         let Some(mut state) = self.hold(wiring, LONGEST_CALL) else { return Err(CallError::Busy) };
@@ -499,9 +508,35 @@ impl<S: IslandState> Island<S> {
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return None,
         };
-        Some(Within::new(state, wiring.environment().bit()))
+        Some(Within::new(state, wiring.environment().mark()))
     }
 
+    /// Whether a thread holds it, for one that only wants to know.
+    fn is_held(&self, wiring: &S::Wiring) -> bool {
+        let Looked { is_held, has_kept } = self.look();
+        if has_kept {
+            wiring.environment().schedule_drain(S::DECLARATION.number);
+        }
+        is_held
+    }
+
+    /// Tries the lock, and lets go at once. A thread that found it taken meanwhile has left its entry in the inbox for the one
+    /// that held it: someone else has to process it.
+    fn look(&self) -> Looked {
+        let tried = self.state.try_lock();
+        let is_held = matches!(tried, Err(TryLockError::WouldBlock));
+        // Releasing a lock is no step of a model: this is one at which others find it taken.
+        #[cfg(loom)]
+        self.pending.load(Ordering::Relaxed);
+        drop(tried);
+        // As in `leave`: either this sees the entry, or that thread has found the lock free.
+        fence(Ordering::SeqCst);
+        let has_kept =
+            !is_held && self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed);
+        Looked { is_held, has_kept }
+    }
+
+    /// Whether no thread holds it. The caller looks at the inbox afterwards: see [`Self::look`].
     fn is_free(&self) -> bool {
         !matches!(self.state.try_lock(), Err(TryLockError::WouldBlock))
     }

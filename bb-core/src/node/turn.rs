@@ -1,5 +1,6 @@
 //! One entry that an island processes.
 
+use super::emission::handed_on;
 use super::environment::{Environment, Mode};
 use crate::declaration::EstimatorDeclaration;
 use crate::journal::{Callback, Event, Recorded, checksum};
@@ -135,10 +136,16 @@ impl<'a> Turn<'a> {
     /// An estimator emits `message` at the publisher of that number.
     #[inline]
     pub fn emit<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
-        if self.is_observed {
-            self.follow(publisher, topic.path(), message);
+        if self.is_observed || topic.is_listened_to() {
+            handed_on(self.environment, topic.path(), || {
+                if self.is_observed {
+                    self.follow(publisher, topic.path(), message);
+                }
+                topic.publish_alone(message);
+            });
+        } else {
+            topic.count_alone();
         }
-        topic.publish_alone(message);
     }
 
     #[cold]

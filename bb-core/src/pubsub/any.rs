@@ -7,12 +7,15 @@ use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
+use std::task::Waker;
 
 /// A message whose payload's type is erased; [`downcast`](Self::downcast) gives it back. Clones are the same message.
 #[derive(Clone)]
 pub struct DynamicMessage {
     path: &'static str,
     message: Arc<dyn AnyMessage>,
+    /// What it holds, on the heap and beside it: asked of the payload once, where no lock is held.
+    bytes: usize,
 }
 
 /// What a message can do for those who do not know its payload.
@@ -39,7 +42,13 @@ pub(super) trait AnyMessage: Send + Sync {
 
 impl DynamicMessage {
     pub(crate) fn new<T: Payload>(path: &'static str, message: &Stamped<T>) -> Self {
-        Self { path, message: Arc::new(message.clone()) }
+        let heap = if T::IS_INLINE { 0 } else { message.payload.heap_bytes() };
+        let bytes = size_of::<Stamped<T>>().saturating_add(heap);
+        Self { path, message: Arc::new(message.clone()), bytes }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
     }
 
     pub(super) fn message(&self) -> &dyn AnyMessage {
@@ -100,7 +109,7 @@ impl DynamicMessage {
 
     /// The same with another wall time.
     pub fn at_wall_time(&self, time: WallTime) -> Self {
-        Self { path: self.path, message: self.message.at_wall_time(time) }
+        Self { message: self.message.at_wall_time(time), ..*self }
     }
 
     /// Whether payload and wall time can be read back from ROS's layout bit for bit.
@@ -145,8 +154,9 @@ pub trait AnyTopic: Any + Send + Sync {
     fn as_any(&self) -> &dyn Any;
     /// What it has counted.
     fn statistics(&self) -> TopicStatistics;
-    /// Tells all subscribers that no more will come.
-    fn close(&self);
+    /// Tells all subscribers that no more will come; the tasks to wake, which is their code.
+    #[must_use = "a task that waits for a message waits for ever unless it is woken"]
+    fn close(&self) -> Vec<Waker>;
 }
 
 /// The queue of such a subscriber, for a topic to hand messages to.

@@ -1,7 +1,7 @@
 //! The bounded queue between a topic and one subscriber.
 
 use super::statistics::SubscriberStatistics;
-use super::wakers::{Wakers, discard, wake};
+use super::wakers::{Wakers, discard};
 use crate::message::{Payload, Stamped};
 use std::collections::VecDeque;
 use std::mem::needs_drop;
@@ -171,17 +171,16 @@ impl<M> Queue<M> {
         Self { state: Mutex::new(state), arrived: Condvar::new(), bound, abandoned: AtomicBool::new(false) }
     }
 
-    /// Tells the reader that no more will come.
-    pub(super) fn close(&self) {
+    /// Tells the reader that no more will come; the task to wake.
+    #[must_use = "to wake a task is user code, which the caller runs where it harms nobody"]
+    pub(super) fn close(&self) -> Option<Waker> {
         let mut state = self.lock();
         state.closed = true;
         let waker = state.waker.take();
         drop(state);
         // Several threads may wait for the same subscription, and none of them will get a message any more.
         self.arrived.notify_all();
-        if let Some(waker) = waker {
-            wake(waker);
-        }
+        waker
     }
 
     /// Says that nobody reads it any more. What waits is dropped here, and nothing is added from now on, so that

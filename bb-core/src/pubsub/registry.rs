@@ -9,6 +9,7 @@ use std::any::{Any, type_name};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::task::Waker;
 
 /// The topics of one robot that it does not declare. A topic that is made here is subscribed to by those whose selection
 /// includes it, whether they subscribed before or after.
@@ -135,13 +136,14 @@ impl Registry {
         self.lock().topics.values().map(|made| Arc::clone(&made.topic)).collect()
     }
 
-    /// Tells the subscribers that no more will come. No further topic is made.
-    pub(crate) fn close(&self) {
+    /// Tells the subscribers that no more will come; the tasks to wake. No further topic is made.
+    #[must_use = "a task that waits for a message waits for ever unless it is woken"]
+    pub(crate) fn close(&self) -> Vec<Waker> {
         let mut state = self.lock();
         state.is_closed = true;
         state.selections = Selections::default();
         drop(state);
-        self.topics().iter().for_each(|topic| topic.close());
+        self.topics().iter().flat_map(|topic| topic.close()).collect()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -412,7 +414,7 @@ mod tests {
         let registry = registry();
         let topic = registry.topic::<JointState>("a").expect("it is free");
         let subscription: Subscription<_> = topic.subscribe(Overflow::default());
-        registry.close();
+        drop(registry.close());
         assert!(subscription.recv().is_none());
         assert_eq!(refusal(&registry, "b"), "cannot publish at `b`: the robot has stopped");
         topic.publish(&state(1.0));

@@ -132,7 +132,7 @@ mod tests {
         let topic = Topic::new("sensor/arm/encoder");
         let subscription = topic.subscribe(Overflow::default());
         topic.publish(&message(1.0));
-        topic.close();
+        drop(topic.close());
         assert!(subscription.recv().is_some());
         assert!(subscription.recv().is_none());
         assert!(topic.subscribe(Overflow::default()).recv().is_none());

@@ -4,12 +4,13 @@ use super::any::DynamicMessage;
 use super::queue::{Overflow, Queue, counted_bytes};
 use super::subscribers::{Subscribers, lock};
 use super::subscription::Subscription;
-use super::wakers::Wakers;
+use super::wakers::{Wakers, wake};
 use crate::Payload;
 use crate::message::Stamped;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Waker;
 
 /// Where the messages of one publisher are subscribed to. Dropping it tells its subscribers that no more will come.
 pub struct Topic<T> {
@@ -44,7 +45,8 @@ impl<T> Topic<T> {
         let mut subscribers = lock(&self.subscribers);
         if subscribers.closed {
             drop(subscribers);
-            queue.close();
+            // Nobody waits for it yet.
+            drop(queue.close());
         } else {
             subscribers.queues = subscribers.queues.iter().chain([&queue]).map(Arc::clone).collect();
             self.listening.store(subscribers.count(), Ordering::Release);
@@ -52,16 +54,15 @@ impl<T> Topic<T> {
         Subscription::new(self.path, queue, Arc::downgrade(&self.subscribers))
     }
 
-    pub(super) fn close_all(&self) {
+    /// The tasks to wake.
+    pub(super) fn close_all(&self) -> Vec<Waker> {
         let mut subscribers = lock(&self.subscribers);
         subscribers.closed = true;
         subscribers.taps = Arc::new([]);
         let queues = std::mem::replace(&mut subscribers.queues, Arc::new([]));
         self.listening.store(0, Ordering::Release);
         drop(subscribers);
-        for queue in queues.iter() {
-            queue.close();
-        }
+        queues.iter().filter_map(|queue| queue.close()).collect()
     }
 }
 
@@ -77,8 +78,20 @@ impl<T: Payload> Topic<T> {
     /// at the same time.
     #[inline]
     pub fn publish_alone(&self, message: &Stamped<T>) {
-        self.published.store(self.published.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        self.count_alone();
         self.hand_out(message);
+    }
+
+    /// The same of a message that nobody listens to.
+    #[inline]
+    pub(crate) fn count_alone(&self) {
+        self.published.store(self.published.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+
+    /// Whether anybody listens.
+    #[inline]
+    pub(crate) fn is_listened_to(&self) -> bool {
+        self.listening.load(Ordering::Acquire) > 0
     }
 
     /// The same for one of several publishers, of a message that `write` writes into a journal: subscribers receive messages
@@ -211,7 +224,7 @@ fn tap_all(taps: &[Arc<Queue<DynamicMessage>>], message: DynamicMessage, bytes: 
 
 impl<T> Drop for Topic<T> {
     fn drop(&mut self) {
-        self.close_all();
+        self.close_all().into_iter().for_each(wake);
     }
 }
 

@@ -11,6 +11,7 @@ use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::task::Waker;
 
 impl<T: Payload> AnyMessage for Stamped<T> {
     fn payload_name(&self) -> &'static str {
@@ -121,7 +122,7 @@ impl<T: Payload> AnyTopic for Topic<T> {
         }
     }
 
-    fn close(&self) {
-        self.close_all();
+    fn close(&self) -> Vec<Waker> {
+        self.close_all()
     }
 }

@@ -2,7 +2,7 @@
 
 mod held;
 
-use self::held::Held;
+use self::held::{Guarded, Held};
 use super::occupied::Occupied;
 use super::source::Assembly;
 use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Permit};
@@ -19,7 +19,7 @@ use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::task::{Wake, Waker};
 use std::time::{Duration, Instant};
 
@@ -39,7 +39,7 @@ struct Inner<A: Actuator> {
     /// When its code was entered.
     occupied: Occupied,
     /// Held while its code runs: nothing that must not wait for user code takes it.
-    state: Mutex<State<A>>,
+    state: Guarded<State<A>>,
 }
 
 struct State<A: Actuator> {
@@ -95,7 +95,7 @@ impl<A: Actuator> ActuatorNode<A> {
             topic: Topic::new(declaration.path),
             orders: Mutex::default(),
             occupied: Occupied::new(),
-            state: Mutex::new(State { slot, is_unsafe: false, told: Vec::new() }),
+            state: Guarded::new(State { slot, is_unsafe: false, told: Vec::new() }),
         });
         // Weak, since the control state that keeps these is kept by the actuator.
         let told = Arc::downgrade(&inner);
@@ -147,11 +147,10 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
 }
 
 impl<A: Actuator> Inner<A> {
-    /// Runs `run` while no other code of the actuator runs; none if it was called by code of the actuator itself, which would
-    /// wait for itself.
+    /// Runs `run` while no other code of the actuator runs; none if it was called by code of the actuator itself, or of another
+    /// one that it waits for, which would wait for itself.
     fn alone<T>(&self, run: impl FnOnce(&mut State<A>) -> T) -> Option<T> {
-        let held = Held::new(std::ptr::from_ref(self).addr())?;
-        let mut state = lock(&self.state);
+        let mut state = self.state.enter()?;
         let result = {
             // Disarming would wait for this as well.
             let _within = self.control.enter_actuator();
@@ -159,7 +158,6 @@ impl<A: Actuator> Inner<A> {
         };
         let told = std::mem::take(&mut state.told);
         drop(state);
-        drop(held);
         told.into_iter().for_each(|told| self.tell_now(told));
         Some(result)
     }
@@ -407,7 +405,7 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
     }
 
     fn terminate(&self, timeout: Duration) -> bool {
-        let Some(mut state) = lock_within(&self.0.state, timeout) else { return false };
+        let Some(mut state) = enter_within(&self.0.state, timeout) else { return false };
         let fault = {
             let _entered = self.0.occupied.enter(self.0.environment.clock());
             state.slot.retire()
@@ -431,14 +429,13 @@ impl<A: Actuator> fmt::Debug for ActuatorNode<A> {
     }
 }
 
-fn lock_within<T>(mutex: &Mutex<T>, timeout: Duration) -> Option<MutexGuard<'_, T>> {
+fn enter_within<S>(state: &Guarded<S>, timeout: Duration) -> Option<Held<'_, S>> {
     let start = Instant::now();
     loop {
-        match mutex.try_lock() {
-            Ok(guard) => return Some(guard),
-            Err(TryLockError::Poisoned(poisoned)) => return Some(poisoned.into_inner()),
-            Err(TryLockError::WouldBlock) if start.elapsed() >= timeout => return None,
-            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(1)),
+        match state.try_enter() {
+            Some(held) => return Some(held),
+            None if start.elapsed() >= timeout => return None,
+            None => std::thread::sleep(Duration::from_millis(1)),
         }
     }
 }

@@ -1,10 +1,12 @@
 //! A robot before it starts.
 
+use super::apart::Apart;
 use super::bound::refused_by_bound;
 use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
 use super::machine::Machine;
+use super::running::STOP_WITHIN;
 use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
 use crate::component::{Fault, Host};
@@ -23,6 +25,7 @@ use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Instant;
 
 /// The wiring with its estimators, and the sensors that feed it.
 pub(super) type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
@@ -244,8 +247,13 @@ impl<R: Robot> Builder<R> {
         let abandon = |path, fault| {
             control.begin_stop();
             control.wait_until_disarmed();
-            control.forget_all_hooks();
+            let mut dropping = Apart::default();
+            for (path, hook) in control.take_all_hooks() {
+                dropping.discard(&control, path, hook);
+            }
             control.pool().close();
+            // What hangs is left behind: there is no report, and the error says what keeps the robot from starting.
+            dropping.wait(Instant::now() + STOP_WITHIN);
             StartError::component(path, fault)
         };
         let (topics, options) = (self.topics, &self.options);

@@ -96,6 +96,9 @@ impl<R: Robot> Host for RobotHost<R> {
     }
 
     fn while_open(&self, publish: &mut dyn FnMut()) {
+        if let Some(journal) = &self.journal {
+            journal.wait_for_room();
+        }
         if let Some(_inside) = self.door.enter() {
             publish();
         }

@@ -8,16 +8,15 @@ use crate::component::{Actuator, Bus, Command, Fault, HandleCall, HandleCast, Ho
 use crate::control::{Control, Execution, Summary};
 use crate::declaration::{ParameterError, ParameterType};
 use crate::event::{ComponentFault, Refusal};
-use crate::journal::{Journal, RequestKind};
+use crate::journal::RequestKind;
 use crate::message::Stamp;
 use crate::node::{
-    AnyIsland, CallError, Environment, Node, NodeEntry, Replayed, Turn, contained_outside, know_calls, know_casts,
+    AnyIsland, CallError, Environment, Node, NodeEntry, Turn, contained_outside, know_calls, know_casts,
 };
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::MonotonicTime;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
 
 pub(super) struct Machine<R: Robot> {
     pub(super) wiring: Arc<R::Wiring>,
@@ -30,10 +29,6 @@ pub(super) struct Machine<R: Robot> {
     /// What it had done when it ended.
     pub(super) last_report: OnceLock<Report>,
 }
-
-/// How long the journal's sink may take for the last lines, and how long at least, whatever else has used up the time.
-const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
-const LEAST_WAIT: Duration = Duration::from_millis(200);
 
 /// One-way requests that may wait for an estimator; one more is refused.
 const MOST_CASTS: u32 = 1024;
@@ -181,88 +176,10 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Has all estimators stop; those that are busy until `deadline` are left behind, and reported.
-    pub(super) fn retire_islands(&self, deadline: Instant) {
-        let now = self.environment.clock().now();
-        for island in self.islands() {
-            island.retire(&self.wiring, now);
-        }
-        self.environment.drain_posted();
-        self.environment.wait_for_retired(R::ISLANDS.len(), deadline);
-        for island in self.islands().filter(|island| !island.has_retired()) {
-            let path = self.path_of_busy(island);
-            let since = self.environment.clock().now().duration_since(island.entered_at());
-            self.fault(
-                path,
-                format!("did not return when the robot stopped; its code was entered {since:.1?} ago"),
-            );
-        }
-    }
-
-    /// On virtual time: has all estimators stop, in order. The journal's line of the stop implies it.
-    pub(super) fn retire_quietly(&self) {
-        let now = self.environment.clock().now();
-        for island in self.islands() {
-            island.replay(&self.wiring, now, Replayed::Retire);
-        }
-    }
-
     /// The estimator whose callback an island runs.
     pub(super) fn path_of_busy(&self, island: &dyn AnyIsland<R::Wiring>) -> &'static str {
-        let running = island.busy().and_then(|(_, estimator)| R::ESTIMATORS.get(estimator));
+        let running = island.busy(&self.wiring).and_then(|(_, estimator)| R::ESTIMATORS.get(estimator));
         running.map_or(island.declaration().name, |estimator| estimator.path)
-    }
-
-    pub(super) fn terminate_actuators(&self, deadline: Instant) {
-        let left = || deadline.saturating_duration_since(Instant::now()).max(Duration::from_millis(1));
-        for actuator in R::all_actuators(&self.wiring) {
-            if !actuator.terminate(left()) {
-                let message = "did not come back from its command, or from disarming, in time";
-                self.fault(actuator.path(), message.to_owned());
-            }
-        }
-    }
-
-    /// Takes no more messages; until `deadline`, waits for those that are on their way and until estimators that have stopped
-    /// have counted theirs.
-    pub(super) fn close_door(&self, deadline: Instant) {
-        if !self.environment.door().close(deadline) {
-            let message = "a publisher did not come back: what followed from its message may be missing";
-            self.fault("journal", message.to_owned());
-        }
-        for island in self.islands().filter(|island| island.has_retired()) {
-            while !island.is_idle() && Instant::now() < deadline {
-                std::thread::sleep(Duration::from_micros(100));
-            }
-        }
-    }
-
-    /// Ends the journal after the last entry of the control state, tells subscribers that no more will come, and makes the
-    /// last report. The journal's sink may take until `deadline` for the last lines.
-    pub(super) fn end(&self, deadline: Instant) {
-        let summary = self.control.end(|summary| {
-            if let Some(journal) = self.environment.journal() {
-                journal.close();
-            }
-            summary
-        });
-        for topic in self.topics() {
-            if topic.path() != "journal" {
-                topic.close();
-            }
-        }
-        let mut report = self.report_of(summary);
-        if let Some(message) = self.environment.journal().and_then(|journal| hand_over(journal, deadline)) {
-            report.add_fault(self.fault("journal", message));
-        }
-        // It is set once.
-        let _ = self.last_report.set(report);
-        self.control.topics().journal.close();
-        self.control.topics().registry.close();
-        self.has_ended.store(true, Ordering::Release);
-        self.control.forget_all_hooks();
-        self.control.bell().ring();
-        self.control.pool().close();
     }
 
     /// On virtual time, after something was done from outside: runs disarm callbacks that an actuator's own code has left, and
@@ -285,7 +202,7 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    fn report_of(&self, control: Summary) -> Report {
+    pub(super) fn report_of(&self, control: Summary) -> Report {
         let topics = self.topics();
         let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
         let made = self.control.topics().registry.topics();
@@ -309,12 +226,4 @@ impl<R: Robot> Machine<R> {
         self.control.note_fault(path, message.clone());
         ComponentFault { path, message }
     }
-}
-
-/// Waits until the journal's sink has the last lines; what is wrong if it does not take them, unless that was said before.
-fn hand_over(journal: &Journal, deadline: Instant) -> Option<String> {
-    let longest = HAND_OVER_WITHIN.min(deadline.saturating_duration_since(Instant::now())).max(LEAST_WAIT);
-    let in_time = journal.hand_over(longest);
-    let late = || "its sink did not take the last lines in time: it ends before the run".to_owned();
-    journal.look().or_else(|| (!in_time && !journal.has_ended()).then(late))
 }

@@ -169,6 +169,7 @@ impl<R: Robot> Replay<R> {
             Event::Options { estimator, .. }
             | Event::Restart { estimator }
             | Event::GiveUp { estimator }
+            | Event::OutputFailed { estimator, .. }
             | Event::Silence { estimator, .. }
             | Event::Request { estimator, .. } => R::ESTIMATORS.get(*estimator).map(|declared| declared.island),
             _ => None,
@@ -212,6 +213,9 @@ impl<R: Robot> Replay<R> {
             }
             Event::Restart { estimator } => self.node(estimator, time, NodeEntry::Restart)?,
             Event::GiveUp { estimator } => self.node(estimator, time, NodeEntry::GiveUp)?,
+            Event::OutputFailed { estimator, message } => {
+                self.node(estimator, time, NodeEntry::OutputFailed { message })?;
+            }
             Event::Silence { estimator, epoch, last_run } => {
                 self.node(estimator, time, NodeEntry::Silence { epoch, last_run })?;
             }

@@ -20,7 +20,7 @@ pub struct Running<R: Robot> {
 pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 
 /// How long it may take at least, once disarm callbacks have used up their time.
-const GRACE: Duration = Duration::from_millis(500);
+const GRACE: Duration = Duration::from_millis(400);
 
 /// Within this time after the call, whatever hangs, the robot has stopped: all above, and the last lines of the journal.
 const BACK_WITHIN: Duration = Duration::from_millis(5800);

@@ -79,7 +79,7 @@ pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
 /// Reports estimators that hang, each time once.
 fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
     for (island, seen) in machine.islands().zip(seen) {
-        let turn = island.busy().map(|(turn, _)| turn);
+        let turn = island.busy(&machine.wiring).map(|(turn, _)| turn);
         if turn.is_none() || turn != seen.turn {
             *seen = Seen { turn, since: now, is_reported: false };
             continue;

@@ -1,25 +1,31 @@
 //! Threads that run user code which no thread of its own runs: turns of islands, commands, wakers.
 //!
 //! Each job may block for ever. When jobs wait and no thread has taken one for some milliseconds, another thread is started,
-//! so that a blocked job delays others by no more than that. Jobs of the four [`Lane`]s wait apart, and each lane but the
+//! so that a blocked job delays others by no more than that. Jobs of the [`Lane`]s wait apart, and each lane but the
 //! robot's own may block so many threads: whatever fills one of them, the others go on, and the full one is reported.
 
 mod crew;
+#[cfg(all(test, loom))]
+mod model;
+mod threads;
 
-use self::crew::{Crew, Next};
+use self::crew::{Call, Crew, Next};
+use self::threads::{Mutex, MutexGuard, Run, Spawn};
 use crate::fault::guarded;
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A job. It catches and reports the panics of user code itself; another panic ends there.
 pub(crate) type Job = Box<dyn FnOnce() + Send>;
 
-/// What a job is for. Lanes are served in this order.
+/// What a job is for. Lanes are served in this order, but for jobs that have waited for long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
-    /// Commands that disarm the robot, or that a change of health has started.
-    Safety,
+    /// Commands that disarm the robot: no other code takes their threads.
+    Disarming,
+    /// Commands that a change of health has started.
+    Health,
     /// Turns of islands, orders to actuators, lines for loggers: as many may block as the robot has components.
     Robot,
     /// All other commands.
@@ -29,12 +35,14 @@ pub(crate) enum Lane {
 }
 
 impl Lane {
-    const ALL: [Self; 4] = [Self::Safety, Self::Robot, Self::Commands, Self::Wakers];
+    const ALL: [Self; 5] = [Self::Disarming, Self::Health, Self::Robot, Self::Commands, Self::Wakers];
 
     /// How many of its jobs may run at once; others wait until one returns.
     const fn most(self) -> usize {
         match self {
-            Self::Safety => 64,
+            // A model has room for few threads.
+            Self::Commands if cfg!(loom) => 1,
+            Self::Disarming | Self::Health => 64,
             Self::Robot => usize::MAX,
             Self::Commands | Self::Wakers => 512,
         }
@@ -43,7 +51,8 @@ impl Lane {
     /// Its jobs, for a report.
     const fn jobs(self) -> &'static str {
         match self {
-            Self::Safety => "commands that disarm, or that health has started",
+            Self::Disarming => "commands that disarm",
+            Self::Health => "commands that health has started",
             Self::Robot => "turns",
             Self::Commands => "commands",
             Self::Wakers => "wakers",
@@ -52,7 +61,7 @@ impl Lane {
 }
 
 /// Threads that are always there.
-const READY: usize = 2;
+const READY: usize = if cfg!(loom) { 1 } else { 2 };
 
 /// How long a lane is full, and jobs of it wait, before that is reported.
 const FULL_AFTER: Duration = Duration::from_secs(1);
@@ -67,16 +76,22 @@ struct Shared {
     idle_for: Duration,
     /// Tells the thread that keeps time that a job waits.
     alarm: Box<dyn Fn() + Send + Sync>,
+    spawn: Box<Spawn>,
 }
 
 impl Pool {
     /// A pool without threads yet. `alarm` is called when a job has to wait: someone then calls [`Pool::relieve`].
     pub(crate) fn new(alarm: impl Fn() + Send + Sync + 'static) -> Self {
-        Self::with_idle_time(Duration::from_secs(5), alarm)
+        Self::with(Duration::from_secs(5), alarm, threads::spawn)
     }
 
-    fn with_idle_time(idle_for: Duration, alarm: impl Fn() + Send + Sync + 'static) -> Self {
-        Self(Arc::new(Shared { state: Mutex::default(), idle_for, alarm: Box::new(alarm) }))
+    fn with(
+        idle_for: Duration,
+        alarm: impl Fn() + Send + Sync + 'static,
+        spawn: impl Fn(String, Run) -> std::io::Result<()> + Send + Sync + 'static,
+    ) -> Self {
+        let state = Mutex::new(Crew::default());
+        Self(Arc::new(Shared { state, idle_for, alarm: Box::new(alarm), spawn: Box::new(spawn) }))
     }
 
     /// Starts the threads that are always there. A thread inherits priority and cores from the one that starts it, and a
@@ -90,21 +105,17 @@ impl Pool {
     pub(crate) fn submit(&self, lane: Lane, job: impl FnOnce() + Send + 'static) {
         let mut crew = self.0.lock();
         crew.add(lane, Box::new(job), Instant::now());
-        if let Some(thread) = crew.take_idle() {
-            drop(crew);
-            thread.unpark();
-        } else if crew.threads() < READY {
-            self.start_thread(crew);
-        } else if crew.may_take() {
-            drop(crew);
-            (self.0.alarm)();
-        }
+        self.call(crew);
     }
 
     /// Starts a thread if jobs wait and those there are take none; when to look again, if jobs wait.
     pub(crate) fn relieve(&self) -> Option<Duration> {
+        self.relieve_at(Instant::now())
+    }
+
+    fn relieve_at(&self, now: Instant) -> Option<Duration> {
         let mut crew = self.0.lock();
-        let wait = crew.wait(Instant::now())?;
+        let wait = crew.wait(now)?;
         if let Some(thread) = crew.take_idle() {
             thread.unpark();
             return Some(crew::PATIENCE);
@@ -116,61 +127,88 @@ impl Pool {
         Some(wait)
     }
 
-    /// The next lane that has become full, in words; each time once.
+    /// The next lane that has become full, in words, or that there is no thread to be had; each time once.
     pub(crate) fn report(&self) -> Option<String> {
-        let lane = self.0.lock().newly_full(Instant::now())?;
+        let mut crew = self.0.lock();
+        if let Some(error) = crew.newly_without_thread() {
+            return Some(format!("no thread can be started, and jobs wait: {error}"));
+        }
+        let lane = crew.newly_full(Instant::now())?;
         let (most, jobs) = (lane.most(), lane.jobs());
         Some(format!("{most} {jobs} have not returned, as many as there are threads for: others wait"))
     }
 
-    /// Runs what waits, on threads that end once nothing does.
+    /// Runs what waits, on threads that end once nothing does. Nobody keeps time any more.
     pub(crate) fn close(&self) {
-        let idle = self.0.lock().close();
-        idle.iter().for_each(std::thread::Thread::unpark);
+        let mut crew = self.0.lock();
+        let idle = crew.close();
+        self.call(crew);
+        idle.iter().for_each(threads::Thread::unpark);
     }
 
+    /// Tells someone of the jobs that may be taken.
+    fn call(&self, mut crew: MutexGuard<'_, Crew>) {
+        match crew.call() {
+            Call::Nobody => {}
+            Call::Thread(thread) => {
+                drop(crew);
+                thread.unpark();
+            }
+            Call::NewThread => self.start_thread(crew),
+            Call::Timekeeper => {
+                drop(crew);
+                (self.0.alarm)();
+            }
+        }
+    }
+
+    /// Jobs may be submitted under a lock of the robot, and the thread that keeps time comes here as well: nothing is logged.
     fn start_thread(&self, mut crew: MutexGuard<'_, Crew>) {
         let number = crew.start();
         drop(crew);
-        let shared = Arc::clone(&self.0);
-        let spawned = std::thread::Builder::new().name(format!("pool {number}")).spawn(move || shared.work());
-        if let Err(error) = spawned {
-            // The threads there are go on; the next look tries again.
-            self.0.lock().not_started();
-            tracing::error!(%error, "no thread for the pool");
+        let pool = self.clone();
+        if let Err(error) = (self.0.spawn)(format!("pool {number}"), Box::new(move || pool.work())) {
+            // The threads there are go on; the thread that keeps time tries again.
+            self.0.lock().not_started(error, Instant::now());
+            (self.0.alarm)();
         }
     }
-}
 
-impl Shared {
     fn work(&self) {
-        let mut crew = self.lock();
+        let mut crew = self.0.lock();
         crew.arrive();
+        let mut has_room = false;
         loop {
             match crew.next(Instant::now()) {
                 Next::Job(lane, job) => {
-                    drop(crew);
+                    if has_room || crew.is_closed() {
+                        self.call(crew);
+                    } else {
+                        drop(crew);
+                    }
                     // A logger that panics, say, which cannot be told so.
                     let _ = guarded(job);
-                    crew = self.lock();
-                    crew.done(lane);
+                    crew = self.0.lock();
+                    has_room = crew.done(lane);
                 }
                 Next::End => return crew.leave(),
                 Next::Idle => {
-                    crew.rest();
+                    has_room = false;
+                    let longest = crew.rest(self.0.idle_for);
                     drop(crew);
-                    let start = Instant::now();
-                    std::thread::park_timeout(self.idle_for);
-                    crew = self.lock();
+                    let was_long = threads::park(longest);
+                    crew = self.0.lock();
                     let was_told = crew.rise();
-                    if !was_told && start.elapsed() >= self.idle_for && crew.threads() > READY {
+                    if was_long && !was_told && crew.threads() > READY && !crew.may_take() {
                         return crew.leave();
                     }
                 }
             }
         }
     }
+}
 
+impl Shared {
     fn lock(&self) -> MutexGuard<'_, Crew> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -182,9 +220,10 @@ impl fmt::Debug for Pool {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::mpsc;
 
     /// Longer than anything takes that does not hang.
@@ -237,10 +276,10 @@ mod tests {
     #[test]
     fn a_full_lane_is_reported_once_and_keeps_no_other_from_running() {
         let pool = Pool::new(|| {});
-        let release = block(&pool, Lane::Safety, Lane::Safety.most() + 3);
-        relieve_until(&pool, || pool.0.lock().is_full(Lane::Safety));
+        let release = block(&pool, Lane::Health, Lane::Health.most() + 3);
+        relieve_until(&pool, || pool.0.lock().is_full(Lane::Health));
         let (done, finished) = mpsc::channel();
-        for lane in [Lane::Robot, Lane::Commands, Lane::Wakers] {
+        for lane in [Lane::Disarming, Lane::Robot, Lane::Commands, Lane::Wakers] {
             let done = done.clone();
             pool.submit(lane, move || done.send(lane).expect("the test waits"));
             relieve_until(&pool, || finished.try_recv() == Ok(lane));
@@ -251,7 +290,7 @@ mod tests {
             report = pool.report();
         }
         let report = report.expect("it is full");
-        assert!(report.starts_with("64 commands that disarm"), "{report}");
+        assert!(report.starts_with("64 commands that health has started"), "{report}");
         assert_eq!((pool.report(), pool.relieve()), (None, None), "nothing that a thread would help");
         drop(release);
         pool.close();
@@ -259,7 +298,7 @@ mod tests {
 
     #[test]
     fn threads_that_are_not_needed_any_more_end_while_others_have_work() {
-        let pool = Pool::with_idle_time(Duration::from_millis(100), || {});
+        let pool = Pool::with(Duration::from_millis(100), || {}, threads::spawn);
         let release = block(&pool, Lane::Commands, 20);
         relieve_until(&pool, || pool.0.lock().threads() >= 20);
         drop(release);
@@ -271,5 +310,39 @@ mod tests {
             std::thread::sleep(Duration::from_millis(2));
         }
         pool.close();
+    }
+
+    #[test]
+    fn jobs_run_once_there_are_threads_again() {
+        let (can_start, told) = (Arc::new(AtomicBool::new(false)), mpsc::channel());
+        let (can, tell) = (Arc::clone(&can_start), std::sync::Mutex::new(told.0));
+        let spawn = move |name, run| match can.load(Ordering::SeqCst) {
+            true => threads::spawn(name, run),
+            false => Err(std::io::Error::other("too many")),
+        };
+        let alarm = move || drop(tell.lock().map(|tell| tell.send(())));
+        let pool = Pool::with(Duration::from_secs(5), alarm, spawn);
+        pool.start();
+        let (done, finished) = mpsc::channel();
+        pool.submit(Lane::Robot, move || done.send(()).expect("the test waits"));
+        assert!(told.1.try_recv().is_ok(), "the thread that keeps time tries again");
+        let report = pool.report().expect("there is no thread");
+        assert_eq!(report, "no thread can be started, and jobs wait: too many");
+        assert_eq!(pool.report(), None, "it is said once");
+        can_start.store(true, Ordering::SeqCst);
+        relieve_until(&pool, || finished.try_recv().is_ok());
+        pool.close();
+    }
+
+    #[test]
+    fn after_the_end_what_waits_runs_though_all_threads_hang() {
+        let pool = Pool::new(|| {});
+        let before = block(&pool, Lane::Commands, 10);
+        pool.close();
+        let after = block(&pool, Lane::Wakers, 10);
+        let (done, finished) = mpsc::channel();
+        pool.submit(Lane::Wakers, move || done.send(()).expect("the test waits"));
+        assert_eq!(finished.recv_timeout(LONG), Ok(()));
+        drop((before, after));
     }
 }

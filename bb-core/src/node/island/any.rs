@@ -40,7 +40,7 @@ pub trait AnyIsland<W> {
     /// Processes what comes, on the calling thread, until its estimators have stopped.
     fn serve(&self, wiring: &W);
     /// Entries processed, and the estimator whose callback ran last; none if no thread holds it now.
-    fn busy(&self) -> Option<(u64, usize)>;
+    fn busy(&self, wiring: &W) -> Option<(u64, usize)>;
     /// The time of the last entry.
     fn entered_at(&self) -> MonotonicTime;
     /// Whether the calling thread is inside an island of this robot, and must not wait for one.
@@ -48,7 +48,7 @@ pub trait AnyIsland<W> {
     /// Whether its estimators have stopped.
     fn has_retired(&self) -> bool;
     /// Whether nothing waits for it and no thread holds it.
-    fn is_idle(&self) -> bool;
+    fn is_idle(&self, wiring: &W) -> bool;
     /// From now on entries are processed when [`Self::replay`] says so.
     fn begin_replay(&self, wiring: &W);
     /// Processes an entry of a journal; false if there is none that matches.
@@ -143,8 +143,8 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         Self::drain(self, wiring);
     }
 
-    fn busy(&self) -> Option<(u64, usize)> {
-        (!self.is_free()).then(|| (self.turns.load(RELAXED), self.running.load(RELAXED) as usize))
+    fn busy(&self, wiring: &S::Wiring) -> Option<(u64, usize)> {
+        self.is_held(wiring).then(|| (self.turns.load(RELAXED), self.running.load(RELAXED) as usize))
     }
 
     fn entered_at(&self) -> MonotonicTime {
@@ -152,16 +152,16 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn is_inside(&self, wiring: &S::Wiring) -> bool {
-        Inside::is_here(wiring.environment().bit())
+        Inside::is_here(wiring.environment().mark())
     }
 
     fn has_retired(&self) -> bool {
         self.has_retired.load(Ordering::SeqCst)
     }
 
-    fn is_idle(&self) -> bool {
+    fn is_idle(&self, wiring: &S::Wiring) -> bool {
         // In this order: a thread holds the island before it takes the last entry.
-        self.pending.load(Ordering::SeqCst) == 0 && self.is_free()
+        self.pending.load(Ordering::SeqCst) == 0 && !self.is_held(wiring)
     }
 
     fn begin_replay(&self, wiring: &S::Wiring) {

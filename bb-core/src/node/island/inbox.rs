@@ -23,7 +23,7 @@ pub(super) enum Entry<M> {
 /// Entries in the order in which they came.
 ///
 /// Messages are bounded by the island's capacity. The rest is bounded by its nature, as at most so much waits of each kind:
-/// two wakes, one request to start, to be restarted, to be given up or to be lost per estimator, the one-way requests that
+/// two wakes, one request to start, to be restarted, to be given up or to be lost per estimator, one panic of its outputs, the one-way requests that
 /// an estimator may have, and a few changes of options.
 pub(super) struct Inbox<M> {
     entries: VecDeque<Dated<M>>,
@@ -124,7 +124,10 @@ impl<M> Inbox<M> {
     pub(super) fn post(&mut self, now: MonotonicTime, estimator: usize, entry: NodeEntry) {
         let is_same = |other: &Entry<M>| match (other, &entry) {
             (Entry::Node(number, NodeEntry::Restart), NodeEntry::Restart)
-            | (Entry::Node(number, NodeEntry::GiveUp), NodeEntry::GiveUp) => *number == estimator,
+            | (Entry::Node(number, NodeEntry::GiveUp), NodeEntry::GiveUp)
+            | (Entry::Node(number, NodeEntry::OutputFailed { .. }), NodeEntry::OutputFailed { .. }) => {
+                *number == estimator
+            }
             _ => false,
         };
         if self.entries.iter().any(|(_, other)| is_same(other)) {

@@ -77,7 +77,7 @@ impl Overseer for Nobody {
 
     fn report(&self, _: usize, _: Report) {}
 
-    fn output_failed(&self, _: &'static crate::declaration::EstimatorDeclaration, _: String) {}
+    fn output_failed(&self, _: usize, _: String) {}
 
     fn bind(&self, _: &'static str, _: &'static [usize], _: Check, _: BindTarget) {}
 
@@ -245,5 +245,21 @@ fn a_publisher_and_the_end() {
     check::<4, 2>(3, [publish_twice::<0, 4>, ends], |seen, dropped| {
         all::<2, 4>(seen, dropped);
         assert!(seen.has_retired);
+    });
+}
+
+/// A thread that looks whether the island is held, for the report of one that hangs, must not keep an entry in the inbox.
+#[test]
+fn a_publisher_what_is_due_and_a_look() {
+    let looks: Thread<4> = |island, wiring| {
+        if island.look().has_kept {
+            island.drain(wiring);
+        }
+    };
+    let due: Thread<4> = |island, wiring| post(island, wiring, |inbox| inbox.wake(NOW));
+    check::<4, 2>(3, [looks, due], |seen, _| assert_eq!(seen.wakes, 1));
+    check::<4, 3>(2, [publish_twice::<0, 4>, due, looks], |seen, dropped| {
+        all::<2, 4>(seen, dropped);
+        assert_eq!(seen.wakes, 1);
     });
 }

@@ -3,7 +3,7 @@
 use super::{Next, Node, Turn};
 use crate::component::RequestCodec;
 use crate::component::{Estimator, HandleCall, HandleCast, Reply};
-use crate::fault::Fault;
+use crate::fault::{Failed, Fault};
 use crate::journal::{Request, RequestKind};
 use crate::message::Stamp;
 use crate::node::entry::NodeEntry;
@@ -58,9 +58,17 @@ impl<E: Estimator> Node<E> {
                     handle(estimator)
                 });
             }
+            NodeEntry::OutputFailed { message } => {
+                let failed = Failed { fault: Fault::new(message), panicked: true };
+                if self.slot.is_running() {
+                    self.fail(failed, turn);
+                } else {
+                    self.report_failure(&failed);
+                }
+            }
             NodeEntry::Retire => {
                 if let Some(fault) = self.slot.retire() {
-                    let failed = crate::fault::Failed::from(fault);
+                    let failed = Failed::from(fault);
                     self.report_failure(&failed);
                     self.set_stopped(Some((failed.fault.to_string(), true)));
                 }

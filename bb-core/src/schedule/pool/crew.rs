@@ -1,14 +1,26 @@
 //! What waits, and who takes it.
 
-use super::{FULL_AFTER, Job, Lane};
+use super::threads::{Thread, current};
+use super::{FULL_AFTER, Job, Lane, READY};
 use std::collections::VecDeque;
-use std::thread::Thread;
 use std::time::{Duration, Instant};
 
 /// How long jobs wait, while no thread takes one, before another thread is started.
 pub(super) const PATIENCE: Duration = Duration::from_millis(2);
 
+/// How long jobs of a later lane wait before they overtake those of an earlier one.
+const OVERDUE: Duration = Duration::from_millis(50);
+
+/// When it is tried again to start a thread after there was none to be had.
+const RETRY: Duration = Duration::from_millis(20);
+
 /// The jobs and the threads of a pool.
+///
+/// Every job that a thread may take is taken. When there is one, [`Crew::call`] says who is told: a thread without work, which
+/// is then counted as starting until it looks; or else the thread that keeps time, which looks as long as jobs wait, and has a
+/// thread started unless one is starting or some were taken lately. It is asked when a job was added, when a job of a full
+/// lane returned, and when no thread could be started. A thread that has no more work looks before it ends, under the same
+/// lock.
 #[derive(Default)]
 pub(super) struct Crew {
     lanes: [Queue; Lane::ALL.len()],
@@ -20,6 +32,8 @@ pub(super) struct Crew {
     idle: Vec<Thread>,
     /// When a thread took a job last: as long as some do, those that wait do so because the machine is busy.
     taken: Option<Instant>,
+    /// There was no thread to be had the last time.
+    without_thread: Option<WithoutThread>,
     is_closed: bool,
 }
 
@@ -33,6 +47,13 @@ struct Queue {
     is_reported: bool,
 }
 
+/// No thread could be started.
+struct WithoutThread {
+    error: std::io::Error,
+    tried: Instant,
+    is_reported: bool,
+}
+
 /// What a thread does next.
 pub(super) enum Next {
     Job(Lane, Job),
@@ -41,9 +62,36 @@ pub(super) enum Next {
     End,
 }
 
+/// Who is to be told that a job may be taken.
+pub(super) enum Call {
+    Nobody,
+    Thread(Thread),
+    NewThread,
+    Timekeeper,
+}
+
 impl Crew {
     pub(super) fn add(&mut self, lane: Lane, job: Job, now: Instant) {
         self.lanes[lane as usize].waiting.push_back((now, job));
+    }
+
+    /// Who is to be told of the jobs that may be taken.
+    pub(super) fn call(&mut self) -> Call {
+        if !self.may_take() {
+            return Call::Nobody;
+        }
+        if let Some(thread) = self.take_idle() {
+            return Call::Thread(thread);
+        }
+        if self.without_thread.is_none() && self.threads < READY {
+            return Call::NewThread;
+        }
+        match (self.is_closed, self.starting) {
+            (false, _) => Call::Timekeeper,
+            // Nobody keeps time any more, but each thread that takes a job has this asked again.
+            (true, 0) => Call::NewThread,
+            (true, _) => Call::Nobody,
+        }
     }
 
     /// The thread that is to be told of a job.
@@ -67,27 +115,41 @@ impl Crew {
         self.lanes.iter().all(|queue| queue.running == 0 && queue.waiting.is_empty())
     }
 
-    /// Whether there is a job that a thread may take.
-    pub(super) fn may_take(&self) -> bool {
-        self.first().is_some()
+    pub(super) fn is_closed(&self) -> bool {
+        self.is_closed
     }
 
-    fn first(&self) -> Option<Lane> {
-        Lane::ALL.into_iter().find(|lane| {
-            let queue = &self.lanes[*lane as usize];
-            !queue.waiting.is_empty() && queue.running < lane.most()
-        })
+    /// Whether there is a job that a thread may take.
+    pub(super) fn may_take(&self) -> bool {
+        Lane::ALL.into_iter().any(|lane| self.front(lane).is_some())
+    }
+
+    /// Since when the first job of a lane waits, if a thread may take it.
+    fn front(&self, lane: Lane) -> Option<Instant> {
+        let queue = &self.lanes[lane as usize];
+        queue.waiting.front().filter(|_| queue.running < lane.most()).map(|(since, _)| *since)
+    }
+
+    /// The lane whose first job is taken next: the first one, unless the job of a later one has waited for too long. What
+    /// disarms the robot is overtaken by nothing.
+    fn first(&self, now: Instant) -> Option<Lane> {
+        if self.front(Lane::Disarming).is_some() {
+            return Some(Lane::Disarming);
+        }
+        let waiting = || Lane::ALL.into_iter().filter_map(|lane| Some((self.front(lane)?, lane)));
+        let oldest = waiting().min_by_key(|(since, _)| *since);
+        let overdue = oldest.filter(|(since, _)| now.saturating_duration_since(*since) >= OVERDUE);
+        overdue.or_else(|| waiting().next()).map(|(_, lane)| lane)
     }
 
     /// How long the jobs that wait may go on doing so; zero if a thread is to be started, none if that would not help.
     pub(super) fn wait(&self, now: Instant) -> Option<Duration> {
-        let waiting = Lane::ALL.into_iter().filter_map(|lane| {
-            let queue = &self.lanes[lane as usize];
-            queue.waiting.front().filter(|_| queue.running < lane.most()).map(|(since, _)| *since)
-        });
-        let since = waiting.min()?;
+        let since = Lane::ALL.into_iter().filter_map(|lane| self.front(lane)).min()?;
         if self.starting > 0 {
             return Some(PATIENCE);
+        }
+        if let Some(WithoutThread { tried, .. }) = &self.without_thread {
+            return Some(RETRY.saturating_sub(now.saturating_duration_since(*tried)));
         }
         let since = self.taken.map_or(since, |taken| taken.max(since));
         Some(PATIENCE.saturating_sub(now.saturating_duration_since(since)))
@@ -108,6 +170,13 @@ impl Crew {
         })
     }
 
+    /// Why no thread could be started; each time once.
+    pub(super) fn newly_without_thread(&mut self) -> Option<String> {
+        let without = self.without_thread.as_mut().filter(|without| !without.is_reported)?;
+        without.is_reported = true;
+        Some(without.error.to_string())
+    }
+
     /// Counts a thread that is started; its number.
     pub(super) fn start(&mut self) -> usize {
         self.threads += 1;
@@ -115,14 +184,17 @@ impl Crew {
         self.threads - 1
     }
 
-    pub(super) fn not_started(&mut self) {
+    pub(super) fn not_started(&mut self, error: std::io::Error, now: Instant) {
         self.threads -= 1;
         self.starting -= 1;
+        let is_reported = self.without_thread.as_ref().is_some_and(|before| before.is_reported);
+        self.without_thread = Some(WithoutThread { error, tried: now, is_reported });
     }
 
     /// A thread that was started runs.
     pub(super) fn arrive(&mut self) {
         self.starting -= 1;
+        self.without_thread = None;
     }
 
     pub(super) fn leave(&mut self) {
@@ -130,7 +202,7 @@ impl Crew {
     }
 
     pub(super) fn next(&mut self, now: Instant) -> Next {
-        let Some(lane) = self.first() else { return if self.is_closed { Next::End } else { Next::Idle } };
+        let Some(lane) = self.first(now) else { return if self.is_closed { Next::End } else { Next::Idle } };
         let queue = &mut self.lanes[lane as usize];
         match queue.waiting.pop_front() {
             Some((_, job)) => {
@@ -142,18 +214,22 @@ impl Crew {
         }
     }
 
-    pub(super) fn done(&mut self, lane: Lane) {
-        self.lanes[lane as usize].running -= 1;
+    /// A job has returned; whether its lane was full, so that another one may be taken now.
+    pub(super) fn done(&mut self, lane: Lane) -> bool {
+        let queue = &mut self.lanes[lane as usize];
+        queue.running -= 1;
+        queue.running + 1 == lane.most()
     }
 
-    /// The calling thread has no work.
-    pub(super) fn rest(&mut self) {
-        self.idle.push(std::thread::current());
+    /// The calling thread has no work; how long it waits for some, unless it is one that is always there.
+    pub(super) fn rest(&mut self, longest: Duration) -> Option<Duration> {
+        self.idle.push(current());
+        (self.threads > READY).then_some(longest)
     }
 
     /// The calling thread goes on; whether it was told of a job.
     pub(super) fn rise(&mut self) -> bool {
-        let this = std::thread::current().id();
+        let this = current().id();
         let position = self.idle.iter().position(|thread| thread.id() == this);
         match position {
             Some(position) => drop(self.idle.remove(position)),
@@ -170,7 +246,7 @@ impl Crew {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
 
@@ -205,6 +281,50 @@ mod tests {
         // A thread that was started and cannot run yet is no reason for another.
         crew.start();
         assert_eq!(crew.wait(at(70)), Some(PATIENCE));
+    }
+
+    #[test]
+    fn a_flood_of_one_lane_does_not_keep_later_ones_from_being_served() {
+        let start = Instant::now();
+        let mut crew = Crew::default();
+        crew.add(Lane::Wakers, Box::new(|| {}), start);
+        let mut taken = Vec::new();
+        for millis in 0..100 {
+            let now = start + Duration::from_millis(millis);
+            (0..2).for_each(|_| crew.add(Lane::Robot, Box::new(|| {}), now));
+            match crew.next(now) {
+                Next::Job(Lane::Robot, _) => {}
+                Next::Job(lane, _) => taken.push((millis, lane)),
+                Next::Idle | Next::End => panic!("jobs wait"),
+            }
+        }
+        assert_eq!(taken, [(50, Lane::Wakers)]);
+        // Not even what is overdue overtakes what disarms the robot.
+        let now = start + Duration::from_secs(1);
+        crew.add(Lane::Disarming, Box::new(|| {}), now);
+        assert!(matches!(crew.next(now), Next::Job(Lane::Disarming, _)));
+    }
+
+    #[test]
+    fn when_there_is_no_thread_to_be_had_that_is_told_once_and_tried_again() {
+        let start = Instant::now();
+        let at = |millis| start + Duration::from_millis(millis);
+        let mut crew = busy(start);
+        crew.add(Lane::Robot, Box::new(|| {}), start);
+        for millis in [2, 22, 42] {
+            assert_eq!(crew.wait(at(millis)), Some(Duration::ZERO), "at {millis} ms");
+            crew.start();
+            crew.not_started(std::io::Error::other("too many"), at(millis));
+            assert_eq!(crew.newly_without_thread(), (millis == 2).then(|| "too many".to_owned()));
+            assert_eq!(crew.wait(at(millis + 5)), Some(Duration::from_millis(15)));
+            assert!(matches!(crew.call(), Call::Timekeeper));
+        }
+        crew.start();
+        crew.arrive();
+        assert!(matches!(crew.next(at(62)), Next::Job(Lane::Robot, _)));
+        crew.start();
+        crew.not_started(std::io::Error::other("again"), at(70));
+        assert!(crew.newly_without_thread().is_some(), "there were some meanwhile");
     }
 
     #[test]

@@ -1,0 +1,179 @@
+//! Lines that wait for the sink, and how many may.
+
+use super::{Entry, Event};
+use crate::message::Field as _;
+use crate::time::MonotonicTime;
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// What may wait for the sink before outside producers have to wait for it.
+pub(super) const CAPACITY: Load = Load { lines: 1 << 16, bytes: 64 << 20 };
+
+/// What may wait from any writer: estimators and the control state do not wait for the sink. One line more is taken, however
+/// large it is.
+pub(super) const MOST: Load = Load { lines: 4 * CAPACITY.lines, bytes: 4 * CAPACITY.bytes };
+
+/// What is handed to the sink at a time.
+pub(super) const BATCH: Load = Load { lines: 1 << 10, bytes: 1 << 20 };
+
+/// How long outside producers wait for a sink that is too slow. One that takes no line for so long while [`CAPACITY`] waits
+/// hangs. Then the journal ends there: it never has a gap.
+pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(2);
+
+/// How much waits.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Load {
+    pub(super) lines: usize,
+    /// What the lines hold, on the heap and beside it.
+    pub(super) bytes: usize,
+}
+
+impl Load {
+    pub(super) fn fills(self, bound: Self) -> bool {
+        self.lines >= bound.lines || self.bytes >= bound.bytes
+    }
+
+    fn add(&mut self, other: Self) {
+        self.lines += other.lines;
+        self.bytes = self.bytes.saturating_add(other.bytes);
+    }
+
+    fn take(&mut self, other: Self) {
+        self.lines = self.lines.saturating_sub(other.lines);
+        self.bytes = self.bytes.saturating_sub(other.bytes);
+    }
+}
+
+/// The bytes that a line counts, before any lock is taken.
+pub(super) fn bytes_of(event: &Event) -> usize {
+    size_of::<Entry>().saturating_add(event.heap_bytes())
+}
+
+/// Lines that are handed to the sink together.
+#[derive(Default)]
+pub(super) struct Batch {
+    pub(super) lines: Vec<Entry>,
+    load: Load,
+}
+
+/// See the [module](self).
+pub(super) struct Queue {
+    batches: VecDeque<Batch>,
+    /// What waits, with the batch that is being handed to the sink.
+    load: Load,
+    /// Its room is used again.
+    spare: Vec<Entry>,
+    next: u64,
+    pub(super) wall_offset_nanos: i64,
+    /// While too much waits: how many lines the sink had taken when that was last seen to change, and when.
+    stalled: Option<(u64, Instant)>,
+    /// Why no more lines are taken.
+    pub(super) ended: Option<Ended>,
+}
+
+/// How a journal ended before the run.
+#[derive(Debug)]
+pub(super) struct Ended {
+    pub(super) message: String,
+    pub(super) is_reported: bool,
+}
+
+impl Queue {
+    pub(super) fn new(wall_offset_nanos: i64) -> Self {
+        Self {
+            batches: VecDeque::new(),
+            load: Load::default(),
+            spare: Vec::new(),
+            // The first line is written last, by `begin`.
+            next: 2,
+            wall_offset_nanos,
+            stalled: None,
+            ended: None,
+        }
+    }
+
+    /// Puts the first line in its place.
+    pub(super) fn begin(&mut self, time: MonotonicTime, event: Event, bytes: usize) {
+        let load = Load { lines: 1, bytes };
+        if self.batches.is_empty() {
+            self.batches.push_back(Batch::default());
+        }
+        if let Some(first) = self.batches.front_mut() {
+            first.lines.insert(0, Entry { number: 1, time, event });
+            first.load.add(load);
+            self.load.add(load);
+        }
+    }
+
+    /// Adds a line: its number, and whether that fills a batch.
+    pub(super) fn push(&mut self, time: MonotonicTime, event: Event, bytes: usize) -> (u64, bool) {
+        let number = self.next;
+        self.next += 1;
+        let load = Load { lines: 1, bytes };
+        self.load.add(load);
+        let entry = Entry { number, time, event };
+        if let Some(last) = self.batches.back_mut().filter(|last| !last.load.fills(BATCH)) {
+            last.lines.push(entry);
+            last.load.add(load);
+            return (number, last.load.fills(BATCH));
+        }
+        let mut lines = std::mem::take(&mut self.spare);
+        lines.push(entry);
+        self.batches.push_back(Batch { lines, load });
+        (number, load.fills(BATCH))
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.load.fills(CAPACITY)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.load.lines == 0
+    }
+
+    pub(super) fn has_batch(&self) -> bool {
+        self.batches.front().is_some_and(|first| first.load.fills(BATCH))
+    }
+
+    /// What the sink gets next.
+    pub(super) fn take(&mut self) -> Option<Batch> {
+        self.batches.pop_front()
+    }
+
+    /// The sink has it.
+    pub(super) fn handed_over(&mut self, batch: Batch) {
+        self.load.take(batch.load);
+        self.spare = batch.lines;
+    }
+
+    /// Ends the journal if its sink, which has taken so many lines, hangs or is so slow that too much waits; whether it has
+    /// ended now. It is reported later: a logger may block for as long as the sink does.
+    #[cold]
+    pub(super) fn judge(&mut self, taken: u64) -> bool {
+        if self.ended.is_some() {
+            return false;
+        }
+        if !self.is_full() {
+            self.stalled = None;
+            return false;
+        }
+        let now = Instant::now();
+        let (seen, since) = *self.stalled.get_or_insert((taken, now));
+        if seen != taken {
+            self.stalled = Some((taken, now));
+        }
+        let why = match (seen == taken && now.duration_since(since) >= LONGEST_WAIT, self.load.fills(MOST)) {
+            (true, _) => "hangs",
+            (false, true) => "is too slow",
+            (false, false) => return false,
+        };
+        let message = format!("its sink {why}, and it ends before line {}", self.next);
+        self.ended = Some(Ended { message, is_reported: false });
+        true
+    }
+
+    #[cfg(test)]
+    pub(super) fn load(&self) -> Load {
+        self.load
+    }
+}

@@ -1,0 +1,73 @@
+//! Code of components that is run as the robot stops, where nobody has to wait for it.
+
+use crate::control::Control;
+use crate::fault::discard;
+use crate::schedule::Lane;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// What runs apart: each piece on a thread of the pool, on virtual time on the caller's.
+#[derive(Default)]
+pub(super) struct Apart(Arc<Shared>);
+
+#[derive(Default)]
+struct Shared {
+    /// The number and the path of each that has not returned.
+    left: Mutex<Vec<(usize, &'static str)>>,
+    changed: Condvar,
+}
+
+impl Apart {
+    /// Runs code of the component at `path`; `run` says whether it is done.
+    pub(super) fn run(
+        &mut self,
+        control: &Control,
+        path: &'static str,
+        run: impl FnOnce() -> bool + Send + 'static,
+    ) {
+        if control.is_virtual() {
+            run();
+            return;
+        }
+        let number = {
+            let mut left = self.0.lock();
+            let number = left.last().map_or(0, |(last, _)| last + 1);
+            left.push((number, path));
+            number
+        };
+        let shared = Arc::clone(&self.0);
+        control.pool().submit(Lane::Robot, move || {
+            if run() {
+                shared.lock().retain(|(other, _)| *other != number);
+                shared.changed.notify_all();
+            }
+        });
+    }
+
+    /// Drops a value of the component at `path`.
+    pub(super) fn discard(&mut self, control: &Control, path: &'static str, value: impl Send + 'static) {
+        self.run(control, path, move || {
+            discard(value);
+            true
+        });
+    }
+
+    /// Waits until all have returned; the paths of those that have not at `deadline`.
+    pub(super) fn wait(self, deadline: Instant) -> Vec<&'static str> {
+        let mut left = self.0.lock();
+        while !left.is_empty() {
+            let time = deadline.saturating_duration_since(Instant::now());
+            if time.is_zero() {
+                break;
+            }
+            left = self.0.changed.wait_timeout(left, time).unwrap_or_else(PoisonError::into_inner).0;
+        }
+        left.iter().map(|(_, path)| *path).collect()
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Vec<(usize, &'static str)>> {
+        self.left.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

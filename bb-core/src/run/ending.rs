@@ -1,0 +1,146 @@
+//! How a robot ends once it was disarmed: its estimators and actuators stop, the journal and the last report are made, and
+//! what components own is closed. Nothing here waits for user code without a limit.
+
+use super::Robot;
+use super::apart::Apart;
+use super::machine::Machine;
+use super::threads::since;
+use crate::fault::wake;
+use crate::journal::Journal;
+use crate::node::Replayed;
+use crate::pubsub::AnyTopic as _;
+use crate::schedule::Lane;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::task::Waker;
+use std::time::{Duration, Instant};
+
+/// How long the journal's sink may take for the last lines.
+const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
+
+/// How long actuators have to stop, and how long the sink has for the last lines and components to drop what they own,
+/// whatever else has used up the time.
+const LEAST_TO_STOP: Duration = Duration::from_millis(100);
+const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
+
+impl<R: Robot> Machine<R> {
+    /// Has all estimators stop; those that are busy until `deadline` are left behind, and reported.
+    pub(super) fn retire_islands(&self, deadline: Instant) {
+        let now = self.environment.clock().now();
+        for island in self.islands() {
+            island.retire(&self.wiring, now);
+        }
+        self.environment.drain_posted();
+        self.environment.wait_for_retired(R::ISLANDS.len(), deadline);
+        for island in self.islands().filter(|island| !island.has_retired()) {
+            let path = self.path_of_busy(island);
+            let since = self.environment.clock().now().duration_since(island.entered_at());
+            self.fault(
+                path,
+                format!("did not return when the robot stopped; its code was entered {since:.1?} ago"),
+            );
+        }
+    }
+
+    /// On virtual time: has all estimators stop, in order. The journal's line of the stop implies it.
+    pub(super) fn retire_quietly(&self) {
+        let now = self.environment.clock().now();
+        for island in self.islands() {
+            island.replay(&self.wiring, now, Replayed::Retire);
+        }
+    }
+
+    /// Closes all actuators at the same time; those that are busy, or whose code has not returned, at `deadline` are left
+    /// behind and reported.
+    pub(super) fn terminate_actuators(self: &Arc<Self>, deadline: Instant) {
+        let deadline = deadline.max(Instant::now() + LEAST_TO_STOP);
+        let mut closing = Apart::default();
+        for (number, actuator) in R::all_actuators(&self.wiring).into_iter().enumerate() {
+            let machine = Arc::clone(self);
+            closing.run(&self.control, actuator.path(), move || {
+                let left = deadline.saturating_duration_since(Instant::now());
+                R::actuator(&machine.wiring, number).is_none_or(|actuator| actuator.terminate(left))
+            });
+        }
+        let left = closing.wait(deadline);
+        let now = self.environment.clock().now();
+        for actuator in
+            R::all_actuators(&self.wiring).into_iter().filter(|actuator| left.contains(&actuator.path()))
+        {
+            let message = match actuator.entered_at() {
+                None => "did not come back from its command, or from disarming, in time".to_owned(),
+                entered => format!("did not return when the robot stopped{}", since(entered, now)),
+            };
+            self.fault(actuator.path(), message);
+        }
+    }
+
+    /// Takes no more messages; until `deadline`, waits for those that are on their way and until estimators that have stopped
+    /// have counted theirs.
+    pub(super) fn close_door(&self, deadline: Instant) {
+        if !self.environment.door().close(deadline) {
+            let message = "a publisher did not come back: what followed from its message may be missing";
+            self.fault("journal", message.to_owned());
+        }
+        for island in self.islands().filter(|island| island.has_retired()) {
+            while !island.is_idle(&self.wiring) && Instant::now() < deadline {
+                std::thread::sleep(Duration::from_micros(100));
+            }
+        }
+    }
+
+    /// Ends the journal after the last entry of the control state, tells subscribers that no more will come, drops what disarm
+    /// callbacks own, and makes the last report. The journal's sink, and what is dropped, may take until `deadline`.
+    pub(super) fn end(&self, deadline: Instant) {
+        let summary = self.control.end(|summary| {
+            if let Some(journal) = self.environment.journal() {
+                journal.close();
+            }
+            summary
+        });
+        for topic in self.topics() {
+            if topic.path() != "journal" {
+                self.wake_all(topic.close());
+            }
+        }
+        let deadline = deadline.max(Instant::now() + LEAST_TO_CLOSE);
+        let mut dropping = Apart::default();
+        for (path, hook) in self.control.take_all_hooks() {
+            dropping.discard(&self.control, path, hook);
+        }
+        let mut report = self.report_of(summary);
+        if let Some(message) = self.environment.journal().and_then(|journal| hand_over(journal, deadline)) {
+            report.add_fault(self.fault("journal", message));
+        }
+        for path in dropping.wait(deadline) {
+            let message = "what its disarm callback owns was not dropped in time".to_owned();
+            report.add_fault(self.fault(path, message));
+        }
+        // It is set once.
+        let _ = self.last_report.set(report);
+        self.wake_all(self.control.topics().journal.close());
+        self.wake_all(self.control.topics().registry.close());
+        self.has_ended.store(true, Ordering::Release);
+        self.control.bell().ring();
+        self.control.pool().close();
+    }
+
+    /// Each waker may block for ever, and is a job of its own.
+    fn wake_all(&self, wakers: Vec<Waker>) {
+        for waker in wakers {
+            if self.control.is_virtual() {
+                wake(waker);
+            } else {
+                self.control.pool().submit(Lane::Wakers, move || wake(waker));
+            }
+        }
+    }
+}
+
+/// Waits until the journal's sink has the last lines; what is wrong if it does not take them, unless that was said before.
+fn hand_over(journal: &Journal, deadline: Instant) -> Option<String> {
+    let longest = HAND_OVER_WITHIN.min(deadline.saturating_duration_since(Instant::now()));
+    let in_time = journal.hand_over(longest);
+    let late = || "its sink did not take the last lines in time: it ends before the run".to_owned();
+    journal.look().or_else(|| (!in_time && !journal.has_ended()).then(late))
+}

@@ -1,0 +1,183 @@
+//! Every order in which threads meet in a pool, by a model checker: `RUSTFLAGS="--cfg loom"`.
+//!
+//! In each, every job runs that a thread may take, whatever hangs, and the thread that keeps time looks only when it was told
+//! or jobs wait. Had it not been told, the model would find that it waits for ever. There is one thread that is always there,
+//! and one command may run at once.
+
+use super::threads::{Run, spawn};
+use super::{Lane, Pool};
+use loom::sync::{Arc, Condvar, Mutex};
+use loom::thread;
+use std::time::{Duration, Instant};
+
+/// What threads tell each other.
+#[derive(Default)]
+struct Told {
+    /// A job waits.
+    is_rung: bool,
+    /// Jobs that have run.
+    done: usize,
+    /// Jobs that hang may return.
+    is_released: bool,
+}
+
+#[derive(Clone)]
+struct Model {
+    pool: Pool,
+    told: Arc<(Mutex<Told>, Condvar)>,
+}
+
+impl Model {
+    /// The first `failing` attempts to start a thread fail.
+    fn new(failing: usize) -> Self {
+        let told: Arc<(Mutex<Told>, Condvar)> = Arc::new((Mutex::new(Told::default()), Condvar::new()));
+        let rung = Arc::clone(&told);
+        let alarm = move || tell(&rung, |told| told.is_rung = true);
+        let left = std::sync::atomic::AtomicUsize::new(failing);
+        let spawn = move |name: String, run: Run| {
+            use std::sync::atomic::Ordering::Relaxed;
+            let fails = left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_ok();
+            if fails { Err(std::io::Error::other("too many")) } else { spawn(name, run) }
+        };
+        Self { pool: Pool::with(Duration::ZERO, alarm, spawn), told }
+    }
+
+    fn quick(&self, lane: Lane) {
+        let told = Arc::clone(&self.told);
+        self.pool.submit(lane, move || tell(&told, |told| told.done += 1));
+    }
+
+    /// A job that hangs until the end.
+    fn hanging(&self, lane: Lane) {
+        let told = Arc::clone(&self.told);
+        self.pool.submit(lane, move || {
+            let mut state = told.0.lock().expect("nobody panicked");
+            while !state.is_released {
+                state = told.1.wait(state).expect("nobody panicked");
+            }
+        });
+    }
+
+    /// Keeps time until so many jobs have run, as the runtime does: it looks while jobs wait, and else when it is told.
+    fn keep_time_until(&self, done: usize) {
+        // Whatever time a thread may still have, it is over.
+        let late = Instant::now() + Duration::from_secs(3600);
+        loop {
+            let waits = self.pool.relieve_at(late).is_some();
+            let mut told = self.told.0.lock().expect("nobody panicked");
+            if told.done >= done {
+                return;
+            }
+            if waits {
+                drop(told);
+                thread::yield_now();
+                continue;
+            }
+            while !told.is_rung && told.done < done {
+                told = self.told.1.wait(told).expect("nobody panicked");
+            }
+            told.is_rung = false;
+        }
+    }
+
+    /// All threads end.
+    fn end(&self) {
+        tell(&self.told, |told| told.is_released = true);
+        self.pool.close();
+    }
+}
+
+fn tell(told: &(Mutex<Told>, Condvar), tell: impl FnOnce(&mut Told)) {
+    tell(&mut told.0.lock().expect("nobody panicked"));
+    told.1.notify_all();
+}
+
+/// Runs `run` in all orders with that many preemptions at most, with so many attempts to start a thread that fail.
+fn check(preemptions: usize, failing: usize, run: fn(&Model)) {
+    let mut checker = loom::model::Builder::new();
+    checker.preemption_bound = Some(preemptions);
+    checker.check(move || run(&Model::new(failing)));
+}
+
+/// The first two start a thread at once.
+#[test]
+fn two_jobs_while_the_first_thread_starts() {
+    check(3, 0, |model| {
+        let other = model.clone();
+        let submits = thread::spawn(move || other.quick(Lane::Wakers));
+        model.quick(Lane::Robot);
+        model.keep_time_until(2);
+        submits.join().expect("it does not panic");
+        model.end();
+    });
+}
+
+#[test]
+fn a_job_while_the_last_thread_without_work_goes_away() {
+    check(2, 0, |model| {
+        model.hanging(Lane::Robot);
+        // Another thread takes it, and ends when it has waited for long enough.
+        model.quick(Lane::Robot);
+        model.keep_time_until(1);
+        model.quick(Lane::Wakers);
+        model.keep_time_until(2);
+        model.end();
+    });
+}
+
+#[test]
+fn a_job_from_another_thread_while_one_that_hangs_is_relieved() {
+    check(2, 0, |model| {
+        let other = model.clone();
+        let submits = thread::spawn(move || other.hanging(Lane::Robot));
+        model.quick(Lane::Robot);
+        model.keep_time_until(1);
+        submits.join().expect("it does not panic");
+        model.quick(Lane::Wakers);
+        model.keep_time_until(2);
+        model.end();
+    });
+}
+
+#[test]
+fn jobs_while_no_thread_can_be_started() {
+    check(2, 2, |model| {
+        let other = model.clone();
+        let submits = thread::spawn(move || other.quick(Lane::Robot));
+        model.quick(Lane::Wakers);
+        model.keep_time_until(2);
+        submits.join().expect("it does not panic");
+        model.end();
+    });
+}
+
+/// The thread whose command returns takes the turn, which hangs: the other command needs another thread.
+#[test]
+fn a_job_of_a_full_lane_that_has_room_again() {
+    check(2, 0, |model| {
+        model.quick(Lane::Commands);
+        model.quick(Lane::Commands);
+        model.hanging(Lane::Robot);
+        model.keep_time_until(2);
+        model.end();
+    });
+}
+
+/// After the end nobody keeps time.
+#[test]
+fn jobs_around_the_end_while_a_thread_hangs() {
+    check(2, 0, |model| {
+        model.hanging(Lane::Robot);
+        let other = model.clone();
+        let submits = thread::spawn(move || other.quick(Lane::Wakers));
+        model.pool.close();
+        submits.join().expect("it does not panic");
+        let mut told = model.told.0.lock().expect("nobody panicked");
+        while told.done < 1 {
+            told = model.told.1.wait(told).expect("nobody panicked");
+        }
+        told.is_released = true;
+        drop(told);
+        model.told.1.notify_all();
+    });
+}

@@ -1,0 +1,127 @@
+//! Many commands that hang keep none from running that makes the robot safe.
+
+use crate::components::{Number, within};
+use crate::disarm_first::Gate;
+use bb_core::event::RefusalReason;
+use bb_core::prelude::*;
+
+static HERE: Gate = Gate::new();
+
+/// Hangs, until all are let go.
+pub(crate) struct Stuck;
+
+impl Command for Stuck {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        HERE.pass("here");
+        Ok(Outcome::done(()))
+    }
+}
+
+/// Diverges at a 1.
+#[derive(Debug)]
+pub(crate) struct Fickle;
+
+impl Estimator for Fickle {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        let reply = Reply::none();
+        Ok(if number.0 == 1.0 { reply.diverged("a 1 came") } else { reply })
+    }
+}
+
+robot! {
+    robot Ill;
+    commands {
+        category many { concurrency: 1000; }
+        disarm: Disarm;
+        stuck: Stuck { category: many; allowed_states: [idle, executing]; }
+    }
+    link base {
+        sensor number: External<Number>() { estimator fickle: Fickle() { recover_after: 1; on_degraded: stuck; } }
+    }
+}
+
+#[test]
+fn health_commands_that_hang_keep_none_that_disarms_from_running() {
+    within(60, || {
+        HERE.close("here");
+        let running = Ill::builder().start().expect("it starts");
+        running.arm().expect("it may be armed");
+        for _ in 0..80 {
+            for number in [1.0, 0.0] {
+                running.publish(ill::sensor::base::number, running.clock().now(), Number(number));
+            }
+        }
+        HERE.wait_for(64);
+        let disarms = running.command(ill::command::disarm, NoArguments).expect("it is armed");
+        assert_eq!(disarms.wait_timeout(Duration::from_secs(20)), Some(Ok(())));
+        assert_eq!(running.safety(), Safety::Disarmed);
+        HERE.open();
+        running.stop();
+    });
+}
+
+#[test]
+fn a_command_that_hangs_is_not_started_for_ever_however_often_it_is_cancelled() {
+    within(60, || {
+        CANCELLED.close("here");
+        let running = Crowded::builder().start().expect("it starts");
+        running.arm().expect("it may be armed");
+        let start = || running.command(crowded::command::errand, NoArguments);
+        let mut started = 0;
+        let refusal = loop {
+            match start() {
+                Ok(execution) => {
+                    CANCELLED.wait_for(started + 1);
+                    execution.cancel();
+                }
+                Err(refusal) => break refusal,
+            }
+            started += 1;
+            assert!(started <= 512, "nobody refuses it");
+        };
+        assert_eq!((started, refusal.reason), (512, RefusalReason::Hanging));
+        let disarms = running.command(crowded::command::disarm, NoArguments).expect("it is armed");
+        assert_eq!(disarms.wait_timeout(Duration::from_secs(20)), Some(Ok(())));
+        CANCELLED.open();
+        running.arm().expect("they have returned");
+        assert!(start().is_ok());
+        running.stop();
+    });
+}
+
+static CANCELLED: Gate = Gate::new();
+
+/// Hangs as well.
+pub(crate) struct Errand;
+
+impl Command for Errand {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        CANCELLED.pass("here");
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Crowded;
+    commands {
+        disarm: Disarm;
+        errand: Errand { allowed_states: [idle, executing]; }
+    }
+    link base { sensor number: External<Number>(); }
+}

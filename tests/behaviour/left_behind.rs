@@ -1,0 +1,167 @@
+//! What hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
+
+use crate::components::{Number, within};
+use crate::disarm_first::Gate;
+use bb_core::journal::Event;
+use bb_core::prelude::*;
+use std::future::Future;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, mpsc};
+use std::task::{Context as Polled, Wake, Waker};
+
+/// Where all of it hangs.
+static HERE: Gate = Gate::new();
+
+/// How often something was made safe.
+static DISARMED: AtomicU32 = AtomicU32::new(0);
+
+/// Hangs when it is closed.
+#[derive(Debug)]
+pub(crate) struct Clinging;
+
+impl Actuator for Clinging {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        DISARMED.fetch_add(1, Ordering::SeqCst);
+        Ok(())
+    }
+
+    fn terminate(&mut self) {
+        HERE.pass("here");
+    }
+}
+
+/// Hangs when it is dropped.
+#[derive(Debug)]
+pub(crate) struct Heavy(Dropping);
+
+/// What hangs when it is dropped.
+#[derive(Debug)]
+struct Dropping;
+
+impl Drop for Dropping {
+    fn drop(&mut self) {
+        HERE.pass("here");
+    }
+}
+
+impl Actuator for Heavy {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self(Dropping))
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
+        let _ = &self.0;
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        DISARMED.fetch_add(1, Ordering::SeqCst);
+        Ok(())
+    }
+}
+
+/// Measures nothing; its disarm callback owns what hangs when it is dropped.
+#[derive(Debug)]
+pub(crate) struct Owner;
+
+impl Sensor for Owner {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let owned = Dropping;
+        context.on_disarm(move || {
+            let _ = &owned;
+            DISARMED.fetch_add(1, Ordering::SeqCst);
+            Ok(())
+        });
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+/// Hangs, unlike what it is woken with.
+struct Hanging;
+
+impl Wake for Hanging {
+    fn wake(self: Arc<Self>) {
+        HERE.pass("here");
+    }
+}
+
+struct Tell(mpsc::Sender<()>);
+
+impl Wake for Tell {
+    fn wake(self: Arc<Self>) {
+        let _ = self.0.send(());
+    }
+}
+
+robot! {
+    robot Sticky;
+    link base {
+        sensor owner: Owner() { rate: 10 Hz; }
+        joint pan: continuous { axis: z; actuator clinging: Clinging(); sensor a: External<Number>(); link head {} }
+        joint tilt: continuous { axis: y; actuator heavy: Heavy(); sensor b: External<Number>(); link eye {} }
+    }
+}
+
+#[test]
+fn a_robot_of_which_everything_hangs_as_it_closes_is_back_and_says_what_it_left() {
+    within(60, || {
+        let mut builder = Sticky::builder();
+        builder.journal(|line| {
+            if matches!(line.event, Event::Stop) {
+                HERE.pass("here");
+            }
+        });
+        let running = builder.start().expect("it starts");
+        running.arm().expect("it may be armed");
+        // Both are woken by the end.
+        let (tell, told) = mpsc::channel();
+        let wakers = [Waker::from(Arc::new(Hanging)), Waker::from(Arc::new(Tell(tell)))];
+        let mut first = running.subscribe(sticky::sensor::base::pan::a);
+        let mut second = running.subscribe(sticky::sensor::base::tilt::b);
+        let mut first = Box::pin(async move { first.recv_async().await.is_none() });
+        let mut second = Box::pin(async move { second.recv_async().await.is_none() });
+        assert!(first.as_mut().poll(&mut Polled::from_waker(&wakers[0])).is_pending());
+        assert!(second.as_mut().poll(&mut Polled::from_waker(&wakers[1])).is_pending());
+        HERE.close("here");
+        let start = std::time::Instant::now();
+        let report = running.stop();
+        assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
+        assert_eq!(told.recv_timeout(Duration::from_secs(20)), Ok(()), "the other one's waker hangs");
+        HERE.open();
+        assert_eq!((DISARMED.load(Ordering::SeqCst), report.safety), (3, Safety::Disarmed));
+        // While it stops, the thread that keeps time reports what hangs as it does while the robot runs.
+        let faults = report.faults.iter().filter(|fault| !fault.message.starts_with("hangs: "));
+        let faults: Vec<_> = faults.map(ToString::to_string).collect();
+        let starts = [
+            "actuator/base/pan/clinging failed: did not return when the robot stopped; its code was entered ",
+            "actuator/base/tilt/heavy failed: did not return when the robot stopped; its code was entered ",
+            "journal failed: its sink did not take the last lines in time: it ends before the run",
+            "sensor/base/owner failed: what its disarm callback owns was not dropped in time",
+        ];
+        assert_eq!(faults.len(), starts.len(), "{faults:?}");
+        for (fault, start) in faults.iter().zip(starts) {
+            assert!(fault.starts_with(start), "{faults:?}");
+        }
+    });
+}
