@@ -1,11 +1,10 @@
 //! The contents of braces, item by item, and how to go on after one that cannot be read.
 
+use super::Notes;
 use super::name::{is_keyword, whole};
-use super::{Notes, Setting, Settings};
-use crate::diagnostics::Place;
-use crate::language::{self, Occurs, Word, Words, unexpected};
+use super::tokens::starts_item;
+use crate::language::Word;
 use proc_macro2::{Delimiter, Ident, TokenTree};
-use syn::buffer::Cursor;
 use syn::ext::IdentExt;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{Attribute, Token};
@@ -36,38 +35,8 @@ impl Head {
 /// What those may write in front of a name who know that other blocks have a word there.
 const NO_WORDS: [&str; 5] = ["command", "state", "parameter", "param", "group"];
 
-/// Reads the items of a place until the end: the settings among them to `settings`, of any other `item` gets the head and
-/// reads the rest. An item that cannot be read is reported and skipped.
-pub(super) fn items<I: Words, S: Words>(
-    input: ParseStream<'_>,
-    notes: &mut Notes<'_>,
-    settings: &mut Settings<S>,
-    mut item: impl FnMut(I, Head, ParseStream<'_>, &mut Notes<'_>) -> syn::Result<()>,
-) {
-    let expected = "this does not start a part of a robot; expected a word such as `link`, `joint` or `sensor`";
-    let mut seen: Vec<&str> = Vec::new();
-    items_of(input, expected, notes, |head, input, notes| {
-        let ident = head.word.clone();
-        let text = ident.to_string();
-        let word = if let Some((word, key)) = S::of(&text) {
-            settings.push(key, Setting::parse(word, head, input, notes)?);
-            word
-        } else if let Some((word, key)) = I::of(&text) {
-            item(key, head, input, notes)?;
-            word
-        } else {
-            return Err(unexpected::<I, S>(&ident));
-        };
-        if seen.contains(&word.text) {
-            notes.repeat(ident);
-        } else if word.occurs == Occurs::Once {
-            seen.push(word.text);
-        }
-        Ok(())
-    });
-}
-
-/// The same where items start with a name; `expected` is the error for anything else.
+/// Reads items until the end, each by its head; `expected` is the error for what starts none. An item that cannot be read is
+/// reported and skipped.
 pub(super) fn items_of(
     input: ParseStream<'_>,
     expected: &str,
@@ -138,32 +107,12 @@ pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Re
     colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }
 
-/// The tokens from `start` up to the position of `input`.
-pub(super) fn place_since(start: Cursor<'_>, input: ParseStream<'_>) -> Place {
-    let (mut cursor, mut place) = (start, Place::from(input.span()));
-    while cursor != input.cursor()
-        && let Some((token, next)) = cursor.token_tree()
-    {
-        let start = if cursor == start { token.span() } else { place.start };
-        place = Place { start, end: token.span() };
-        cursor = next;
-    }
-    place
-}
-
 /// Skips to the next item, unless one starts here.
 pub(super) fn skip_to_item(input: ParseStream<'_>) {
     let ahead = input.fork();
     if ahead.call(Attribute::parse_outer).is_err() || !starts_item(&ahead) {
         skip(input);
     }
-}
-
-/// Whether an item starts here: with a word of the language, or a name followed by `:` or braces.
-pub(super) fn starts_item(input: ParseStream<'_>) -> bool {
-    let is_word = input.fork().call(Ident::parse_any).map(|word| language::starts_item(&word.to_string()));
-    let is_name = input.peek2(Token![:]) && !input.peek2(Token![::]) || input.peek2(syn::token::Brace);
-    is_word.is_ok_and(|is_word| is_word || is_name)
 }
 
 fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::Result<Option<Head>> {

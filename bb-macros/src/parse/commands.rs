@@ -5,8 +5,9 @@ mod settings;
 pub(crate) use settings::{Cancelled, CommandSettings};
 
 use super::Notes;
-use super::block::{Head, braced, items, items_of, opened, semicolon};
+use super::block::{Head, braced, items_of, opened, semicolon};
 use super::component::Declared;
+use super::items::items;
 use super::name::name;
 use super::{Component, Settings};
 use crate::language::{CategoryItem, CategorySetting, CommandSetting, CommandsItem, Words, words};

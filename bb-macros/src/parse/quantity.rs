@@ -1,9 +1,7 @@
 //! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also glued, `20ms`.
 
-use super::Notes;
-use super::block::{place_since, starts_item};
+use super::tokens::{place_since, starts_item};
 use crate::diagnostics::Place;
-use crate::language::{Value, Word};
 use crate::units::{Dimension, Unit};
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
@@ -35,16 +33,6 @@ impl Quantity {
             return ahead.parse::<Token![-]>().is_ok() && is_number(&ahead);
         }
         is_number(input)
-    }
-
-    /// Reads the number that is given to a word; the rules say whether it is one that the word takes.
-    pub(super) fn of(word: &'static Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
-        if matches!(word.value, Value::Count { .. }) && !Self::peek(input) {
-            return Err(input.error(format!("expected a whole number, as in `{}{}`", word.text, word.example)));
-        }
-        let quantity = Self::parse(input)?;
-        notes.give(word, &quantity);
-        Ok(quantity)
     }
 
     /// Reads a number, and the unit if one follows.

@@ -1,7 +1,8 @@
 //! `robot Rover; parameters { … } states { … } commands { … } sensors { … } link base { … }`
 
 use super::Notes;
-use super::block::{Head, attributes, braced, items, semicolon, skip_to_item};
+use super::block::{Head, attributes, braced, semicolon, skip_to_item};
+use super::items::items;
 use super::{
     Commands, Given, JointAddition, Link, ParameterItem, Sensor, Service, ServiceKind, Settings, State, Topology,
 };

@@ -1,9 +1,9 @@
 //! What a component is given: `beta = 0.1`, `gain = param::gain`.
 
-use crate::parse::block::place_since;
 use crate::parse::literal::capitalized;
 use crate::parse::name::whole;
 use crate::parse::quantity::decimal_comma;
+use crate::parse::tokens::place_since;
 use crate::parse::{Path, Quantity};
 use proc_macro2::Ident;
 use syn::parse::ParseStream;

@@ -2,10 +2,10 @@
 
 use crate::diagnostics::Place;
 use crate::language::{LimitField, OriginField, Word, words};
-use crate::parse::Notes;
-use crate::parse::Quantity;
-use crate::parse::block::{Head, colon, place_since, semicolon};
+use crate::parse::block::{Head, colon, semicolon};
 use crate::parse::record::{array, record};
+use crate::parse::tokens::place_since;
+use crate::parse::{Notes, Quantity};
 use proc_macro2::Ident;
 use syn::Token;
 use syn::ext::IdentExt;
@@ -114,7 +114,7 @@ impl Limit {
                 LimitField::Velocity => &mut limit.velocity,
                 LimitField::Effort => &mut limit.effort,
             };
-            *slot = Some(Quantity::of(word, input, notes)?);
+            *slot = Some(notes.number(word, input)?);
             Ok(())
         })?;
         semicolon(input, "`limit`", notes);

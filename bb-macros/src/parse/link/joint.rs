@@ -6,11 +6,12 @@ mod mechanics;
 pub(crate) use geometry::{Axis, Limit, Origin};
 pub(crate) use mechanics::{Dynamics, Mimic, Transmission};
 
-use super::Notes;
-use super::block::{Head, colon, items, opened, semicolon};
-use super::name::name;
-use super::{Actuator, Link, Sensor, Settings};
+use super::Link;
 use crate::language::{JointItem, JointKind, Nothing};
+use crate::parse::block::{Head, colon, opened, semicolon};
+use crate::parse::items::items;
+use crate::parse::name::name;
+use crate::parse::{Actuator, Notes, Sensor, Settings};
 use proc_macro2::Ident;
 use syn::Attribute;
 use syn::ext::IdentExt;
