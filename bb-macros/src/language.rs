@@ -12,6 +12,7 @@ mod joint_kind;
 mod measure;
 pub(crate) mod words;
 
+pub(crate) use foreign::way_out;
 pub(crate) use joint_kind::JointKind;
 pub(crate) use measure::{Bounds, Measure};
 
@@ -302,7 +303,7 @@ pub(crate) fn unexpected<I: Words, S: Words>(word: &Ident) -> syn::Error {
     let allowed: Vec<&str> = I::texts().into_iter().chain(S::texts()).collect();
     let message = if allowed.is_empty() {
         format!("{place} holds nothing; leave this out")
-    } else if let Some(way) = foreign::way_out(place, &name) {
+    } else if let Some(way) = way_out(place, &name) {
         if starts_item(&name) {
             format!("`{name}` does not belong in {place}; {way}")
         } else {

@@ -125,6 +125,10 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
         let message = "only doc comments are allowed before a part of a robot; leave this attribute out";
         notes.error(attribute, message.into());
     }
+    if input.peek(Token![pub]) && (input.peek2(Ident::peek_any) || input.peek2(syn::token::Paren)) {
+        notes.at(input.span(), "the parts of a robot are as visible as the robot; leave `pub` out".into());
+        input.parse::<syn::Visibility>()?;
+    }
     let place = input.span();
     let expected = if input.peek(Token![<]) {
         "a robot is not written in XML; `topology: urdf(\"robot.urdf\");` takes links and joints from a URDF"
@@ -138,13 +142,16 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
 /// Reads attributes and doc comments; what is a comment in other languages is reported and passed over.
 pub(super) fn attributes(input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Vec<Attribute>> {
     let mut attributes = Vec::new();
-    while input.peek(Token![#]) {
+    let is_dashes = || input.peek(Token![-]) && input.peek2(Token![-]);
+    while input.peek(Token![#]) || is_dashes() {
         if input.peek2(syn::token::Bracket) {
             attributes.extend(input.call(Attribute::parse_outer)?);
             continue;
         }
         let place = input.span();
-        let message = if input.peek2(Token![!]) {
+        let message = if is_dashes() {
+            "`--` does not start a comment; write `//`"
+        } else if input.peek2(Token![!]) {
             "`//!` and `#![…]` cannot be used in a robot; write `///` before what it documents"
         } else {
             "`#` does not start a comment; write `//`"

@@ -75,7 +75,7 @@ impl Category {
 impl Command {
     fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = head.name(input)?;
-        let declared = Declared::named(head.attributes, name, input, notes)?;
+        let declared = Declared::named("command", head.attributes, name, input, notes)?;
         let Declared { attributes, name, component, body } = declared;
         let mut settings = CommandSettings::default();
         let mut numbers = Settings::default();

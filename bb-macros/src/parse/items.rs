@@ -2,7 +2,11 @@
 
 use super::block::{Head, items_of};
 use super::{Notes, Setting, Settings};
-use crate::language::{Occurs, Words, unexpected};
+use crate::language::{Occurs, Word, Words, unexpected};
+use crate::names::one_of;
+use proc_macro2::Ident;
+use syn::Token;
+use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
 /// Reads the items of a place until the end: the settings among them to `settings`, of any other `item` gets the head and
@@ -25,7 +29,7 @@ pub(super) fn items<I: Words, S: Words>(
             item(key, head, input, notes)?;
             word
         } else {
-            return Err(unexpected::<I, S>(&ident));
+            return Err(without_word::<I>(&ident, input).unwrap_or_else(|| unexpected::<I, S>(&ident)));
         };
         if seen.contains(&word.text) {
             notes.repeat(ident);
@@ -34,4 +38,17 @@ pub(super) fn items<I: Words, S: Words>(
         }
         Ok(())
     });
+}
+
+/// The error for a component without its word, `imu: Bmi270()`, in a place that holds components.
+fn without_word<I: Words>(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
+    let ahead = input.fork();
+    ahead.parse::<Token![:]>().ok()?;
+    let kind = ahead.call(Ident::parse_any).ok()?;
+    let is_component = |word: &&Word| word.example.starts_with(" name: Type");
+    let words: Vec<&str> =
+        I::ALL.iter().map(|(word, _)| *word).filter(is_component).map(|word| word.text).collect();
+    let first = words.first().filter(|_| kind.to_string().starts_with(char::is_uppercase))?;
+    let message = format!("expected {} before `{name}`, as in `{first} {name}: {kind}()`", one_of(&words));
+    Some(syn::Error::new(name.span(), message))
 }

@@ -21,6 +21,8 @@ pub(crate) struct Quantity {
 
 /// What those may write for π who write angles in radians.
 const PI: [&str; 6] = ["pi", "PI", "M_PI", "math", "np", "std"];
+/// What those may write who want none.
+const NO_NUMBER: [&str; 9] = ["None", "none", "null", "nil", "inf", "infinity", "infinite", "never", "unlimited"];
 const ANGLES: &str = "expected a number with its unit; nothing is computed here, write `90 deg` for π / 2";
 
 impl Quantity {
@@ -52,7 +54,12 @@ impl Quantity {
         };
         let place = input.span();
         let is_pi = input.fork().call(Ident::parse_any).is_ok_and(|word| PI.contains(&&*word.to_string()));
-        let expected = if is_pi { ANGLES } else { "expected a number with its unit" };
+        let is_none = input.fork().call(Ident::parse_any).is_ok_and(|word| NO_NUMBER.contains(&&*word.to_string()));
+        let expected = match (is_pi, is_none) {
+            (true, _) => ANGLES,
+            (_, true) => "expected a number with its unit; leave the setting out to have its default",
+            _ => "expected a number with its unit",
+        };
         let literal: Lit = input.parse().map_err(|_| syn::Error::new(place, expected))?;
         let (digits, suffix) = match &literal {
             Lit::Int(literal) => {

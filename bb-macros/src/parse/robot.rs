@@ -1,7 +1,7 @@
 //! `robot Rover; parameters { … } states { … } commands { … } sensors { … } link base { … }`
 
 use super::Notes;
-use super::block::{Head, attributes, braced, semicolon, skip_to_item};
+use super::block::{Head, attributes, braced, opened, semicolon, skip_to_item};
 use super::items::items;
 use super::{
     Commands, Given, JointAddition, Link, ParameterItem, Sensor, Service, ServiceKind, Settings, State, Topology,
@@ -50,6 +50,15 @@ impl Robot {
                 skip_to_item(input);
             }
         }
+        if input.peek(syn::token::Brace)
+            && let Ok(body) = opened(input)
+        {
+            self.items(&body, notes);
+        }
+        self.items(input, notes);
+    }
+
+    fn items(&mut self, input: ParseStream<'_>, notes: &mut Notes<'_>) {
         items(input, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
             self.item(item, head, input, notes)
         });
@@ -75,7 +84,11 @@ impl Robot {
             return Err(input.error("the name follows without a colon, as in `robot Rover;`"));
         }
         self.name = Some(super::name::name(input, &word)?);
-        semicolon(input, "the robot's name", notes);
+        if let (Some(name), true) = (&self.name, input.peek(syn::token::Brace)) {
+            notes.at(input.span(), format!("what a robot holds follows without braces, after `robot {name};`"));
+        } else {
+            semicolon(input, "the robot's name", notes);
+        }
         Ok(())
     }
 

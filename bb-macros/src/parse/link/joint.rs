@@ -13,9 +13,9 @@ use crate::parse::items::items;
 use crate::parse::name::name;
 use crate::parse::{Actuator, Notes, Sensor, Settings};
 use proc_macro2::Ident;
-use syn::Attribute;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
+use syn::{Attribute, Token};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
@@ -68,6 +68,12 @@ impl Joint {
                 joint.item(item, head, input, notes)
             });
             notes.joint = around;
+        } else if input.peek(Token![,]) {
+            let message = format!(
+                "what a joint holds is written in braces: `joint {}: {} {{ … }}`",
+                joint.name, joint.kind_word
+            );
+            return Err(input.error(message));
         } else {
             semicolon(input, &format!("`{}`", joint.name), notes);
         }
