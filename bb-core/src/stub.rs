@@ -113,7 +113,7 @@ pub fn stub<T>() -> T {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __stub_robot {
-    ($robot:ident, $name:literal) => {
+    ($robot:ty, $name:literal) => {
         impl $crate::Robot for $robot {
             const NAME: &'static str = $name;
             const TOPOLOGY: &'static $crate::topology::Topology =

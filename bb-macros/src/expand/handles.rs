@@ -5,7 +5,7 @@
 //! ```
 
 use super::group;
-use super::literal::ident;
+use super::literal::{ident, respan};
 use super::options::parameter_type;
 use super::part::Part;
 use super::types::{Accessors, Types, imports};
@@ -14,7 +14,7 @@ use crate::model::{
     ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, SensorId, ServiceId,
 };
 use crate::parse::ServiceKind;
-use proc_macro2::{Ident, Span, TokenStream};
+use proc_macro2::{Delimiter, Group, Ident, Span, TokenStream};
 use quote::quote;
 use std::collections::{HashMap, HashSet};
 use syn::Attribute;
@@ -102,10 +102,14 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
         let path = ["category".to_owned(), crate::names::text(&category.name)];
         root.add(&path, &category.name, Handle::Category(id));
     }
+    // Where the robot's name is, so that a second one is reported there.
     let module = ident(module);
+    let module = respan(quote!(mod #module), name.span());
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
     let content = root.tokens(types, accessors, 1);
     let imports = imports(types, accessors);
+    let mut body = Group::new(Delimiter::Brace, quote!(#imports #content));
+    body.set_span(name.span());
     quote! {
         #[doc = #text]
         #[allow(
@@ -117,7 +121,7 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
             unreachable_pub,
             clippy::all
         )]
-        #visibility mod #module { #imports #content }
+        #visibility #module #body
     }
 }
 
