@@ -287,7 +287,7 @@ language! {
     }
 }
 
-/// The words that start an item, wherever.
+/// Whether a word starts an item in any place.
 pub(crate) fn starts_item(text: &str) -> bool {
     item_words().any(|word| word == text)
 }

@@ -1,4 +1,4 @@
-//! A robot that failed: its type and handles only, so that code which uses them gives no errors of its own.
+//! A robot that is not valid: only its type and handles, so that code which uses them causes no further errors.
 
 use super::handles::handles;
 use super::types::Accessors;

@@ -1,7 +1,7 @@
-//! How the expansion names the types of components, and what follows from them.
+//! The names of components' types in the expansion, and of the types derived from them.
 //!
-//! Each type that the user wrote is aliased once. The alias is then used at the span of the user's type, so that what
-//! rustc has to say of it is said there, and once.
+//! Each type that the user wrote is aliased once. The alias is used at the span of the user's type, so that rustc reports
+//! errors there, once.
 
 use super::group;
 use super::literal::{ident, respan};
@@ -68,7 +68,7 @@ pub(super) fn members(types: &Types<'_>) -> TokenStream {
 pub(super) enum Accessors {
     /// Into the wiring.
     Wired,
-    /// Nowhere: the robot has failed, and its handles only keep names and types.
+    /// Nowhere: the robot is not valid, and its handles only have names and types.
     Stub,
 }
 

@@ -225,7 +225,7 @@ impl<'a> Wiring<'a> {
         if runs { name.clone() } else { format_ident!("{name}__kept") }
     }
 
-    /// `fn sensor_base_imu` of the wiring, for a publisher that is no estimator: publishes, then runs what is downstream,
+    /// `fn sensor_base_imu` of the wiring, for a sensor or a service: publishes, then runs what is downstream,
     /// island by island.
     fn published(&self, id: PublisherId) -> TokenStream {
         if island_of(self.types, self.islands, id).is_some() {

@@ -113,7 +113,7 @@ impl std::convert::From<parse::Category> for Category {
         let mut concurrency = 1;
         for (setting, quantity) in settings.each() {
             match setting {
-                // A value that is no such number is refused; a cast saturates all the same.
+                // Another value is refused by a rule; the cast saturates.
                 CategorySetting::Concurrency => concurrency = quantity.value as u32,
             }
         }

@@ -25,7 +25,7 @@ impl Robot {
         Some(self.publishers.ids().filter(|publisher| self.mount_of(*publisher) == Mount::Joint(id)).collect())
     }
 
-    /// The way from the frame of `source` to that of `target`. Without a frame there is none.
+    /// The route from the frame of `source` to that of `target`; empty without a frame.
     pub(crate) fn route(&self, source: Mount, target: Mount) -> Route {
         let (Some((source, link_from_source)), Some((target, link_from_target))) =
             (self.link_of(source), self.link_of(target))

@@ -41,7 +41,7 @@ impl Timing {
                 EstimatorSetting::SyncTolerance => timing.sync_tolerance_s = Some(value),
                 EstimatorSetting::LatencyBudget => timing.latency_budget_s = Some(value),
                 EstimatorSetting::LostAfter => timing.lost_after_s = Some(value),
-                // A value that is no such number is refused; a cast saturates all the same.
+                // Another value is refused by a rule; the cast saturates.
                 EstimatorSetting::RecoverAfter => timing.recover_after = value as u32,
             }
         }

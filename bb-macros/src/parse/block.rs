@@ -32,7 +32,7 @@ impl Head {
     }
 }
 
-/// What those may write in front of a name who know that other blocks have a word there.
+/// Words that people write before a name, as other blocks require one there.
 const NO_WORDS: [&str; 5] = ["command", "state", "parameter", "param", "group"];
 
 /// Reads items until the end, each by its head; `expected` is the error for what starts none. An item that cannot be read is
@@ -45,13 +45,13 @@ pub(super) fn items_of(
 ) {
     while !input.is_empty() {
         if input.peek(Token![;]) {
-            // One too many is no harm.
+            // An extra one is harmless.
             let _: syn::Result<Token![;]> = input.parse();
             continue;
         }
         let result = match head(input, expected, notes) {
             Ok(Some(head)) => item(head, input, notes),
-            // What follows a comment in another language's notation cannot be read.
+            // Nothing can be read after a comment in another language's notation.
             Ok(None) => return,
             Err(error) => Err(error),
         };

@@ -19,9 +19,9 @@ pub(crate) struct Quantity {
     pub(crate) place: Place,
 }
 
-/// What those may write for π who write angles in radians.
+/// What people who think in radians write for π.
 const PI: [&str; 6] = ["pi", "PI", "M_PI", "math", "np", "std"];
-/// What those may write who want none.
+/// What people write for a setting that does not apply.
 const NO_NUMBER: [&str; 9] = ["None", "none", "null", "nil", "inf", "infinity", "infinite", "never", "unlimited"];
 const ANGLES: &str = "expected a number with its unit; nothing is computed here, write `90 deg` for π / 2";
 

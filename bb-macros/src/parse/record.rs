@@ -31,7 +31,7 @@ pub(super) fn record<F: Words>(
         let Some((field_word, field)) = F::of(&text) else {
             let hint = match way_out(F::PLACE, &text) {
                 Some(way) => format!("; {way}"),
-                // One field is no choice.
+                // With one field there is nothing to suggest.
                 None if fields.len() > 1 => did_you_mean(&text, fields.iter().copied()),
                 None => String::new(),
             };

@@ -42,7 +42,7 @@ impl Robot {
         if let Err(error) = self.header(input, notes) {
             notes.syntax(&error);
             skip_to_item(input);
-            // What stood before the header is wrong, not the header.
+            // The tokens before the header are wrong, not the header.
             if starts_header(&input.fork())
                 && let Err(error) = self.header(input, notes)
             {

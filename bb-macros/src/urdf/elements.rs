@@ -266,7 +266,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         self.number(node, name, dimension)
     }
 
-    /// None if it is not there; a fault if it is no number.
+    /// `None` if it is missing; a fault if it is not a number.
     fn number(&mut self, node: Node<'_, '_>, name: &str, dimension: Dimension) -> Option<Quantity> {
         node.attribute(name)?;
         let [number] = self.numbers::<1>(node, name)?;

@@ -13,8 +13,8 @@ loom::thread_local! {
     static INSIDE: Cell<u64> = Cell::new(0);
 }
 
-/// The calling thread is inside an island of a robot as long as this lives. Each robot has one of 64 bits; those that share
-/// the last one, beyond 63 at once, are told to use another thread where they would not have to.
+/// A guard while the calling thread is inside an island of a robot. Each robot has one of 64 bits. Beyond 63 robots at once,
+/// those that share the last bit get the error even where they could wait.
 pub(super) struct Inside {
     before: u64,
 }
