@@ -1,8 +1,8 @@
-//! A verified robot to its wiring: declarations and calls; loops and decisions live in `bb_core`.
+//! Expands a verified robot to its wiring: declarations and calls; loops and decisions are in `bb_core`.
 //!
 //! ```text
 //! mod __Rover_2_11 { pub struct Rover; }               // the robot's type, whose name is at line 2, column 11
-//! impl Rover { pub fn builder() … }                    // so that no trait need be in scope
+//! impl Rover { pub fn builder() … }                    // so that no trait has to be imported
 //! type __Rover_2_11__sensor_base_imu = Bmi270;         // one alias per component: its type is named once
 //! enum __Rover_2_11__member__sensor_base_imu_tilt {}   // the marker of an estimator in its island
 //! const _: () = {
@@ -15,7 +15,7 @@
 //! };
 //! const _: () = { use rover::… as _; … };              // what the user refers to, for the editor
 //! pub mod rover { … }                                  // a handle per publisher, at its path; exports the type as `__Robot`
-//! pub use rover::__Robot as Rover;                     // of a second robot of that name it is the first one's: no more errors
+//! pub use rover::__Robot as Rover;                     // for a second robot of that name it is the first one's
 //! ```
 
 mod checks;

@@ -126,7 +126,7 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
 }
 
 impl Module {
-    /// Adds a handle at a path; the second of one path is left out, since it is reported elsewhere.
+    /// Adds a handle at a path; a second one at the same path is left out, and reported elsewhere.
     fn add(&mut self, path: &[String], name: &Ident, handle: Handle) {
         let Some((last, above)) = path.split_last() else {
             return;
@@ -147,7 +147,7 @@ impl Module {
         }
     }
 
-    /// Has the module at a path carry a name's place and doc comments; one without handles does not exist.
+    /// Gives the module at a path the place and doc comments of a name; a module without handles does not exist.
     fn describe(&mut self, path: &[String], name: &Ident, attributes: &[Attribute]) {
         let mut module = self;
         for segment in path {
@@ -283,7 +283,7 @@ fn visit(types: &Types<'_>, id: EstimatorId, accessors: Accessors) -> TokenStrea
     }
 }
 
-/// The constant of what has no handle but a name: `pub const moving: &str = "moving";`
+/// The constant for a part that has a name instead of a handle: `pub const moving: &str = "moving";`
 fn text(constant: &Ident, attributes: &[Attribute], name: &Ident) -> TokenStream {
     let docs = docs(attributes);
     let text = crate::names::text(name);

@@ -1,9 +1,9 @@
-//! What the items of the expansion are called: by the path of what they are for, so that the expansion can be read.
+//! The names of items in the expansion: each contains the path of its part, so that the expansion is readable.
 //!
 //! `sensor/base/imu` is `sensor_base_imu`. Where two paths would give one name, the second has a number at its end.
 //!
-//! Items beside the robot's type have the line and the column of its name in theirs. So two robots of one name in a module
-//! collide by what the user knows, their types and modules, and by nothing else.
+//! Items beside the robot's type have the line and the column of its name in theirs. So two robots with the same name in one
+//! module collide only in what the user knows, their types and modules.
 
 use super::part::Part;
 use crate::diagnostics::Place;
@@ -81,7 +81,7 @@ impl Naming {
     }
 }
 
-/// `__Rover_2_11`: how the names of a robot's items start, and the module of its type.
+/// `__Rover_2_11`: the prefix of a robot's items, and the module of its type.
 pub(super) fn prefix(robot: &Ident) -> Ident {
     let place = robot.span().start();
     format_ident!("__{robot}_{}_{}", place.line, place.column + 1, span = Span::call_site())

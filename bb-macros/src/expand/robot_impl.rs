@@ -1,4 +1,4 @@
-//! `impl Robot`: how all is made, started and listed.
+//! `impl Robot`: how its parts are made, started and listed.
 
 use super::options::{binding, bound};
 use super::part::Part;

@@ -77,8 +77,8 @@ pub(super) const ROBOT: &str = "__Robot";
 
 /// `pub use super::{__Rover_2_11::Rover as __Robot, __Rover_2_11__sensor_base_imu, …};` in the robot's module.
 ///
-/// One import, so that it is one error where there is nothing to import: in a function, whose items no module can name. The
-/// first name says so, since rustc writes it.
+/// A single import, so that it is one error in a function, whose items a module cannot name. Its first name explains the error,
+/// since rustc prints it.
 pub(super) fn imports(types: &Types<'_>, accessors: Accessors) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let parts = Part::all(robot).map(|part| &types.names(part).alias);
@@ -99,7 +99,7 @@ fn without_span(name: &Ident) -> Ident {
     name
 }
 
-/// An item beside the robot's type that only its module imports.
+/// An item that only the robot's module imports.
 fn marker(name: &Ident) -> Ident {
     format_ident!("{}_must_be_declared_outside_of_functions", prefix(name), span = Span::call_site())
 }

@@ -1,4 +1,4 @@
-//! The contents of braces, item by item, and how to go on after one that cannot be read.
+//! The contents of braces, item by item, and recovery after one that cannot be read.
 
 use super::Notes;
 use super::name::{is_keyword, whole};
@@ -16,7 +16,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// The first word as the name that it is where items start with no word of the language.
+    /// The first word as a name, where items start with a name instead of a word of the language.
     pub(super) fn name(&self, input: ParseStream<'_>) -> syn::Result<Ident> {
         let text = self.word.to_string();
         if NO_WORDS.contains(&&*text) && input.peek(Ident::peek_any) {
@@ -78,7 +78,7 @@ pub(super) fn opened<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>>
     Ok(content)
 }
 
-/// Reads `;`. If it is missing that is reported; if the next item follows at once, reading goes on there.
+/// Reads `;`. If it is missing, that is reported, and reading resumes at the next item.
 pub(super) fn semicolon(input: ParseStream<'_>, after: &str, notes: &mut Notes<'_>) {
     if input.peek(Token![;]) {
         let _: syn::Result<Token![;]> = input.parse();
@@ -139,7 +139,7 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
     Ok(Some(Head { attributes, word }))
 }
 
-/// Reads attributes and doc comments; what is a comment in other languages is reported and passed over.
+/// Reads attributes and doc comments; comments of other languages are reported and skipped.
 pub(super) fn attributes(input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Vec<Attribute>> {
     let mut attributes = Vec::new();
     let is_dashes = || input.peek(Token![-]) && input.peek2(Token![-]);

@@ -1,4 +1,4 @@
-//! What is collected beside the tree while a robot is read: for the rules that hold for all words alike.
+//! Facts that are collected while a robot is read, for the rules that concern all words.
 
 use super::{JointKind, Quantity};
 use crate::diagnostics::Diagnostics;

@@ -27,13 +27,13 @@ pub(crate) struct Robot {
     pub(crate) links: Vec<Link>,
     /// `topology: urdf("…");`
     pub(crate) topologies: Vec<Topology>,
-    /// What is declared onto joints of the URDF.
+    /// What is declared at joints of the URDF.
     pub(crate) joints: Vec<JointAddition>,
     /// All numbers that are given to words of the language.
     pub(crate) given: Vec<Given>,
-    /// All words that are written more often than they may.
+    /// All words that are repeated where they may not be.
     pub(crate) repeated: Vec<Ident>,
-    /// Whether everything could be read; if not, what is missing may have been declared.
+    /// Whether everything could be read. If not, missing parts may have been declared.
     pub(crate) complete: bool,
 }
 
@@ -64,7 +64,7 @@ impl Robot {
         });
     }
 
-    /// `pub robot Rover;` If it is not there, its attributes alone are consumed.
+    /// `pub robot Rover;` If it is missing, only its attributes are consumed.
     fn header(&mut self, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<()> {
         const EXPECTED: &str = "expected the robot's name first, as in `robot Rover;`";
         if input.is_empty() {

@@ -1,4 +1,4 @@
-//! Where tokens are, and whether they start an item.
+//! Places of tokens, and whether an item starts at one.
 
 use crate::diagnostics::Place;
 use crate::language;

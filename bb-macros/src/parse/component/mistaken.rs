@@ -1,4 +1,4 @@
-//! A component that is made as Rust makes a value: `Encoder { port: 1 }`, `Encoder::new(1)`.
+//! Components written in other ways: `Encoder { port: 1 }`, `Encoder::new(1)`, `sensor_msgs::Image()`.
 
 use crate::diagnostics::Place;
 use crate::language::{item_words, starts_item};
@@ -52,9 +52,8 @@ fn of_ros(path: &syn::Path) -> Option<(String, syn::PathSegment)> {
     is_of_ros.then(|| path.segments.last().map(|last| (package, last.clone()))).flatten()
 }
 
-/// Reports types of ROS: `sensor_msgs::Image()`, of which no component remains, and `External<sensor_msgs::Imu>`, of which the
-/// last name does. No type of another crate can be a payload, so that such a path names no payload either where a crate of that
-/// name is there.
+/// Reports types of ROS. `sensor_msgs::Image()` becomes an unknown component, `External<sensor_msgs::Imu>` keeps the last name. A
+/// type of another crate cannot be a payload, so that such a path names no payload even if there is a crate of that name.
 pub(super) fn ros_types(word: &str, kind: &mut syn::Path, notes: &mut Notes<'_>) {
     if let Some((package, message)) = of_ros(kind) {
         let message = message.ident;
@@ -104,7 +103,7 @@ pub(super) fn type_of(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error
     Some(syn::Error::new(place, message))
 }
 
-/// The error for what follows a component elsewhere: `Bmi270().rate(200)`, `Bmi270() @ 200 Hz`, `Bmi270 | Bmi088`.
+/// The error for what follows a component in other languages: `Bmi270().rate(200)`, `Bmi270() @ 200 Hz`, `Bmi270 | Bmi088`.
 pub(super) fn tail(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
     let is_tail = input.peek(Token![.]) || input.peek(Token![@]) || input.peek(Token![|]) || input.peek(Token![=]);
     let message = format!(

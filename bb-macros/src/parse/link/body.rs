@@ -1,4 +1,4 @@
-//! What a link weighs, looks like and occupies: `inertial`, `visual` and `collision`, with URDF's meaning.
+//! Mass, appearance and extent of a link: `inertial`, `visual` and `collision`, as in URDF.
 
 use super::Origin;
 use crate::language::{

@@ -1,4 +1,4 @@
-//! Where a joint is, which axis it moves about, and how far.
+//! Origin, axis and limits of a joint.
 
 use crate::diagnostics::Place;
 use crate::language::{LimitField, OriginField, Word, words};
@@ -66,7 +66,7 @@ impl Origin {
 }
 
 impl Axis {
-    /// The direction at unit length; one that has it already is kept as it is.
+    /// The direction as a unit vector; one that has unit length already is not changed.
     pub(crate) fn unit(&self) -> [f64; 3] {
         let length = self.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
         if (length - 1.0).abs() < 1e-12 { self.direction } else { self.direction.map(|value| value / length) }
