@@ -1,4 +1,4 @@
-//! What the runtime publishes about itself on its own topics.
+//! Events that the runtime publishes on its own topics.
 
 mod arming;
 mod command;

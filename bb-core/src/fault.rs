@@ -1,4 +1,4 @@
-//! Why a component cannot start or go on, and how user code is called so that it harms nobody but itself.
+//! The errors of components, and calls of user code that contain its panics.
 
 mod guard;
 mod value;

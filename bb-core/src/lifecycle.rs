@@ -7,9 +7,9 @@
 //!                       └── restart from above, new options ──▶ retire, then make at once
 //! ```
 //!
-//! What differs between components is who calls: an estimator's slot is called by the turns of its island, a sensor's or
-//! service's by its thread, an actuator's by those who send it commands. Retiring always comes before making: a device is
-//! closed before it is opened again.
+//! Only the caller differs: an estimator's slot is called by its island, a sensor's or service's by its thread, an actuator's
+//! by the senders of its commands. A component is always retired before the next one is made, so that a device is closed before
+//! it is opened again.
 
 mod adapter;
 mod backoff;

@@ -45,21 +45,21 @@ pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 /// ```
 ///
 /// Payloads are handed on by reference; a clone is made only for a subscriber and for the cache of an input that is
-/// not the driver, so large data belongs behind an `Arc`.
+/// not the driver, so put large data behind an `Arc`.
 ///
-/// The derive also writes how it is recorded and read back, bit for bit: see [`codec`]. All its fields must be
-/// [`Field`]s; `#[payload(ros)]` says that ROS has a message for it, which a [`RosMessage`] makes.
+/// The derive also implements how it is recorded and read back, bit for bit: see [`codec`]. All its fields must be
+/// [`Field`]s. `#[payload(ros)]` records it as a message of ROS, which its [`RosMessage`] makes.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a payload",
     label = "cannot be the payload of a message",
     note = "derive it: `#[derive(Clone, Debug, Payload)]`",
-    note = "messages cross threads: what they share is behind an `Arc`, not an `Rc`"
+    note = "messages cross threads: share data by `Arc` instead of `Rc`"
 )]
 pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
-    /// The type's name, for people: `Imu`.
+    /// The type's name, for messages: `Imu`.
     const NAME: &'static str;
 
-    /// How ROS writes it, if ROS has a message for it.
+    /// Its layout in ROS, if ROS has a message for it.
     #[doc(hidden)]
     const ROS: Option<RosLayout<Self>> = None;
 

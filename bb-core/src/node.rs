@@ -1,5 +1,4 @@
-//! A running estimator: what comes in, what goes out, its fan-in, health, timers and counters; and the islands in which
-//! estimators run.
+//! Running estimators (fan-in, health, timers and counters), and the islands in which they run.
 
 mod admission;
 mod backlog;

@@ -1,9 +1,9 @@
-//! What keeps one mistake to one message.
+//! Stand-ins that keep one mistake to one message.
 //!
-//! A type that is declared as a sensor but is not one would be reported wherever the wiring names it. So the wiring names
-//! it through [`Known`]: a type that is not what it is declared as is [`Unknown`] there, which fits everywhere, and the
-//! mistake is reported where the options are filled, once. Likewise an input or output that the algorithm does not
-//! have is `Unknown`, and is reported by its check (see `check`). None of this ever runs, since none of it compiles.
+//! A type that is declared as a sensor but is not one would be reported at each use in the wiring. So the wiring names it
+//! through [`Known`], which replaces such a type by [`Unknown`], a type that fits everywhere. The mistake is reported once,
+//! where the options are set. An input or output that the algorithm does not have is `Unknown` as well, and is reported by its
+//! check (see `check`). None of this ever runs, since such a robot does not compile.
 
 mod unknown;
 
@@ -15,12 +15,12 @@ use crate::message::Payload;
 use std::any::Any;
 use std::marker::PhantomData;
 
-/// Tells as a constant whether `T` is a sensor, an estimator, …: its own constants where it is, else those of
-/// [`NotProbed`], since own ones go first.
+/// Tells as a constant whether `T` is a sensor, an estimator, …: by its inherent constants if it is, else by those of
+/// [`NotProbed`], since inherent ones take precedence.
 #[derive(Debug)]
 pub struct Probe<T>(PhantomData<fn() -> T>);
 
-// The bounds of associated types are written out: an implementation that breaks one is reported by itself, and does not count.
+// The bounds of associated types are repeated: an implementation that violates one is reported there, and does not count.
 impl<T> Probe<T>
 where
     T: Sensor<Options: Options, Output: Payload>,
@@ -63,23 +63,23 @@ where
 
 /// Fallback: every constant is `false`.
 pub trait NotProbed {
-    /// It is not known to be a sensor.
+    /// Not a sensor.
     const IS_SENSOR: bool = false;
-    /// It is not known to be an estimator.
+    /// Not an estimator.
     const IS_ESTIMATOR: bool = false;
-    /// It is not known to be an actuator.
+    /// Not an actuator.
     const IS_ACTUATOR: bool = false;
-    /// It is not known to be a service.
+    /// Not a service.
     const IS_SERVICE: bool = false;
-    /// It is not known to be a command.
+    /// Not a command.
     const IS_COMMAND: bool = false;
 }
 
 impl<T> NotProbed for Probe<T> {}
 
-/// The type itself if it is what it was declared as, else [`Unknown`].
+/// The type itself if it implements the trait it was declared with, else [`Unknown`].
 pub trait Known<const KNOWN: bool> {
-    /// Which of the two.
+    /// `Self` or `Unknown`.
     type Type;
 }
 
@@ -91,7 +91,7 @@ impl<T> Known<false> for T {
     type Type = Unknown;
 }
 
-/// Whether both payloads are known, so that they must be the same.
+/// Whether both payloads are known, and therefore must be equal.
 pub const fn both_known<P: Payload, T: Payload>() -> bool {
     P::KNOWN && T::KNOWN
 }
@@ -113,7 +113,7 @@ pub fn stub<T>() -> T {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __stub_robot {
-    ($robot:ident, $name:literal) => {
+    ($robot:ty, $name:literal) => {
         impl $crate::Robot for $robot {
             const NAME: &'static str = $name;
             const TOPOLOGY: &'static $crate::topology::Topology =

@@ -9,7 +9,7 @@ pub use body::{Collision, Geometry, Inertial, Material, Visual};
 use crate::message::Frame;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// The language that a graph is written in.
+/// The format of a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GraphFormat {
     /// [Mermaid](https://mermaid.js.org), which Markdown viewers draw.
@@ -32,15 +32,15 @@ pub struct Topology {
 pub struct Link {
     /// Its name, and that of its frame.
     pub name: &'static str,
-    /// The number of the joint that carries it; none for the root.
+    /// The number of the joint that carries it; `None` for the root.
     pub parent_joint: Option<usize>,
     /// Takes points from this link to the root, if all joints between are fixed.
     pub root_from_link: Option<Transform>,
-    /// What it weighs.
+    /// Its mass and moments of inertia.
     pub inertial: Option<Inertial>,
-    /// What it looks like.
+    /// Shapes that viewers draw.
     pub visuals: &'static [Visual],
-    /// What it must not run into.
+    /// Shapes for collision checks.
     pub collisions: &'static [Collision],
 }
 
@@ -49,7 +49,7 @@ pub struct Link {
 pub struct Joint {
     /// Its name.
     pub name: &'static str,
-    /// How it moves.
+    /// Its type.
     pub kind: JointKind,
     /// The number of the link it is mounted on.
     pub parent: usize,
@@ -59,9 +59,9 @@ pub struct Joint {
     pub parent_from_joint: Origin,
     /// The axis of motion in the joint's frame, of unit length; for a planar joint the plane's normal.
     pub axis: Option<[f64; 3]>,
-    /// How far, fast and strongly it moves.
+    /// Its limits of position, velocity and effort.
     pub limit: Option<Limit>,
-    /// How it resists.
+    /// Its damping and friction.
     pub dynamics: Option<Dynamics>,
     /// The joint that it follows.
     pub mimic: Option<Mimic>,
@@ -69,12 +69,12 @@ pub struct Joint {
     pub transmission: Option<Transmission>,
 }
 
-/// How a joint resists being moved: N·m·s/rad and N·m where it turns, N·s/m and N where it slides.
+/// Damping and friction of a joint: N·m·s/rad and N·m where it turns, N·s/m and N where it slides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dynamics {
-    /// Resistance for each unit of velocity.
+    /// Viscous friction.
     pub damping: f64,
-    /// Resistance to the first motion.
+    /// Static friction.
     pub friction: f64,
 }
 
@@ -103,7 +103,7 @@ pub enum JointKind {
     Fixed,
     /// Turns about its axis between limits.
     Revolute,
-    /// Turns about its axis without end.
+    /// Turns about its axis without limits.
     Continuous,
     /// Slides along its axis between limits.
     Prismatic,

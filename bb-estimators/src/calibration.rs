@@ -8,7 +8,7 @@
 //!
 //! `‖M (x - b)‖ = r`
 //!
-//! with the measurements x, the offset b, and the matrix M of scale and misalignment. The norm says nothing about a rotation
+//! with the measurements x, the offset b, and the matrix M of scale and misalignment. The norm does not depend on a rotation
 //! of all measurements, so that M has six numbers: it is upper triangular for the accelerometer, whose x axis is then the
 //! body's, and symmetric for the magnetometer.
 //!

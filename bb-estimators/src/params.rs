@@ -108,7 +108,7 @@ pub trait Params {
     ///
     /// # Errors
     ///
-    /// An unknown name, with the nearest one; a text that is no value of the parameter; a value outside its range.
+    /// An unknown name, with the nearest one; a text that is not a value of the parameter; a value outside its range.
     /// Nothing is changed then.
     fn set<'t>(&mut self, name: &'t str, text: &'t str) -> Result<(), SetError<'t>> {
         let parameters = self.parameters();

@@ -1,10 +1,10 @@
-//! A verified robot to its wiring: declarations and calls; loops and decisions live in `bb_core`.
+//! Expands a verified robot to its wiring: declarations and calls; loops and decisions are in `bb_core`.
 //!
 //! ```text
-//! pub struct Rover;                                    // the robot's type
-//! impl Rover { pub fn builder() … }                    // so that no trait need be in scope
-//! type __Rover__sensor_base_imu = Bmi270;              // one alias per component: its type is named once
-//! enum __Rover__member__sensor_base_imu_tilt {}        // the marker of an estimator in its island
+//! mod __Rover_2_11 { pub struct Rover; }               // the robot's type, whose name is at line 2, column 11
+//! impl Rover { pub fn builder() … }                    // so that no trait has to be imported
+//! type __Rover_2_11__sensor_base_imu = Bmi270;         // one alias per component: its type is named once
+//! enum __Rover_2_11__member__sensor_base_imu_tilt {}   // the marker of an estimator in its island
 //! const _: () = {
 //!     …                                                // constants that check type facts at the user's tokens
 //!     static __SENSORS, __ESTIMATORS, …                // what was declared, as data
@@ -14,7 +14,8 @@
 //!     impl Robot for Rover { … }
 //! };
 //! const _: () = { use rover::… as _; … };              // what the user refers to, for the editor
-//! pub mod rover { … }                                  // a handle per publisher, at its path
+//! pub mod rover { … }                                  // a handle per publisher, at its path; exports the type as `__Robot`
+//! pub use rover::__Robot as Rover;                     // for a second robot of that name it is the first one's
 //! ```
 
 mod checks;
@@ -60,6 +61,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let implementation = robot_impl::robot_impl(verified, &types);
     let references = references::references(verified);
     let handles = handles::handles(&types, name, &verified.module, types::Accessors::Wired);
+    let export = export(robot, name, Some(&verified.module));
     quote! {
         #definition
         #aliases
@@ -75,24 +77,49 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
         };
         #references
         #handles
+        #export
     }
 }
 
 /// The robot's type, with the user's docs and attributes.
 fn definition(robot: &Robot, name: &Ident) -> TokenStream {
     let (attributes, visibility) = (&robot.attributes, &robot.visibility);
+    let (module, this) = (naming::prefix(name), types::robot_type(name));
     quote! {
-        #(#attributes)*
-        #[derive(Clone, Copy, Debug)]
-        #visibility struct #name;
+        #[allow(non_snake_case, unreachable_pub, unused_imports)]
+        mod #module {
+            use super::*;
 
-        impl #name {
+            #(#attributes)*
+            #[derive(Clone, Copy, Debug)]
+            pub struct #name;
+        }
+
+        impl #this {
             /// Assembles the robot: options may be changed and topics subscribed to before it starts.
             #[allow(dead_code)]
             #visibility fn builder() -> ::bb_core::Builder<Self> {
                 <Self as ::bb_core::Robot>::builder()
             }
         }
+    }
+}
+
+/// `pub use rover::__Robot as Rover;`
+fn export(robot: &Robot, name: &Ident, module: Option<&str>) -> TokenStream {
+    let visibility = &robot.visibility;
+    let path = match module {
+        Some(module) => {
+            let (module, this) = (literal::ident(module), literal::ident(types::ROBOT));
+            // Where the robot's name is, so that a second one is reported there.
+            literal::respan(quote!(#module::#this), name.span())
+        }
+        None => types::robot_type(name),
+    };
+    quote! {
+        #[doc(inline)]
+        #[allow(unused_imports)]
+        #visibility use #path as #name;
     }
 }
 

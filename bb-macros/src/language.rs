@@ -1,7 +1,7 @@
 //! The words of the language, each stated once: where it may be written, what number it takes, how often it may be
 //! repeated, an example, and its documentation.
 //!
-//! Everything that has to know the words derives from here: the parser (what belongs where, where reading can restart,
+//! Everything that depends on the words is derived from here: the parser (what belongs where, where it can resume,
 //! "did you mean"), the rules on dimensions, bounds and repetition, and the tables of the reference on `bb_core::robot`.
 //!
 //! To add a setting such as `deadline: 5 ms;` of an estimator: state the word in `language/words.rs`, name it in
@@ -12,6 +12,7 @@ mod joint_kind;
 mod measure;
 pub(crate) mod words;
 
+pub(crate) use foreign::way_out;
 pub(crate) use joint_kind::JointKind;
 pub(crate) use measure::{Bounds, Measure};
 
@@ -24,7 +25,7 @@ pub(crate) struct Word {
     pub(crate) text: &'static str,
     pub(crate) value: Value,
     pub(crate) occurs: Occurs,
-    /// What follows the word, up to the end of what it says.
+    /// What follows the word, up to the end of its item.
     pub(crate) example: &'static str,
     /// For the reference, which a test compares.
     #[cfg_attr(not(test), allow(dead_code, reason = "read by the test of the reference"))]
@@ -94,7 +95,7 @@ macro_rules! language {
     (items { $($items:tt)* } fields { $($fields:tt)* }) => {
         enums! { $($items)* $($fields)* }
         language! { @list
-            /// The words that start an item, by place: where reading can restart.
+            /// The words that start an item, by place: where the parser can resume.
             ITEMS { $($items)* } }
         language! { @list
             /// The words within items, by place.
@@ -151,7 +152,7 @@ language! {
             Actuator = ACTUATOR,
             Link = LINK,
         }
-        /// What a joint that a URDF has brought is given.
+        /// What is declared at a joint of a URDF.
         UrdfJointItem in "a joint of a URDF" {
             Sensor = SENSOR,
             Actuator = ACTUATOR,
@@ -286,7 +287,7 @@ language! {
     }
 }
 
-/// The words that start an item, wherever.
+/// Whether a word starts an item in any place.
 pub(crate) fn starts_item(text: &str) -> bool {
     item_words().any(|word| word == text)
 }
@@ -302,7 +303,7 @@ pub(crate) fn unexpected<I: Words, S: Words>(word: &Ident) -> syn::Error {
     let allowed: Vec<&str> = I::texts().into_iter().chain(S::texts()).collect();
     let message = if allowed.is_empty() {
         format!("{place} holds nothing; leave this out")
-    } else if let Some(way) = foreign::way_out(place, &name) {
+    } else if let Some(way) = way_out(place, &name) {
         if starts_item(&name) {
             format!("`{name}` does not belong in {place}; {way}")
         } else {

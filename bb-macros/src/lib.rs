@@ -56,7 +56,7 @@ pub fn payload(tokens: TokenStream) -> TokenStream {
 }
 
 /// Makes a struct the options of a component: `#[option(default = …, range = a..=b, unit = "…")]` or
-/// `#[option(required)]` on each field. See the trait. (`#[options]` is an attribute so that it can be called a mistake.)
+/// `#[option(required)]` on each field. See the trait. (`#[options]` is accepted as an attribute so that the derive can report it.)
 #[proc_macro_derive(Options, attributes(option, options))]
 pub fn options(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::options).into()

@@ -2,13 +2,12 @@
 
 mod actuator;
 mod block;
-mod body;
 mod commands;
 mod component;
 mod estimator;
 mod health;
 mod input;
-mod joint;
+mod items;
 mod link;
 mod literal;
 mod name;
@@ -24,20 +23,19 @@ mod sensor;
 mod service;
 mod setting;
 mod states;
+mod tokens;
 mod topology;
 
 pub(crate) use crate::language::JointKind;
 pub(crate) use actuator::Actuator;
-#[cfg(feature = "urdf")]
-pub(crate) use body::Material;
-pub(crate) use body::{Geometry, Inertial, Shape};
 pub(crate) use commands::{Cancelled, Category, Command, CommandSettings, Commands};
 pub(crate) use component::{Component, ComponentOption, OptionValue};
 pub(crate) use estimator::Estimator;
 pub(crate) use health::{Reaction, Reactions};
 pub(crate) use input::Input;
-pub(crate) use joint::{Axis, Dynamics, Joint, Limit, Mimic, Origin, Transmission};
-pub(crate) use link::Link;
+#[cfg(feature = "urdf")]
+pub(crate) use link::Material;
+pub(crate) use link::{Axis, Dynamics, Geometry, Inertial, Joint, Limit, Link, Mimic, Origin, Shape, Transmission};
 pub(crate) use literal::{Literal, Value};
 pub(crate) use notes::Given;
 pub(crate) use output::Output;

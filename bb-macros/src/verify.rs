@@ -61,7 +61,7 @@ const RULES: &[Rule] = &[
     single_settings::check,
 ];
 
-/// A robot of which all rules hold.
+/// A robot for which all rules hold.
 #[derive(Debug)]
 pub(crate) struct Verified<'a> {
     pub(crate) robot: &'a Robot,

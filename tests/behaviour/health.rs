@@ -4,6 +4,7 @@ use crate::components::{Number, Snapshot, at};
 use bb_core::HealthTransition;
 use bb_core::event::{CommandPhase, RefusalReason};
 use bb_core::prelude::*;
+use bb_core::run::DropReason;
 
 /// Passes numbers on; a negative one is a divergence.
 #[derive(Debug)]
@@ -203,6 +204,29 @@ fn silence_is_a_loss_and_the_first_input_leads_back_without_a_command() -> Resul
     run.number(1.0);
     assert_eq!(run.changes(WATCH), ["degraded -> healthy: recovered"]);
     assert_eq!(run.simulation.state(), "idle");
+    Ok(())
+}
+
+/// What publishes all along, and is refused: the statistics say why the estimator is lost.
+#[test]
+fn a_loss_after_refused_messages_has_their_reason() -> Result<(), StartError> {
+    let mut run = Run::start()?;
+    let last_drop = |run: &Run| {
+        let report = run.simulation.report();
+        report.estimator(WATCH).and_then(|estimator| estimator.last_drop)
+    };
+    run.number(1.0);
+    assert_eq!(last_drop(&run), None);
+    for _ in 0..12 {
+        run.number(f64::NAN);
+    }
+    assert_eq!(run.changes(WATCH), ["healthy -> lost: lost"]);
+    assert_eq!(last_drop(&run).map(|(_, reason)| reason), Some(DropReason::NonFinite));
+    run.simulation.publish(watched::sensor::base::number, at(1), Number(1.0));
+    assert_eq!(last_drop(&run).map(|(_, reason)| reason), Some(DropReason::OutOfOrder));
+    run.number(1.0);
+    assert_eq!(run.changes(WATCH), ["lost -> degraded: recovered"]);
+    assert_eq!(last_drop(&run), None, "it has run since");
     Ok(())
 }
 

@@ -91,7 +91,7 @@ fn drive(failures: &Failures, seconds: f64) -> Result<Seen, StartError> {
     let frame = LocalFrame::new(Geodetic::from_degrees(ORIGIN.0, ORIGIN.1, ORIGIN.2));
     let board_from_base = UnitQuaternion::from_euler_angles(PI, 0.0, FRAC_PI_2).inverse();
     let wheels_from_base = UnitQuaternion::from_euler_angles(0.0, 0.0, FRAC_PI_2).inverse();
-    let (mut noise, mut late) = (Noise(7), std::collections::VecDeque::new());
+    let (mut noise, mut late) = (Noise::new(7), std::collections::VecDeque::new());
     let mut origin = None;
     for millis in (0..(seconds * 1000.0) as u64).step_by(10) {
         let (now, time) = (millis as f64 * 1e-3, MonotonicTime::ZERO + Duration::from_millis(millis));

@@ -1,5 +1,7 @@
 //! Tests of whole robots; see the test targets of this crate. The code in the documents is compiled here.
 
+pub mod random;
+
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 struct Readme;

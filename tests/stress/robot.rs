@@ -2,28 +2,12 @@
 
 use bb_core::RequestCodec;
 use bb_core::prelude::*;
+use bb_tests::random::Random;
 
 /// What happens where it arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(joint_position)]
 pub(crate) struct Dice(pub(crate) f64);
-
-/// Xorshift with a multiplier: good enough to throw dice.
-#[derive(Clone, Debug)]
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    pub(crate) fn below(&mut self, end: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) % end
-    }
-}
 
 /// Options of [`Storm`].
 #[derive(Clone, Debug, Options)]

@@ -1,4 +1,4 @@
-//! What is asked of an estimator as a whole: that all is declared that it cannot do without.
+//! Whether an estimator's declaration is complete.
 
 use super::find::find_input;
 use super::names::list;
@@ -7,10 +7,10 @@ use super::text::{Text, equal};
 use crate::component::{Estimator, Inputs, OptionField, Options, Outputs, TakenAt};
 use crate::stub::UNKNOWN_INDEX;
 
-/// That an estimator has its required options among those `given`, its inputs among those `declared`, and an output declared
-/// if it has several. `declared` is `None` for a nested estimator, whose one input is its sensor's.
+/// Checks that an estimator has its required options among `given`, its required inputs among `declared`, and an output if it
+/// has several. `declared` is `None` for a nested estimator, whose one input is its sensor's.
 ///
-/// All that is missing is one message, since all of it is missing at one word.
+/// Everything that is missing is one message, since it is reported at one word.
 #[track_caller]
 pub const fn check_estimator<E: Estimator>(
     estimator: &str,
@@ -43,7 +43,7 @@ const fn and(first: Option<Text>, second: Option<Text>) -> Option<Text> {
     }
 }
 
-/// The first input that the algorithm cannot do without and that is not declared.
+/// The first required input that is not declared.
 const fn missing_input<I: Inputs>(estimator: &str, declared: &[&str]) -> Option<Text> {
     if !I::KNOWN {
         return None;
@@ -77,7 +77,7 @@ const fn missing_input<I: Inputs>(estimator: &str, declared: &[&str]) -> Option<
     None
 }
 
-/// Why the sensor of a nested estimator is not its input: it must have exactly one that it cannot do without, or only one.
+/// Why the sensor of a nested estimator is not its input: the algorithm must have exactly one required input, or only one.
 const fn no_nested_input<I: Inputs>(estimator: &str) -> Option<Text> {
     if !I::KNOWN || <I::Nested as TakenAt<I>>::INDEX != UNKNOWN_INDEX {
         return None;
@@ -97,7 +97,7 @@ const fn no_nested_input<I: Inputs>(estimator: &str) -> Option<Text> {
     Some(text.push("declare it on the link, with an `input` for each"))
 }
 
-/// That an algorithm of several outputs has none declared.
+/// Reports that an algorithm of several outputs has none declared.
 const fn no_output<O: Outputs>(estimator: &str) -> Option<Text> {
     let fields = O::FIELDS;
     if fields.is_empty() {

@@ -1,6 +1,6 @@
 //! The number of a declared input or output in the algorithm's struct, looked up by name at compile time.
 //!
-//! What is not there gets [`UNKNOWN_INDEX`], which every struct has; the check of that name reports it.
+//! An unknown name gets [`UNKNOWN_INDEX`], which every struct has; the check of that name reports it.
 
 use super::text::equal;
 use crate::component::{Inputs, Outputs};

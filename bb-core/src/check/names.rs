@@ -5,7 +5,7 @@ use super::text::{Text, equal, nearest};
 use crate::component::{Inputs, Outputs};
 use crate::stub::UNKNOWN_INDEX;
 
-/// That the algorithm has the declared input `name`.
+/// Checks that the algorithm has the declared input `name`.
 #[track_caller]
 pub const fn check_input<I: Inputs>(estimator: &str, name: &str) {
     if !I::KNOWN || find_input::<I>(name) != UNKNOWN_INDEX {
@@ -21,7 +21,7 @@ pub const fn check_input<I: Inputs>(estimator: &str, name: &str) {
     unknown(Text::new("").name(estimator).push(" has no input ").name(name).push("; it takes "), names, name)
 }
 
-/// That the algorithm has the declared output `name`.
+/// Checks that the algorithm has the declared output `name`.
 #[track_caller]
 pub const fn check_output<O: Outputs>(estimator: &str, name: &str) {
     if !O::KNOWN || find_output::<O>(name) != UNKNOWN_INDEX {
@@ -35,7 +35,7 @@ pub const fn check_output<O: Outputs>(estimator: &str, name: &str) {
     unknown(start.push("; it emits "), O::FIELDS, name)
 }
 
-/// That the algorithm can do without the input `name`, which is declared as optional.
+/// Checks that the input `name`, which is declared as optional, is optional in the algorithm.
 #[track_caller]
 pub const fn check_optional<I: Inputs>(estimator: &str, name: &str) {
     let fields = I::FIELDS;
@@ -49,7 +49,7 @@ pub const fn check_optional<I: Inputs>(estimator: &str, name: &str) {
     }
 }
 
-/// That the algorithm handles inputs across moving joints.
+/// Checks that the algorithm handles inputs across moving joints.
 #[track_caller]
 pub const fn check_dynamic(estimator: &str, handles: bool, input: &str, joint: &str, kind: &str) {
     if !handles {

@@ -15,7 +15,7 @@ pub struct Given {
     pub number: Option<f64>,
 }
 
-/// That a given option has the dimension and keeps the range that its field states. Unknown names are left to rustc.
+/// Checks the dimension and the range of a given option. Unknown names are left to rustc.
 #[track_caller]
 pub const fn check_option(component: &str, fields: &[OptionField], given: Given) {
     let mut index = 0;
@@ -29,7 +29,7 @@ pub const fn check_option(component: &str, fields: &[OptionField], given: Given)
     }
 }
 
-/// That every required option is given.
+/// Checks that every required option is given.
 #[track_caller]
 pub const fn check_required(component: &str, fields: &[OptionField], given: &[&str]) {
     if let Some(text) = missing_option(component, fields, given) {

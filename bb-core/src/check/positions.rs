@@ -1,8 +1,8 @@
-//! Whether the position of a joint that is moved is known.
+//! Whether the position of an actuated joint is known.
 
 use super::text::Text;
 
-/// That one of the publishers at the joint tells its position.
+/// Checks that one of the publishers at the joint tells its position.
 #[track_caller]
 pub const fn check_position(actuator: &str, joint: &str, tell: &[bool]) {
     let mut index = 0;

@@ -1,9 +1,9 @@
-//! What commands do to the robot's safety.
+//! Commands that arm or disarm the robot.
 
 use super::text::{Text, equal};
 use crate::declaration::Role;
 
-/// That no command before has the same role, where a robot may have one such command.
+/// Checks that no earlier command has the same role, if a robot may have only one such command.
 #[track_caller]
 pub const fn check_role(command: &str, role: Role, before: &[(&str, Role)]) {
     let mut index = 0;
@@ -22,7 +22,7 @@ pub const fn check_role(command: &str, role: Role, before: &[(&str, Role)]) {
     }
 }
 
-/// That a command that arms may start while the robot is disarmed, and one that disarms while it is not.
+/// Checks that a command that arms may start while the robot is disarmed, and one that disarms while it is not.
 #[track_caller]
 pub const fn check_reachable(command: &str, role: Role, allowed: &[&str]) {
     let (mut disarmed, mut other, mut index) = (false, false, 0);

@@ -1,4 +1,4 @@
-//! Text put together at compile time, and how near two names are.
+//! Text made at compile time, and the distance of two names.
 
 /// A text of bounded length, made in a constant.
 #[derive(Clone, Copy)]
@@ -12,7 +12,7 @@ impl Text {
         Self { bytes: [0; 1024], length: 0 }.push(start)
     }
 
-    /// Adds `text`; what does not fit is cut at a character's start.
+    /// Appends `text`, cut at a character boundary if it does not fit.
     pub(super) const fn push(mut self, text: &str) -> Self {
         let bytes = text.as_bytes();
         let mut end = bytes.len();
@@ -31,7 +31,7 @@ impl Text {
         self
     }
 
-    /// Adds `` `name` ``.
+    /// Appends `` `name` ``.
     pub(super) const fn name(self, name: &str) -> Self {
         self.push("`").push(name).push("`")
     }

@@ -44,7 +44,7 @@ pub trait Estimator: Sized + Send + 'static {
     /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// A payload, or a struct of several inputs.
-    type Input: Inputs;
+    type Input: Inputs; // of a struct: `type Input = Pair<'static>;`
     /// A payload, or a struct of several outputs.
     type Output: Outputs;
 

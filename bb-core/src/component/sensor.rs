@@ -41,7 +41,7 @@ use crate::time::MonotonicTime;
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a sensor",
     label = "cannot be declared with `sensor`",
-    note = "implement `bb_core::Sensor` for it"
+    note = "implement `bb_core::Sensor` for it; a payload that other code publishes is declared as `External<Payload>()`"
 )]
 pub trait Sensor: Sized + Send + 'static {
     /// Its options: the struct that `Name(…)` in `robot!` fills.

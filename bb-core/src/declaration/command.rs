@@ -19,7 +19,7 @@ pub struct CommandDeclaration {
     pub name: &'static str,
     /// Its path: `command/stop`.
     pub path: &'static str,
-    /// The states in which it may start; none: as its role has it.
+    /// The states in which it may start; `None` for the default of its role.
     pub allowed_states: Option<&'static [&'static str]>,
     /// How long it may take.
     pub timeout_nanos: Option<i64>,

@@ -19,7 +19,7 @@ pub struct EstimatorDeclaration {
     pub island: usize,
     /// The number of its supervisor, see [`Supervisor`](super::Supervisor).
     pub supervisor: usize,
-    /// What is declared of its health.
+    /// The settings of its health.
     pub health: HealthDeclaration,
     /// Whether it has a thread of its own.
     pub worker: Option<WorkerDeclaration>,
@@ -31,7 +31,7 @@ impl EstimatorDeclaration {
         self.inputs.iter().find(|input| input.driver)
     }
 
-    /// One with nothing declared.
+    /// Without settings.
     pub(crate) const NONE: Self = Self {
         path: "",
         frame: Frame::NONE,
@@ -62,7 +62,7 @@ pub struct HealthDeclaration {
 }
 
 impl HealthDeclaration {
-    /// Nothing declared.
+    /// No settings.
     pub const NONE: Self = Self {
         latency_budget_nanos: None,
         lost_after_nanos: None,
@@ -96,7 +96,7 @@ pub struct IslandDeclaration {
     pub inlets: &'static [InletDeclaration],
 }
 
-/// A publisher outside of an island, and whom it feeds there.
+/// A publisher outside of an island, and the estimators that it feeds there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InletDeclaration {
     /// The publisher, as the island numbers them.
@@ -127,7 +127,7 @@ pub struct InputDeclaration {
     pub driver: bool,
     /// Whether the estimator is called without it when it is missing or too old.
     pub optional: bool,
-    /// How much older than the driver it may be; none: any age will do.
+    /// How much older than the driver it may be; `None` for any age.
     pub tolerance_nanos: Option<i64>,
     /// How old it may be when it arrives, by the clock; for the driver.
     pub stale_after_nanos: Option<i64>,

@@ -1,4 +1,4 @@
-//! A robot as a picture: links and joints, and what flows from sensors through estimators.
+//! A robot as a graph: links and joints, and the dataflow from sensors through estimators.
 
 use super::{EstimatorDeclaration, SensorDeclaration};
 use crate::topology::{GraphFormat, Topology};

@@ -1,6 +1,6 @@
-//! Constants put together.
+//! Concatenates constant arrays.
 
-/// The values of all parts, in order. There are `N`, and at least one.
+/// The values of all parts in order: `N`, which is at least 1.
 ///
 /// `robot!` writes long tables in parts: the time that rustc takes for one constant grows with the square of its values.
 pub const fn join<T: Copy, const N: usize>(parts: &[&[T]]) -> [T; N] {

@@ -44,11 +44,11 @@ impl From<ParameterDefault> for ParameterValue {
     }
 }
 
-/// What a parameter may be.
+/// The types of parameters.
 pub trait ParameterType: Sized + Clone + Send + Sync + 'static {
     /// The value, if it is of this type.
     fn from_value(value: &ParameterValue) -> Option<Self>;
-    /// As a value.
+    /// Converts it to a value.
     fn into_value(self) -> ParameterValue;
     /// The value used for a parameter that does not exist.
     #[doc(hidden)]
@@ -127,7 +127,7 @@ impl ParameterValues {
         &self.0
     }
 
-    /// The same with another value for the parameter `number`, and the previous value; none if there is no such parameter.
+    /// The same with another value for the parameter `number`, and the previous value; `None` if there is no such parameter.
     pub(crate) fn with(&self, number: usize, value: ParameterValue) -> Option<(Self, ParameterValue)> {
         let mut values = self.0.to_vec();
         let previous = std::mem::replace(values.get_mut(number)?, value);

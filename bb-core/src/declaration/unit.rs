@@ -17,7 +17,7 @@ impl Quantity {
     /// Reads a number and a unit after it, if there is one.
     ///
     /// # Errors
-    /// What is no number, or the unit that there is not, with the nearest one.
+    /// The text is not a number, or the unit is unknown; names the nearest one.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let text = text.trim();
         let (number, unit) = split(text).ok_or_else(|| format!("expected a number with a unit, found `{text}`"))?;

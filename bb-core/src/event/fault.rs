@@ -1,4 +1,4 @@
-//! Components that have failed.
+//! Failures of components.
 
 use crate::Payload;
 use std::fmt;

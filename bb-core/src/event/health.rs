@@ -38,16 +38,16 @@ pub enum HealthReason {
     Recovered,
 }
 
-/// A change of an estimator's health, as published and as commands get it.
+/// A change of an estimator's health, as published and as passed to commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct HealthTransition {
     /// The path of the estimator.
     pub estimator: &'static str,
     /// The path of the publisher whose message, or whose silence, was the cause.
     pub source: &'static str,
-    /// What it was.
+    /// The previous state.
     pub from: HealthState,
-    /// What it is.
+    /// The new state.
     pub to: HealthState,
     /// Why.
     pub reason: HealthReason,

@@ -1,14 +1,14 @@
-//! Calls user code: a panic in it becomes a value.
+//! Calls user code, and turns a panic into a value.
 
 use super::Fault;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::task::Waker;
 
-/// What user code did instead of what it was called for.
+/// How a call of user code failed.
 pub(crate) struct Failed {
     pub(crate) fault: Fault,
-    /// It panicked, and may have left anything half done.
+    /// It panicked, and may have left its data inconsistent.
     pub(crate) panicked: bool,
 }
 
@@ -36,7 +36,7 @@ pub(crate) fn guarded(call: impl FnOnce()) -> Result<(), Fault> {
     called.map_err(|failed| failed.fault)
 }
 
-/// Drops a user's value; a panic in its `Drop` ends there.
+/// Drops a user's value and catches a panic of its `Drop`.
 pub(crate) fn discard<T>(value: T) {
     if let Err(fault) = guarded(|| drop(value)) {
         tracing::error!(%fault, "a value panicked when it was dropped");
@@ -57,7 +57,7 @@ pub(crate) fn retire<C>(mut component: C, panicked: bool, close: impl FnOnce(&mu
     closed.and(dropped).err()
 }
 
-/// What a panic says.
+/// The message of a panic.
 #[cold]
 pub(crate) fn of_panic(panic: Box<dyn Any + Send>) -> Fault {
     let message = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());

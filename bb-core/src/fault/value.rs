@@ -1,4 +1,4 @@
-//! Why a component cannot start or go on.
+//! The error of a component.
 
 use std::error::Error;
 use std::fmt;
@@ -22,7 +22,7 @@ pub struct Fault {
     pub(crate) then: Then,
 }
 
-/// What becomes of the component.
+/// What happens to the component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Then {
     /// It is restarted.
@@ -56,7 +56,7 @@ impl Fault {
         Self { error: "it is restarted with its new options".into(), then: Then::Remake }
     }
 
-    /// The error it was made of.
+    /// The error it was made from.
     pub fn as_error(&self) -> &(dyn Error + Send + Sync + 'static) {
         &*self.error
     }

@@ -1,4 +1,4 @@
-//! What all components have in common, whatever contract they implement.
+//! The common interface of all components, whatever trait they implement.
 
 use crate::component::{
     Actuator, ActuatorContext, Context, Estimator, Options, Reading, Sensor, SensorContext, Service, ServiceContext,
@@ -12,7 +12,7 @@ use crate::time::MonotonicTime;
 pub trait Component: Sized + Send + 'static {
     /// Its options.
     type Options: Options;
-    /// What it is given when it starts.
+    /// The context for its start.
     type Context: Send;
 
     /// Makes it.
@@ -29,7 +29,7 @@ pub trait Component: Sized + Send + 'static {
     fn close(&mut self);
 }
 
-/// A component that is called at a rate and publishes what it gives: a sensor or a service.
+/// A component that is called at a rate and publishes its readings: a sensor or a service.
 pub trait Periodic: Component {
     /// What it publishes.
     type Output: Payload;
@@ -40,13 +40,13 @@ pub trait Periodic: Component {
     /// Takes one reading.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Why it cannot be taken.
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
     /// When it wants to be read first.
     fn starts_at(&self) -> Option<MonotonicTime>;
 }
 
-/// The robot, as contexts hold it.
+/// The robot, for contexts.
 #[derive(Clone, Debug)]
 pub struct HostHandle(pub(crate) std::sync::Arc<dyn crate::component::Host>);
 

@@ -1,9 +1,9 @@
-//! How long a component that has failed waits for its restart.
+//! Delays of restarts.
 
 use crate::time::MonotonicTime;
 use std::time::Duration;
 
-/// How components that fail are restarted.
+/// How failed components are restarted.
 ///
 /// A fault (`Err`) restarts its component alone, for as long as the robot runs. A panic does too, and counts against the
 /// budget of the component's supervisor.
@@ -21,8 +21,7 @@ pub struct Supervision {
     pub longest_backoff: Duration,
 }
 
-/// The shortest wait, so that time goes on between: on virtual time, a component that fails again and again would keep it from
-/// doing so.
+/// The shortest wait. On virtual time, a component that fails again and again without it would stop the time from advancing.
 const SHORTEST: Duration = Duration::from_micros(100);
 
 impl Default for Supervision {
@@ -52,9 +51,9 @@ pub(super) struct Failures {
 }
 
 impl Failures {
-    /// Counts a failure; when the component is to be restarted.
+    /// Counts a failure; returns when to restart the component.
     pub(super) fn add(&mut self, now: MonotonicTime, supervision: &Supervision) -> MonotonicTime {
-        // After so long without a failure the next one is the first again.
+        // After that long without a failure, the next one counts as the first.
         if now.duration_since(self.last) > supervision.within {
             self.count = 0;
         }

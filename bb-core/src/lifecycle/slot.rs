@@ -1,4 +1,4 @@
-//! Where one component lives, and what becomes of it.
+//! The slot of one component, with its lifecycle.
 
 use super::backoff::{Failures, Supervision};
 use super::{Component, backoff};
@@ -7,7 +7,7 @@ use crate::declaration::ParameterValues;
 use crate::fault::{Failed, Fault, Then, caught, retire};
 use crate::time::MonotonicTime;
 
-/// What a component is made of, at the start and at every restart.
+/// The options and the context from which a component is made, at the start and at every restart.
 pub(crate) struct Recipe<O> {
     /// An error if they could not be copied, which keeps the robot from starting.
     options: Result<O, String>,
@@ -39,18 +39,18 @@ enum State<C> {
     /// Not made yet, or retired.
     Vacant,
     Running(C),
-    /// It has failed and is restarted then.
+    /// It has failed, and is restarted at that time.
     Waiting(MonotonicTime),
-    /// It stays as it is.
+    /// It stays stopped.
     Stopped,
 }
 
-/// What follows from a fault.
+/// The consequence of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AfterFault {
-    /// A restart, then.
+    /// A restart at that time.
     RestartAt(MonotonicTime),
-    /// Nothing: it stays stopped.
+    /// None: it stays stopped.
     Stopped,
 }
 
@@ -80,17 +80,17 @@ impl<C: Component> Slot<C> {
         }
     }
 
-    /// Makes it; what was there is retired first. After an error it is vacant, and the caller decides between
-    /// [`Self::fail`] and a robot that does not start.
+    /// Makes it, after retiring the previous one. After an error it is vacant, and the caller either calls [`Self::fail`] or
+    /// prevents the robot from starting.
     pub(crate) fn make(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<(), Failed> {
-        // What goes wrong while the previous one closes has no bearing on the next one.
+        // An error of the previous one while it closes does not concern the next one.
         let _ = self.retire();
         let made = caught(|| C::make(self.recipe.bound(parameters)?, context))?;
         self.state = State::Running(made);
         Ok(())
     }
 
-    /// Hands new options to it. `Ok(false)`: it must be restarted with them.
+    /// Passes new options to it. `Ok(false)`: it must be restarted with them.
     pub(crate) fn change(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<bool, Failed> {
         let State::Running(component) = &mut self.state else { return Ok(true) };
         let changed = caught(|| component.change(self.recipe.bound(parameters)?, context));
@@ -105,7 +105,7 @@ impl<C: Component> Slot<C> {
     pub(crate) fn fail(&mut self, failed: &Failed, now: MonotonicTime) -> AfterFault {
         let previous = std::mem::replace(&mut self.state, State::Stopped);
         if let State::Running(component) = previous {
-            // The fault is known; what goes wrong from here on follows from it.
+            // The fault is known; later errors follow from it.
             let _ = retire(component, failed.panicked, C::close);
         }
         match failed.fault.then {
@@ -140,7 +140,7 @@ impl<C: Component> Slot<C> {
         self.state = State::Stopped;
     }
 
-    /// Closes and drops it; what went wrong.
+    /// Closes and drops it; returns what went wrong.
     pub(crate) fn retire(&mut self) -> Option<Fault> {
         match std::mem::replace(&mut self.state, State::Vacant) {
             State::Running(component) => retire(component, false, C::close),
@@ -150,7 +150,7 @@ impl<C: Component> Slot<C> {
 }
 
 impl<C: Component> Drop for Slot<C> {
-    /// Of a robot that did not start.
+    /// For a robot that did not start.
     fn drop(&mut self) {
         let _ = self.retire();
     }

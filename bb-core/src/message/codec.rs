@@ -2,22 +2,22 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | what a field of a payload must be able to do | [`Field`]; `#[derive(Payload)]` writes it for structs and enums |
+//! | what a field of a payload implements | [`Field`]; `#[derive(Payload)]` implements it for structs and enums |
 //! | plain CDR, little endian, as ROS 2 writes it | [`Writer`], [`Reader`] |
-//! | what the bytes mean | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
+//! | the layout of the bytes | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
 //! | the hash by which ROS 2 tells types apart | [`type_hash`] |
 //! | a message in the layout that ROS has for it | [`RosMessage`] |
 //! | a value to JSON and back, and the JSON Schema of a type | [`to_json`], [`from_json`], [`json_schema`] |
 //!
-//! A message has an *exact* layout, [`Stamped`](crate::Stamped) with all it holds, and may have the layout of a ROS
-//! message beside, which viewers know and in which some values cannot be told apart.
+//! A message has an *exact* layout, that of [`Stamped`](crate::Stamped) with all its fields. It may also have the layout of a
+//! ROS message, which viewers know, and which does not keep every value apart.
 //!
 //! Reading takes bytes from anywhere: it never panics, allocates no more than the bytes at hand justify, and names the
 //! field that is wrong.
 //!
-//! Why not a crate for CDR: those that there are go through serde, which knows the values of a type but not its shape, so
-//! that a definition for other programs would have to be written a second time and could differ; every payload and all that
-//! it holds would have to implement serde's traits; and none promises what the paragraph above does.
+//! Why not an existing crate for CDR: they use serde, which knows the values of a type but not its shape, so that definitions
+//! for other programs would be written a second time and could differ; every payload and all its fields would have to
+//! implement serde's traits; and none guarantees the paragraph above.
 
 mod algebra;
 mod collections;

@@ -1,4 +1,4 @@
-//! A payload with what every message carries beside it.
+//! A payload with its time, frame and origin.
 
 use super::Payload;
 use crate::time::{MonotonicTime, WallTime};
@@ -10,7 +10,7 @@ use std::ops::Deref;
 pub struct Frame(&'static str);
 
 impl Frame {
-    /// The frame of no link: that of robot-level sensors.
+    /// No frame: for sensors of the robot as a whole.
     pub const NONE: Self = Self("");
 
     /// The frame `name`.
@@ -42,9 +42,9 @@ pub struct Origin {
 /// All of a message but its payload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stamp {
-    /// When it was measured: for order and age.
+    /// When it was measured, on the monotonic clock: for order and age.
     pub monotonic_time: MonotonicTime,
-    /// When it was measured: for logs.
+    /// When it was measured, by the calendar: for logs.
     pub wall_time: WallTime,
     /// The frame the payload is in.
     pub frame: Frame,
@@ -99,10 +99,10 @@ impl<T> Deref for Stamped<T> {
     }
 }
 
-/// That a publisher of `Self` may feed an input that takes `T`: it may if they are the same, or if one of them is not
-/// known since another mistake hides it.
+/// Whether a publisher of `Self` may feed an input of type `T`. It may if the types are equal, or if one of them is unknown
+/// because of another mistake.
 ///
-/// The wiring calls it at every `input`, so that a mismatch is reported there.
+/// The wiring calls it at every `input`, where a mismatch is reported.
 #[diagnostic::on_unimplemented(
     message = "this publishes `{Self}`, but the estimator's input takes `{T}`",
     label = "publishes `{Self}`, not `{T}`"

@@ -1,4 +1,4 @@
-//! Which messages of an input are let in.
+//! Which messages of an input are accepted.
 
 use super::DropReason;
 use crate::Payload;
@@ -20,7 +20,7 @@ impl Admission {
         Self { last: vec![never; inputs].into() }
     }
 
-    /// Lets `message`, which arrived at `now`, in, or says why not. Equal times are in order.
+    /// Accepts `message`, which arrived at `now`, or returns why not. Equal times are in order.
     #[inline]
     pub(super) fn admit<T: Payload>(
         &mut self,

@@ -1,11 +1,11 @@
-//! What waits for an estimator that is being restarted.
+//! Messages that wait for an estimator to be restarted.
 
 use std::collections::VecDeque;
 
 /// Deliveries in the order in which they came, each with the number of the input that it is for.
 pub(super) struct Backlog<D>(VecDeque<(usize, D)>);
 
-/// As many as an inbox holds.
+/// The capacity of an inbox.
 const CAPACITY: usize = 1024;
 
 impl<D> Backlog<D> {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(crate) struct Count(AtomicU64);
 
 impl Count {
-    /// The new count.
+    /// Adds one; returns the new count.
     #[inline]
     pub(crate) fn increment(&self) -> u64 {
         let count = self.0.load(Ordering::Relaxed).wrapping_add(1);

@@ -19,13 +19,13 @@ pub enum DropReason {
     NonFinite,
     /// The message's stamp was more than a second ahead of the clock.
     ClockSkew,
-    /// The estimator does not run: it has stopped, or it waits for its restart and more came than can wait.
+    /// The estimator does not run: it has stopped, or it waits for its restart and its backlog is full.
     Stopped,
     /// The estimator was busy, and its inbox full.
     Overflow,
 }
 
-/// Where no budget is declared, every so many callbacks are measured.
+/// Without a declared budget, one of this many callbacks is measured.
 pub(super) const SAMPLED: u64 = 64;
 
 const REASONS: usize = DropReason::ALL.len();
@@ -35,7 +35,7 @@ impl DropReason {
     pub const ALL: &'static [Self] =
         &[Self::SyncMiss, Self::OutOfOrder, Self::NonFinite, Self::ClockSkew, Self::Stopped, Self::Overflow];
 
-    /// As people read it.
+    /// Its name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::SyncMiss => "sync miss",
@@ -70,6 +70,8 @@ pub(crate) struct Counters {
     /// How long callbacks took, in nanoseconds: all where a latency budget is declared, else every 64th run.
     pub(super) latency: Latency,
     pub(super) last_divergence: Mutex<Option<&'static str>>,
+    /// See [`Self::set_last_drop`]; 0 if nothing was dropped.
+    last_drop: AtomicU64,
 }
 
 impl Counters {
@@ -85,13 +87,33 @@ impl Counters {
     pub(super) fn drop(&self, input: usize, reason: DropReason) {
         if let Some(counters) = self.inputs.get(input) {
             counters.dropped[reason as usize].increment();
+            self.set_last_drop(input, reason);
         }
+    }
+
+    /// Stores a drop with the number of runs before it: runs, input and reason in one word, from the upper half.
+    fn set_last_drop(&self, input: usize, reason: DropReason) {
+        let runs = self.dispatched.get() << 32;
+        let drop = (input as u64) << 8 | (reason as u64 + 1);
+        self.last_drop.store(runs | drop & u64::from(u32::MAX), Ordering::Relaxed);
+    }
+
+    /// The input and the reason of the last drop, unless the estimator has run since.
+    pub(super) fn last_drop(&self, declaration: &EstimatorDeclaration) -> Option<(&'static str, DropReason)> {
+        let drop = self.last_drop.load(Ordering::Relaxed);
+        if drop >> 32 != self.dispatched.get() & u64::from(u32::MAX) {
+            return None;
+        }
+        let reason = DropReason::ALL.get((drop as u8 as usize).checked_sub(1)?)?;
+        let input = declaration.inputs.get((drop as u32 >> 8) as usize)?;
+        Some((input.name, *reason))
     }
 
     /// Counts a message that did not fit in an inbox; on any thread.
     pub(super) fn overflow(&self, input: usize) {
         if let Some(counters) = self.inputs.get(input) {
             counters.overflowed.fetch_add(1, Ordering::Relaxed);
+            self.set_last_drop(input, DropReason::Overflow);
         }
     }
 
@@ -125,6 +147,7 @@ impl Counters {
             health,
             latency: self.latency.statistics(),
             last_divergence: *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner),
+            last_drop: self.last_drop(declaration),
             stopped,
         }
     }
@@ -152,8 +175,11 @@ pub struct EstimatorStatistics {
     pub health: HealthState,
     /// How long its callbacks took: all where a `latency_budget` is declared, else every 64th run.
     pub latency: LatencyStatistics,
-    /// What it said the last time.
+    /// The reason of its last divergence.
     pub last_divergence: Option<&'static str>,
+    /// The input and the reason of the last message or run that was dropped, if it has not run since. When an estimator is lost
+    /// although its driver publishes, this says why.
+    pub last_drop: Option<(&'static str, DropReason)>,
     /// Why it does not run, if it does not.
     pub stopped: Option<String>,
 }
@@ -166,7 +192,7 @@ pub struct InputStatistics {
     pub name: &'static str,
     /// The path of its publisher.
     pub source: &'static str,
-    /// Messages that arrived, the dropped ones included.
+    /// Messages that arrived, including dropped ones.
     pub received: u64,
     /// How old the driver's messages were, from their stamp to the return of the callback that they led to; measured as
     /// [`EstimatorStatistics::latency`] is.

@@ -1,5 +1,5 @@
-//! Whose output's code panicked: that of a payload is run by whoever hands it on (its `clone` for a subscriber, say), far from
-//! the estimator that emitted it.
+//! Attributes panics in the code of a payload to the estimator that emitted it: that code (`clone` for a subscriber, say) runs
+//! wherever the message is passed on.
 
 use super::Environment;
 use super::shared::SharedNode;
@@ -12,7 +12,7 @@ thread_local! {
     static CULPRIT: Cell<Option<usize>> = const { Cell::new(None) };
 }
 
-/// What an estimator has emitted is handed on as long as this lives. Nothing is done unless that panics.
+/// A guard while an estimator's output is passed on. It does nothing unless that panics.
 pub(crate) struct Emitting(usize);
 
 impl Emitting {
@@ -28,7 +28,7 @@ impl Emitting {
 }
 
 impl Drop for Emitting {
-    /// Of a panic: the innermost emission is the one whose code it was.
+    /// The innermost emission is the one whose code panicked.
     #[cold]
     fn drop(&mut self) {
         if CULPRIT.get().is_none() {
@@ -37,8 +37,8 @@ impl Drop for Emitting {
     }
 }
 
-/// Runs what hands on messages. A panic in the code of an estimator's output is that estimator's, and is reported as such; any
-/// other failure is returned.
+/// Runs code that passes messages on. A panic in the code of an estimator's output is reported as that estimator's; any other
+/// failure is returned.
 pub(crate) fn contained(environment: &Environment, run: impl FnOnce()) -> Result<(), Failed> {
     let done = caught(|| {
         run();
@@ -47,7 +47,7 @@ pub(crate) fn contained(environment: &Environment, run: impl FnOnce()) -> Result
     done.or_else(|failed| blame(environment, failed))
 }
 
-/// The same for a caller outside, who gets any other panic.
+/// The same for a caller outside; any other panic is resumed.
 pub(crate) fn contained_outside(environment: &Environment, run: impl FnOnce()) {
     let Err(panic) = catch_unwind(AssertUnwindSafe(run)) else { return };
     match take_culprit(environment) {
@@ -56,7 +56,7 @@ pub(crate) fn contained_outside(environment: &Environment, run: impl FnOnce()) {
     }
 }
 
-/// What was caught where messages are handed on: reported if it was an estimator's output, else returned.
+/// Reports a failure that was caught while messages were passed on, if it was an estimator's output, or returns it.
 #[cold]
 pub(crate) fn blame(environment: &Environment, failed: Failed) -> Result<(), Failed> {
     match take_culprit(environment).filter(|_| failed.panicked) {
@@ -87,7 +87,7 @@ fn take_culprit(environment: &Environment) -> Option<usize> {
 /// The estimator fails, in the order of all that reaches it.
 fn report(environment: &Environment, estimator: usize, fault: &Fault) {
     environment.overseer().output_failed(estimator, format!("its output {fault}"));
-    // Islands that were left in haste have not looked at their inboxes.
+    // Islands that were left by the unwinding have not looked at their inboxes.
     let mut islands: Vec<_> = environment.nodes().iter().map(|node| node.declaration().island).collect();
     islands.dedup();
     islands.into_iter().for_each(|island| environment.schedule_drain(island));

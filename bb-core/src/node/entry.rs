@@ -9,7 +9,7 @@ use std::fmt;
 
 /// An entry for one estimator of an island.
 pub enum NodeEntry {
-    /// It starts: what it asked for in `init` counts from now.
+    /// It starts: timers that it asked for in `init` run from now.
     Start,
     /// New values of parameters.
     Options(ParameterValues),
@@ -28,7 +28,7 @@ pub enum NodeEntry {
     Cast {
         /// The request.
         request: Request,
-        /// Handles it; none if a journal that does not hold the request is replayed.
+        /// Handles it. `None` in a replay of a journal that does not contain the request.
         handle: Option<Box<dyn Any + Send>>,
     },
     /// The code of one of its outputs has panicked where that was handed on.
@@ -89,6 +89,6 @@ pub(crate) enum Report {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HealthReport {
     pub(crate) transition: HealthTransition,
-    /// How often the estimator knew itself to be lost: a report made before it learnt of its last loss is out of date.
+    /// How many losses the estimator knew of. A report from before its last loss is out of date.
     pub(crate) epoch: u32,
 }

@@ -22,28 +22,28 @@ use std::time::Instant;
 /// The robot as its estimators see it: the control state takes note of what they report, without waiting for anything.
 pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
-    /// The code of an output of that estimator has panicked where it was handed on: an entry for it.
+    /// Code of an output of that estimator has panicked while the output was passed on: the estimator gets an entry.
     fn output_failed(&self, estimator: usize, message: String);
-    /// Takes note that the options of the component at `path` are bound to these parameters. `estimator` is told of new
-    /// values by entries, others by what they registered.
+    /// Registers that the options of the component at `path` are bound to these parameters. An estimator gets new values as
+    /// entries, other components through their inbox.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
     fn parameters(&self) -> ParameterValues;
-    /// Runs `make`, which makes the component at `path`, or changes its options. The disarm callbacks that it registers replace
-    /// those from before.
+    /// Runs `make`, which creates the component at `path`, or changes its options. The disarm callbacks that it registers
+    /// replace earlier ones.
     fn replacing_hooks(
         &self,
         path: &'static str,
         is_made: bool,
         make: &mut dyn FnMut() -> Result<(), Failed>,
     ) -> Result<(), Failed>;
-    /// The component at `path` was left out: it guards nothing.
+    /// The component at `path` was left out: it has no disarm callbacks.
     fn forget_hooks(&self, path: &'static str);
 }
 
 /// Whether options would be valid with these parameters.
 pub(crate) type Check = Box<dyn Fn(&ParameterValues) -> Result<(), String> + Send + Sync>;
 
-/// Who is told of new values.
+/// The receiver of new values.
 pub(crate) enum BindTarget {
     /// An estimator, by its number.
     Estimator(usize),
@@ -99,13 +99,13 @@ struct Inner {
     /// Islands with entries that wait, on virtual time.
     posted: Mutex<VecDeque<usize>>,
     refusal: Mutex<Option<Refusal>>,
-    /// Facts of the components that are part of the journal's beginning.
+    /// Facts about the components for the header of the journal.
     facts: Mutex<Vec<String>>,
-    /// Facts of the declaration.
+    /// Facts about the declaration.
     declared_facts: Mutex<Vec<String>>,
-    /// The line of the journal that is replayed.
+    /// The line of the journal that is being replayed.
     replayed_line: AtomicU64,
-    /// What islands have emitted in a replay, to be compared with the journal.
+    /// Outputs of the islands in a replay, to be compared with the journal.
     replayed: ReplayedOutputs,
     /// Islands whose estimators have stopped.
     retired: (Mutex<usize>, Condvar),
@@ -120,7 +120,7 @@ impl ReplayedOutputs {
         lock(&self.0).entry(island).or_default().push_back((publisher, checksum));
     }
 
-    /// Takes the first output of an island that was not compared yet.
+    /// Takes the first output of an island that has not been compared yet.
     pub(crate) fn take(&self, island: usize) -> Option<(usize, u64)> {
         lock(&self.0).get_mut(&island)?.pop_front()
     }
@@ -179,8 +179,8 @@ impl Environment {
         }))
     }
 
-    /// Makes a component of a robot that starts, unless another one could not start; if it cannot start either, that is kept.
-    /// The error says why it does not run, and whether it was left out.
+    /// Makes a component of a robot that starts, unless another one has failed to start. A failure is stored. The error says
+    /// why the component does not run, and whether it was left out.
     pub(crate) fn make<C>(
         &self,
         path: &'static str,
@@ -202,7 +202,7 @@ impl Environment {
         })
     }
 
-    /// Keeps the robot from starting, unless another component does so already.
+    /// Stores why the robot cannot start, unless another component has done so.
     pub(crate) fn refuse(&self, path: &'static str, fault: Fault) {
         lock(&self.0.refusal).get_or_insert(Refusal { path, fault });
     }
@@ -212,8 +212,8 @@ impl Environment {
         lock(&self.0.refusal).take()
     }
 
-    /// Has `target` told when a parameter has changed that these options are bound to. A value with which they would not be
-    /// valid is refused.
+    /// Notifies `target` of changes of the parameters that these options are bound to. A value that would make the options
+    /// invalid is refused.
     pub(crate) fn bind<O: Options>(
         &self,
         path: &'static str,
@@ -231,7 +231,7 @@ impl Environment {
         }
     }
 
-    /// Adds a fact to the journal's beginning.
+    /// Adds a fact to the header of the journal.
     pub(crate) fn add_fact(&self, fact: String) {
         lock(&self.0.facts).push(fact);
     }
@@ -245,7 +245,7 @@ impl Environment {
         lock(&self.0.facts).clone()
     }
 
-    /// All facts, as a journal begins with them.
+    /// All facts, for the header of a journal.
     pub(crate) fn all_facts(&self) -> Vec<String> {
         lock(&self.0.declared_facts).iter().chain(&*lock(&self.0.facts)).cloned().collect()
     }
@@ -256,7 +256,7 @@ impl Environment {
         let _ = self.0.drain.set(Box::new(drain));
     }
 
-    /// Has an island with a new entry drained: by the pool, or by the loop of a simulation.
+    /// Schedules an island with a new entry to be drained, by the pool or by the loop of a simulation.
     pub(crate) fn schedule_drain(&self, island: usize) {
         match self.0.mode {
             Mode::Real => {
@@ -291,7 +291,7 @@ impl Environment {
         self.0.retired.1.notify_all();
     }
 
-    /// Waits until the estimators of so many islands have stopped, or until `deadline`.
+    /// Waits until the estimators of `count` islands have stopped, or until `deadline`.
     pub(crate) fn wait_for_retired(&self, islands: usize, deadline: Instant) {
         let mut retired = lock(&self.0.retired.0);
         while *retired < islands {
@@ -368,7 +368,7 @@ impl Environment {
         self.0.telemetry.as_ref()
     }
 
-    /// Whether anything follows single messages: a journal, a handler of telemetry, or a replay that compares.
+    /// Whether individual messages are observed: by a journal, a handler of telemetry, or the comparison of a replay.
     #[inline]
     pub(crate) fn is_observed(&self) -> bool {
         self.0.journal.is_some() || self.0.telemetry.is_some() || self.0.mode == Mode::Replay
@@ -382,7 +382,7 @@ impl Environment {
         self.0.replayed_line.store(line, Ordering::Relaxed);
     }
 
-    /// Hands what a sensor or a service publishes to its subscribers, and writes it into the journal, if there is one; the
+    /// Passes a message of a sensor or a service to its subscribers, and writes it to the journal, if there is one. Returns the
     /// number of the line, or 0.
     #[inline]
     pub fn publish<T: Payload>(

@@ -8,12 +8,12 @@
 //! | healthy, degraded | no run completed on a message of the driver for `lost_after` | lost | lost | `on_lost` |
 //! | lost | first run completed on a message of the driver | degraded, that completion counts if good | recovered | none |
 //!
-//! Whether an estimator is lost is decided by the watchdog, which waits for no user code. It tells the estimator by an entry
-//! of its island; a run that was completed in between is then the first one after the loss.
+//! The watchdog, which waits for no user code, decides whether an estimator is lost. It tells the estimator by an entry of its
+//! island; a run completed before the estimator takes that entry is the first one after the loss.
 
 use crate::event::{HealthReason, HealthState};
 
-/// What happens to an estimator, as far as its health is concerned.
+/// An event that concerns an estimator's health.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Event {
     /// A run in budget, synchronous and not diverged.

@@ -1,18 +1,18 @@
-//! Estimators that always run together, with one ordered entry.
+//! Estimators that always run together, with one ordered queue in front of them.
 //!
 //! Which estimators a message reaches is known at compile time, so `robot!` cuts the dataflow into islands: an estimator
 //! that is fed by one sensor alone, directly or through others, belongs to that sensor's island; one that several sensors
 //! feed, or that is declared `runs_on: worker`, begins an island of its own. Inside an island a message goes from estimator
 //! to estimator by plain calls on plain fields, without a lock, an atomic or a queue.
 //!
-//! Everything that reaches an island enters here: messages, and timers, options, requests, restarts, losses and the end. A
+//! Everything that reaches an island enters here: messages, timers, options, requests, restarts, losses and the stop. A
 //! publisher that finds the island free and nothing waiting runs everything downstream; otherwise the entry waits in the
 //! inbox, for the thread that holds the island to process before it leaves. So there is a single writer, and every entry has
 //! its place in one order.
 //!
 //! No thread blocks on the island's own lock: it is only ever tried. Threads that need an island which is held (a caller that
-//! waits for an answer, a publisher that waits for room) wait on a condition with a limit, so that an estimator that hangs
-//! keeps nobody waiting for ever.
+//! waits for an answer, a publisher that waits for room) wait on a condition variable with a timeout, so that an estimator that
+//! hangs blocks no other thread forever.
 
 mod any;
 mod inbox;
@@ -55,8 +55,8 @@ pub trait IslandWiring {
     fn environment(&self) -> &Environment;
 }
 
-/// What `robot!` implements for each island. That all may go to other threads is asked of the whole wiring: of each it
-/// would be proven again wherever the island is named.
+/// What `robot!` implements for each island. `Send` is required of the whole wiring; as a bound here it would be proven again
+/// wherever an island is named.
 pub trait IslandState: Sized {
     /// The robot's wiring.
     type Wiring: IslandWiring;
@@ -108,34 +108,34 @@ pub trait IslandState: Sized {
     }
 }
 
-/// How long a publisher waits for room in a full inbox before it takes the holder to hang.
+/// How long a publisher waits for room in a full inbox before it concludes that the holder hangs.
 const LONGEST_WAIT: Duration = Duration::from_millis(500);
 
 /// How long a caller waits for an island.
 const LONGEST_CALL: Duration = Duration::from_secs(5);
 
-/// Of what is no part of the model.
+/// For what is not part of the model.
 const RELAXED: std::sync::atomic::Ordering = std::sync::atomic::Ordering::Relaxed;
 
 /// An island and the inbox in front of it.
 pub struct Island<S: IslandState> {
     state: Mutex<S>,
     inbox: Mutex<Inbox<Keyed<S::Message>>>,
-    /// What the inbox holds: the one word that the holder looks at before it leaves.
+    /// The contents of the inbox as one word, which the holder checks before it leaves.
     pending: AtomicUsize,
     /// Callers that wait for the island, and publishers that wait for room in its inbox.
     waiting: AtomicUsize,
-    /// A publisher has waited for room in vain: the holder hangs, until it takes the next entry.
+    /// A publisher has waited for room in vain. The holder is considered hung until it takes the next entry.
     hangs: AtomicBool,
-    /// Tells the worker that an entry has come.
+    /// Signals the worker that an entry has been added.
     arrived: Condvar,
-    /// Tells those who wait that an entry was taken, or that the island is free.
+    /// Signals waiting threads that an entry was taken, or that the island is free.
     moved: Condvar,
     /// Whether a worker serves it.
     served: AtomicBool,
     /// Whether a journal says when its entries are processed.
     replayed: AtomicBool,
-    /// Entries processed, for the report of an island that hangs.
+    /// Number of entries processed, for the report of an island that hangs.
     turns: AtomicU64,
     /// The estimator whose callback ran last.
     running: AtomicU32,
@@ -145,8 +145,7 @@ pub struct Island<S: IslandState> {
     has_retired: AtomicBool,
 }
 
-/// What a message is known by: which of the island's publishers it is from, and the number of its line in the journal, if
-/// there is one.
+/// The key of a message: its publisher, and the number of its line in the journal, if there is one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key {
     /// The publisher, as the island numbers them.
@@ -235,7 +234,7 @@ impl<S: IslandState> Island<S> {
         self.process_line(wiring, now, Some((line, wall_offset_nanos)), run)
     }
 
-    /// The same for an entry whose line was written already, by a writer who saw that offset of the wall clock.
+    /// The same for an entry whose line has been written already, with that offset of the wall clock.
     #[inline]
     fn process_line<T>(
         &self,
@@ -263,11 +262,11 @@ impl<S: IslandState> Island<S> {
         result
     }
 
-    /// Leaves a message in the inbox and makes sure that a thread processes it.
+    /// Puts a message into the inbox and makes sure that a thread processes it.
     #[cold]
     fn enqueue(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
         let mut inbox = self.inbox();
-        // Room is made once, at the first message that has to wait.
+        // Allocated once, at the first message that has to wait.
         inbox.reserve(S::CAPACITY);
         if self.replayed.load(Ordering::Relaxed) {
             return inbox.push(now, message);
@@ -277,7 +276,7 @@ impl<S: IslandState> Island<S> {
             let may_have_room = self.wait_for_room(wiring);
             self.attend(wiring);
             inbox = self.inbox();
-            // Otherwise another publisher may have taken the room that there was.
+            // Otherwise another publisher may have taken the last place.
             if !may_have_room {
                 break;
             }
@@ -312,15 +311,15 @@ impl<S: IslandState> Island<S> {
         if !in_time {
             self.hangs.store(true, Ordering::Relaxed);
         }
-        // Before this thread attends to the inbox: see `drain`.
+        // Before this thread looks at the inbox: see `drain`.
         self.waiting.fetch_sub(1, Ordering::SeqCst);
         in_time
     }
 
-    /// Waits until `holds`, `longest` at most; whether it does.
+    /// Waits until `holds`, at most for `longest`; returns whether it holds.
     #[cfg(not(loom))]
     fn wait(&self, longest: Duration, holds: impl Fn() -> bool) -> bool {
-        // How long a change may go unnoticed that nobody could tell of, since it came before this thread began to wait.
+        // A change just before this thread began to wait is not signalled: this bounds how long it goes unnoticed.
         const STEP: Duration = Duration::from_millis(1);
         let start = std::time::Instant::now();
         loop {
@@ -335,7 +334,7 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// A model has no time: others go on once.
+    /// A model has no time: other threads go on once.
     #[cfg(loom)]
     fn wait(&self, _: Duration, holds: impl Fn() -> bool) -> bool {
         loom::thread::yield_now();
@@ -359,8 +358,8 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// After an entry was added: the worker is told, or the island is drained here unless another thread holds it. That one
-    /// looks at the inbox after it has let go; the fences make sure that one of the two sees the other.
+    /// After an entry was added: signals the worker, or drains the island here unless another thread holds it. That thread
+    /// looks at the inbox after it has released the island; the fences make sure that one of the two sees the other.
     fn attend(&self, wiring: &S::Wiring) {
         fence(Ordering::SeqCst);
         if self.served.load(Ordering::Relaxed) {
@@ -372,7 +371,7 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// Lets go, and processes what has come into the inbox meanwhile.
+    /// Releases the island, and processes what has been added to the inbox since.
     #[inline]
     fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
         drop(state);
@@ -382,8 +381,8 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// Once it has processed as much as an inbox holds, this thread lets those who wait go on in its place: they attend to
-    /// the inbox after they have ceased to wait, and the fences make sure that one of the two sees the other.
+    /// Once it has processed as much as an inbox holds, this thread leaves the rest to the threads that wait: they look at the
+    /// inbox after their wait, and the fences make sure that one of the two sees the other.
     #[cold]
     fn drain(&self, wiring: &S::Wiring) {
         if self.replayed.load(Ordering::Relaxed) {
@@ -417,14 +416,14 @@ impl<S: IslandState> Island<S> {
         processed >= S::CAPACITY && self.waiting.load(Ordering::Relaxed) != 0
     }
 
-    /// Takes the next entry and processes it; false if there is none.
+    /// Takes the next entry and processes it; returns false if the inbox is empty.
     fn process_next(&self, state: &mut S, wiring: &S::Wiring) -> bool {
         let environment = wiring.environment();
         let mut inbox = self.inbox();
         let Some(taken) = inbox.take() else { return false };
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         self.hangs.store(false, Ordering::Relaxed);
-        // Under the inbox's lock, so that the line of a message which is dropped meanwhile follows.
+        // Under the inbox's lock, so that the line of a message dropped at the same time comes after it.
         let (now, line) = match &taken {
             Taken::Retire(now) => (*now, Event::Retire { island: S::DECLARATION.number }),
             Taken::Entry(now, entry) => (*now, line_of::<S>(entry)),
@@ -447,7 +446,7 @@ impl<S: IslandState> Island<S> {
             Taken::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
         });
         if retires {
-            // What still waits is counted, and in the journal, before the last report is made.
+            // Count and journal what still waits before the last report.
             let mut processed = 0;
             while processed < S::CAPACITY && self.process_next(state, wiring) {
                 processed += 1;
@@ -458,10 +457,10 @@ impl<S: IslandState> Island<S> {
         true
     }
 
-    /// Calls `call` once the island is free and what waited before has been processed, then processes what has come
-    /// meanwhile.
+    /// Calls `call` once the island is free and all earlier entries have been processed, then processes what has been added
+    /// since.
     ///
-    /// `line` is written before, in a journal.
+    /// With a journal, `line` is written first.
     pub(crate) fn call<T>(
         &self,
         wiring: &S::Wiring,

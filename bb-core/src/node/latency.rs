@@ -1,7 +1,7 @@
 //! How long callbacks take, as a histogram that can be read while it is written.
 //!
-//! Buckets of an eighth of a power of two: a quantile is right within 12.5 %. A count is a load and a store, since
-//! the thread that holds the estimator is the only writer; ready-made histograms need a lock for that.
+//! Buckets of an eighth of a power of two: a quantile is accurate within 12.5 %. Counting is a load and a store, since
+//! the thread that holds the estimator is the only writer; existing crates of histograms need a lock for that.
 
 use super::count::Count;
 use std::fmt;
@@ -80,17 +80,17 @@ fn upper_end(bucket: usize) -> u64 {
     ((PARTS + part + 1) as u64) << (power - 3)
 }
 
-/// How long callbacks took. Quantiles are right within an eighth.
+/// How long callbacks took. Quantiles are accurate within an eighth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct LatencyStatistics {
     /// How many were measured.
     pub count: u64,
-    /// Half of them took longer.
+    /// The median.
     pub median: Duration,
-    /// One of a hundred took longer.
+    /// The 99th percentile.
     pub p99: Duration,
-    /// One of a thousand took longer.
+    /// The 99.9th percentile.
     pub p999: Duration,
     /// The longest.
     pub longest: Duration,

@@ -6,7 +6,7 @@ use crate::journal::RequestKind;
 use std::any::{Any, TypeId, type_name};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A one-way request, as it waits.
+/// A one-way request that waits.
 pub(crate) type Cast<E> = Box<dyn FnOnce(&mut E) -> Result<Reply<<E as Estimator>::Output>, Fault> + Send>;
 
 /// Handles a request from its bytes, as a journal holds it.
@@ -27,10 +27,10 @@ impl Known {
     }
 }
 
-/// The requests that this process has seen or was told of: a replay needs them by name.
+/// The types of requests that this process has seen or registered; a replay looks them up by name.
 static KNOWN: Mutex<Vec<Known>> = Mutex::new(Vec::new());
 
-/// From now on a replay can make calls of type `Q` again.
+/// Registers calls of type `Q` for replays.
 pub(crate) fn know_calls<E: HandleCall<Q>, Q>() {
     if E::RECORD.is_some() {
         know::<E>(RequestKind::Call, type_name::<Q>(), |estimator, bytes| {
@@ -40,7 +40,7 @@ pub(crate) fn know_calls<E: HandleCall<Q>, Q>() {
     }
 }
 
-/// From now on a replay can make one-way requests of type `Q` again.
+/// Registers one-way requests of type `Q` for replays.
 pub(crate) fn know_casts<E: HandleCast<Q>, Q>() {
     if E::RECORD.is_some() {
         know::<E>(RequestKind::Cast, type_name::<Q>(), |estimator, bytes| {

@@ -1,4 +1,4 @@
-//! One running estimator: what comes in, what goes out, and what becomes of it when it fails.
+//! One running estimator: its inputs, its outputs, and what happens when it fails.
 
 mod recovery;
 mod requests;
@@ -35,26 +35,26 @@ pub struct Node<E: Estimator> {
     admission: Admission,
     backlog: Backlog<Deliver<E>>,
     health: Health,
-    /// How often it was lost, as far as it knows.
+    /// How many losses it knows of.
     epoch: u32,
     /// Whether its last run was good.
     was_good: bool,
     timers: Timers,
-    /// When its island is woken for it, or before.
+    /// When its island is woken for it, at the latest.
     scheduled: Option<MonotonicTime>,
-    /// How often in a row it has gone on with its work.
+    /// How often in a row it has continued its work.
     continued: u32,
-    /// What it asked for in its first `init`, until it starts.
+    /// The requests of its first `init`, until it starts.
     requested: Vec<Request>,
-    /// The values of parameters as it was last told.
+    /// The values of parameters that it got last.
     parameters: ParameterValues,
 }
 
-/// Hands a message that was kept to its estimator; the stamp of what it emitted, if anything.
+/// Delivers a stored message to its estimator; returns the stamp of what it emitted, if anything.
 type Deliver<E> =
     Box<dyn FnOnce(&mut Node<E>, &Turn<'_>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + Send>;
 
-/// How often in a row it may go on with its work before it is taken to be stuck.
+/// How often in a row it may continue its work before it is considered stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
 /// What became of a message.
@@ -65,8 +65,8 @@ enum Handled {
     Ran,
 }
 
-/// Where the parts of a reply go, one by one. To hand a reply on as a whole, from one result into the next, costs more than
-/// all else that a hop does.
+/// Where the parts of a reply go, one by one. Moving a reply as a whole from one result into the next costs more than all the
+/// rest of a hop.
 struct Taken<'a, O> {
     emitted: &'a mut Option<O>,
     timers: &'a mut Timers,
@@ -94,14 +94,14 @@ impl<'a, O> Taken<'a, O> {
     }
 }
 
-/// What [`Node::turn`] has done.
+/// The result of [`Node::turn`].
 #[derive(Debug)]
 pub enum Next {
     /// Nothing is due.
     Idle,
-    /// Something was, and emitted nothing.
+    /// Something was due, and emitted nothing.
     Quiet,
-    /// Something was, and emitted.
+    /// Something was due, and emitted.
     Emitted(Stamp),
 }
 
@@ -147,8 +147,8 @@ impl<E: Estimator> Node<E> {
         node
     }
 
-    /// Takes a message of the declared input number `input`, which is the algorithm's field `F`. If it is the driver and all
-    /// is well, the estimator runs; the stamp of what it put into `emitted`, if anything.
+    /// Takes a message of the declared input number `input`, which is the algorithm's field `F`. If it is the driver and no
+    /// required input is missing, the estimator runs. Returns the stamp of what it put into `emitted`, if anything.
     #[inline]
     pub fn receive<F: TakenAt<E::Input>>(
         &mut self,
@@ -168,7 +168,7 @@ impl<E: Estimator> Node<E> {
         None
     }
 
-    /// The same for a message that was counted.
+    /// The same for a message that has been counted.
     #[inline]
     pub(super) fn take_in<F: TakenAt<E::Input>>(
         &mut self,
@@ -185,8 +185,8 @@ impl<E: Estimator> Node<E> {
         let budget = self.declaration.health.latency_budget_nanos;
         let mut start = None;
         turn.enter(self.shared.number() as u32);
-        // All of the user's code at once: the payload's, the cache's clone and the estimator. After a panic the
-        // estimator is dropped, so that nothing sees what was left half done.
+        // All user code in one call: the payload's, the cache's clone and the estimator. After a panic the estimator is
+        // dropped, so that nothing sees a half-finished state.
         let handled = caught(|| {
             if let Err(reason) = admission.admit(input, message, turn.now()) {
                 return Ok(Handled::Refused(reason));
@@ -243,7 +243,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Whether it has asked to go on at once.
+    /// Whether it has asked to continue at once.
     #[inline]
     pub fn is_unfinished(&self) -> bool {
         self.timers.continue_with.is_some()
@@ -288,7 +288,7 @@ impl<E: Estimator> Node<E> {
         Next::Quiet
     }
 
-    /// Any callback but `handle_input`. It can degrade the estimator, and is no completion that counts for a recovery.
+    /// Any callback but `handle_input`. It can degrade the estimator, but does not count towards its recovery.
     fn run(
         &mut self,
         turn: &Turn<'_>,
@@ -373,7 +373,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Measures a callback that began at `start`; the reason if it took longer than its budget. `driver` is the input that
+    /// Measures a callback that began at `start`; returns a reason if it took longer than its budget. `driver` is the input that
     /// it was called with, and the message's stamp.
     fn measure(
         &mut self,
@@ -453,7 +453,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Keeps a message for after the restart, or counts it as dropped if there will be none.
+    /// Stores a message until after the restart, or counts it as dropped if no restart is planned.
     #[cold]
     fn keep<F: TakenAt<E::Input>>(&mut self, input: usize, message: &Stamped<F::Payload>) {
         let is_kept = self.slot.is_running() || self.slot.restart_at().is_some();
@@ -471,7 +471,7 @@ impl<E: Estimator> Node<E> {
         match kept {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
             Ok(None) => {}
-            // The payload's `clone` panicked: it cannot be kept.
+            // The payload's `clone` panicked: it cannot be stored.
             Err(failed) => {
                 self.shared.counters().drop(input, DropReason::Stopped);
                 self.report_failure(&failed);
@@ -479,7 +479,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Has the island woken when something is due next.
+    /// Schedules the next wake-up of the island.
     fn schedule(&mut self) {
         let next = if self.slot.is_running() { self.timers.next() } else { self.slot.restart_at() };
         if let Some(next) = next

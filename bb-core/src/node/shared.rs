@@ -18,14 +18,14 @@ struct Inner {
     number: usize,
     declaration: &'static EstimatorDeclaration,
     counters: Counters,
-    /// As the control state last published it.
+    /// Its health as the control state published it last.
     health: AtomicU8,
-    /// When the message came on which the last run was completed: for the watchdog.
+    /// When the message of the last completed run arrived: for the watchdog.
     last_run_nanos: AtomicI64,
     stopped: Mutex<Option<Stopped>>,
     /// One-way requests that wait.
     casts: AtomicU32,
-    /// How long its callbacks pretend to take on virtual time.
+    /// How long its callbacks are made to take on virtual time.
     pretended_latency_nanos: AtomicI64,
     /// How long they took, in a replay.
     replayed_latencies: Mutex<VecDeque<i64>>,
@@ -108,7 +108,7 @@ impl SharedNode {
         *lock(&self.0.stopped) = stopped;
     }
 
-    /// Takes one of so many places for one-way requests; false if there is none left.
+    /// Takes one of `most` places for one-way requests; returns false if all are taken.
     pub(crate) fn begin_cast(&self, most: u32) -> bool {
         let taken = self
             .0
@@ -126,7 +126,7 @@ impl SharedNode {
         self.0.pretended_latency_nanos.store(nanos, Ordering::Relaxed);
     }
 
-    /// The callback about to be measured takes so long in a replay.
+    /// Sets how long the next measured callback takes in a replay.
     pub(crate) fn replay_latency(&self, nanos: i64) {
         lock(&self.0.replayed_latencies).push_back(nanos);
     }

@@ -16,8 +16,8 @@ pub(super) struct Timers {
 /// Timers that one estimator may have running; one more replaces the latest.
 const MAX_TIMERS: usize = 64;
 
-/// Nothing is due sooner after it was asked for, so that time goes on between: on virtual time, whoever asks for less again
-/// and again would keep it from doing so.
+/// The shortest delay of a request. On virtual time, an estimator that asks for less again and again would stop the time from
+/// advancing.
 const SHORTEST: Duration = Duration::from_micros(1);
 
 impl Timers {
@@ -40,7 +40,7 @@ impl Timers {
         }
     }
 
-    /// Something has happened to the estimator: a timeout is over.
+    /// The estimator has handled something, which ends a timeout.
     #[inline]
     pub(super) fn happened(&mut self) {
         self.timeout = None;
@@ -53,14 +53,14 @@ impl Timers {
         all.min().filter(|time| *time < MonotonicTime::MAX)
     }
 
-    /// Takes what is due first, with the time it was due.
+    /// Takes what is due first, and the time at which it was due.
     pub(super) fn take(&mut self, now: MonotonicTime) -> Option<Info> {
         let due = self.next().filter(|due| *due <= now)?;
         if let Some(position) = self.timers.iter().position(|(_, time)| *time == due) {
             return Some(Info::Timer(self.timers.remove(position).0));
         }
         if let Some((period, time)) = self.tick.filter(|(_, time)| *time == due) {
-            // What was missed is skipped, the phase kept.
+            // Missed ticks are skipped; the phase stays the same.
             let period_nanos = i64::try_from(period.as_nanos()).unwrap_or(i64::MAX);
             let periods = now.nanos_since(time) / period_nanos + 1;
             self.tick = Some((period, time.plus_nanos(period_nanos.saturating_mul(periods))));

@@ -11,7 +11,7 @@ use std::cell::{Cell, RefCell};
 use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The processing of one entry: its time, and what is measured and written while it lasts.
+/// The processing of one entry: its time, measurements, and what goes to the journal.
 pub struct Turn<'a> {
     now: MonotonicTime,
     wall_offset_nanos: i64,
@@ -24,7 +24,7 @@ pub struct Turn<'a> {
     read_at: Cell<Option<MonotonicTime>>,
     /// How long measured callbacks took, if there is a journal.
     measured: RefCell<Vec<Callback>>,
-    /// The estimator whose callback runs now, if the journal does not hold the request that it answers.
+    /// The estimator whose callback runs now, if the journal does not contain the request that it answers.
     answering: Cell<Option<&'static EstimatorDeclaration>>,
     /// The estimator whose outputs are such an answer.
     unrecorded: Cell<Option<&'static EstimatorDeclaration>>,
@@ -108,8 +108,8 @@ impl<'a> Turn<'a> {
         self.measured.take()
     }
 
-    /// The journal does not hold the request that `estimator` is about to answer, so it holds what it emits. What others
-    /// make of that follows.
+    /// The journal does not contain the request that `estimator` is about to answer, so its outputs are recorded instead. What
+    /// other estimators emit follows from these.
     pub(super) fn set_unrecorded(&self, estimator: &'static EstimatorDeclaration) {
         self.answering.set(Some(estimator));
     }
@@ -120,7 +120,7 @@ impl<'a> Turn<'a> {
         self.answering.set(None);
     }
 
-    /// A callback of `estimator` has emitted, at one or several outputs. Those of others follow in between.
+    /// A callback of `estimator` has emitted at one or several outputs. Callbacks of other estimators may run in between.
     #[inline]
     pub(super) fn begin_emission(&self, estimator: &'static EstimatorDeclaration) {
         if self.is_observed {

@@ -1,4 +1,4 @@
-//! Commands to an actuator, and what it reports about a motion. The message's frame names the joint.
+//! Commands to an actuator, and its reports of a motion. The message's frame names the joint.
 
 use crate::Payload;
 use crate::time::MonotonicTime;

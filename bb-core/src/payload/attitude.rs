@@ -1,9 +1,9 @@
-//! Where a body is and how it is turned.
+//! Orientation and pose of a body.
 
 use crate::Payload;
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
-/// How a body is turned in the world.
+/// The orientation of a body in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Orientation {
@@ -20,7 +20,7 @@ impl Orientation {
     }
 }
 
-/// Where a body is and how it is turned in the world (`geometry_msgs/PoseWithCovariance`).
+/// The position and orientation of a body in the world (`geometry_msgs/PoseWithCovariance`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Pose {

@@ -58,7 +58,7 @@ impl From<TwistWithCovariance> for Twist {
     }
 }
 
-/// How the motion of a body changes, in its own frame (`geometry_msgs/AccelWithCovariance`).
+/// The acceleration of a body, in its own frame (`geometry_msgs/AccelWithCovariance`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Accel {

@@ -4,7 +4,7 @@ use super::Pose;
 use crate::Payload;
 use nalgebra::{Matrix6, Vector3};
 
-/// How a body moves, in its own frame (`geometry_msgs/TwistWithCovariance`).
+/// The velocity of a body, in its own frame (`geometry_msgs/TwistWithCovariance`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Twist {
@@ -16,7 +16,7 @@ pub struct Twist {
     pub covariance: Option<Matrix6<f64>>,
 }
 
-/// Where a body is and how it moves, of an estimator or counted from wheels (`nav_msgs/Odometry`). Either covariance may be
+/// The pose and velocity of a body, from an estimator or from wheels (`nav_msgs/Odometry`). Either covariance may be
 /// unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]

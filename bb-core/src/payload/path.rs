@@ -24,7 +24,7 @@ pub struct PathPose {
     pub world_from_body: UnitQuaternion<f64>,
 }
 
-/// How a body moved between two times, from wheels, scans or pictures. It does not say where it was.
+/// The motion of a body between two times, from wheels, scans or images, without its absolute pose.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct RelativePose {
     /// The earlier time.

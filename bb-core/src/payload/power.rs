@@ -28,13 +28,13 @@ pub struct BatteryState {
     pub health: BatteryHealth,
     /// Its chemistry.
     pub technology: BatteryTechnology,
-    /// Whether there is one in its place.
+    /// Whether it is present.
     pub is_present: bool,
     /// V, by cell; empty where the number of cells is not known.
     pub cell_voltages: Vec<Option<f64>>,
     /// K, by cell; empty where the number of cells is not known.
     pub cell_temperatures: Vec<Option<f64>>,
-    /// The place it is in.
+    /// Its location in the robot.
     pub location: String,
     /// Its serial number.
     pub serial_number: String,
@@ -43,7 +43,7 @@ pub struct BatteryState {
 /// Whether a battery is being charged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub enum BatteryStatus {
-    /// It does not say.
+    /// Unknown.
     #[default]
     Unknown,
     /// It is being charged.
@@ -59,14 +59,14 @@ pub enum BatteryStatus {
 /// The condition of a battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub enum BatteryHealth {
-    /// It does not say.
+    /// Unknown.
     #[default]
     Unknown,
     /// No fault.
     Good,
     /// Too hot.
     Overheat,
-    /// It holds no charge.
+    /// Dead.
     Dead,
     /// Too high a voltage.
     Overvoltage,
@@ -83,7 +83,7 @@ pub enum BatteryHealth {
 /// The chemistry of a battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub enum BatteryTechnology {
-    /// It does not say.
+    /// Unknown.
     #[default]
     Unknown,
     /// Nickel–metal hydride.

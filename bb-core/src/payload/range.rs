@@ -3,17 +3,17 @@
 use crate::Payload;
 use std::sync::Arc;
 
-/// The distance to what is in a cone in front of a sensor, along x of the message's frame (`sensor_msgs/Range`).
+/// The distance to the nearest object in a cone in front of a sensor, along x of the message's frame (`sensor_msgs/Range`).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Range {
-    /// What is sent out.
+    /// The kind of radiation.
     pub radiation: Radiation,
     /// The full angle of the cone, rad.
     pub field_of_view: f32,
-    /// The least distance that is measured, m.
+    /// The smallest distance that is measured, m.
     pub min_range: f32,
-    /// The greatest distance that is measured, m.
+    /// The largest distance that is measured, m.
     pub max_range: f32,
     /// Distance, m. A sensor that only detects presence reports −∞ for an object and +∞ for none (REP 117).
     #[payload(non_finite)]
@@ -22,7 +22,7 @@ pub struct Range {
     pub variance: Option<f32>,
 }
 
-/// What a [`Range`] sensor sends out.
+/// The radiation of a [`Range`] sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub enum Radiation {
     /// Sound.
@@ -47,9 +47,9 @@ pub struct LaserScan {
     pub time_increment: f32,
     /// Time from scan to scan, s.
     pub scan_time: f32,
-    /// The least distance that is measured, m.
+    /// The smallest distance that is measured, m.
     pub range_min: f32,
-    /// The greatest distance that is measured, m.
+    /// The largest distance that is measured, m.
     pub range_max: f32,
     /// Distances, m: −∞ if too near, +∞ if nothing was hit, NaN if the measurement failed (REP 117).
     #[payload(non_finite)]

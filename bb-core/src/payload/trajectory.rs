@@ -1,10 +1,10 @@
-//! How joints are to move.
+//! Trajectories of joints.
 
 use crate::Payload;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How several joints are to move together (`trajectory_msgs/JointTrajectory`). It starts at the message's time.
+/// A motion of several joints (`trajectory_msgs/JointTrajectory`). It starts at the message's time.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 #[payload(ros)]
 pub struct JointTrajectory {

@@ -34,8 +34,8 @@ enum Kind {
     Virtual(Arc<AtomicI64>),
 }
 
-/// By how much the measured offset must differ from the current one to replace it: above what a thread that loses its
-/// core between two reads causes, below what a recording shows.
+/// The least difference of the measured offset from the current one that replaces it: more than preemption between two reads
+/// causes, less than shows in a recording.
 const WALL_STEP_NANOS: u64 = 1_000_000;
 
 impl Clock {
@@ -94,7 +94,7 @@ impl Clock {
     }
 
     /// Sets the offset of a virtual clock; a real one measures its own.
-    // A replay calls it, with what the journal says.
+    // A replay calls it, with the offset in the journal.
     pub(crate) fn set_wall_offset_nanos(&self, nanos: i64) {
         if self.is_virtual() {
             self.wall_offset_nanos.store(nanos, Ordering::Relaxed);
@@ -109,7 +109,7 @@ impl Clock {
         }
     }
 
-    /// Moves a virtual clock on to `time`; never back, and never a real one.
+    /// Advances a virtual clock to `time`. Does nothing if that is earlier, or if the clock is real.
     pub(crate) fn advance_to(&self, time: MonotonicTime) {
         if let Kind::Virtual(nanos) = &self.kind {
             nanos.fetch_max(time.as_nanos(), Ordering::AcqRel);
@@ -127,8 +127,8 @@ impl Clock {
     }
 }
 
-/// The offset between both clocks, from pairs of reads (monotonic, wall). A thread that loses its core between the
-/// reads of a pair spoils that pair, which the median leaves out.
+/// The offset between both clocks, from pairs of reads (monotonic, wall). Preemption between the two
+/// reads spoils a pair, which the median leaves out.
 fn median_wall_offset(mut read: impl FnMut() -> (i64, i64)) -> i64 {
     let mut offsets = [0; 5].map(|_: i64| {
         let (monotonic, wall) = read();

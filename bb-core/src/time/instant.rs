@@ -1,6 +1,6 @@
 //! Instants as integers of nanoseconds.
 //!
-//! Arithmetic saturates: a stamp from a broken device must not overflow its way into a panic.
+//! Arithmetic saturates, so that a stamp from a broken device causes no overflow panic.
 
 use std::fmt;
 use std::ops::{Add, Sub};
@@ -17,7 +17,7 @@ pub struct WallTime(i64);
 impl MonotonicTime {
     /// The instant 0.
     pub const ZERO: Self = Self(0);
-    /// The last instant there is: a time that never comes.
+    /// The largest instant: a time that never comes.
     pub const MAX: Self = Self(i64::MAX);
 
     /// From nanoseconds.
@@ -30,17 +30,17 @@ impl MonotonicTime {
         self.0
     }
 
-    /// Nanoseconds from `earlier` to `self`, negative if `earlier` is in truth later; saturates.
+    /// Nanoseconds from `earlier` to `self`, negative if `earlier` is later; saturates.
     pub const fn nanos_since(self, earlier: Self) -> i64 {
         self.0.saturating_sub(earlier.0)
     }
 
-    /// Seconds from `earlier` to `self`, negative if `earlier` is in truth later.
+    /// Seconds from `earlier` to `self`, negative if `earlier` is later.
     pub const fn seconds_since(self, earlier: Self) -> f64 {
         self.nanos_since(earlier) as f64 * 1e-9
     }
 
-    /// The time from `earlier` to `self`; zero if `earlier` is in truth later.
+    /// The time from `earlier` to `self`; zero if `earlier` is later.
     pub const fn duration_since(self, earlier: Self) -> Duration {
         let nanos = self.nanos_since(earlier);
         Duration::from_nanos(if nanos < 0 { 0 } else { nanos as u64 })

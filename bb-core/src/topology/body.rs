@@ -1,4 +1,4 @@
-//! What a link weighs, looks like and occupies: URDF's `inertial`, `visual` and `collision`.
+//! Mass, appearance and extent of a link: URDF's `inertial`, `visual` and `collision`.
 
 use super::Origin;
 
@@ -13,7 +13,7 @@ pub struct Inertial {
     pub inertia: [f64; 6],
 }
 
-/// A shape to be seen.
+/// A shape that viewers draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Visual {
     /// Takes points from the shape's frame to the link's.
@@ -24,7 +24,7 @@ pub struct Visual {
     pub material: Option<Material>,
 }
 
-/// A shape that must not run into others.
+/// A shape for collision checks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
     /// Takes points from the shape's frame to the link's.
@@ -45,12 +45,12 @@ pub enum Geometry {
         /// m
         length: f64,
     },
-    /// A ball.
+    /// A sphere.
     Sphere {
         /// m
         radius: f64,
     },
-    /// A file.
+    /// A mesh in a file.
     Mesh {
         /// Its name, as URDF has it: `package://…` or a path.
         file: &'static str,
@@ -66,6 +66,6 @@ pub struct Material {
     pub name: &'static str,
     /// Red, green, blue, opacity, each from 0 to 1.
     pub color: Option<[f64; 4]>,
-    /// The file of its picture.
+    /// The file of its texture.
     pub texture: Option<&'static str>,
 }

@@ -68,7 +68,7 @@ macro_rules! any {
             }
         }
 
-        /// Calls a method of whichever filter it is.
+        /// Calls a method of the filter in it.
         macro_rules! running {
             ($any:expr, $one:ident => $call:expr) => {
                 match $any {

@@ -14,7 +14,7 @@
 //! * The low-pass for the tilt works on the specific force as a vector in the world frame, with its length, so
 //!   that accelerations cancel as the motion goes to and fro: D. Laidig, T. Seel, "VQF: Highly accurate IMU
 //!   orientation estimation with bias estimation and magnetic disturbance rejection", Information Fusion 91,
-//!   2023. Theirs is of second order. The specific force has to be in m/s² for this.
+//!   2023. Theirs is of second order. The specific force must be in m/s².
 
 mod filter;
 mod params;

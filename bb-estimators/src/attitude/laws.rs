@@ -185,7 +185,7 @@ macro_rules! laws_in {
 }
 pub(super) use laws_in;
 
-/// What the laws need of a filter beside its trait.
+/// What the laws need of a filter in addition to its trait.
 pub(super) trait Filter: AttitudeFilter + Clone + PartialEq + core::fmt::Debug {
     /// What a law allows for the rounding of the scalar that the filter computes with.
     fn within(double: f64, single: f64) -> f64;

@@ -22,7 +22,7 @@
 //!
 //! # Tilt
 //!
-//! `v̇ = R f - g`, hence `δv̇ = θ × R f`. A body does not get faster for ever: its velocity is zero up to a deviation
+//! `v̇ = R f - g`, hence `δv̇ = θ × R f`. A body does not accelerate forever: its velocity is zero up to a deviation
 //! that lasts for some time T; in windows of dt, a white error of variance `2 σ² T / dt` has the same effect. So
 //! accelerations count for as little as their mean does, where a low-pass of the specific force counts them all
 //! up to its time constant. The deviation grows with the accelerations of late; at rest it is next to nothing.

@@ -16,7 +16,7 @@ pub const MAX_ANGULAR_VELOCITY: f64 = 1e3;
 /// The greatest component of the specific force that a filter takes, m/s². Shock sensors end below 10⁵ m/s².
 pub const MAX_SPECIFIC_FORCE: f64 = 1e6;
 
-/// The greatest component of the magnetic field that a filter takes, in whatever unit it comes.
+/// The largest component of the magnetic field that a filter takes, in any unit.
 pub const MAX_MAGNETIC_FIELD: f64 = 1e15;
 
 /// One sample of an inertial sensor, with the magnetic field when there is a new one.

@@ -73,7 +73,7 @@ pub struct Known {
     pub at_most: f64,
 }
 
-/// Why there is no noise to tell.
+/// Why the noise cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AllanError {
     /// There are too few samples.
@@ -148,7 +148,7 @@ pub fn allan_deviation(integrals: &[f64], m: usize) -> Option<f64> {
 ///
 /// # Errors
 ///
-/// [`AllanError`]: too few samples, all the same, or one that is no number.
+/// [`AllanError`]: too few samples, all the same, or one that is not a number.
 pub fn sensor_noise(integrals: &[f64], period_s: f64) -> Result<SensorNoise, AllanError> {
     let samples = integrals.len().saturating_sub(1);
     if samples < LEAST {

@@ -83,7 +83,7 @@ pub fn gyroscope(rests: &[Rest]) -> Result<GyroscopeFit, CalibrationError> {
 }
 
 /// The accelerometer's offset and scale from rests in six directions, and its misalignment from nine: at rest it measures
-/// `gravity`, m/s², in whatever direction. Poses need not be exact.
+/// `gravity`, m/s², in any direction. Poses need not be exact.
 ///
 /// # Errors
 ///

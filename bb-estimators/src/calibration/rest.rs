@@ -24,13 +24,13 @@ params! {
         time: f64 = 1.0, in 0.01..=1e4, unit "s";
         /// The most that the angular velocity varies at rest, standard deviation of a component.
         ///
-        /// Small: noise is taken for motion. Large: motion is taken for rest.
+        /// Small: noise is mistaken for motion. Large: motion is mistaken for rest.
         ///
         /// Source: MEMS gyroscopes at 100 to 1000 Hz have 0.002 to 0.01 rad/s.
         rotation: f64 = 0.02, in 1e-6..=100.0, unit "rad/s";
         /// The most that the specific force varies at rest, standard deviation of a component.
         ///
-        /// Small: noise is taken for motion. Large: motion is taken for rest.
+        /// Small: noise is mistaken for motion. Large: motion is mistaken for rest.
         ///
         /// Source: MEMS accelerometers at 100 to 1000 Hz have 0.02 to 0.1 m/s².
         force: f64 = 0.15, in 1e-6..=1e4, unit "m/s^2";

@@ -40,7 +40,7 @@ pub enum SetError<'t> {
         /// Those there are.
         parameters: &'static [Parameter],
     },
-    /// The text is no value of the parameter's kind.
+    /// The text is not a value of the parameter's kind.
     NoValue {
         /// The parameter.
         parameter: &'static Parameter,

@@ -73,7 +73,7 @@ impl Range {
     /// All there are.
     pub const ALL: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY };
 
-    /// What a statement says; all numbers, if it says nothing.
+    /// The stated range; all numbers, if none is stated.
     pub(crate) const fn stated(ranges: &[RangeInclusive<f64>]) -> Self {
         match ranges {
             [range, ..] => Self { min: *range.start(), max: *range.end() },

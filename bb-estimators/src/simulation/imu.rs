@@ -52,7 +52,7 @@ impl Sensor for SimulatedImu {
 
     fn init(options: SimulatedImuOptions, context: &SensorContext) -> Result<Self, Fault> {
         let root_from_frame = context.root_from_frame().ok_or_else(|| {
-            Fault::new("it stands behind a moving joint, which the simulated motion does not know")
+            Fault::new("it is mounted beyond a moving joint, which the simulated motion does not include")
         })?;
         let mut random = ChaCha8Rng::seed_from_u64(options.seed ^ hash(context.path()));
         let bias = options.gyroscope_bias * normal(&mut random);

@@ -20,7 +20,7 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
     let one_lifetime =
         item.generics.params.len() == 1 && matches!(item.generics.params.first(), Some(GenericParam::Lifetime(_)));
     if !one_lifetime {
-        let message = "a struct of inputs has one lifetime and no other parameter; write `<'a>` after its name";
+        let message = "a struct of inputs has one lifetime and no other parameter, as in `struct Pair<'a> { imu: Input<'a, Imu>, … }`";
         diagnostics.error(&item.ident, message.into());
         return TokenStream::new();
     }

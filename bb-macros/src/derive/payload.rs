@@ -73,7 +73,7 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     }
 }
 
-/// Reports the first type parameter of which nothing says that it can be recorded.
+/// Reports the first type parameter without a bound that makes it recordable.
 fn unbounded(generics: &Generics, diagnostics: &mut Diagnostics) -> bool {
     let in_clause = |name: &Ident| {
         let predicates = generics.where_clause.iter().flat_map(|clause| &clause.predicates);

@@ -61,7 +61,7 @@ fn given(component: &Component) -> TokenStream {
     quote!(&[#(#names),*])
 }
 
-/// Literals have the right dimension and keep their range.
+/// Literals have the right dimension and are in range.
 fn options(robot: &Robot, component: &Component, options: &TokenStream) -> TokenStream {
     let name = type_name(component);
     let fields = quote!(<#options as ::bb_core::Options>::FIELDS);
@@ -105,7 +105,7 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenS
     Some((place, quote!(::bb_core::__private::Given { name: #name, dimension: #unit, number: #number })))
 }
 
-/// The declared inputs are the algorithm's, and those that are optional are so there.
+/// The declared inputs are those of the algorithm, and optional ones are optional there.
 fn inputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let estimator = &robot.estimators[id];
     let (name, taken) = (type_name(&estimator.component), types.estimator_input(id));
@@ -132,7 +132,7 @@ fn outputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     known.collect()
 }
 
-/// No input spans a moving joint, unless the algorithm handles that.
+/// No input spans a moving joint, unless the algorithm handles it.
 fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let robot = verified.robot;
     let mut checks = TokenStream::new();
@@ -159,7 +159,7 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     checks
 }
 
-/// What measures the position of a joint that an actuator moves is known by its payload.
+/// The position of a joint with an actuator is measured, as payloads tell.
 fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
     let checks = robot.actuators.iter().filter_map(|actuator| {
         let sources = robot.position_sources(actuator.joint)?;
@@ -177,7 +177,7 @@ fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
     checks.collect()
 }
 
-/// At most one command arms and one disarms, each in a state in which it can.
+/// At most one command arms and one disarms, each in a state that allows it.
 fn roles(robot: &Robot, types: &Types<'_>) -> TokenStream {
     let mut checks = TokenStream::new();
     let mut before: Vec<TokenStream> = Vec::new();

@@ -1,5 +1,5 @@
-//! Structs of many fields in groups, each made by a function of its own: the time that rustc takes for one function
-//! grows with the square of what it makes.
+//! Structs with many fields, split into groups, each made by its own function: the time that rustc takes for one function
+//! grows with the square of the number of fields.
 //!
 //! ```text
 //! struct __Topics { g0: __Topics0, g1: __Topics1, … }

@@ -5,7 +5,7 @@
 //! ```
 
 use super::group;
-use super::literal::ident;
+use super::literal::{ident, respan};
 use super::options::parameter_type;
 use super::part::Part;
 use super::types::{Accessors, Types, imports};
@@ -14,7 +14,7 @@ use crate::model::{
     ActuatorId, CategoryId, CommandId, EstimatorId, From, Id as _, ParameterId, PublisherId, SensorId, ServiceId,
 };
 use crate::parse::ServiceKind;
-use proc_macro2::{Ident, Span, TokenStream};
+use proc_macro2::{Delimiter, Group, Ident, Span, TokenStream};
 use quote::quote;
 use std::collections::{HashMap, HashSet};
 use syn::Attribute;
@@ -102,10 +102,14 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
         let path = ["category".to_owned(), crate::names::text(&category.name)];
         root.add(&path, &category.name, Handle::Category(id));
     }
+    // Where the robot's name is, so that a second one is reported there.
     let module = ident(module);
+    let module = respan(quote!(mod #module), name.span());
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
     let content = root.tokens(types, accessors, 1);
     let imports = imports(types, accessors);
+    let mut body = Group::new(Delimiter::Brace, quote!(#imports #content));
+    body.set_span(name.span());
     quote! {
         #[doc = #text]
         #[allow(
@@ -117,12 +121,12 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
             unreachable_pub,
             clippy::all
         )]
-        #visibility mod #module { #imports #content }
+        #visibility #module #body
     }
 }
 
 impl Module {
-    /// Adds a handle at a path; the second of one path is left out, since it is reported elsewhere.
+    /// Adds a handle at a path; a second one at the same path is left out, and reported elsewhere.
     fn add(&mut self, path: &[String], name: &Ident, handle: Handle) {
         let Some((last, above)) = path.split_last() else {
             return;
@@ -143,7 +147,7 @@ impl Module {
         }
     }
 
-    /// Has the module at a path carry a name's place and doc comments; one without handles does not exist.
+    /// Gives the module at a path the place and doc comments of a name; a module without handles does not exist.
     fn describe(&mut self, path: &[String], name: &Ident, attributes: &[Attribute]) {
         let mut module = self;
         for segment in path {
@@ -279,7 +283,7 @@ fn visit(types: &Types<'_>, id: EstimatorId, accessors: Accessors) -> TokenStrea
     }
 }
 
-/// The constant of what has no handle but a name: `pub const moving: &str = "moving";`
+/// The constant for a part that has a name instead of a handle: `pub const moving: &str = "moving";`
 fn text(constant: &Ident, attributes: &[Attribute], name: &Ident) -> TokenStream {
     let docs = docs(attributes);
     let text = crate::names::text(name);

@@ -29,7 +29,7 @@ pub(super) struct Islands {
 /// What feeds an input.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Feed {
-    /// Something that is no estimator, by its publisher.
+    /// A sensor or a service, by its publisher.
     Outside(PublisherId),
     Island(IslandId),
 }

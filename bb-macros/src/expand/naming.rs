@@ -1,6 +1,9 @@
-//! What the items of the expansion are called: by the path of what they are for, so that the expansion can be read.
+//! The names of items in the expansion: each contains the path of its part, so that the expansion is readable.
 //!
 //! `sensor/base/imu` is `sensor_base_imu`. Where two paths would give one name, the second has a number at its end.
+//!
+//! Items beside the robot's type have the line and the column of its name in theirs. So two robots with the same name in one
+//! module collide only in what the user knows, their types and modules.
 
 use super::part::Part;
 use crate::diagnostics::Place;
@@ -22,12 +25,14 @@ pub(super) struct Naming {
 pub(super) struct PartNames {
     /// `sensor_base_imu`
     pub(super) name: Ident,
-    /// `__Rover__sensor_base_imu`: its type.
+    /// `__Rover_2_11__sensor_base_imu`: its type.
     pub(super) alias: Ident,
-    /// `__Rover__given__sensor_base_imu`: its type as the user wrote it.
+    /// `__Rover_2_11__given__sensor_base_imu`: its type as the user wrote it.
     pub(super) given: Ident,
-    /// `__Rover__member__sensor_base_imu_tilt`: an estimator in its island.
+    /// `__Rover_2_11__member__sensor_base_imu_tilt`: an estimator in its island.
     pub(super) member: Ident,
+    /// `__Rover_2_11__exported__sensor_base_imu_tilt`: the same, for the robot's module.
+    pub(super) exported: Ident,
     /// Where the user wrote its type. Names are looked up as in the expansion.
     pub(super) span: Span,
 }
@@ -37,7 +42,7 @@ pub(super) struct PartNames {
 pub(super) struct PublisherNames {
     /// `sensor_base_imu`
     pub(super) name: Ident,
-    /// `__Rover__payload__sensor_base_imu_tilt`
+    /// `__Rover_2_11__payload__sensor_base_imu_tilt`
     pub(super) payload: Ident,
 }
 
@@ -45,8 +50,8 @@ impl Naming {
     pub(super) fn of(robot: &Robot, robot_name: &Ident) -> Self {
         let (mut taken_by_parts, mut taken_by_publishers) = (HashSet::new(), HashSet::new());
         let call_site = Span::call_site();
-        let item =
-            |kind: &str, name: &Ident, span: Span| format_ident!("__{robot_name}__{kind}{name}", span = span);
+        let prefix = prefix(robot_name);
+        let item = |kind: &str, name: &Ident, span: Span| format_ident!("{prefix}__{kind}{name}", span = span);
         let parts = Part::all(robot).map(|part| {
             let name = fresh(part.path(robot), &mut taken_by_parts);
             let span = Place::of(&part.component(robot).kind).start.resolved_at(call_site);
@@ -54,6 +59,7 @@ impl Naming {
                 alias: item("", &name, span),
                 given: item("given__", &name, span),
                 member: item("member__", &name, call_site),
+                exported: item("exported__", &name, call_site),
                 name,
                 span,
             }
@@ -73,6 +79,12 @@ impl Naming {
     pub(super) fn publisher(&self, id: PublisherId) -> &PublisherNames {
         &self.publishers[id]
     }
+}
+
+/// `__Rover_2_11`: the prefix of a robot's items, and the module of its type.
+pub(super) fn prefix(robot: &Ident) -> Ident {
+    let place = robot.span().start();
+    format_ident!("__{robot}_{}_{}", place.line, place.column + 1, span = Span::call_site())
 }
 
 fn fresh(path: &[String], taken: &mut HashSet<String>) -> Ident {

@@ -53,7 +53,7 @@ pub(super) fn bound(robot: &Robot) -> TokenStream {
 
 /// `fn __declared_sensor_base_imu() -> … { let mut options = defaults(); options.beta = 0.1; options }`
 ///
-/// The only place that names the type as the user wrote it, so a type of another kind is reported here.
+/// Only this names the type as the user wrote it, so that a type of another kind is reported here.
 fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
     let settings: Vec<TokenStream> = component
         .options

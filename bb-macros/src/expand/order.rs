@@ -1,10 +1,10 @@
-//! In which order what is due at one instant happens, so that every estimator gets the newest of all its inputs.
+//! The order of events that are due at the same instant, so that every estimator gets the newest of all its inputs.
 
 use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId, Table, Trigger};
 use crate::verify::Verified;
 
-/// How many estimators stand above each one on the longest way to a sensor. Consumers of one publisher are called in
-/// this order: one that also takes what another makes of the same message comes after it.
+/// The number of estimators on the longest path from each one to a sensor. Consumers of one publisher are called in this order,
+/// so that one that also takes another's output for the same message comes after it.
 pub(super) fn depths(verified: &Verified<'_>) -> Table<EstimatorId, usize> {
     let mut known = verified.robot.estimators.map(|_| None);
     verified.robot.estimators.map(|id| depth(verified, id, &mut known))
@@ -25,7 +25,7 @@ fn depth(verified: &Verified<'_>, id: EstimatorId, known: &mut Table<EstimatorId
 }
 
 /// The sensors in the order in which they are read when several are due at once: one whose message makes an estimator
-/// run comes after those that the estimator takes besides it. Otherwise, and round a circle, by declaration.
+/// run comes after those that the estimator takes besides it. Otherwise, and in a cycle, by declaration.
 pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
     let robot = verified.robot;
     let mut before: Table<SensorId, Vec<SensorId>> = robot.sensors.map(|_| Vec::new());
@@ -46,7 +46,7 @@ pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
     order
 }
 
-/// The sensor whose message makes this publisher publish.
+/// The sensor whose message triggers this publisher.
 fn trigger(robot: &Robot, publisher: PublisherId) -> Option<SensorId> {
     match robot.trigger(publisher)? {
         Trigger::Sensor(id) => Some(id),

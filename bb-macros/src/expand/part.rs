@@ -17,7 +17,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// All of a robot, in the order in which their options stand.
+    /// All parts of a robot, in the order of their options.
     pub(super) fn all(robot: &Robot) -> impl Iterator<Item = Self> + use<> {
         let sensors = robot.sensors.ids().map(Self::Sensor);
         let estimators = robot.estimators.ids().map(Self::Estimator);

@@ -34,7 +34,7 @@ pub(super) fn references(verified: &Verified<'_>) -> TokenStream {
     }
 }
 
-/// The publishers of inputs: the whole path, the names that the user wrote at their places.
+/// The publishers of inputs: whole paths, with the names that the user wrote at their places.
 fn inputs(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     let inputs = robot.estimators.iter().flat_map(|estimator| &estimator.inputs);
     inputs.filter_map(|input| {

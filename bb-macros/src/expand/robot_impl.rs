@@ -1,4 +1,4 @@
-//! `impl Robot`: how all is made, started and listed.
+//! `impl Robot`: how its parts are made, started and listed.
 
 use super::options::{binding, bound};
 use super::part::Part;
@@ -14,7 +14,7 @@ const SIZE: usize = 16;
 
 pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let (robot, name) = (verified.robot, verified.name);
-    let text = name.to_string();
+    let (text, this) = (name.to_string(), types.robot());
     let sensors = order::sensors(verified).into_iter().map(|id| {
         source(types, Part::Sensor(id), robot.sensors[id].publisher, quote!(AsSensor), quote!(&__SENSORS[#id]))
     });
@@ -57,7 +57,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
     quote! {
         #(#groups)*
 
-        impl ::bb_core::Robot for #name {
+        impl ::bb_core::Robot for #this {
             const NAME: &'static str = #text;
             const TOPOLOGY: &'static __private::Topology = &__TOPOLOGY;
             const SENSORS: &'static [__private::SensorDeclaration] = &__SENSORS;

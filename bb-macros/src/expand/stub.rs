@@ -1,4 +1,4 @@
-//! A robot that failed: its type and handles only, so that code which uses them gives no errors of its own.
+//! A robot that is not valid: only its type and handles, so that code which uses them causes no further errors.
 
 use super::handles::handles;
 use super::types::Accessors;
@@ -18,13 +18,16 @@ pub(crate) fn stub(robot: &Robot) -> TokenStream {
     let types = types::Types::new(robot, &naming, name, 0);
     let aliases = types::aliases(&types);
     // A name that leaves none for the module is what failed.
-    let handles = module_name(name).map(|module| handles(&types, name, &module, Accessors::Stub));
-    let text = name.to_string();
+    let module = module_name(name);
+    let handles = module.as_ref().map(|module| handles(&types, name, module, Accessors::Stub));
+    let export = super::export(robot, name, module.as_deref());
+    let (text, this) = (name.to_string(), types.robot());
     quote! {
         #[allow(non_camel_case_types)]
         #definition
         #aliases
-        ::bb_core::__private::stub_robot!(#name, #text);
+        ::bb_core::__private::stub_robot!(#this, #text);
         #handles
+        #export
     }
 }

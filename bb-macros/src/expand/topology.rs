@@ -16,7 +16,7 @@ pub(super) fn topology(verified: &Verified<'_>) -> TokenStream {
     quote!(__private::Topology { links: &[#(#links),*], joints: &[#(#joints),*] })
 }
 
-/// The transform to the root, if there are only fixed joints between.
+/// The transform to the root, if all joints between are fixed.
 pub(super) fn root_from(robot: &Robot, mount: Mount) -> TokenStream {
     let route = robot.route_to_root(mount).filter(|route| route.moving.is_empty());
     option(route.map(|route| transform(route.transform)))
@@ -70,7 +70,7 @@ fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
     })
 }
 
-/// As declared, so that URDF gets the same numbers.
+/// As declared, so that an exported URDF has the same numbers.
 fn origin(origin: Option<&Origin>) -> TokenStream {
     let Some(origin) = origin else { return quote!(__private::Origin::IDENTITY) };
     let (xyz, rpy) = (values(origin.xyz.as_ref(), 0.0), values(origin.rpy.as_ref(), 0.0));

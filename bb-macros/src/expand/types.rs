@@ -1,20 +1,20 @@
-//! How the expansion names the types of components, and what follows from them.
+//! The names of components' types in the expansion, and of the types derived from them.
 //!
-//! Each type that the user wrote is aliased once. The alias is then used at the span of the user's type, so that what
-//! rustc has to say of it is said there, and once.
+//! Each type that the user wrote is aliased once. The alias is used at the span of the user's type, so that rustc reports
+//! errors there, once.
 
 use super::group;
 use super::literal::{ident, respan};
-use super::naming::{Naming, PartNames};
+use super::naming::{Naming, PartNames, prefix};
 use super::part::Part;
 use crate::model::{EstimatorId, From, Id as _, PublisherId, Robot, SensorId};
 use crate::parse::Component;
 use proc_macro2::{Ident, Span, TokenStream};
-use quote::{format_ident, quote, quote_spanned};
+use quote::{ToTokens, format_ident, quote, quote_spanned};
 
-/// `type __Rover__sensor_base_imu = Bmi270;`, if it is a sensor, else `Unknown`; as the user wrote it,
-/// `__Rover__given__sensor_base_imu`; and the payload of each estimator's output,
-/// `__Rover__payload__sensor_base_imu_tilt`.
+/// `type __Rover_2_11__sensor_base_imu = Bmi270;`, if it is a sensor, else `Unknown`; as the user wrote it,
+/// `__Rover_2_11__given__sensor_base_imu`; and the payload of each estimator's output,
+/// `__Rover_2_11__payload__sensor_base_imu_tilt`.
 pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let parts = Part::all(robot).map(|part| {
@@ -36,23 +36,29 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
         }
         From::Sensor(_) | From::Service(_) => None,
     });
-    let marker = (marker(name), quote!(#name));
+    let marker = (marker(name), robot_type(name));
     let aliases = parts.flatten().chain(outputs).chain([marker]).map(|(alias, kind)| {
         quote! {
-            #[allow(non_camel_case_types, dead_code)]
-            type #alias = #kind;
+            #[doc(hidden)]
+            #[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+            pub type #alias = #kind;
         }
     });
     aliases.collect()
 }
 
-/// `enum __Rover__member__sensor_base_imu_tilt {}`: the marker of an estimator in its island.
+/// `enum __Rover_2_11__member__sensor_base_imu_tilt {}`: the marker of an estimator in its island; and an alias by which the
+/// robot's module, which exports what it imports, can import it.
 pub(super) fn members(types: &Types<'_>) -> TokenStream {
-    let members = types.robot.estimators.ids().map(|id| types.member_item(id));
+    let names = || types.robot.estimators.ids().map(|id| types.names(Part::Estimator(id)));
+    let (members, aliases) = (names().map(|names| &names.member), names().map(|names| &names.exported));
     quote! {
         #(
             #[allow(non_camel_case_types, dead_code)]
             enum #members {}
+            #[doc(hidden)]
+            #[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+            pub type #aliases = #members;
         )*
     }
 }
@@ -62,29 +68,29 @@ pub(super) fn members(types: &Types<'_>) -> TokenStream {
 pub(super) enum Accessors {
     /// Into the wiring.
     Wired,
-    /// Nowhere: the robot has failed, and its handles only keep names and types.
+    /// Nowhere: the robot is not valid, and its handles only have names and types.
     Stub,
 }
 
 /// The robot's type in its module.
-const ROBOT: &str = "__Robot";
+pub(super) const ROBOT: &str = "__Robot";
 
-/// `use super::{Rover as __Robot, __Rover__sensor_base_imu, …};` in the robot's module.
+/// `pub use super::{__Rover_2_11::Rover as __Robot, __Rover_2_11__sensor_base_imu, …};` in the robot's module.
 ///
-/// One import, so that it is one error where there is nothing to import: in a function, whose items no module can name. The
-/// first name says so, since rustc writes it.
+/// A single import, so that it is one error in a function, whose items a module cannot name. Its first name explains the error,
+/// since rustc prints it.
 pub(super) fn imports(types: &Types<'_>, accessors: Accessors) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let parts = Part::all(robot).map(|part| &types.names(part).alias);
     let outputs = robot.publishers.ids().filter(|id| matches!(types.from(*id), From::Estimator(..)));
     let payloads = outputs.map(|id| &types.naming.publisher(id).payload);
     let is_wired = accessors == Accessors::Wired;
-    let members = robot.estimators.ids().filter(|_| is_wired).map(|id| types.member_item(id));
+    let members = robot.estimators.ids().filter(|_| is_wired).map(|id| &types.names(Part::Estimator(id)).exported);
     let items = parts.chain(payloads).chain(members);
-    let (marker, this) = (marker(name), ident(ROBOT));
-    let imports = quote!(use super::{#marker as _, #name as #this, #(#items),*};);
+    let (marker, kind, this) = (marker(name), robot_type(name), ident(ROBOT));
+    let imports = quote!(pub use super::{#marker as _, #kind as #this, #(#items),*};);
     let imports = respan(imports, name.span());
-    quote!(#[allow(unused_imports)] #imports)
+    quote!(#[doc(hidden)] #[allow(unused_imports)] #imports)
 }
 
 fn without_span(name: &Ident) -> Ident {
@@ -93,9 +99,15 @@ fn without_span(name: &Ident) -> Ident {
     name
 }
 
-/// An item beside the robot's type that only its module imports.
+/// An item that only the robot's module imports.
 fn marker(name: &Ident) -> Ident {
-    format_ident!("__{name}_must_be_declared_outside_of_functions", span = Span::call_site())
+    format_ident!("{}_must_be_declared_outside_of_functions", prefix(name), span = Span::call_site())
+}
+
+/// `__Rover_2_11::Rover`: the robot's type, where it is defined.
+pub(super) fn robot_type(name: &Ident) -> TokenStream {
+    let (module, name) = (prefix(name), ident(&name.to_string()));
+    quote!(#module::#name)
 }
 
 /// The last name of a component's type, for messages: `Madgwick`.
@@ -150,12 +162,9 @@ impl<'a> Types<'a> {
     }
 
     /// The marker of an estimator in its island.
-    fn member_item(&self, id: EstimatorId) -> &'a Ident {
-        &self.names(Part::Estimator(id)).member
-    }
-
     pub(super) fn member(&self, id: EstimatorId) -> TokenStream {
-        let (above, member) = (&self.above, self.member_item(id));
+        let (above, names) = (&self.above, self.names(Part::Estimator(id)));
+        let member = if self.is_in_module { &names.exported } else { &names.member };
         quote!(#above #member)
     }
 
@@ -171,7 +180,7 @@ impl<'a> Types<'a> {
     /// The robot's type.
     pub(super) fn robot(&self) -> TokenStream {
         let above = &self.above;
-        let name = if self.is_in_module { ident(ROBOT) } else { ident(&self.name.to_string()) };
+        let name = if self.is_in_module { ident(ROBOT).into_token_stream() } else { robot_type(self.name) };
         quote!(#above #name)
     }
 

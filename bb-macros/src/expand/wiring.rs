@@ -9,10 +9,10 @@
 //! }
 //! impl IslandState for __Island_sensor_base_imu_tilt {
 //!     fn deliver(&mut self, wiring: &__Wiring, message: &Stamped<Imu>, turn: &Turn) {
-//!         receive::<__Rover__member__sensor_base_imu_tilt, …>(self, wiring, 0, feed(message), turn);
+//!         receive::<__Rover_2_11__member__sensor_base_imu_tilt, …>(self, wiring, 0, feed(message), turn);
 //!     }
 //! }
-//! impl Member for __Rover__member__sensor_base_imu_tilt {
+//! impl Member for __Rover_2_11__member__sensor_base_imu_tilt {
 //!     fn publish(wiring: &__Wiring, island: &mut __Island…, emitted: &mut Option<Orientation>, stamp: Stamp, turn: &Turn) {
 //!         if let Some(payload) = take(emitted) { … }
 //!     }
@@ -225,7 +225,7 @@ impl<'a> Wiring<'a> {
         if runs { name.clone() } else { format_ident!("{name}__kept") }
     }
 
-    /// `fn sensor_base_imu` of the wiring, for a publisher that is no estimator: publishes, then runs what is downstream,
+    /// `fn sensor_base_imu` of the wiring, for a sensor or a service: publishes, then runs what is downstream,
     /// island by island.
     fn published(&self, id: PublisherId) -> TokenStream {
         if island_of(self.types, self.islands, id).is_some() {

@@ -3,7 +3,7 @@
 /// The places in which words are (none: in all), the words, and the way out.
 type Row = (&'static [&'static str], &'static [&'static str], &'static str);
 
-const ROWS: [Row; 31] = [
+const ROWS: [Row; 40] = [
     // Words of the language, elsewhere.
     (&["a link"], &["link"], "put it at the end of a joint: `joint name: fixed { link arm { } }`"),
     (&["a link"], &["actuator"], "an actuator moves a joint; declare it in one"),
@@ -15,6 +15,9 @@ const ROWS: [Row; 31] = [
     (&["a robot"], &["estimator"], "declare it in a link, or in the sensor that feeds it"),
     (&["a robot"], &["controller"], "declare it in `controllers { … }`"),
     (&["a robot"], &["bridge"], "declare it in `bridges { … }`"),
+    (&["a robot"], &["estimators"], "declare each in a link, or in the sensor that feeds it"),
+    (&["a robot"], &["actuator", "actuators"], "an actuator moves a joint; declare it in one"),
+    (&["a robot"], &["robot"], "one `robot!` declares one robot; write another `robot!` for the next"),
     (
         &["a robot"],
         &["include", "import", "xacro", "urdf"],
@@ -34,7 +37,7 @@ const ROWS: [Row; 31] = [
     ),
     (
         &[],
-        &["publish", "publisher", "publishes", "pub", "out", "outputs"],
+        &["publish", "publisher", "publishes", "out", "outputs"],
         "what a component emits is published at its path; an estimator of several outputs names them, as in `output pose;`",
     ),
     (&["an estimator"], &["slop", "sync", "tolerance", "max_interval_duration"], "write `sync_tolerance: 20 ms;`"),
@@ -42,6 +45,11 @@ const ROWS: [Row; 31] = [
         &["an estimator"],
         &["timeout", "deadline", "watchdog"],
         "write `lost_after: 100 ms;` for how long it may be silent, `latency_budget: 1 ms;` for how long it may take",
+    ),
+    (
+        &["an estimator"],
+        &["on_error", "on_fault", "on_failure", "on_timeout", "on_late"],
+        "write `on_degraded: …;` for a run that fails or is late, `on_lost: …;` for no run within `lost_after`",
     ),
     (
         &["an estimator", "a link", "a joint"],
@@ -70,7 +78,7 @@ const ROWS: [Row; 31] = [
     ),
     (
         &[],
-        &["plugin", "package", "executable", "node", "exec", "pkg"],
+        &["plugin", "package", "executable", "node", "nodes", "component", "components", "exec", "pkg"],
         "a component is named by its Rust type, after its name: `sensor imu: Bmi270();`",
     ),
     (
@@ -95,7 +103,7 @@ const ROWS: [Row; 31] = [
     ),
     (
         &["a joint", "a joint of a URDF"],
-        &["xyz", "rpy"],
+        &["xyz", "rpy", "position", "orientation", "pose", "transform", "translation", "rotation", "offset"],
         "write `origin: { xyz: [0 m, 0 m, 0.9 m], rpy: [0 deg, 0 deg, 90 deg] };`",
     ),
     (
@@ -103,6 +111,15 @@ const ROWS: [Row; 31] = [
         &["lower", "upper", "velocity", "effort"],
         "write `limit: { lower: -90 deg, upper: 90 deg };`",
     ),
+    (&["`limit`"], &["min", "max", "minimum", "maximum"], "write `lower: -90 deg, upper: 90 deg`"),
+    (
+        &["`origin`"],
+        &["quat", "quaternion", "orientation", "rotation", "wxyz", "xyzw"],
+        "write roll, pitch and yaw: `rpy: [0 deg, 0 deg, 90 deg]`",
+    ),
+    (&["`origin`"], &["position", "translation", "x", "y", "z"], "write `xyz: [0.1 m, 0 m, 0 m]`"),
+    (&["`origin`"], &["roll", "pitch", "yaw"], "write `rpy: [0 deg, 0 deg, 90 deg]`"),
+    (&["`inertia`"], &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"], "leave the `i` out, as in `xx: 0.1 kg*m^2`"),
     // Programs.
     (
         &[],
@@ -117,7 +134,7 @@ const ROWS: [Row; 31] = [
 ];
 
 /// What to write instead of `word` in `place`.
-pub(super) fn way_out(place: &str, word: &str) -> Option<&'static str> {
+pub(crate) fn way_out(place: &str, word: &str) -> Option<&'static str> {
     let is_here =
         |(places, words, _): &&Row| (places.is_empty() || places.contains(&place)) && words.contains(&word);
     ROWS.iter().find(is_here).map(|(_, _, way)| *way)

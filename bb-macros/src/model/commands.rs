@@ -13,7 +13,7 @@ ids! { CommandId CategoryId }
 /// The operational states that every robot has.
 pub(crate) const BUILT_IN_STATES: [&str; 3] = ["disarmed", "idle", "executing"];
 
-/// The category of commands that name none.
+/// The category of commands without one.
 pub(crate) const DEFAULT_CATEGORY: &str = "default";
 
 #[derive(Clone, Debug)]
@@ -32,14 +32,14 @@ pub(crate) struct Command {
     pub(crate) component: Component,
     /// As written.
     pub(crate) settings: CommandSettings,
-    /// Built-in or declared ones; none if it does not say.
+    /// Built-in or declared states; `None` for the default.
     pub(crate) allowed_states: Option<Vec<Ident>>,
     pub(crate) timeout_s: Option<f64>,
     pub(crate) category: CategoryId,
     pub(crate) cancel: Cancel,
 }
 
-/// Which commands one ends when it starts.
+/// Which commands it cancels when it starts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Cancel {
     Nothing,
@@ -113,7 +113,7 @@ impl std::convert::From<parse::Category> for Category {
         let mut concurrency = 1;
         for (setting, quantity) in settings.each() {
             match setting {
-                // A value that is no such number is refused; a cast saturates all the same.
+                // Another value is refused by a rule; the cast saturates.
                 CategorySetting::Concurrency => concurrency = quantity.value as u32,
             }
         }

@@ -1,4 +1,4 @@
-//! How one frame is reached from another: the joints between, and the transform if all of them are fixed.
+//! Routes between frames: the joints between, and the transform if all of them are fixed.
 
 use super::{JointId, LinkId, Mount, PublisherId, Rigid, Robot};
 use crate::names::text;
@@ -6,17 +6,17 @@ use crate::parse::JointKind;
 use proc_macro2::Ident;
 use syn::Attribute;
 
-/// The way from one frame to another through the tree.
+/// The route from one frame to another through the tree.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Route {
-    /// `target_from_source`; moving joints count as they stand at zero.
+    /// `target_from_source`; with moving joints at position zero.
     pub(crate) transform: Rigid,
     /// The joints on the way that move.
     pub(crate) moving: Vec<JointId>,
 }
 
 impl Robot {
-    /// What publishes at a joint and may tell its position; `None` where none is needed.
+    /// The publishers at a joint that may tell its position; `None` if none is needed.
     pub(crate) fn position_sources(&self, id: JointId) -> Option<Vec<PublisherId>> {
         let joint = &self.joints[id];
         if joint.kind == JointKind::Fixed || !joint.mimics.is_empty() {
@@ -25,7 +25,7 @@ impl Robot {
         Some(self.publishers.ids().filter(|publisher| self.mount_of(*publisher) == Mount::Joint(id)).collect())
     }
 
-    /// The way from the frame of `source` to that of `target`. Without a frame there is none.
+    /// The route from the frame of `source` to that of `target`; empty without a frame.
     pub(crate) fn route(&self, source: Mount, target: Mount) -> Route {
         let (Some((source, link_from_source)), Some((target, link_from_target))) =
             (self.link_of(source), self.link_of(target))
@@ -33,7 +33,7 @@ impl Robot {
             return Route { transform: Rigid::IDENTITY, moving: Vec::new() };
         };
         let (mut up, mut down) = (self.ancestry(source), self.ancestry(target));
-        // What both have in common from the root on is not on the way.
+        // The part from the root that both have in common is not on the route.
         while up.last().is_some() && up.last() == down.last() {
             up.pop();
             down.pop();

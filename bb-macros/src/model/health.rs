@@ -1,10 +1,10 @@
-//! When an estimator counts as degraded or lost, and what that calls.
+//! When an estimator is degraded or lost, and which commands that starts.
 
 use super::{CommandId, Robot};
 use crate::language::EstimatorSetting;
 use crate::parse::{Reaction, Reactions, RunsOn, Settings};
 
-/// The numbers that an estimator is declared with.
+/// The numeric settings of an estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Timing {
     pub(crate) sync_tolerance_s: Option<f64>,
@@ -14,7 +14,7 @@ pub(crate) struct Timing {
     pub(crate) recover_after: u32,
 }
 
-/// What is called when its health changes: none where nothing is, or where no command has the name.
+/// The commands that changes of its health start: `None` if none is declared, or no command has the name.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Health {
     pub(crate) on_degraded: Option<CommandId>,
@@ -41,7 +41,7 @@ impl Timing {
                 EstimatorSetting::SyncTolerance => timing.sync_tolerance_s = Some(value),
                 EstimatorSetting::LatencyBudget => timing.latency_budget_s = Some(value),
                 EstimatorSetting::LostAfter => timing.lost_after_s = Some(value),
-                // A value that is no such number is refused; a cast saturates all the same.
+                // Another value is refused by a rule; the cast saturates.
                 EstimatorSetting::RecoverAfter => timing.recover_after = value as u32,
             }
         }

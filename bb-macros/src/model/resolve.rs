@@ -1,4 +1,4 @@
-//! The tree to lists: every part gets its number and its path, every input its publisher.
+//! Resolves the tree to lists: every part gets its number and its path, every input its publisher.
 
 use super::{
     Actuator, Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, PublisherId, Robot,
@@ -12,7 +12,7 @@ use proc_macro2::Ident;
 use std::collections::HashMap;
 use syn::Visibility;
 
-/// Resolves what can be resolved; what cannot be is left out of the references for the rules to report.
+/// Resolves names. References that cannot be resolved are left out, and reported by the rules.
 pub(crate) fn resolve(tree: parse::Robot) -> Robot {
     let parse::Robot {
         attributes,
@@ -242,7 +242,7 @@ fn texts(root: &str, path: &[Ident]) -> Vec<String> {
     std::iter::once(root.to_owned()).chain(path.iter().map(text)).collect()
 }
 
-/// None if the rate is not a valid one, which another rule reports.
+/// `None` if the rate is not valid, which another rule reports.
 fn period(rate: &Quantity) -> Option<f64> {
     (rate.dimension == Dimension::FREQUENCY && rate.value > 0.0).then(|| 1.0 / rate.value)
 }

@@ -60,7 +60,7 @@ impl<I: Id, T> Table<I, T> {
         self.items.iter().enumerate().map(|(number, item)| (I::new(number), item))
     }
 
-    /// The first item's id of which `is` holds.
+    /// The id of the first item for which `is` holds.
     pub(crate) fn position(&self, is: impl FnMut(&T) -> bool) -> Option<I> {
         self.items.iter().position(is).map(I::new)
     }

@@ -1,4 +1,4 @@
-//! What makes a publisher publish, followed back through estimators, and how often that is.
+//! What triggers a publisher, traced back through estimators, and how often.
 
 use super::{From, Home, PublisherId, Robot, SensorId, ServiceId};
 
@@ -10,7 +10,7 @@ pub(crate) enum Trigger {
 }
 
 impl Robot {
-    /// Whose message makes this publisher publish. None round a circle and where an input names nothing.
+    /// The publisher whose message triggers this one. `None` in a cycle, and if an input names nothing.
     pub(crate) fn trigger(&self, mut publisher: PublisherId) -> Option<Trigger> {
         for _ in 0..=self.estimators.len() {
             let id = match self.publishers[publisher].from {

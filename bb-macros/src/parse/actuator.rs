@@ -3,8 +3,9 @@
 use super::Component;
 use super::Notes;
 use super::Settings;
-use super::block::{Head, items};
+use super::block::Head;
 use super::component::Declared;
+use super::items::items;
 use crate::language::{ActuatorItem, Nothing};
 use proc_macro2::Ident;
 use syn::Attribute;

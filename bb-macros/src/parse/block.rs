@@ -1,11 +1,10 @@
-//! The contents of braces, item by item, and how to go on after one that cannot be read.
+//! The contents of braces, item by item, and recovery after one that cannot be read.
 
+use super::Notes;
 use super::name::{is_keyword, whole};
-use super::{Notes, Setting, Settings};
-use crate::diagnostics::Place;
-use crate::language::{self, Occurs, Word, Words, unexpected};
+use super::tokens::starts_item;
+use crate::language::Word;
 use proc_macro2::{Delimiter, Ident, TokenTree};
-use syn::buffer::Cursor;
 use syn::ext::IdentExt;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{Attribute, Token};
@@ -17,7 +16,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// The first word as the name that it is where items start with no word of the language.
+    /// The first word as a name, where items start with a name instead of a word of the language.
     pub(super) fn name(&self, input: ParseStream<'_>) -> syn::Result<Ident> {
         let text = self.word.to_string();
         if NO_WORDS.contains(&&*text) && input.peek(Ident::peek_any) {
@@ -33,41 +32,11 @@ impl Head {
     }
 }
 
-/// What those may write in front of a name who know that other blocks have a word there.
+/// Words that people write before a name, as other blocks require one there.
 const NO_WORDS: [&str; 5] = ["command", "state", "parameter", "param", "group"];
 
-/// Reads the items of a place until the end: the settings among them to `settings`, of any other `item` gets the head and
-/// reads the rest. An item that cannot be read is reported and skipped.
-pub(super) fn items<I: Words, S: Words>(
-    input: ParseStream<'_>,
-    notes: &mut Notes<'_>,
-    settings: &mut Settings<S>,
-    mut item: impl FnMut(I, Head, ParseStream<'_>, &mut Notes<'_>) -> syn::Result<()>,
-) {
-    let expected = "this does not start a part of a robot; expected a word such as `link`, `joint` or `sensor`";
-    let mut seen: Vec<&str> = Vec::new();
-    items_of(input, expected, notes, |head, input, notes| {
-        let ident = head.word.clone();
-        let text = ident.to_string();
-        let word = if let Some((word, key)) = S::of(&text) {
-            settings.push(key, Setting::parse(word, head, input, notes)?);
-            word
-        } else if let Some((word, key)) = I::of(&text) {
-            item(key, head, input, notes)?;
-            word
-        } else {
-            return Err(unexpected::<I, S>(&ident));
-        };
-        if seen.contains(&word.text) {
-            notes.repeat(ident);
-        } else if word.occurs == Occurs::Once {
-            seen.push(word.text);
-        }
-        Ok(())
-    });
-}
-
-/// The same where items start with a name; `expected` is the error for anything else.
+/// Reads items until the end, each by its head; `expected` is the error for what starts none. An item that cannot be read is
+/// reported and skipped.
 pub(super) fn items_of(
     input: ParseStream<'_>,
     expected: &str,
@@ -76,13 +45,13 @@ pub(super) fn items_of(
 ) {
     while !input.is_empty() {
         if input.peek(Token![;]) {
-            // One too many is no harm.
+            // An extra one is harmless.
             let _: syn::Result<Token![;]> = input.parse();
             continue;
         }
         let result = match head(input, expected, notes) {
             Ok(Some(head)) => item(head, input, notes),
-            // What follows a comment in another language's notation cannot be read.
+            // Nothing can be read after a comment in another language's notation.
             Ok(None) => return,
             Err(error) => Err(error),
         };
@@ -109,7 +78,7 @@ pub(super) fn opened<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>>
     Ok(content)
 }
 
-/// Reads `;`. If it is missing that is reported; if the next item follows at once, reading goes on there.
+/// Reads `;`. If it is missing, that is reported, and reading resumes at the next item.
 pub(super) fn semicolon(input: ParseStream<'_>, after: &str, notes: &mut Notes<'_>) {
     if input.peek(Token![;]) {
         let _: syn::Result<Token![;]> = input.parse();
@@ -138,32 +107,12 @@ pub(super) fn colon(input: ParseStream<'_>, name: &Ident, what: &str) -> syn::Re
     colon.map(drop).map_err(|_| syn::Error::new(place, format!("expected `:` and {what} after `{name}`")))
 }
 
-/// The tokens from `start` up to the position of `input`.
-pub(super) fn place_since(start: Cursor<'_>, input: ParseStream<'_>) -> Place {
-    let (mut cursor, mut place) = (start, Place::from(input.span()));
-    while cursor != input.cursor()
-        && let Some((token, next)) = cursor.token_tree()
-    {
-        let start = if cursor == start { token.span() } else { place.start };
-        place = Place { start, end: token.span() };
-        cursor = next;
-    }
-    place
-}
-
 /// Skips to the next item, unless one starts here.
 pub(super) fn skip_to_item(input: ParseStream<'_>) {
     let ahead = input.fork();
     if ahead.call(Attribute::parse_outer).is_err() || !starts_item(&ahead) {
         skip(input);
     }
-}
-
-/// Whether an item starts here: with a word of the language, or a name followed by `:` or braces.
-pub(super) fn starts_item(input: ParseStream<'_>) -> bool {
-    let is_word = input.fork().call(Ident::parse_any).map(|word| language::starts_item(&word.to_string()));
-    let is_name = input.peek2(Token![:]) && !input.peek2(Token![::]) || input.peek2(syn::token::Brace);
-    is_word.is_ok_and(|is_word| is_word || is_name)
 }
 
 fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::Result<Option<Head>> {
@@ -176,6 +125,10 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
         let message = "only doc comments are allowed before a part of a robot; leave this attribute out";
         notes.error(attribute, message.into());
     }
+    if input.peek(Token![pub]) && (input.peek2(Ident::peek_any) || input.peek2(syn::token::Paren)) {
+        notes.at(input.span(), "the parts of a robot are as visible as the robot; leave `pub` out".into());
+        input.parse::<syn::Visibility>()?;
+    }
     let place = input.span();
     let expected = if input.peek(Token![<]) {
         "a robot is not written in XML; `topology: urdf(\"robot.urdf\");` takes links and joints from a URDF"
@@ -186,16 +139,19 @@ fn head(input: ParseStream<'_>, expected: &str, notes: &mut Notes<'_>) -> syn::R
     Ok(Some(Head { attributes, word }))
 }
 
-/// Reads attributes and doc comments; what is a comment in other languages is reported and passed over.
+/// Reads attributes and doc comments; comments of other languages are reported and skipped.
 pub(super) fn attributes(input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Vec<Attribute>> {
     let mut attributes = Vec::new();
-    while input.peek(Token![#]) {
+    let is_dashes = || input.peek(Token![-]) && input.peek2(Token![-]);
+    while input.peek(Token![#]) || is_dashes() {
         if input.peek2(syn::token::Bracket) {
             attributes.extend(input.call(Attribute::parse_outer)?);
             continue;
         }
         let place = input.span();
-        let message = if input.peek2(Token![!]) {
+        let message = if is_dashes() {
+            "`--` does not start a comment; write `//`"
+        } else if input.peek2(Token![!]) {
             "`//!` and `#![…]` cannot be used in a robot; write `///` before what it documents"
         } else {
             "`#` does not start a comment; write `//`"

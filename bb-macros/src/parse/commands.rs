@@ -5,8 +5,9 @@ mod settings;
 pub(crate) use settings::{Cancelled, CommandSettings};
 
 use super::Notes;
-use super::block::{Head, braced, items, items_of, opened, semicolon};
+use super::block::{Head, braced, items_of, opened, semicolon};
 use super::component::Declared;
+use super::items::items;
 use super::name::name;
 use super::{Component, Settings};
 use crate::language::{CategoryItem, CategorySetting, CommandSetting, CommandsItem, Words, words};
@@ -74,7 +75,7 @@ impl Category {
 impl Command {
     fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = head.name(input)?;
-        let declared = Declared::named(head.attributes, name, input, notes)?;
+        let declared = Declared::named("command", head.attributes, name, input, notes)?;
         let Declared { attributes, name, component, body } = declared;
         let mut settings = CommandSettings::default();
         let mut numbers = Settings::default();

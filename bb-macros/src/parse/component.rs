@@ -32,22 +32,28 @@ impl<'a> Declared<'a> {
     /// Reads what follows the word.
     pub(super) fn parse(head: Head, input: ParseStream<'a>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         let name = name(input, &head.word)?;
-        Self::named(head.attributes, name, input, notes)
+        Self::named(&head.word.to_string(), head.attributes, name, input, notes)
     }
 
-    /// Reads what follows the name.
+    /// Reads what follows the name of what `word` declares.
     pub(super) fn named(
+        word: &str,
         attributes: Vec<Attribute>,
         name: Ident,
         input: ParseStream<'a>,
         notes: &mut Notes<'_>,
     ) -> syn::Result<Self> {
+        if input.peek(syn::token::Brace) {
+            let message = format!("the type comes before the braces, as in `{name}: Type() {{ … }}`");
+            return Err(input.error(message));
+        }
         colon(input, &name, "a type")?;
-        let (component, is_closed) = Component::parse(&name, input, notes)?;
+        let (component, is_closed) = Component::parse(word, &name, input, notes)?;
         let body = if input.peek(syn::token::Brace) {
             Some(opened(input)?)
         } else {
             if !is_closed {
+                mistaken::tail(&name, input).map_or(Ok(()), Err)?;
                 semicolon(input, &format!("`{name}`"), notes);
             }
             None
@@ -58,10 +64,10 @@ impl<'a> Declared<'a> {
 
 impl Component {
     /// Also whether its braces have ended it, so that no `;` is missing.
-    fn parse(name: &Ident, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<(Self, bool)> {
+    fn parse(word: &str, name: &Ident, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<(Self, bool)> {
         let mut kind = path_of_type(name, input)?;
         let is_made_here = mistaken::constructor(&mut kind, notes);
-        mistaken::ros_messages(&mut kind, notes);
+        mistaken::ros_types(word, &mut kind, notes);
         let mut options = Vec::new();
         let mut is_closed = false;
         if input.peek(syn::token::Paren) {
@@ -84,6 +90,7 @@ impl Component {
 
 /// Reads a path whose last parentheses are not taken for the arguments of a function's type.
 fn path_of_type(name: &Ident, input: ParseStream<'_>) -> syn::Result<syn::Path> {
+    mistaken::type_of(name, input).map_or(Ok(()), Err)?;
     let leading_colon = input.parse()?;
     let mut segments = syn::punctuated::Punctuated::new();
     loop {

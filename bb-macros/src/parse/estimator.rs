@@ -3,8 +3,9 @@
 //! Both forms are read alike; that a nested one takes no `input` is a rule, so that the error can say why.
 
 use super::Notes;
-use super::block::{Head, items};
+use super::block::Head;
 use super::component::Declared;
+use super::items::items;
 use super::{Component, Input, Output, Reaction, Reactions, RunsOn, Settings};
 use crate::language::{EstimatorItem, EstimatorSetting};
 use proc_macro2::Ident;

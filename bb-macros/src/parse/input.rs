@@ -34,7 +34,7 @@ impl Input {
                 InputField::Driver => parsed.driver = Some(ident.clone()),
                 InputField::Optional => parsed.optional = Some(ident.clone()),
                 InputField::Within => {
-                    if parsed.within.replace(Quantity::of(word, input, notes)?).is_some() {
+                    if parsed.within.replace(notes.number(word, input)?).is_some() {
                         notes.repeat(ident.clone());
                     }
                 }

@@ -1,9 +1,17 @@
 //! `link base { sensor … estimator … joint … }`
 
-use super::Notes;
-use super::block::{Head, items, opened, semicolon};
+mod body;
+mod joint;
+
+#[cfg(feature = "urdf")]
+pub(crate) use body::Material;
+pub(crate) use body::{Geometry, Inertial, Shape};
+pub(crate) use joint::{Axis, Dynamics, Joint, Limit, Mimic, Origin, Transmission};
+
+use super::block::{Head, opened, semicolon};
+use super::items::items;
 use super::name::name;
-use super::{Estimator, Inertial, Joint, Sensor, Settings, Shape};
+use super::{Estimator, Notes, Sensor, Settings};
 use crate::language::{LinkItem, Nothing};
 use proc_macro2::{Ident, TokenTree};
 use syn::parse::ParseStream;

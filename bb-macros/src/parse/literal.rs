@@ -1,8 +1,8 @@
 //! What is written out: a number with or without its unit, a text, `true` or `false`.
 
 use super::Quantity;
-use super::block::{place_since, starts_item};
 use super::quantity::decimal_comma;
+use super::tokens::{place_since, starts_item};
 use crate::diagnostics::Place;
 use crate::units::Dimension;
 use proc_macro2::Ident;

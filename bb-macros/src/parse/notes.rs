@@ -1,10 +1,11 @@
-//! What is collected beside the tree while a robot is read: for the rules that hold for all words alike.
+//! Facts that are collected while a robot is read, for the rules that concern all words.
 
 use super::{JointKind, Quantity};
 use crate::diagnostics::Diagnostics;
-use crate::language::Word;
+use crate::language::{Value, Word};
 use proc_macro2::Ident;
 use std::ops::{Deref, DerefMut};
+use syn::parse::ParseStream;
 
 /// A number, and the word that it was given to.
 #[derive(Clone, Debug)]
@@ -32,6 +33,16 @@ impl<'a> Notes<'a> {
     /// All numbers, and all words that were written too often.
     pub(super) fn into_given(self) -> (Vec<Given>, Vec<Ident>) {
         (self.given, self.repeated)
+    }
+
+    /// Reads the number that is given to a word; the rules say whether it is one that the word takes.
+    pub(super) fn number(&mut self, word: &'static Word, input: ParseStream<'_>) -> syn::Result<Quantity> {
+        if matches!(word.value, Value::Count { .. }) && !Quantity::peek(input) {
+            return Err(input.error(format!("expected a whole number, as in `{}{}`", word.text, word.example)));
+        }
+        let quantity = Quantity::parse(input)?;
+        self.give(word, &quantity);
+        Ok(quantity)
     }
 
     pub(super) fn give(&mut self, word: &'static Word, quantity: &Quantity) {

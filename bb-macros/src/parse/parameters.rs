@@ -9,7 +9,7 @@ use crate::names::did_you_mean;
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
-use syn::{Attribute, Token};
+use syn::{Attribute, Lit, Token};
 
 /// An item of `parameters`, or of a group in it.
 #[derive(Clone, Debug)]
@@ -76,11 +76,18 @@ impl Parameter {
         notes: &mut Notes<'_>,
     ) -> syn::Result<Self> {
         colon(input, &name, "the type of the parameter")?;
+        if let Ok(value) = input.fork().parse::<Lit>() {
+            let message = format!("expected the type before the default, as in `{name}: f64 = 0.1`");
+            return Err(syn::Error::new(value.span(), message));
+        }
         let kind = ParameterKind::parse(input)?;
         let place = input.span();
         let equals: syn::Result<Token![=]> = input.parse();
         equals.map_err(|_| syn::Error::new(place, format!("expected `=` and the default of `{name}`")))?;
         let default = Literal::parse(input)?;
+        if input.peek(syn::token::Bracket) || input.peek(syn::token::Paren) || input.peek(Token![in]) {
+            return Err(input.error("a range follows a comma, as in `, range: 0.0..=1.0`"));
+        }
         let mut range = None;
         properties(input, notes, |field, _, ident, input, notes| {
             match field {

@@ -1,6 +1,6 @@
 //! Names with `::` between them.
 
-use super::block::place_since;
+use super::tokens::place_since;
 use crate::diagnostics::Place;
 use proc_macro2::Ident;
 use syn::ext::IdentExt;

@@ -1,9 +1,7 @@
 //! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also glued, `20ms`.
 
-use super::Notes;
-use super::block::{place_since, starts_item};
+use super::tokens::{place_since, starts_item};
 use crate::diagnostics::Place;
-use crate::language::{Value, Word};
 use crate::units::{Dimension, Unit};
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
@@ -21,8 +19,10 @@ pub(crate) struct Quantity {
     pub(crate) place: Place,
 }
 
-/// What those may write for π who write angles in radians.
+/// What people who think in radians write for π.
 const PI: [&str; 6] = ["pi", "PI", "M_PI", "math", "np", "std"];
+/// What people write for a setting that does not apply.
+const NO_NUMBER: [&str; 9] = ["None", "none", "null", "nil", "inf", "infinity", "infinite", "never", "unlimited"];
 const ANGLES: &str = "expected a number with its unit; nothing is computed here, write `90 deg` for π / 2";
 
 impl Quantity {
@@ -35,16 +35,6 @@ impl Quantity {
             return ahead.parse::<Token![-]>().is_ok() && is_number(&ahead);
         }
         is_number(input)
-    }
-
-    /// Reads the number that is given to a word; the rules say whether it is one that the word takes.
-    pub(super) fn of(word: &'static Word, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
-        if matches!(word.value, Value::Count { .. }) && !Self::peek(input) {
-            return Err(input.error(format!("expected a whole number, as in `{}{}`", word.text, word.example)));
-        }
-        let quantity = Self::parse(input)?;
-        notes.give(word, &quantity);
-        Ok(quantity)
     }
 
     /// Reads a number, and the unit if one follows.
@@ -64,7 +54,12 @@ impl Quantity {
         };
         let place = input.span();
         let is_pi = input.fork().call(Ident::parse_any).is_ok_and(|word| PI.contains(&&*word.to_string()));
-        let expected = if is_pi { ANGLES } else { "expected a number with its unit" };
+        let is_none = input.fork().call(Ident::parse_any).is_ok_and(|word| NO_NUMBER.contains(&&*word.to_string()));
+        let expected = match (is_pi, is_none) {
+            (true, _) => ANGLES,
+            (_, true) => "expected a number with its unit; leave the setting out to have its default",
+            _ => "expected a number with its unit",
+        };
         let literal: Lit = input.parse().map_err(|_| syn::Error::new(place, expected))?;
         let (digits, suffix) = match &literal {
             Lit::Int(literal) => {

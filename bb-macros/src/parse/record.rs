@@ -5,7 +5,7 @@ use super::name::one_name;
 use super::quantity::decimal_comma;
 use super::{Notes, Quantity};
 use crate::diagnostics::Place;
-use crate::language::{Word, Words};
+use crate::language::{Word, Words, way_out};
 use crate::names::{did_you_mean, one_of};
 use proc_macro2::{Ident, TokenTree};
 use syn::Token;
@@ -29,8 +29,12 @@ pub(super) fn record<F: Words>(
         let name = content.call(Ident::parse_any).map_err(|_| syn::Error::new(place, &expected))?;
         let text = name.to_string();
         let Some((field_word, field)) = F::of(&text) else {
-            // One field is no choice.
-            let hint = if fields.len() > 1 { did_you_mean(&text, fields.iter().copied()) } else { String::new() };
+            let hint = match way_out(F::PLACE, &text) {
+                Some(way) => format!("; {way}"),
+                // With one field there is nothing to suggest.
+                None if fields.len() > 1 => did_you_mean(&text, fields.iter().copied()),
+                None => String::new(),
+            };
             return Err(syn::Error::new(name.span(), format!("{expected}{hint}")));
         };
         if seen.contains(&name) {
@@ -68,10 +72,18 @@ pub(super) fn properties<F: Words>(
         };
         if has_value(word) {
             colon(input, &name, "a value")?;
+        } else if input.peek(Token![:]) || input.peek(Token![=]) {
+            return Err(input.error(format!("`{name}` takes no value; write `, {name}` alone")));
         }
         value(field, word, &name, input, notes)?;
     }
-    Ok(())
+    let place = input.span();
+    match input.fork().call(Ident::parse_any) {
+        Ok(word) if F::of(&word.to_string()).is_some() => {
+            Err(syn::Error::new(place, format!("expected `,` before `{word}`")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Reads the `[a, b, …]` of a word, exactly `N` of them.

@@ -1,7 +1,8 @@
 //! `robot Rover; parameters { … } states { … } commands { … } sensors { … } link base { … }`
 
 use super::Notes;
-use super::block::{Head, attributes, braced, items, semicolon, skip_to_item};
+use super::block::{Head, attributes, braced, opened, semicolon, skip_to_item};
+use super::items::items;
 use super::{
     Commands, Given, JointAddition, Link, ParameterItem, Sensor, Service, ServiceKind, Settings, State, Topology,
 };
@@ -26,13 +27,13 @@ pub(crate) struct Robot {
     pub(crate) links: Vec<Link>,
     /// `topology: urdf("…");`
     pub(crate) topologies: Vec<Topology>,
-    /// What is declared onto joints of the URDF.
+    /// What is declared at joints of the URDF.
     pub(crate) joints: Vec<JointAddition>,
     /// All numbers that are given to words of the language.
     pub(crate) given: Vec<Given>,
-    /// All words that are written more often than they may.
+    /// All words that are repeated where they may not be.
     pub(crate) repeated: Vec<Ident>,
-    /// Whether everything could be read; if not, what is missing may have been declared.
+    /// Whether everything could be read. If not, missing parts may have been declared.
     pub(crate) complete: bool,
 }
 
@@ -41,7 +42,7 @@ impl Robot {
         if let Err(error) = self.header(input, notes) {
             notes.syntax(&error);
             skip_to_item(input);
-            // What stood before the header is wrong, not the header.
+            // The tokens before the header are wrong, not the header.
             if starts_header(&input.fork())
                 && let Err(error) = self.header(input, notes)
             {
@@ -49,12 +50,21 @@ impl Robot {
                 skip_to_item(input);
             }
         }
+        if input.peek(syn::token::Brace)
+            && let Ok(body) = opened(input)
+        {
+            self.items(&body, notes);
+        }
+        self.items(input, notes);
+    }
+
+    fn items(&mut self, input: ParseStream<'_>, notes: &mut Notes<'_>) {
         items(input, notes, &mut Settings::<Nothing>::default(), |item, head, input, notes| {
             self.item(item, head, input, notes)
         });
     }
 
-    /// `pub robot Rover;` If it is not there, its attributes alone are consumed.
+    /// `pub robot Rover;` If it is missing, only its attributes are consumed.
     fn header(&mut self, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<()> {
         const EXPECTED: &str = "expected the robot's name first, as in `robot Rover;`";
         if input.is_empty() {
@@ -74,7 +84,11 @@ impl Robot {
             return Err(input.error("the name follows without a colon, as in `robot Rover;`"));
         }
         self.name = Some(super::name::name(input, &word)?);
-        semicolon(input, "the robot's name", notes);
+        if let (Some(name), true) = (&self.name, input.peek(syn::token::Brace)) {
+            notes.at(input.span(), format!("what a robot holds follows without braces, after `robot {name};`"));
+        } else {
+            semicolon(input, "the robot's name", notes);
+        }
         Ok(())
     }
 

@@ -32,7 +32,7 @@ impl RunsOn {
                 RunsOnField::Priority => &mut parsed.priority,
                 RunsOnField::Core => &mut parsed.core,
             };
-            if slot.replace(Quantity::of(word, input, notes)?).is_some() {
+            if slot.replace(notes.number(word, input)?).is_some() {
                 notes.repeat(ident.clone());
             }
             Ok(())

@@ -1,8 +1,9 @@
 //! `sensor imu: Bmi270(bus = 1) { rate: 200 Hz; estimator … }`
 
 use super::Notes;
-use super::block::{Head, items};
+use super::block::Head;
 use super::component::Declared;
+use super::items::items;
 use super::{Component, Estimator, Settings};
 use crate::language::{SensorItem, SensorSetting};
 use proc_macro2::Ident;

@@ -1,8 +1,9 @@
 //! `controller stability: Stability() { rate: 100 Hz; }`, and a `bridge` alike: what runs beside the topology.
 
 use super::Notes;
-use super::block::{Head, braced, items};
+use super::block::{Head, braced};
 use super::component::Declared;
+use super::items::items;
 use super::{Component, Settings};
 use crate::language::{BridgeItem, BridgesItem, ControllerItem, ControllersItem, Nothing, ServiceSetting, Word};
 use proc_macro2::Ident;

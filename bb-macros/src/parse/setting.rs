@@ -26,7 +26,7 @@ impl Setting {
         notes: &mut Notes<'_>,
     ) -> syn::Result<Self> {
         colon(input, &head.word, "a value")?;
-        let quantity = Quantity::of(word, input, notes)?;
+        let quantity = notes.number(word, input)?;
         semicolon(input, &format!("`{}`", head.word), notes);
         Ok(Self { word: head.word, quantity })
     }

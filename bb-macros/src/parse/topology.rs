@@ -1,7 +1,8 @@
 //! `topology: urdf("robot.urdf");`, and what is declared onto the joints that it brings: `joint elbow { sensor … }`.
 
 use super::Notes;
-use super::block::{Head, braced, items, semicolon};
+use super::block::{Head, braced, semicolon};
+use super::items::items;
 use super::name::name;
 use super::{Actuator, Sensor, Settings};
 use crate::diagnostics::Place;

@@ -148,7 +148,7 @@ fn components_made_as_in_rust() {
 
 #[test]
 fn parameters_in_expressions() {
-    let message = "an option is bound to a parameter as it is, and a parameter is no value that can be computed with; compute in the component, or declare a parameter of its own";
+    let message = "an option is bound to a parameter as it is, and a parameter is not a value that can be computed with; compute in the component, or declare a parameter of its own";
     for (value, place) in [
         ("param::gain * 2.0", "param::gain"),
         ("2.0 * param::gain", "param::gain"),

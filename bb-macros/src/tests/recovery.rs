@@ -50,7 +50,10 @@ fn headers() {
     wrong("robo Rover; link base;", &[("robo", expected)]);
     wrong("robot; link base;", &[(";", "expected the name of this `robot`")]);
     wrong("robot 5; link base;", &[("5", "expected the name of this `robot`")]);
-    wrong("robot Rover { link base; }", &[("{", "expected `;` after the robot's name")]);
+    wrong(
+        "robot Rover { link base; }",
+        &[("{", "what a robot holds follows without braces, after `robot Rover;`")],
+    );
     // What is missing at the end is missing at the last token, of which a group is known by its last character.
     for robot in ["robot", "robot Rover", "pub", "#[doc = \"\"]", "robot Rover; link"] {
         let places = places(robot);

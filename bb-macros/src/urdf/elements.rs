@@ -1,4 +1,4 @@
-//! The elements of a URDF: each to the part of the tree that the language has for it.
+//! Converts the elements of a URDF to parts of the tree.
 
 use crate::diagnostics::Place;
 use crate::parse::{
@@ -252,7 +252,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         Origin { xyz, rpy }
     }
 
-    /// The only child of that name, which must be there.
+    /// The only child of that name, which is required.
     fn only<'n, 'i>(&mut self, node: Node<'n, 'i>, name: &str) -> Option<Node<'n, 'i>> {
         let child = self.children(node, name).into_iter().next();
         if child.is_none() {
@@ -266,7 +266,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         self.number(node, name, dimension)
     }
 
-    /// None if it is not there; a fault if it is no number.
+    /// `None` if it is missing; a fault if it is not a number.
     fn number(&mut self, node: Node<'_, '_>, name: &str, dimension: Dimension) -> Option<Quantity> {
         node.attribute(name)?;
         let [number] = self.numbers::<1>(node, name)?;

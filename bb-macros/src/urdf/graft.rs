@@ -1,4 +1,4 @@
-//! Puts what is declared onto the links and joints of a URDF.
+//! Adds declarations to the links and joints of a URDF.
 
 use super::{read, refuse_joints};
 use crate::diagnostics::Diagnostics;

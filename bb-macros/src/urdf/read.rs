@@ -5,7 +5,7 @@ use crate::parse::{Joint, Link, Topology};
 use roxmltree::{Document, Node};
 use std::collections::{HashMap, HashSet};
 
-/// The root link with all that hangs on it; or the faults, each with its line and column.
+/// The root link with everything attached to it; or the faults, each with its line and column.
 pub(super) fn root(text: &str, topology: &Topology) -> Result<Link, Vec<String>> {
     let document = Document::parse(text).map_err(|error| {
         let place = error.pos();

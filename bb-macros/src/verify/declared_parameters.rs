@@ -22,7 +22,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             OptionValue::Parameter(path) => path,
             OptionValue::Expression { expression, .. } => {
                 if let Some(place) = inside(expression.to_token_stream()) {
-                    let message = "an option is bound to a parameter as it is, and a parameter is no value that can be \
+                    let message = "an option is bound to a parameter as it is, and a parameter is not a value that can be \
                                    computed with; compute in the component, or declare a parameter of its own";
                     diagnostics.at(place, message.into());
                 }

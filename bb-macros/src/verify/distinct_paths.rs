@@ -58,7 +58,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// What has a path and is no publisher of the language's: its path, and how messages name it.
+/// What has a path without being a declared publisher: the path, and its name in messages.
 fn others(robot: &Robot) -> HashMap<&[String], String> {
     let actuators = robot.actuators.iter().map(|it| (&it.path[..], format!("the actuator `{}`", it.name)));
     let parameters = robot.parameters.iter().map(|it| (&it.path[..], format!("the parameter `{}`", it.name)));

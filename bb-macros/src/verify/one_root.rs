@@ -10,7 +10,8 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     let mut roots = robot.links.iter().filter(|link| link.joint.is_none());
     match (roots.next(), &robot.name) {
         (Some(root), _) => {
-            for extra in roots {
+            // Where something could not be read, it may be no root.
+            for extra in roots.filter(|_| robot.complete) {
                 let (root, name) = (&root.name, &extra.name);
                 diagnostics.error(
                     name,

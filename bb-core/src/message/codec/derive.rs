@@ -1,9 +1,9 @@
-//! How the derive names the fields of a payload: so that a type that is not a field is reported in one place.
+//! What the derive calls for each field of a payload, so that a type that is not a field is reported once.
 
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::marker::PhantomData;
 
-/// Whether a field is finite. Of all that the derive generates, this and [`is_any`] alone require a [`Field`].
+/// Whether a field is finite. Of the functions that the derive calls, only this and [`is_any`] require a [`Field`].
 pub fn is_finite<T: Field>(value: &T) -> bool {
     value.is_finite()
 }
@@ -13,7 +13,7 @@ pub fn is_any<T: Field>(_: &T) -> bool {
     true
 }
 
-/// What `T` does as a field, if it is one; else what [`NotField`] does, since own functions go first.
+/// Calls `T`'s implementation of [`Field`], if it has one, else [`NotField`]: inherent functions take precedence.
 #[derive(Debug)]
 pub struct FieldOf<T>(PhantomData<fn() -> T>);
 
@@ -39,14 +39,14 @@ impl<T: Field> FieldOf<T> {
     /// Reads the field `name`.
     ///
     /// # Errors
-    /// What is wrong with it, by its name.
+    /// The field's error, with its name.
     #[inline]
     pub fn read(reader: &mut Reader<'_>, name: &'static str) -> Result<T, DecodeError> {
         reader.field(name)
     }
 }
 
-/// What holds of a type that is no field: nothing that is ever run, since it does not compile.
+/// Fallback for a type that is not a field. It never runs, since such a payload does not compile.
 pub trait NotField<T> {
     /// Any.
     const SHAPE: Shape = Shape::Bool;

@@ -1,4 +1,4 @@
-//! Plain CDR in. Nothing is believed that the bytes at hand do not bear out.
+//! Reads plain CDR. Lengths are checked against the bytes that are left before anything is allocated.
 
 use super::{DecodeError, Field};
 
@@ -6,7 +6,7 @@ use super::{DecodeError, Field};
 const BIG_ENDIAN: u16 = 0x0000;
 const LITTLE_ENDIAN: u16 = 0x0001;
 
-/// Reads values off bytes.
+/// Reads values from bytes.
 #[derive(Clone, Debug)]
 pub struct Reader<'a> {
     bytes: &'a [u8],
@@ -24,7 +24,7 @@ impl<'a> Reader<'a> {
     /// Reads a message, which begins with the four bytes that name the encoding: plain CDR, in either byte order.
     ///
     /// # Errors
-    /// They are not there, or name another encoding.
+    /// They are missing, or name another encoding.
     pub fn of_message(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let Some((header, data)) = bytes.split_first_chunk::<4>() else {
             let found = format!("{} bytes", bytes.len());
@@ -43,12 +43,12 @@ impl<'a> Reader<'a> {
         Err(DecodeError::new(0, "the encoding 0x0000 or 0x0001, plain CDR", format!("{encoding:#06x}{name}")))
     }
 
-    /// How many bytes are left.
+    /// The number of bytes left.
     pub fn left(&self) -> usize {
         self.bytes.len() - self.at
     }
 
-    /// That something else was expected here.
+    /// The error for an unexpected value at this position.
     pub fn error(&self, expected: &'static str, found: impl Into<std::borrow::Cow<'static, str>>) -> DecodeError {
         DecodeError::new(self.at, expected, found)
     }
@@ -56,7 +56,7 @@ impl<'a> Reader<'a> {
     /// A number, which is at a multiple of its size. Its bytes are returned in little endian.
     ///
     /// # Errors
-    /// The bytes end before.
+    /// The bytes end early.
     pub fn number<const SIZE: usize>(&mut self, expected: &'static str) -> Result<[u8; SIZE], DecodeError> {
         let padding = self.at.next_multiple_of(SIZE) - self.at;
         let number = self.bytes.get(self.at + padding..).and_then(|rest| rest.first_chunk::<SIZE>());
@@ -72,17 +72,17 @@ impl<'a> Reader<'a> {
     /// Bytes as they are.
     ///
     /// # Errors
-    /// There are fewer.
+    /// There are fewer bytes.
     pub fn raw(&mut self, length: usize, expected: &'static str) -> Result<&'a [u8], DecodeError> {
         let Some(raw) = self.bytes[self.at..].get(..length) else { return Err(self.ends(expected)) };
         self.at += length;
         Ok(raw)
     }
 
-    /// How many values follow. Every value has a byte at least, so there cannot be more than bytes are left.
+    /// The number of values that follow. Every value has at least one byte, so that there are at most as many as bytes are left.
     ///
     /// # Errors
-    /// The bytes end before, or cannot hold so many.
+    /// The bytes end early, or are too few for that number.
     pub fn length(&mut self) -> Result<usize, DecodeError> {
         let length = u32::from_le_bytes(self.number("a length")?);
         match usize::try_from(length) {
@@ -94,7 +94,7 @@ impl<'a> Reader<'a> {
     /// Text.
     ///
     /// # Errors
-    /// It does not end where it says, or is not UTF-8.
+    /// It does not end where its length says, or is not UTF-8.
     pub fn text(&mut self) -> Result<&'a str, DecodeError> {
         let length = self.length()?;
         let bytes = self.raw(length, "text")?;
@@ -112,10 +112,10 @@ impl<'a> Reader<'a> {
         T::read(self).map_err(|error| error.within(name))
     }
 
-    /// A list of none or one: whether there is one.
+    /// A list of at most one element: whether it has one.
     ///
     /// # Errors
-    /// There are more.
+    /// It has more.
     pub fn is_present(&mut self) -> Result<bool, DecodeError> {
         match u32::from_le_bytes(self.number("a length of 0 or 1")?) {
             0 => Ok(false),
@@ -136,13 +136,13 @@ impl<'a> Reader<'a> {
         self.number("the number of a variant").map(u32::from_le_bytes)
     }
 
-    /// That a variant has no such number.
+    /// The error for a number that no variant has.
     #[doc(hidden)]
     pub fn no_variant<T>(&self, number: u32) -> Result<T, DecodeError> {
         Err(self.error("the number of a variant", number.to_string()))
     }
 
-    /// The empty lists of so many other variants.
+    /// The empty lists of `count` other variants.
     #[doc(hidden)]
     pub fn absent(&mut self, count: usize) -> Result<(), DecodeError> {
         for _ in 0..count {
@@ -153,7 +153,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The list of one that holds the fields of the variant that there is.
+    /// The list with the fields of the variant that is present.
     #[doc(hidden)]
     pub fn present(&mut self) -> Result<(), DecodeError> {
         match self.is_present()? {

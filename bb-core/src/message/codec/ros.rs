@@ -154,33 +154,33 @@ pub trait RosMessage: Sized {
     /// A second message, where ROS divides the payload into two.
     const COMPANION: Option<RosCompanion<Self>> = None;
 
-    /// The message as ROS has it.
+    /// Converts a message to that of ROS.
     fn to_ros(message: &Stamped<Self>) -> Self::Message;
 
-    /// Its payload and time.
+    /// Converts it back to a payload and a time.
     ///
     /// # Errors
     /// The message is not one that [`to_ros`](Self::to_ros) makes.
     fn from_ros(message: Self::Message) -> Result<(Self, WallTime), DecodeError>;
 }
 
-/// A second message of ROS for a payload, recorded on a topic below that of the first. A payload may be without it.
+/// A second message of ROS for a payload, recorded on a topic below that of the first. It is optional for each payload.
 #[derive(Debug)]
 pub struct RosCompanion<T> {
     /// The last part of the topic: `magnetic_field`.
     pub topic: &'static str,
-    /// What the bytes mean.
+    /// The layout of the bytes.
     pub shape: Shape,
-    /// Appends it; false, and nothing, if this payload is without it.
+    /// Appends it, or appends nothing and returns false if this payload does not have it.
     pub write: fn(&Stamped<T>, &mut Writer<'_>) -> bool,
-    /// Puts what it says into the payload that the first message gave.
+    /// Adds its contents to the payload that was read from the first message.
     pub read: fn(&mut T, &mut Reader<'_>) -> Result<(), DecodeError>,
 }
 
 /// How messages of a payload are written in ROS's layout.
 #[derive(Debug)]
 pub struct RosLayout<T> {
-    /// What the bytes mean.
+    /// The layout of the bytes.
     pub(crate) shape: Shape,
     pub(crate) write: fn(&Stamped<T>, &mut Writer<'_>),
     pub(crate) read: fn(&mut Reader<'_>) -> Result<(T, WallTime), DecodeError>,
@@ -188,7 +188,7 @@ pub struct RosLayout<T> {
 }
 
 impl<T: Payload + RosMessage> RosLayout<T> {
-    /// As its [`RosMessage`] says.
+    /// As its [`RosMessage`] implementation does.
     pub const OF: Self = Self {
         shape: <T::Message as Field>::SHAPE,
         write: |message, writer| T::to_ros(message).write(writer),
@@ -196,7 +196,7 @@ impl<T: Payload + RosMessage> RosLayout<T> {
         companion: T::COMPANION,
     };
 
-    /// As its [`RosMessage`] says.
+    /// As its [`RosMessage`] implementation does.
     #[doc(hidden)]
     pub const fn of() -> Self {
         Self::OF
@@ -204,7 +204,7 @@ impl<T: Payload + RosMessage> RosLayout<T> {
 }
 
 impl<T> RosLayout<T> {
-    /// What the bytes mean.
+    /// The layout of the bytes.
     pub fn shape(&self) -> Shape {
         self.shape
     }

@@ -1,4 +1,4 @@
-//! An island whose estimators are not known: what the runtime does with each.
+//! An island with its estimators erased: the interface of the runtime.
 
 use super::{Key, NodeEntry};
 use crate::declaration::{IslandDeclaration, WorkerDeclaration};
@@ -35,11 +35,11 @@ pub trait AnyIsland<W> {
     fn drain(&self, wiring: &W);
     /// How its worker runs, if it has one.
     fn worker(&self) -> Option<WorkerDeclaration>;
-    /// From now on a worker serves it, see [`Self::serve`].
+    /// Sets that a worker serves it, see [`Self::serve`].
     fn give_to_worker(&self);
-    /// Processes what comes, on the calling thread, until its estimators have stopped.
+    /// Processes entries on the calling thread until its estimators have stopped.
     fn serve(&self, wiring: &W);
-    /// Entries processed, and the estimator whose callback ran last; none if no thread holds it now.
+    /// The number of entries processed, and the estimator whose callback ran last; `None` if no thread holds it.
     fn busy(&self, wiring: &W) -> Option<(u64, usize)>;
     /// The time of the last entry.
     fn entered_at(&self) -> MonotonicTime;
@@ -49,9 +49,9 @@ pub trait AnyIsland<W> {
     fn has_retired(&self) -> bool;
     /// Whether nothing waits for it and no thread holds it.
     fn is_idle(&self, wiring: &W) -> bool;
-    /// From now on entries are processed when [`Self::replay`] says so.
+    /// Sets that entries are processed only by [`Self::replay`].
     fn begin_replay(&self, wiring: &W);
-    /// Processes an entry of a journal; false if there is none that matches.
+    /// Processes the entry that a journal names; returns false if none matches.
     fn replay(&self, wiring: &W, now: MonotonicTime, entry: Replayed<'_>) -> bool;
 }
 
@@ -123,7 +123,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
             }
             let is_last = inbox.retires();
             drop(inbox);
-            // A caller may hold the island; it tells when it is done.
+            // A caller may hold the island; it signals when it is done.
             let Some(mut state) = self.hold(wiring, Duration::MAX) else { continue };
             while self.process_next(&mut state, wiring) && self.waiting.load(Ordering::Relaxed) == 0 {}
             drop(state);
@@ -132,7 +132,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
             }
             if self.waiting.load(Ordering::SeqCst) != 0 {
                 self.tell_waiting();
-                // A lock is not fair, and this thread would be faster than those that must be woken.
+                // A lock is not fair, and this thread would be faster than those that have to wake up first.
                 self.wait(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
             }
         }

@@ -22,8 +22,8 @@ pub(super) enum Entry<M> {
 
 /// Entries in the order in which they came.
 ///
-/// Messages are bounded by the island's capacity. The rest is bounded by its nature, as at most so much waits of each kind:
-/// two wakes, one request to start, to be restarted, to be given up or to be lost per estimator, one panic of its outputs, the one-way requests that
+/// Messages are bounded by the island's capacity. All other entries are bounded by their kind: at most two wakes, one request
+/// to start, to be restarted, to be given up or to be lost per estimator, one panic of its outputs, the one-way requests that
 /// an estimator may have, and a few changes of options.
 pub(super) struct Inbox<M> {
     entries: VecDeque<Dated<M>>,
@@ -59,7 +59,7 @@ impl<M> Inbox<M> {
         Self { entries: VecDeque::new(), messages: 0, wakes: 0, retires: None }
     }
 
-    /// Makes room for as many messages as it may hold.
+    /// Allocates room for its capacity.
     pub(super) fn reserve(&mut self, capacity: usize) {
         if self.entries.capacity() == 0 {
             self.entries.reserve_exact(capacity);
@@ -85,7 +85,7 @@ impl<M> Inbox<M> {
         self.take_message(|_| true)
     }
 
-    /// Takes the first message of which `is_wanted` holds.
+    /// Takes the first message that `is_wanted`.
     pub(super) fn take_message(&mut self, is_wanted: impl Fn(&M) -> bool) -> Option<M> {
         let position = self.entries.iter().position(|(_, entry)| match entry {
             Entry::Message(message) => is_wanted(message),

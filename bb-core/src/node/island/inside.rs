@@ -17,7 +17,7 @@ loom::thread_local! {
     static SHARING: RefCell<Vec<u64>> = RefCell::new(Vec::new());
 }
 
-/// The calling thread is inside an island of a robot as long as this lives.
+/// A guard while the calling thread is inside an island of a robot.
 pub(super) struct Inside {
     before: u64,
     is_shared: bool,

@@ -1,4 +1,4 @@
-//! An estimator in its island. The expansion of `robot!` says where it is and where its outputs go; what is done with it is
+//! An estimator in its island. The expansion of `robot!` says where it is and where its outputs go; the code that uses it is
 //! here, once for all estimators.
 
 use super::{Island, IslandState, Key};
@@ -22,7 +22,7 @@ pub trait Member {
     /// Its number.
     const NUMBER: usize;
 
-    /// It, in its island.
+    /// Its node in the island.
     fn node(island: &mut Self::State) -> &mut Node<Self::Estimator>;
 
     /// Publishes what it has emitted, output by output.
@@ -39,18 +39,18 @@ pub trait Member {
         Default::default()
     }
 
-    /// What emits a message at its output of that number alone; none if the payload is another.
+    /// A function that emits a message at its output of that number alone; `None` if the payload's type differs.
     fn emitted(output: usize, message: &DynamicMessage) -> Option<OutputOf<Self>> {
         if output == 0 { alone::<<OutputOf<Self> as Outputs>::Only, _>(message) } else { None }
     }
 }
 
-/// What emits `message` alone at the output `F`.
+/// Emits `message` alone at the output `F`.
 pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
     message.downcast::<F::Payload>().map(|message| F::alone(message.payload.clone()))
 }
 
-/// What is done with one estimator of an island beside handing it messages.
+/// What an island does with one of its estimators, other than delivering messages.
 #[allow(missing_debug_implementations)]
 pub enum Act<'a, 'b> {
     /// All that is due.
@@ -72,7 +72,7 @@ pub fn start<M: Member>(
     Node::new(M::NUMBER, options, binding, M::cache, environment)
 }
 
-/// Hands a message to an estimator's input of that number, publishes what it emits, and lets it go on if it wants to.
+/// Delivers a message to an estimator's input of that number, publishes what it emits, and lets it continue if it asks to.
 #[inline]
 pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
     island: &mut M::State,
@@ -90,7 +90,7 @@ pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
     }
 }
 
-/// Publishes what an estimator has emitted; a panic in there is its output's.
+/// Publishes what an estimator has emitted; a panic in it is attributed to the output.
 #[inline]
 pub(crate) fn publish<M: Member>(
     wiring: &WiringOf<M>,
@@ -104,7 +104,7 @@ pub(crate) fn publish<M: Member>(
     emitting.done();
 }
 
-/// Does something with an estimator; false if it cannot emit that message.
+/// Performs an act on an estimator; returns false if it cannot emit that message.
 #[cold]
 pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, '_>) -> bool {
     match act {
@@ -156,7 +156,7 @@ pub fn enter<S: IslandState, T: Payload>(
     S::find(wiring).enter(wiring, now, key, direct, || keep(message.clone()));
 }
 
-/// An island of a wiring, whatever its estimators.
+/// An island of a wiring, with its estimators erased.
 pub fn island<S: IslandState + 'static>(wiring: &S::Wiring) -> &dyn AnyIsland<S::Wiring>
 where
     Island<S>: AnyIsland<S::Wiring>,
@@ -164,7 +164,7 @@ where
     S::find(wiring)
 }
 
-/// Publishes a recorded message of a sensor or a service again; false if its payload is another.
+/// Publishes a recorded message of a sensor or a service; returns false if its payload has another type.
 pub fn feed<W, T: Payload>(
     wiring: &W,
     message: &DynamicMessage,

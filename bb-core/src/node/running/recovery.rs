@@ -14,7 +14,7 @@ use crate::node::{DropReason, Report};
 use crate::time::MonotonicTime;
 
 impl<E: Estimator> Node<E> {
-    /// Makes it for the first time. What keeps the robot from starting is kept in the environment.
+    /// Makes it for the first time. A failure that prevents the robot from starting is stored in the environment.
     pub(super) fn make_first(&mut self, now: MonotonicTime) {
         let context = self.context(now);
         self.shared.set_last_run(now);
@@ -105,7 +105,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Everything is fresh but the backlog and the health.
+    /// Resets everything but the backlog and the health.
     fn refresh(&mut self, context: Context, now: MonotonicTime) {
         self.cache = (self.make_cache)();
         self.admission = Admission::new(self.declaration.inputs.len());
@@ -120,14 +120,14 @@ impl<E: Estimator> Node<E> {
         self.schedule();
     }
 
-    /// It stops for good: what waits is counted as dropped.
+    /// It stops for good: waiting messages are counted as dropped.
     pub(super) fn drop_backlog(&mut self) {
         let counters = self.shared.counters();
         self.backlog.clear().for_each(|input| counters.drop(input, DropReason::Stopped));
     }
 }
 
-/// Runs `make`; the disarm callbacks that it registers replace those from before.
+/// Runs `make`; the disarm callbacks that it registers replace earlier ones.
 fn replacing_hooks<T>(
     environment: &Environment,
     path: &'static str,

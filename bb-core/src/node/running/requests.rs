@@ -12,7 +12,7 @@ use crate::node::requests::{Cast, find};
 use std::any::Any;
 
 impl<E: Estimator> Node<E> {
-    /// Handles an entry; what is due afterwards is for [`Self::turn`].
+    /// Handles an entry. What becomes due is left to [`Self::turn`].
     pub fn handle(&mut self, entry: NodeEntry, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
         match entry {
             NodeEntry::Start => self.begin(turn),
@@ -40,6 +40,9 @@ impl<E: Estimator> Node<E> {
                     if self.was_good {
                         self.judge(HealthEvent::Good, source, turn.now());
                     }
+                } else if let Some((input, reason)) = self.shared.counters().last_drop(self.declaration) {
+                    let (estimator, reason) = (self.declaration.path, reason.name());
+                    tracing::info!(estimator, input, reason, "lost; its last message was dropped");
                 }
             }
             NodeEntry::Cast { request, handle } => {
@@ -48,7 +51,7 @@ impl<E: Estimator> Node<E> {
                     Some(handle) => handle.downcast::<Cast<E>>().ok().map(|handle| *handle),
                     None => Self::replayed(&request),
                 };
-                // That something happened to it ends its timeout, whatever it was.
+                // Any entry ends the timeout.
                 let handle = handle.unwrap_or_else(|| Box::new(|_| Ok(Reply::none())));
                 let declaration = self.declaration;
                 return self.run(turn, emitted, |estimator| {
@@ -79,7 +82,7 @@ impl<E: Estimator> Node<E> {
         Next::Quiet
     }
 
-    /// A request of a journal, if this process knows how to make it again.
+    /// A request from a journal, if this process can decode it.
     fn replayed(request: &Request) -> Option<Cast<E>> {
         let handle = find::<E>(request.kind, &request.name)?;
         let bytes = request.bytes.clone()?;
@@ -96,7 +99,7 @@ impl<E: Estimator> Node<E> {
         self.make_first(self.environment.clock().now());
     }
 
-    /// Answers a request; the stamp of what it put into `emitted`, if anything.
+    /// Answers a request; returns the stamp of what it put into `emitted`, if anything.
     pub(crate) fn call<Q>(
         &mut self,
         request: Q,
@@ -131,7 +134,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// A one-way request of type `Q`, as it waits, with what the journal holds of it.
+    /// A waiting one-way request of type `Q`, with its bytes for the journal.
     pub(crate) fn cast<Q: Send + 'static>(request: Q) -> (Request, Box<dyn Any + Send>)
     where
         E: HandleCast<Q>,

@@ -19,8 +19,8 @@ use std::sync::Arc;
 const NO_ORIENTATION: [f64; 9] = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
 /// An orientation is absent where `sensor_msgs/Imu` says that it is: where the first element of its covariance is −1.
-/// A quaternion of zeros, which drivers send that leave the field alone, is no rotation, and so is absent as well. Any
-/// other quaternion is taken as it is.
+/// A quaternion of zeros is not a rotation, and is absent as well: drivers that do not set the field send it. Any other
+/// quaternion is read as it is.
 fn orientation_from_ros(
     orientation: UnitQuaternion<f64>,
     covariance: &[f64; 9],

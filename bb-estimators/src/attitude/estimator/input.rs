@@ -6,7 +6,7 @@ use bb_core::payload::{Imu, MagneticField, Marg};
 use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Matrix3, Vector3};
 
-/// An input of which an inertial sample can be made.
+/// An input that an inertial sample can be made from.
 #[diagnostic::on_unimplemented(
     message = "an attitude filter cannot take `{Self}`",
     label = "not an inertial input",

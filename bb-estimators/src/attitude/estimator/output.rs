@@ -1,4 +1,4 @@
-//! What an attitude estimator emits: the orientation alone, or what else its filter knows beside it.
+//! The outputs of an attitude estimator: the orientation, or also the other estimates of its filter.
 
 use crate::attitude::AttitudeFilter;
 use bb_core::payload::Orientation;
@@ -16,7 +16,7 @@ pub trait AttitudeOutput: Outputs + Sized {
     fn of<F: AttitudeFilter>(filter: &F) -> Option<Self>;
 }
 
-/// What a filter knows beside the orientation; `None` where its algorithm has no such notion.
+/// The other estimates of a filter; `None` where its algorithm has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub struct AttitudeStatus {
     /// The gyroscope's bias, rad/s, in the frame of the orientation.

@@ -44,19 +44,19 @@ params! {
         recovery_time: f64 = 5.0, in 0.0..=1e6, unit "s";
         /// Whether the gyroscope's offset is found at rest.
         ///
-        /// Off: an offset tilts the estimate by offset over gain. On: slow rotation for a long time is taken for one.
+        /// Off: an offset tilts the estimate by offset over gain. On: slow rotation for a long time is mistaken for one.
         ///
         /// Source: the library's offset correction, to be used along with the filter.
         offset_correction: bool = true;
         /// The greatest angular velocity, less the offset so far, that counts as rest.
         ///
-        /// Small: a larger offset is never found. Large: slow rotation is taken for an offset.
+        /// Small: a larger offset is never found. Large: slow rotation is mistaken for an offset.
         ///
         /// Source: the library's.
         rest_angular_velocity: f64 = 3.0 * DEGREE, in 0.0..=1000.0, shown "3°/s", unit "rad/s";
-        /// How long the rotation has to be that slow to be rest.
+        /// How long the rotation must be that slow to count as rest.
         ///
-        /// Small: a pause is taken for rest. Large: short rests are not used.
+        /// Small: a pause is mistaken for rest. Large: short rests are not used.
         ///
         /// Source: the library's.
         rest_time: f64 = 3.0, in 0.0..=1e6, unit "s";

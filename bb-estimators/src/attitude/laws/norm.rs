@@ -1,4 +1,4 @@
-//! The orientation has unit norm for ever, and whatever else a filter tells is finite.
+//! The orientation keeps unit norm, and all other outputs of a filter are finite.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;

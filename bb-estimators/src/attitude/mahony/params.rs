@@ -17,7 +17,7 @@ params! {
         /// How fast the same error becomes gyroscope bias.
         ///
         /// Small: steady, and a bias stays for long. Large: a bias is found soon, but accelerations and field
-        /// disturbances are taken for one; above a quarter of the squared proportional gain the orientation swings.
+        /// disturbances are mistaken for one; above a quarter of the squared proportional gain the orientation swings.
         ///
         /// Source: as above; Mahony's paper has 0.3.
         integral_gain: f64 = 0.0012, in 0.0..=1e3, plain "1/s²";

@@ -26,7 +26,7 @@ const LEAST_EVIDENCE_S: f64 = 1.0;
 /// A new field is believed when it has lasted this many times as long as the reference was seen.
 const EVIDENCE_RATIO: f64 = 2.0;
 
-/// A new field that lasts this long is believed whatever was before, s.
+/// A new field that lasts this long is accepted in any case, s.
 const MOST_EVIDENCE_S: f64 = 40.0;
 
 /// How soon a disturbance is forgotten, s: passing a piece of iron takes about a second.

@@ -184,7 +184,7 @@ impl<T: Real> MekfFilter<T> {
         self.calibration
     }
 
-    /// What the magnetometer reads beside the field: by iron on the body, in the body frame and the field's unit. Zero
+    /// The offset of the magnetometer's reading from the field, by iron on the body, in the body frame and the field's unit. Zero
     /// as long as nothing speaks for another.
     pub fn magnetometer_offset(&self) -> Vector3<T> {
         self.iron.offset

@@ -14,20 +14,20 @@ params! {
         /// What the gyroscope's error grows by with the angular velocity, beyond scale and misalignment: nonlinearity,
         /// its sensitivity to acceleration, and the sampling of a rate that changes.
         ///
-        /// Small: trusts the calibration that it finds, which then has to be constant. Large: fast rotation is forgotten
+        /// Small: trusts the calibration that it finds, which must then be constant. Large: fast rotation is forgotten
         /// like noise.
         ///
         /// Source: data sheets give a nonlinearity of 0.1 %, here of motion that changes about once a second.
         gyroscope_rate_noise: f64 = 9e-4, in 0.0..=1.0, plain "√s";
         /// Standard deviation of the gyroscope's bias at the start.
         ///
-        /// Small: a larger bias is found late. Large: an acceleration at the start is taken for one.
+        /// Small: a larger bias is found late. Large: an acceleration at the start is mistaken for one.
         ///
         /// Source: data sheets; VQF's `biasSigmaInit` is 0.5°/s.
         initial_bias: f64 = 0.0175, in 0.0..=1.0, shown "1°/s", unit "rad/s";
         /// How fast the bias wanders: its standard deviation after a second.
         ///
-        /// Small: steady, and slow to follow a bias that changes. Large: accelerations are taken for bias.
+        /// Small: steady, and slow to follow a bias that changes. Large: accelerations are mistaken for bias.
         ///
         /// Source: VQF's `biasForgettingTime`, 0.1°/s in 100 s.
         bias_drift: f64 = 1.4e-4, in 0.0..=1.0, shown "0.08°/s after 100 s", plain "rad/s/√s";
@@ -56,7 +56,7 @@ params! {
         /// How much the accelerometer may lag the gyroscope, standard deviation. The lag is estimated; it may be
         /// negative.
         ///
-        /// 0: takes them as simultaneous. Large: accelerations are taken for a lag.
+        /// 0: takes them as simultaneous. Large: accelerations are mistaken for a lag.
         ///
         /// Source: the two low-pass filters of one chip differ by a millisecond or two.
         accelerometer_latency: f64 = 1e-3, in 0.0..=1.0, unit "s";

@@ -21,7 +21,7 @@ params! {
         heading_time_constant: f64 = 9.0, in 1e-3..=1e6, unit "s";
         /// Whether the gyroscope's bias is estimated at rest.
         ///
-        /// Off: only motion shows the bias, and slow rotation is never taken for one. On: rest shows it within seconds.
+        /// Off: only motion shows the bias, and slow rotation is never mistaken for one. On: rest shows it within seconds.
         ///
         /// Source: the paper's `restBiasEstEnabled`.
         rest_bias: bool = true;
@@ -34,7 +34,7 @@ params! {
         motion_bias: bool = true;
         /// Standard deviation of the gyroscope's bias at the start, about each axis.
         ///
-        /// Small: a larger bias is found late. Large: what the first seconds show is taken for a bias.
+        /// Small: a larger bias is found late. Large: what the first seconds show is mistaken for a bias.
         ///
         /// Source: the paper's `biasSigmaInit`.
         initial_bias: f64 = 0.5 * DEGREE, in 0.0..=1.0, shown "0.5°/s", unit "rad/s";
@@ -46,7 +46,7 @@ params! {
         bias_forgetting_time: f64 = 100.0, in 1e-3..=1e9, unit "s";
         /// The greatest bias there is, and the greatest angular velocity that may count as rest.
         ///
-        /// Small: a larger bias is never found, and then there is no rest. Large: slow steady rotation is taken for
+        /// Small: a larger bias is never found, and then there is no rest. Large: slow steady rotation is mistaken for
         /// rest.
         ///
         /// Source: the paper's `biasClip`.
@@ -70,27 +70,27 @@ params! {
         ///
         /// Source: the paper's `biasSigmaRest`.
         rest_bias_deviation: f64 = 0.03 * DEGREE, in 1e-06..=10.0, shown "0.03°/s", unit "rad/s";
-        /// How long the sensor has to lie still to be at rest.
+        /// How long the sensor must not move to be at rest.
         ///
-        /// Small: a pause is taken for rest. Large: short rests are not used.
+        /// Small: a pause is mistaken for rest. Large: short rests are not used.
         ///
         /// Source: the paper's `restMinT`.
         rest_time: f64 = 1.5, in 0.0..=1e6, unit "s";
         /// Time constant of the low-pass that angular velocity and specific force are compared with to recognise rest.
         ///
-        /// Small: slow motion is taken for rest. Large: rest is recognised late.
+        /// Small: slow motion is mistaken for rest. Large: rest is recognised late.
         ///
         /// Source: the paper's `restFilterTau`.
         rest_time_constant: f64 = 0.5, in 1e-3..=1e6, unit "s";
         /// How far the angular velocity may be from its low-passed value at rest.
         ///
-        /// Small: noise hides rest. Large: slow motion is taken for rest.
+        /// Small: noise hides rest. Large: slow motion is mistaken for rest.
         ///
         /// Source: the paper's `restThGyr`.
         rest_angular_velocity: f64 = 2.0 * DEGREE, in 0.0..=1000.0, shown "2°/s", unit "rad/s";
         /// How far the specific force may be from its low-passed value at rest.
         ///
-        /// Small: noise hides rest. Large: slow motion is taken for rest.
+        /// Small: noise hides rest. Large: slow motion is mistaken for rest.
         ///
         /// Source: the paper's `restThAcc`.
         rest_specific_force: f64 = 0.5, in 0.0..=1e6, unit "m/s^2";
@@ -139,11 +139,11 @@ params! {
         first_field_time: f64 = 5.0, in 0.0..=1e6, unit "s";
         /// The least low-passed angular velocity that counts as motion for a new reference.
         ///
-        /// Small: the field of a sensor beside a magnet becomes the reference. Large: only fast motion counts.
+        /// Small: the field near a magnet becomes the reference. Large: only fast motion counts.
         ///
         /// Source: the paper's `magNewMinGyr`.
         new_field_angular_velocity: f64 = 20.0 * DEGREE, in 0.0..=1000.0, shown "20°/s", unit "rad/s";
-        /// How long a field has to be like the reference to count as undisturbed.
+        /// How long a field must match the reference to count as undisturbed.
         ///
         /// Small: a disturbance that looks right for a moment counts. Large: good fields are not used.
         ///

@@ -62,7 +62,7 @@ impl<T: Real> Rest<T> {
         }
     }
 
-    /// Takes a specific force, m/s², and ends rest if it differs too much; else the sensor may lie still.
+    /// Takes a specific force, m/s², and ends rest if it differs too much; else the sensor may be at rest.
     #[inline]
     pub(super) fn add_force(
         &mut self,

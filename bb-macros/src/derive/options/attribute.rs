@@ -21,7 +21,7 @@ pub(super) struct Attribute {
     pub(super) default: Option<Expr>,
     pub(super) range: Option<(Expr, Expr, String)>,
     pub(super) unit: Option<(Unit, String)>,
-    /// Whether something in it is wrong, so that what is missing is no further mistake.
+    /// Whether it has an error, so that missing parts are not reported as well.
     pub(super) is_mistaken: bool,
 }
 

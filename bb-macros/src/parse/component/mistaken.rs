@@ -1,4 +1,4 @@
-//! A component that is made as Rust makes a value: `Encoder { port: 1 }`, `Encoder::new(1)`.
+//! Components written in other ways: `Encoder { port: 1 }`, `Encoder::new(1)`, `sensor_msgs::Image()`.
 
 use crate::diagnostics::Place;
 use crate::language::{item_words, starts_item};
@@ -6,9 +6,9 @@ use crate::names::nearest;
 use crate::parse::Notes;
 use crate::parse::block::opened;
 use proc_macro2::{Ident, TokenTree};
-use syn::Token;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
+use syn::{LitStr, Token};
 
 /// Reports a function of a type, `Encoder::new`, and leaves the type.
 pub(super) fn constructor(kind: &mut syn::Path, notes: &mut Notes<'_>) -> bool {
@@ -30,23 +30,52 @@ pub(super) fn constructor(kind: &mut syn::Path, notes: &mut Notes<'_>) -> bool {
 }
 
 /// The packages of ROS that have the messages of robots.
-const ROS_PACKAGES: [&str; 6] =
-    ["geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "tf2_msgs", "trajectory_msgs"];
+const ROS_PACKAGES: [&str; 12] = [
+    "action_msgs",
+    "builtin_interfaces",
+    "control_msgs",
+    "diagnostic_msgs",
+    "geometry_msgs",
+    "nav_msgs",
+    "sensor_msgs",
+    "std_msgs",
+    "std_srvs",
+    "tf2_msgs",
+    "trajectory_msgs",
+    "visualization_msgs",
+];
 
-/// Reports messages of ROS, `External<sensor_msgs::Imu>`, and leaves the last name. No type of another crate can be a payload,
-/// so that such a path names no payload either where a crate of that name is there.
-pub(super) fn ros_messages(kind: &mut syn::Path, notes: &mut Notes<'_>) {
+/// The package and the last name of a type of ROS: `sensor_msgs::msg::Image`.
+fn of_ros(path: &syn::Path) -> Option<(String, syn::PathSegment)> {
+    let package = path.segments.first()?.ident.to_string();
+    let is_of_ros = path.segments.len() > 1 && ROS_PACKAGES.contains(&&*package);
+    is_of_ros.then(|| path.segments.last().map(|last| (package, last.clone()))).flatten()
+}
+
+/// Reports types of ROS. `sensor_msgs::Image()` becomes an unknown component, `External<sensor_msgs::Imu>` keeps the last name. A
+/// type of another crate cannot be a payload, so that such a path names no payload even if there is a crate of that name.
+pub(super) fn ros_types(word: &str, kind: &mut syn::Path, notes: &mut Notes<'_>) {
+    if let Some((package, message)) = of_ros(kind) {
+        let message = message.ident;
+        let expected = if word == "sensor" {
+            format!(
+                "a sensor is declared by its driver's type in Rust, or as `External<{message}>()` if other code publishes it"
+            )
+        } else {
+            format!("expected the type of Rust that implements this `{word}`")
+        };
+        let error =
+            format!("`{package}` is a package of ROS; {expected} (a module of that name is `self::{package}`)");
+        notes.error(&*kind, error);
+        *kind = syn::parse_quote!(::bb_core::__private::Unknown);
+        return;
+    }
     for segment in &mut kind.segments {
         let syn::PathArguments::AngleBracketed(arguments) = &mut segment.arguments else { continue };
         for argument in &mut arguments.args {
             let syn::GenericArgument::Type(syn::Type::Path(message)) = argument else { continue };
             let path = &mut message.path;
-            let (Some(first), Some(last)) = (path.segments.first(), path.segments.last()) else { continue };
-            let package = first.ident.to_string();
-            if path.segments.len() < 2 || !ROS_PACKAGES.contains(&&*package) {
-                continue;
-            }
-            let last = last.clone();
+            let Some((package, last)) = of_ros(path) else { continue };
             let error = format!(
                 "`{package}` is a package of ROS; the payload is a type of Rust, `{}`, which the prelude has if it is one of \
                  `bb_core` (a module of that name is `self::{package}`)",
@@ -57,6 +86,30 @@ pub(super) fn ros_messages(kind: &mut syn::Path, notes: &mut Notes<'_>) {
             path.leading_colon = None;
         }
     }
+}
+
+/// The error for what is not a type, where one is expected: `"Bmi270"`, `dyn Sensor`, `&Bmi270`.
+pub(super) fn type_of(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
+    let place = input.span();
+    let message = if let Ok(text) = input.fork().parse::<LitStr>()
+        && syn::parse_str::<syn::Path>(&text.value()).is_ok()
+    {
+        format!("a type is written without quotes: `{name}: {}()`", text.value())
+    } else if input.peek(Token![dyn]) || input.peek(Token![impl]) || input.peek(Token![&]) {
+        format!("expected the type of `{name}` itself, as in `{name}: Type()`")
+    } else {
+        return None;
+    };
+    Some(syn::Error::new(place, message))
+}
+
+/// The error for what follows a component in other languages: `Bmi270().rate(200)`, `Bmi270() @ 200 Hz`, `Bmi270 | Bmi088`.
+pub(super) fn tail(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
+    let is_tail = input.peek(Token![.]) || input.peek(Token![@]) || input.peek(Token![|]) || input.peek(Token![=]);
+    let message = format!(
+        "expected `;` or braces after `{name}`; options go into parentheses, settings into braces: `Type(option = value) {{ … }}`"
+    );
+    is_tail.then(|| input.error(message))
 }
 
 /// The error for options in braces, `Encoder { port: 1 }`, which are read if they come next.

@@ -1,9 +1,9 @@
 //! What a component is given: `beta = 0.1`, `gain = param::gain`.
 
-use crate::parse::block::place_since;
 use crate::parse::literal::capitalized;
 use crate::parse::name::whole;
 use crate::parse::quantity::decimal_comma;
+use crate::parse::tokens::place_since;
 use crate::parse::{Path, Quantity};
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
@@ -20,7 +20,7 @@ pub(crate) struct ComponentOption {
 pub(crate) enum OptionValue {
     /// A literal number with a unit.
     Quantity(Quantity),
-    /// `param::imu::beta`: whatever the parameter is at the time.
+    /// `param::imu::beta`: the current value of the parameter.
     Parameter(Path),
     /// Any expression; with its number, if it is a literal one.
     Expression { expression: Box<Expr>, number: Option<f64> },
@@ -41,7 +41,7 @@ impl ComponentOption {
 }
 
 impl OptionValue {
-    /// A number with a unit, or any expression: tried as a quantity first, since `0.42 m` is no expression.
+    /// A number with a unit, or any expression: tried as a quantity first, since `0.42 m` is not an expression.
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         if let Some(parameter) = Self::parameter(input)? {
             return Ok(parameter);

@@ -1,167 +1,211 @@
 // What `robot!` makes of everything.txt. Written by a test: `UPDATE_EXPANSION=1 cargo test -p bb-macros expansion`.
 
-/// One of everything.
-#[derive(Clone, Copy, Debug)]
-pub struct Rover;
-impl Rover {
+#[allow(non_snake_case, unreachable_pub, unused_imports)]
+mod __Rover_2_11 {
+    use super::*;
+    /// One of everything.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Rover;
+}
+impl __Rover_2_11::Rover {
     /// Assembles the robot: options may be changed and topics subscribed to before it starts.
     #[allow(dead_code)]
     pub fn builder() -> ::bb_core::Builder<Self> {
         <Self as ::bb_core::Robot>::builder()
     }
 }
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__sensor_battery = Ina219;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__sensor_battery = <__Rover__given__sensor_battery as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__sensor_battery = Ina219;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_battery = <__Rover_2_11__given__sensor_battery as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__sensor_battery>>::IS_SENSOR
+        <::bb_core::__private::Probe<__Rover_2_11__given__sensor_battery>>::IS_SENSOR
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__sensor_base_imu = Bmi270;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__sensor_base_imu = <__Rover__given__sensor_base_imu as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__sensor_base_imu = Bmi270;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_base_imu = <__Rover_2_11__given__sensor_base_imu as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__sensor_base_imu>>::IS_SENSOR
+        <::bb_core::__private::Probe<__Rover_2_11__given__sensor_base_imu>>::IS_SENSOR
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__sensor_base_pan_encoder = Encoder;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__sensor_base_pan_encoder = <__Rover__given__sensor_base_pan_encoder as ::bb_core::__private::Known<
-    {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__sensor_base_pan_encoder>>::IS_SENSOR
-    },
->>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__sensor_base_imu_tilt = Madgwick;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__sensor_base_imu_tilt = <__Rover__given__sensor_base_imu_tilt as ::bb_core::__private::Known<
-    {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__sensor_base_imu_tilt>>::IS_ESTIMATOR
-    },
->>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__estimator_base_pose = Eskf;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__estimator_base_pose = <__Rover__given__estimator_base_pose as ::bb_core::__private::Known<
-    {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__estimator_base_pose>>::IS_ESTIMATOR
-    },
->>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__actuator_base_pan_servo = Dynamixel;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__actuator_base_pan_servo = <__Rover__given__actuator_base_pan_servo as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__sensor_base_pan_encoder = Encoder;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_base_pan_encoder = <__Rover_2_11__given__sensor_base_pan_encoder as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
         <::bb_core::__private::Probe<
-            __Rover__given__actuator_base_pan_servo,
+            __Rover_2_11__given__sensor_base_pan_encoder,
+        >>::IS_SENSOR
+    },
+>>::Type;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__sensor_base_imu_tilt = Madgwick;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_base_imu_tilt = <__Rover_2_11__given__sensor_base_imu_tilt as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<
+            __Rover_2_11__given__sensor_base_imu_tilt,
+        >>::IS_ESTIMATOR
+    },
+>>::Type;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__estimator_base_pose = Eskf;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__estimator_base_pose = <__Rover_2_11__given__estimator_base_pose as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<
+            __Rover_2_11__given__estimator_base_pose,
+        >>::IS_ESTIMATOR
+    },
+>>::Type;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__actuator_base_pan_servo = Dynamixel;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__actuator_base_pan_servo = <__Rover_2_11__given__actuator_base_pan_servo as ::bb_core::__private::Known<
+    {
+        use ::bb_core::__private::NotProbed as _;
+        <::bb_core::__private::Probe<
+            __Rover_2_11__given__actuator_base_pan_servo,
         >>::IS_ACTUATOR
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__controller_stability = Stability;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__controller_stability = <__Rover__given__controller_stability as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__controller_stability = Stability;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__controller_stability = <__Rover_2_11__given__controller_stability as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__controller_stability>>::IS_SERVICE
+        <::bb_core::__private::Probe<
+            __Rover_2_11__given__controller_stability,
+        >>::IS_SERVICE
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__bridge_ros = RosBridge;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__bridge_ros = <__Rover__given__bridge_ros as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__bridge_ros = RosBridge;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__bridge_ros = <__Rover_2_11__given__bridge_ros as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__bridge_ros>>::IS_SERVICE
+        <::bb_core::__private::Probe<__Rover_2_11__given__bridge_ros>>::IS_SERVICE
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__command_arm = Arm;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__command_arm = <__Rover__given__command_arm as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__command_arm = Arm;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__command_arm = <__Rover_2_11__given__command_arm as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__command_arm>>::IS_COMMAND
+        <::bb_core::__private::Probe<__Rover_2_11__given__command_arm>>::IS_COMMAND
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__command_move_to = MoveTo;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__command_move_to = <__Rover__given__command_move_to as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__command_move_to = MoveTo;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__command_move_to = <__Rover_2_11__given__command_move_to as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__command_move_to>>::IS_COMMAND
+        <::bb_core::__private::Probe<__Rover_2_11__given__command_move_to>>::IS_COMMAND
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__given__command_stop = Stop;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__command_stop = <__Rover__given__command_stop as ::bb_core::__private::Known<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__given__command_stop = Stop;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__command_stop = <__Rover_2_11__given__command_stop as ::bb_core::__private::Known<
     {
         use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover__given__command_stop>>::IS_COMMAND
+        <::bb_core::__private::Probe<__Rover_2_11__given__command_stop>>::IS_COMMAND
     },
 >>::Type;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__payload__sensor_base_imu_tilt = <<<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as ::bb_core::__private::EmittedAt<
-    <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__payload__sensor_base_imu_tilt = <<<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as ::bb_core::__private::EmittedAt<
+    <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
 >>::Payload;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__payload__estimator_base_pose_pose = <::bb_core::__private::At<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__payload__estimator_base_pose_pose = <::bb_core::__private::At<
     {
         ::bb_core::__private::find_output::<
-            <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+            <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
         >("pose")
     },
 > as ::bb_core::__private::EmittedAt<
-    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+    <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
 >>::Payload;
-#[allow(non_camel_case_types, dead_code)]
-type __Rover__payload__nav_velocity = <::bb_core::__private::At<
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__payload__nav_velocity = <::bb_core::__private::At<
     {
         ::bb_core::__private::find_output::<
-            <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+            <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
         >("velocity")
     },
 > as ::bb_core::__private::EmittedAt<
-    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+    <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
 >>::Payload;
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11_must_be_declared_outside_of_functions = __Rover_2_11::Rover;
 #[allow(non_camel_case_types, dead_code)]
-type __Rover_must_be_declared_outside_of_functions = Rover;
+enum __Rover_2_11__member__sensor_base_imu_tilt {}
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__exported__sensor_base_imu_tilt = __Rover_2_11__member__sensor_base_imu_tilt;
 #[allow(non_camel_case_types, dead_code)]
-enum __Rover__member__sensor_base_imu_tilt {}
-#[allow(non_camel_case_types, dead_code)]
-enum __Rover__member__estimator_base_pose {}
+enum __Rover_2_11__member__estimator_base_pose {}
+#[doc(hidden)]
+#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__exported__estimator_base_pose = __Rover_2_11__member__estimator_base_pose;
 #[allow(clippy::all, non_snake_case, unused_variables)]
 const _: () = {
     use ::bb_core::__private;
     const _: () = ::bb_core::__private::check_required(
         "Ina219",
-        <<__Rover__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
         &[],
     );
     const _: () = ::bb_core::__private::check_required(
         "Bmi270",
-        <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
         &["bus"],
     );
     const _: () = ::bb_core::__private::check_required(
         "Encoder",
-        <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
         &["id"],
     );
     const _: () = ::bb_core::__private::check_option(
         "Encoder",
-        <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
         ::bb_core::__private::Given {
             name: "id",
             dimension: __private::None,
@@ -169,11 +213,11 @@ const _: () = {
         },
     );
     const _: () = ::bb_core::__private::check_estimator::<
-        __Rover__sensor_base_imu_tilt,
+        __Rover_2_11__sensor_base_imu_tilt,
     >("Madgwick", &["beta"], __private::None, false);
     const _: () = ::bb_core::__private::check_option(
         "Madgwick",
-        <<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options as ::bb_core::Options>::FIELDS,
         ::bb_core::__private::Given {
             name: "beta",
             dimension: __private::None,
@@ -181,16 +225,16 @@ const _: () = {
         },
     );
     const _: () = ::bb_core::__private::check_estimator::<
-        __Rover__estimator_base_pose,
+        __Rover_2_11__estimator_base_pose,
     >("Eskf", &[], __private::Some(&["imu", "tilt", "wheel"]), true);
     const _: () = ::bb_core::__private::check_required(
         "Dynamixel",
-        <<__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
         &["id"],
     );
     const _: () = ::bb_core::__private::check_option(
         "Dynamixel",
-        <<__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
         ::bb_core::__private::Given {
             name: "id",
             dimension: __private::None,
@@ -199,17 +243,17 @@ const _: () = {
     );
     const _: () = ::bb_core::__private::check_required(
         "Stability",
-        <<__Rover__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
         &[],
     );
     const _: () = ::bb_core::__private::check_required(
         "RosBridge",
-        <<__Rover__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
         &["port"],
     );
     const _: () = ::bb_core::__private::check_option(
         "RosBridge",
-        <<__Rover__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
         ::bb_core::__private::Given {
             name: "port",
             dimension: __private::None,
@@ -218,17 +262,17 @@ const _: () = {
     );
     const _: () = ::bb_core::__private::check_required(
         "Arm",
-        <<__Rover__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
         &[],
     );
     const _: () = ::bb_core::__private::check_required(
         "MoveTo",
-        <<__Rover__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
         &["speed"],
     );
     const _: () = ::bb_core::__private::check_option(
         "MoveTo",
-        <<__Rover__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
         ::bb_core::__private::Given {
             name: "speed",
             dimension: __private::Some(::bb_core::__private::Dimension {
@@ -240,55 +284,55 @@ const _: () = {
     );
     const _: () = ::bb_core::__private::check_required(
         "Stop",
-        <<__Rover__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
+        <<__Rover_2_11__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
         &[],
     );
     const _: () = ::bb_core::__private::check_input::<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >("Eskf", "imu");
     const _: () = ::bb_core::__private::check_input::<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >("Eskf", "tilt");
     const _: () = ::bb_core::__private::check_input::<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >("Eskf", "wheel");
     const _: () = ::bb_core::__private::check_optional::<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >("Eskf", "wheel");
     const _: () = ::bb_core::__private::check_output::<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
     >("Eskf", "pose");
     const _: () = ::bb_core::__private::check_output::<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
     >("Eskf", "velocity");
     const _: () = ::bb_core::__private::check_position(
         "servo",
         "pan",
         &[
-            <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as ::bb_core::Payload>::TELLS_JOINT_POSITION,
+            <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as ::bb_core::Payload>::TELLS_JOINT_POSITION,
         ],
     );
     const _: () = ::bb_core::__private::check_role(
         "arm",
-        <__Rover__command_arm as ::bb_core::Command>::ROLE,
+        <__Rover_2_11__command_arm as ::bb_core::Command>::ROLE,
         &[],
     );
     const _: () = ::bb_core::__private::check_role(
         "move_to",
-        <__Rover__command_move_to as ::bb_core::Command>::ROLE,
-        &[("arm", <__Rover__command_arm as ::bb_core::Command>::ROLE)],
+        <__Rover_2_11__command_move_to as ::bb_core::Command>::ROLE,
+        &[("arm", <__Rover_2_11__command_arm as ::bb_core::Command>::ROLE)],
     );
     const _: () = ::bb_core::__private::check_reachable(
         "move_to",
-        <__Rover__command_move_to as ::bb_core::Command>::ROLE,
+        <__Rover_2_11__command_move_to as ::bb_core::Command>::ROLE,
         &["idle", "degraded"],
     );
     const _: () = ::bb_core::__private::check_role(
         "stop",
-        <__Rover__command_stop as ::bb_core::Command>::ROLE,
+        <__Rover_2_11__command_stop as ::bb_core::Command>::ROLE,
         &[
-            ("arm", <__Rover__command_arm as ::bb_core::Command>::ROLE),
-            ("move_to", <__Rover__command_move_to as ::bb_core::Command>::ROLE),
+            ("arm", <__Rover_2_11__command_arm as ::bb_core::Command>::ROLE),
+            ("move_to", <__Rover_2_11__command_move_to as ::bb_core::Command>::ROLE),
         ],
     );
     static __SENSORS: [__private::SensorDeclaration; 3usize] = [
@@ -510,40 +554,40 @@ const _: () = {
         }
     }
     pub struct __Options0 {
-        sensor_battery: <__Rover__sensor_battery as ::bb_core::Sensor>::Options,
-        sensor_base_imu: <__Rover__sensor_base_imu as ::bb_core::Sensor>::Options,
-        sensor_base_pan_encoder: <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
-        sensor_base_imu_tilt: <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
-        estimator_base_pose: <__Rover__estimator_base_pose as ::bb_core::Estimator>::Options,
-        actuator_base_pan_servo: <__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
-        controller_stability: <__Rover__controller_stability as ::bb_core::Service>::Options,
-        bridge_ros: <__Rover__bridge_ros as ::bb_core::Service>::Options,
-        command_arm: <__Rover__command_arm as ::bb_core::Command>::Options,
-        command_move_to: <__Rover__command_move_to as ::bb_core::Command>::Options,
-        command_stop: <__Rover__command_stop as ::bb_core::Command>::Options,
+        sensor_battery: <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Options,
+        sensor_base_imu: <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options,
+        sensor_base_pan_encoder: <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
+        sensor_base_imu_tilt: <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+        estimator_base_pose: <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Options,
+        actuator_base_pan_servo: <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
+        controller_stability: <__Rover_2_11__controller_stability as ::bb_core::Service>::Options,
+        bridge_ros: <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options,
+        command_arm: <__Rover_2_11__command_arm as ::bb_core::Command>::Options,
+        command_move_to: <__Rover_2_11__command_move_to as ::bb_core::Command>::Options,
+        command_stop: <__Rover_2_11__command_stop as ::bb_core::Command>::Options,
     }
     fn __declared_options0() -> __Options0 {
         __Options0 {
             sensor_battery: __private::as_known(
-                <<__Rover__given__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::defaults(),
+                <<__Rover_2_11__given__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::defaults(),
             ),
             sensor_base_imu: __declared_sensor_base_imu(),
             sensor_base_pan_encoder: __declared_sensor_base_pan_encoder(),
             sensor_base_imu_tilt: __declared_sensor_base_imu_tilt(),
             estimator_base_pose: __private::as_known(
-                <<__Rover__given__estimator_base_pose as ::bb_core::Estimator>::Options as ::bb_core::Options>::defaults(),
+                <<__Rover_2_11__given__estimator_base_pose as ::bb_core::Estimator>::Options as ::bb_core::Options>::defaults(),
             ),
             actuator_base_pan_servo: __declared_actuator_base_pan_servo(),
             controller_stability: __private::as_known(
-                <<__Rover__given__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::defaults(),
+                <<__Rover_2_11__given__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::defaults(),
             ),
             bridge_ros: __declared_bridge_ros(),
             command_arm: __private::as_known(
-                <<__Rover__given__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+                <<__Rover_2_11__given__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
             ),
             command_move_to: __declared_command_move_to(),
             command_stop: __private::as_known(
-                <<__Rover__given__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+                <<__Rover_2_11__given__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
             ),
         }
     }
@@ -575,32 +619,32 @@ const _: () = {
             _ => __private::None,
         }
     }
-    fn __declared_sensor_base_imu() -> <__Rover__sensor_base_imu as ::bb_core::Sensor>::Options {
-        let mut __options: <__Rover__given__sensor_base_imu as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+    fn __declared_sensor_base_imu() -> <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options {
+        let mut __options: <__Rover_2_11__given__sensor_base_imu as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
         __options.bus = ::bb_core::__private::FromText::from_text("i2c-1");
         __private::as_known(__options)
     }
-    fn __declared_sensor_base_pan_encoder() -> <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Options {
-        let mut __options: <__Rover__given__sensor_base_pan_encoder as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+    fn __declared_sensor_base_pan_encoder() -> <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options {
+        let mut __options: <__Rover_2_11__given__sensor_base_pan_encoder as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
         __options.id = 3;
         __private::as_known(__options)
     }
-    fn __declared_sensor_base_imu_tilt() -> <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options {
-        let __options: <__Rover__given__sensor_base_imu_tilt as ::bb_core::Estimator>::Options = ::bb_core::Options::defaults();
+    fn __declared_sensor_base_imu_tilt() -> <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options {
+        let __options: <__Rover_2_11__given__sensor_base_imu_tilt as ::bb_core::Estimator>::Options = ::bb_core::Options::defaults();
         __private::as_known(__options)
     }
-    fn __declared_actuator_base_pan_servo() -> <__Rover__actuator_base_pan_servo as ::bb_core::Actuator>::Options {
-        let mut __options: <__Rover__given__actuator_base_pan_servo as ::bb_core::Actuator>::Options = ::bb_core::Options::defaults();
+    fn __declared_actuator_base_pan_servo() -> <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options {
+        let mut __options: <__Rover_2_11__given__actuator_base_pan_servo as ::bb_core::Actuator>::Options = ::bb_core::Options::defaults();
         __options.id = 3;
         __private::as_known(__options)
     }
-    fn __declared_bridge_ros() -> <__Rover__bridge_ros as ::bb_core::Service>::Options {
-        let mut __options: <__Rover__given__bridge_ros as ::bb_core::Service>::Options = ::bb_core::Options::defaults();
+    fn __declared_bridge_ros() -> <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options {
+        let mut __options: <__Rover_2_11__given__bridge_ros as ::bb_core::Service>::Options = ::bb_core::Options::defaults();
         __options.port = 1;
         __private::as_known(__options)
     }
-    fn __declared_command_move_to() -> <__Rover__command_move_to as ::bb_core::Command>::Options {
-        let mut __options: <__Rover__given__command_move_to as ::bb_core::Command>::Options = ::bb_core::Options::defaults();
+    fn __declared_command_move_to() -> <__Rover_2_11__command_move_to as ::bb_core::Command>::Options {
+        let mut __options: <__Rover_2_11__given__command_move_to as ::bb_core::Command>::Options = ::bb_core::Options::defaults();
         __options.speed = __private::FromQuantity::from_quantity(1f64);
         __private::as_known(__options)
     }
@@ -618,24 +662,26 @@ const _: () = {
     }
     pub struct __Topics0 {
         sensor_battery: __private::Topic<
-            <__Rover__sensor_battery as ::bb_core::Sensor>::Output,
+            <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Output,
         >,
         controller_stability: __private::Topic<
-            <__Rover__controller_stability as ::bb_core::Service>::Output,
+            <__Rover_2_11__controller_stability as ::bb_core::Service>::Output,
         >,
         bridge_ros: __private::Topic<
-            <__Rover__bridge_ros as ::bb_core::Service>::Output,
+            <__Rover_2_11__bridge_ros as ::bb_core::Service>::Output,
         >,
         sensor_base_imu: __private::Topic<
-            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
         >,
-        sensor_base_imu_tilt: __private::Topic<__Rover__payload__sensor_base_imu_tilt>,
+        sensor_base_imu_tilt: __private::Topic<
+            __Rover_2_11__payload__sensor_base_imu_tilt,
+        >,
         estimator_base_pose_pose: __private::Topic<
-            __Rover__payload__estimator_base_pose_pose,
+            __Rover_2_11__payload__estimator_base_pose_pose,
         >,
-        nav_velocity: __private::Topic<__Rover__payload__nav_velocity>,
+        nav_velocity: __private::Topic<__Rover_2_11__payload__nav_velocity>,
         sensor_base_pan_encoder: __private::Topic<
-            <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+            <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
         >,
     }
     fn __new_topics0() -> __Topics0 {
@@ -669,12 +715,12 @@ const _: () = {
         __Islands0 {
             sensor_base_imu_tilt: __private::Island::new(__Island_sensor_base_imu_tilt {
                 sensor_base_imu_tilt: __private::start::<
-                    __Rover__member__sensor_base_imu_tilt,
+                    __Rover_2_11__member__sensor_base_imu_tilt,
                 >(
                     &options.g0.sensor_base_imu_tilt,
                     __private::Binding {
                         apply: |
-                            options: &mut <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+                            options: &mut <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
                             values: &__private::ParameterValues|
                         {
                             options.beta = __private::FromParameter::from_parameter(
@@ -688,7 +734,7 @@ const _: () = {
             }),
             estimator_base_pose: __private::Island::new(__Island_estimator_base_pose {
                 estimator_base_pose: __private::start::<
-                    __Rover__member__estimator_base_pose,
+                    __Rover_2_11__member__estimator_base_pose,
                 >(
                     &options.g0.estimator_base_pose,
                     __private::Binding::NONE,
@@ -710,7 +756,7 @@ const _: () = {
     }
     pub struct __Actuators0 {
         actuator_base_pan_servo: __private::ActuatorNode<
-            __Rover__actuator_base_pan_servo,
+            __Rover_2_11__actuator_base_pan_servo,
         >,
     }
     fn __new_actuators0(
@@ -719,7 +765,7 @@ const _: () = {
     ) -> __Actuators0 {
         __Actuators0 {
             actuator_base_pan_servo: __private::ActuatorNode::<
-                __Rover__actuator_base_pan_servo,
+                __Rover_2_11__actuator_base_pan_servo,
             >::new(
                 0usize,
                 &__ACTUATORS[0usize],
@@ -787,7 +833,7 @@ const _: () = {
         fn sensor_battery(
             &self,
             message: &__private::Stamped<
-                <__Rover__sensor_battery as ::bb_core::Sensor>::Output,
+                <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Output,
             >,
             now: __private::MonotonicTime,
         ) {
@@ -799,7 +845,7 @@ const _: () = {
         fn controller_stability(
             &self,
             message: &__private::Stamped<
-                <__Rover__controller_stability as ::bb_core::Service>::Output,
+                <__Rover_2_11__controller_stability as ::bb_core::Service>::Output,
             >,
             now: __private::MonotonicTime,
         ) {
@@ -811,7 +857,7 @@ const _: () = {
         fn bridge_ros(
             &self,
             message: &__private::Stamped<
-                <__Rover__bridge_ros as ::bb_core::Service>::Output,
+                <__Rover_2_11__bridge_ros as ::bb_core::Service>::Output,
             >,
             now: __private::MonotonicTime,
         ) {
@@ -823,7 +869,7 @@ const _: () = {
         fn sensor_base_imu(
             &self,
             message: &__private::Stamped<
-                <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
             >,
             now: __private::MonotonicTime,
         ) {
@@ -863,7 +909,7 @@ const _: () = {
         fn sensor_base_pan_encoder(
             &self,
             message: &__private::Stamped<
-                <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+                <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
             >,
             now: __private::MonotonicTime,
         ) {
@@ -886,18 +932,18 @@ const _: () = {
             );
         }
     }
-    type __input__sensor_base_imu_tilt = <<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Nested;
+    type __input__sensor_base_imu_tilt = <<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Nested;
     type __taken__sensor_base_imu_tilt = <__input__sensor_base_imu_tilt as __private::TakenAt<
-        <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
     >>::Payload;
-    impl __private::Member for __Rover__member__sensor_base_imu_tilt {
+    impl __private::Member for __Rover_2_11__member__sensor_base_imu_tilt {
         type State = __Island_sensor_base_imu_tilt;
-        type Estimator = __Rover__sensor_base_imu_tilt;
+        type Estimator = __Rover_2_11__sensor_base_imu_tilt;
         const NUMBER: usize = 0usize;
         #[inline(always)]
         fn node(
             island: &mut __Island_sensor_base_imu_tilt,
-        ) -> &mut __private::Node<__Rover__sensor_base_imu_tilt> {
+        ) -> &mut __private::Node<__Rover_2_11__sensor_base_imu_tilt> {
             &mut island.sensor_base_imu_tilt
         }
         #[inline]
@@ -905,12 +951,12 @@ const _: () = {
             wiring: &__Wiring,
             island: &mut __Island_sensor_base_imu_tilt,
             emitted: &mut __private::Option<
-                <__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
+                <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
             >,
             stamp: __private::Stamp,
             turn: &__private::Turn<'_>,
         ) {
-            if let __private::Some(payload) = <<<__Rover__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as __private::EmittedAt<
+            if let __private::Some(payload) = <<<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as __private::EmittedAt<
                 _,
             >>::take(emitted) {
                 let message = &stamp.message(payload);
@@ -935,41 +981,41 @@ const _: () = {
     type __input__estimator_base_pose__imu = ::bb_core::__private::At<
         {
             ::bb_core::__private::find_input::<
-                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
             >("imu")
         },
     >;
     type __taken__estimator_base_pose__imu = <__input__estimator_base_pose__imu as __private::TakenAt<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >>::Payload;
     type __input__estimator_base_pose__tilt = ::bb_core::__private::At<
         {
             ::bb_core::__private::find_input::<
-                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
             >("tilt")
         },
     >;
     type __taken__estimator_base_pose__tilt = <__input__estimator_base_pose__tilt as __private::TakenAt<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >>::Payload;
     type __input__estimator_base_pose__wheel = ::bb_core::__private::At<
         {
             ::bb_core::__private::find_input::<
-                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
             >("wheel")
         },
     >;
     type __taken__estimator_base_pose__wheel = <__input__estimator_base_pose__wheel as __private::TakenAt<
-        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >>::Payload;
-    impl __private::Member for __Rover__member__estimator_base_pose {
+    impl __private::Member for __Rover_2_11__member__estimator_base_pose {
         type State = __Island_estimator_base_pose;
-        type Estimator = __Rover__estimator_base_pose;
+        type Estimator = __Rover_2_11__estimator_base_pose;
         const NUMBER: usize = 1usize;
         #[inline(always)]
         fn node(
             island: &mut __Island_estimator_base_pose,
-        ) -> &mut __private::Node<__Rover__estimator_base_pose> {
+        ) -> &mut __private::Node<__Rover_2_11__estimator_base_pose> {
             &mut island.estimator_base_pose
         }
         #[inline]
@@ -977,7 +1023,7 @@ const _: () = {
             wiring: &__Wiring,
             island: &mut __Island_estimator_base_pose,
             emitted: &mut __private::Option<
-                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
             >,
             stamp: __private::Stamp,
             turn: &__private::Turn<'_>,
@@ -985,7 +1031,7 @@ const _: () = {
             if let __private::Some(payload) = <::bb_core::__private::At<
                 {
                     ::bb_core::__private::find_output::<
-                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
                     >("pose")
                 },
             > as __private::EmittedAt<_>>::take(emitted) {
@@ -995,7 +1041,7 @@ const _: () = {
             if let __private::Some(payload) = <::bb_core::__private::At<
                 {
                     ::bb_core::__private::find_output::<
-                        <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
                     >("velocity")
                 },
             > as __private::EmittedAt<_>>::take(emitted) {
@@ -1003,19 +1049,19 @@ const _: () = {
                 turn.emit(6usize, &wiring.topics.g0.nav_velocity, message);
             }
         }
-        fn cache() -> <<__Rover__estimator_base_pose as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Cache {
+        fn cache() -> <<__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Cache {
             let mut cache = __private::Default::default();
             __private::declare::<
                 __input__estimator_base_pose__imu,
-                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
             >(&mut cache, &__ESTIMATORS[1usize], 0usize);
             __private::declare::<
                 __input__estimator_base_pose__tilt,
-                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
             >(&mut cache, &__ESTIMATORS[1usize], 1usize);
             __private::declare::<
                 __input__estimator_base_pose__wheel,
-                <__Rover__estimator_base_pose as ::bb_core::Estimator>::Input,
+                <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
             >(&mut cache, &__ESTIMATORS[1usize], 2usize);
             cache
         }
@@ -1023,7 +1069,7 @@ const _: () = {
             output: usize,
             message: &__private::DynamicMessage,
         ) -> __private::Option<
-            <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+            <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
         > {
             match output {
                 0usize => {
@@ -1031,7 +1077,7 @@ const _: () = {
                         ::bb_core::__private::At<
                             {
                                 ::bb_core::__private::find_output::<
-                                    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                                    <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
                                 >("pose")
                             },
                         >,
@@ -1043,7 +1089,7 @@ const _: () = {
                         ::bb_core::__private::At<
                             {
                                 ::bb_core::__private::find_output::<
-                                    <__Rover__estimator_base_pose as ::bb_core::Estimator>::Output,
+                                    <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
                                 >("velocity")
                             },
                         >,
@@ -1055,12 +1101,12 @@ const _: () = {
         }
     }
     struct __Island_sensor_base_imu_tilt {
-        sensor_base_imu_tilt: __private::Node<__Rover__sensor_base_imu_tilt>,
+        sensor_base_imu_tilt: __private::Node<__Rover_2_11__sensor_base_imu_tilt>,
     }
     impl __private::IslandState for __Island_sensor_base_imu_tilt {
         type Wiring = __Wiring;
         type Message = __private::Stamped<
-            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
         >;
         const DECLARATION: __private::IslandDeclaration = __private::IslandDeclaration {
             number: 0usize,
@@ -1084,22 +1130,22 @@ const _: () = {
             &mut self,
             wiring: &__Wiring,
             message: &__private::Stamped<
-                <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
             >,
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
-                __Rover__member__sensor_base_imu_tilt,
+                __Rover_2_11__member__sensor_base_imu_tilt,
                 __input__sensor_base_imu_tilt,
             >(
                 self,
                 wiring,
                 0usize,
-                <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
+                <<__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
                     __taken__sensor_base_imu_tilt,
                     {
                         __private::both_known::<
-                            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+                            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
                             __taken__sensor_base_imu_tilt,
                         >()
                     },
@@ -1116,7 +1162,7 @@ const _: () = {
             match estimator {
                 0usize => {
                     __private::act::<
-                        __Rover__member__sensor_base_imu_tilt,
+                        __Rover_2_11__member__sensor_base_imu_tilt,
                     >(self, wiring, act)
                 }
                 _ => false,
@@ -1124,19 +1170,21 @@ const _: () = {
         }
     }
     struct __Island_estimator_base_pose {
-        estimator_base_pose: __private::Node<__Rover__estimator_base_pose>,
+        estimator_base_pose: __private::Node<__Rover_2_11__estimator_base_pose>,
     }
     #[allow(non_camel_case_types, clippy::large_enum_variant)]
     enum __Message_estimator_base_pose {
         sensor_base_imu(
-            __private::Stamped<<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output>,
+            __private::Stamped<
+                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
+            >,
         ),
         sensor_base_imu_tilt__kept(
-            __private::Stamped<__Rover__payload__sensor_base_imu_tilt>,
+            __private::Stamped<__Rover_2_11__payload__sensor_base_imu_tilt>,
         ),
         sensor_base_pan_encoder__kept(
             __private::Stamped<
-                <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+                <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
             >,
         ),
     }
@@ -1146,22 +1194,22 @@ const _: () = {
             &mut self,
             wiring: &__Wiring,
             message: &__private::Stamped<
-                <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
             >,
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
-                __Rover__member__estimator_base_pose,
+                __Rover_2_11__member__estimator_base_pose,
                 __input__estimator_base_pose__imu,
             >(
                 self,
                 wiring,
                 0usize,
-                <<__Rover__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
+                <<__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
                     __taken__estimator_base_pose__imu,
                     {
                         __private::both_known::<
-                            <__Rover__sensor_base_imu as ::bb_core::Sensor>::Output,
+                            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
                             __taken__estimator_base_pose__imu,
                         >()
                     },
@@ -1173,21 +1221,21 @@ const _: () = {
         fn sensor_base_imu_tilt__kept(
             &mut self,
             wiring: &__Wiring,
-            message: &__private::Stamped<__Rover__payload__sensor_base_imu_tilt>,
+            message: &__private::Stamped<__Rover_2_11__payload__sensor_base_imu_tilt>,
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
-                __Rover__member__estimator_base_pose,
+                __Rover_2_11__member__estimator_base_pose,
                 __input__estimator_base_pose__tilt,
             >(
                 self,
                 wiring,
                 1usize,
-                <__Rover__payload__sensor_base_imu_tilt as __private::Feeds<
+                <__Rover_2_11__payload__sensor_base_imu_tilt as __private::Feeds<
                     __taken__estimator_base_pose__tilt,
                     {
                         __private::both_known::<
-                            __Rover__payload__sensor_base_imu_tilt,
+                            __Rover_2_11__payload__sensor_base_imu_tilt,
                             __taken__estimator_base_pose__tilt,
                         >()
                     },
@@ -1200,22 +1248,22 @@ const _: () = {
             &mut self,
             wiring: &__Wiring,
             message: &__private::Stamped<
-                <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+                <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
             >,
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
-                __Rover__member__estimator_base_pose,
+                __Rover_2_11__member__estimator_base_pose,
                 __input__estimator_base_pose__wheel,
             >(
                 self,
                 wiring,
                 2usize,
-                <<__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as __private::Feeds<
+                <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as __private::Feeds<
                     __taken__estimator_base_pose__wheel,
                     {
                         __private::both_known::<
-                            <__Rover__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+                            <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
                             __taken__estimator_base_pose__wheel,
                         >()
                     },
@@ -1283,7 +1331,7 @@ const _: () = {
             match estimator {
                 1usize => {
                     __private::act::<
-                        __Rover__member__estimator_base_pose,
+                        __Rover_2_11__member__estimator_base_pose,
                     >(self, wiring, act)
                 }
                 _ => false,
@@ -1298,8 +1346,8 @@ const _: () = {
     ) {
         assembly
             .source::<
-                Rover,
-                __private::AsSensor<__Rover__sensor_battery>,
+                __Rover_2_11::Rover,
+                __private::AsSensor<__Rover_2_11__sensor_battery>,
             >(
                 &__SENSORS[0usize],
                 &options.g0.sensor_battery,
@@ -1310,8 +1358,8 @@ const _: () = {
             );
         assembly
             .source::<
-                Rover,
-                __private::AsSensor<__Rover__sensor_base_pan_encoder>,
+                __Rover_2_11::Rover,
+                __private::AsSensor<__Rover_2_11__sensor_base_pan_encoder>,
             >(
                 &__SENSORS[2usize],
                 &options.g0.sensor_base_pan_encoder,
@@ -1322,8 +1370,8 @@ const _: () = {
             );
         assembly
             .source::<
-                Rover,
-                __private::AsSensor<__Rover__sensor_base_imu>,
+                __Rover_2_11::Rover,
+                __private::AsSensor<__Rover_2_11__sensor_base_imu>,
             >(
                 &__SENSORS[1usize],
                 &options.g0.sensor_base_imu,
@@ -1334,8 +1382,8 @@ const _: () = {
             );
         assembly
             .source::<
-                Rover,
-                __private::AsService<__Rover__controller_stability>,
+                __Rover_2_11::Rover,
+                __private::AsService<__Rover_2_11__controller_stability>,
             >(
                 &__SERVICES[0usize],
                 &options.g0.controller_stability,
@@ -1346,8 +1394,8 @@ const _: () = {
             );
         assembly
             .source::<
-                Rover,
-                __private::AsService<__Rover__bridge_ros>,
+                __Rover_2_11::Rover,
+                __private::AsService<__Rover_2_11__bridge_ros>,
             >(
                 &__SERVICES[1usize],
                 &options.g0.bridge_ros,
@@ -1357,7 +1405,7 @@ const _: () = {
                 sources,
             );
     }
-    impl ::bb_core::Robot for Rover {
+    impl ::bb_core::Robot for __Rover_2_11::Rover {
         const NAME: &'static str = "Rover";
         const TOPOLOGY: &'static __private::Topology = &__TOPOLOGY;
         const SENSORS: &'static [__private::SensorDeclaration] = &__SENSORS;
@@ -1451,11 +1499,11 @@ const _: () = {
         }
         fn commands(options: &__Options) -> __private::Vec<__private::Prepared> {
             ::std::vec![
-                __private::Prepared::new:: < __Rover__command_arm > (& options.g0
+                __private::Prepared::new:: < __Rover_2_11__command_arm > (& options.g0
                 .command_arm, __private::Binding::NONE), __private::Prepared::new:: <
-                __Rover__command_move_to > (& options.g0.command_move_to,
+                __Rover_2_11__command_move_to > (& options.g0.command_move_to,
                 __private::Binding::NONE), __private::Prepared::new:: <
-                __Rover__command_stop > (& options.g0.command_stop,
+                __Rover_2_11__command_stop > (& options.g0.command_stop,
                 __private::Binding::NONE)
             ]
         }
@@ -1488,23 +1536,27 @@ const _: () = {
     clippy::all
 )]
 pub mod rover {
+    #[doc(hidden)]
     #[allow(unused_imports)]
-    use super::{
-        __Rover_must_be_declared_outside_of_functions as _, Rover as __Robot,
-        __Rover__sensor_battery, __Rover__sensor_base_imu,
-        __Rover__sensor_base_pan_encoder, __Rover__sensor_base_imu_tilt,
-        __Rover__estimator_base_pose, __Rover__actuator_base_pan_servo,
-        __Rover__controller_stability, __Rover__bridge_ros, __Rover__command_arm,
-        __Rover__command_move_to, __Rover__command_stop,
-        __Rover__payload__sensor_base_imu_tilt,
-        __Rover__payload__estimator_base_pose_pose, __Rover__payload__nav_velocity,
-        __Rover__member__sensor_base_imu_tilt, __Rover__member__estimator_base_pose,
+    pub use super::{
+        __Rover_2_11_must_be_declared_outside_of_functions as _,
+        __Rover_2_11::Rover as __Robot, __Rover_2_11__sensor_battery,
+        __Rover_2_11__sensor_base_imu, __Rover_2_11__sensor_base_pan_encoder,
+        __Rover_2_11__sensor_base_imu_tilt, __Rover_2_11__estimator_base_pose,
+        __Rover_2_11__actuator_base_pan_servo, __Rover_2_11__controller_stability,
+        __Rover_2_11__bridge_ros, __Rover_2_11__command_arm,
+        __Rover_2_11__command_move_to, __Rover_2_11__command_stop,
+        __Rover_2_11__payload__sensor_base_imu_tilt,
+        __Rover_2_11__payload__estimator_base_pose_pose,
+        __Rover_2_11__payload__nav_velocity,
+        __Rover_2_11__exported__sensor_base_imu_tilt,
+        __Rover_2_11__exported__estimator_base_pose,
     };
     pub mod sensor {
         ///`sensor/battery`
         pub const battery: ::bb_core::__private::SensorHandle<
             super::__Robot,
-            super::__Rover__sensor_battery,
+            super::__Rover_2_11__sensor_battery,
         > = ::bb_core::__private::SensorHandle::new(
             "sensor/battery",
             ::bb_core::__private::Frame::new(""),
@@ -1518,7 +1570,7 @@ pub mod rover {
             ///`sensor/base/imu`
             pub const imu: ::bb_core::__private::SensorHandle<
                 super::super::__Robot,
-                super::super::__Rover__sensor_base_imu,
+                super::super::__Rover_2_11__sensor_base_imu,
             > = ::bb_core::__private::SensorHandle::new(
                 "sensor/base/imu",
                 ::bb_core::__private::Frame::new("base"),
@@ -1530,7 +1582,7 @@ pub mod rover {
                 ///`sensor/base/pan/encoder`
                 pub const encoder: ::bb_core::__private::SensorHandle<
                     super::super::super::__Robot,
-                    super::super::super::__Rover__sensor_base_pan_encoder,
+                    super::super::super::__Rover_2_11__sensor_base_pan_encoder,
                 > = ::bb_core::__private::SensorHandle::new(
                     "sensor/base/pan/encoder",
                     ::bb_core::__private::Frame::new("pan"),
@@ -1543,15 +1595,15 @@ pub mod rover {
                 ///`sensor/base/imu/tilt`
                 pub const tilt: ::bb_core::__private::EstimatorHandle<
                     super::super::super::__Robot,
-                    super::super::super::__Rover__sensor_base_imu_tilt,
-                    super::super::super::__Rover__payload__sensor_base_imu_tilt,
+                    super::super::super::__Rover_2_11__sensor_base_imu_tilt,
+                    super::super::super::__Rover_2_11__payload__sensor_base_imu_tilt,
                 > = ::bb_core::__private::EstimatorHandle::new(
                     "sensor/base/imu/tilt",
                     0usize,
                     4usize,
                     3usize,
                     ::bb_core::__private::visit::<
-                        super::super::super::__Rover__member__sensor_base_imu_tilt,
+                        super::super::super::__Rover_2_11__exported__sensor_base_imu_tilt,
                     >,
                     ::core::marker::PhantomData,
                 );
@@ -1563,13 +1615,13 @@ pub mod rover {
             ///`estimator/base/pose`
             pub const pose: ::bb_core::__private::EstimatorOfSeveralHandle<
                 super::super::__Robot,
-                super::super::__Rover__estimator_base_pose,
+                super::super::__Rover_2_11__estimator_base_pose,
             > = ::bb_core::__private::EstimatorOfSeveralHandle::new(
                 "estimator/base/pose",
                 1usize,
                 4usize,
                 ::bb_core::__private::visit::<
-                    super::super::__Rover__member__estimator_base_pose,
+                    super::super::__Rover_2_11__exported__estimator_base_pose,
                 >,
             );
             pub mod pose {
@@ -1578,7 +1630,7 @@ pub mod rover {
                 ///`estimator/base/pose/pose`
                 pub const pose: ::bb_core::__private::OutputHandle<
                     super::super::super::__Robot,
-                    super::super::super::__Rover__payload__estimator_base_pose_pose,
+                    super::super::super::__Rover_2_11__payload__estimator_base_pose_pose,
                 > = ::bb_core::__private::OutputHandle::new(
                     "estimator/base/pose/pose",
                     5usize,
@@ -1591,7 +1643,7 @@ pub mod rover {
         ///`nav/velocity`
         pub const velocity: ::bb_core::__private::OutputHandle<
             super::__Robot,
-            super::__Rover__payload__nav_velocity,
+            super::__Rover_2_11__payload__nav_velocity,
         > = ::bb_core::__private::OutputHandle::new(
             "nav/velocity",
             6usize,
@@ -1602,7 +1654,7 @@ pub mod rover {
         ///`controller/stability`
         pub const stability: ::bb_core::__private::ControllerHandle<
             super::__Robot,
-            super::__Rover__controller_stability,
+            super::__Rover_2_11__controller_stability,
         > = ::bb_core::__private::ControllerHandle::new(
             "controller/stability",
             1usize,
@@ -1614,7 +1666,7 @@ pub mod rover {
         ///`bridge/ros`
         pub const ros: ::bb_core::__private::BridgeHandle<
             super::__Robot,
-            super::__Rover__bridge_ros,
+            super::__Rover_2_11__bridge_ros,
         > = ::bb_core::__private::BridgeHandle::new(
             "bridge/ros",
             2usize,
@@ -1628,7 +1680,7 @@ pub mod rover {
                 ///`actuator/base/pan/servo`
                 pub const servo: ::bb_core::__private::ActuatorHandle<
                     super::super::super::__Robot,
-                    super::super::super::__Rover__actuator_base_pan_servo,
+                    super::super::super::__Rover_2_11__actuator_base_pan_servo,
                 > = ::bb_core::__private::ActuatorHandle::new(
                     "actuator/base/pan/servo",
                     |
@@ -1643,7 +1695,7 @@ pub mod rover {
         ///`command/arm`
         pub const arm: ::bb_core::__private::CommandHandle<
             super::__Robot,
-            super::__Rover__command_arm,
+            super::__Rover_2_11__command_arm,
         > = ::bb_core::__private::CommandHandle::new(
             "command/arm",
             0usize,
@@ -1655,7 +1707,7 @@ pub mod rover {
         ///`command/move_to`
         pub const move_to: ::bb_core::__private::CommandHandle<
             super::__Robot,
-            super::__Rover__command_move_to,
+            super::__Rover_2_11__command_move_to,
         > = ::bb_core::__private::CommandHandle::new(
             "command/move_to",
             1usize,
@@ -1665,7 +1717,7 @@ pub mod rover {
         ///`command/stop`
         pub const stop: ::bb_core::__private::CommandHandle<
             super::__Robot,
-            super::__Rover__command_stop,
+            super::__Rover_2_11__command_stop,
         > = ::bb_core::__private::CommandHandle::new(
             "command/stop",
             2usize,
@@ -1695,3 +1747,6 @@ pub mod rover {
         pub const motion: &str = "motion";
     }
 }
+#[doc(inline)]
+#[allow(unused_imports)]
+pub use rover::__Robot as Rover;

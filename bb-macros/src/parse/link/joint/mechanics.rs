@@ -1,10 +1,9 @@
-//! How a joint resists, what it follows, and the gear before it.
+//! Friction of a joint, the joint that it mimics, and its gear.
 
 use crate::language::{DynamicsField, MimicField, TransmissionField, words};
-use crate::parse::Notes;
-use crate::parse::Quantity;
 use crate::parse::block::{Head, colon, semicolon};
 use crate::parse::record::record;
+use crate::parse::{Notes, Quantity};
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
 
@@ -19,7 +18,7 @@ pub(crate) struct Dynamics {
 #[derive(Clone, Debug)]
 pub(crate) struct Mimic {
     pub(crate) word: Ident,
-    /// The joint that is followed; missing in one that could not be read.
+    /// The joint that is followed; `None` if it could not be read.
     pub(crate) joint: Option<Ident>,
     pub(crate) multiplier: Option<Quantity>,
     pub(crate) offset: Option<Quantity>,
@@ -40,7 +39,7 @@ impl Dynamics {
                 DynamicsField::Damping => &mut dynamics.damping,
                 DynamicsField::Friction => &mut dynamics.friction,
             };
-            *slot = Some(Quantity::of(word, input, notes)?);
+            *slot = Some(notes.number(word, input)?);
             Ok(())
         })?;
         semicolon(input, "`dynamics`", notes);
@@ -55,8 +54,8 @@ impl Mimic {
         record(&words::MIMIC, input, notes, |field, word, _, input, notes| {
             match field {
                 MimicField::Joint => mimic.joint = Some(input.parse()?),
-                MimicField::Multiplier => mimic.multiplier = Some(Quantity::of(word, input, notes)?),
-                MimicField::Offset => mimic.offset = Some(Quantity::of(word, input, notes)?),
+                MimicField::Multiplier => mimic.multiplier = Some(notes.number(word, input)?),
+                MimicField::Offset => mimic.offset = Some(notes.number(word, input)?),
             }
             Ok(())
         })?;
@@ -71,7 +70,7 @@ impl Transmission {
         let mut transmission = Self { reduction: None };
         record(&words::TRANSMISSION, input, notes, |field, word, _, input, notes| {
             match field {
-                TransmissionField::Reduction => transmission.reduction = Some(Quantity::of(word, input, notes)?),
+                TransmissionField::Reduction => transmission.reduction = Some(notes.number(word, input)?),
             }
             Ok(())
         })?;

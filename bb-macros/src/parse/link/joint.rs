@@ -6,15 +6,16 @@ mod mechanics;
 pub(crate) use geometry::{Axis, Limit, Origin};
 pub(crate) use mechanics::{Dynamics, Mimic, Transmission};
 
-use super::Notes;
-use super::block::{Head, colon, items, opened, semicolon};
-use super::name::name;
-use super::{Actuator, Link, Sensor, Settings};
+use super::Link;
 use crate::language::{JointItem, JointKind, Nothing};
+use crate::parse::block::{Head, colon, opened, semicolon};
+use crate::parse::items::items;
+use crate::parse::name::name;
+use crate::parse::{Actuator, Notes, Sensor, Settings};
 use proc_macro2::Ident;
-use syn::Attribute;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
+use syn::{Attribute, Token};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
@@ -67,6 +68,12 @@ impl Joint {
                 joint.item(item, head, input, notes)
             });
             notes.joint = around;
+        } else if input.peek(Token![,]) {
+            let message = format!(
+                "what a joint holds is written in braces: `joint {}: {} {{ … }}`",
+                joint.name, joint.kind_word
+            );
+            return Err(input.error(message));
         } else {
             semicolon(input, &format!("`{}`", joint.name), notes);
         }

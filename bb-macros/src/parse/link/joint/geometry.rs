@@ -1,11 +1,11 @@
-//! Where a joint is, which axis it moves about, and how far.
+//! Origin, axis and limits of a joint.
 
 use crate::diagnostics::Place;
 use crate::language::{LimitField, OriginField, Word, words};
-use crate::parse::Notes;
-use crate::parse::Quantity;
-use crate::parse::block::{Head, colon, place_since, semicolon};
+use crate::parse::block::{Head, colon, semicolon};
 use crate::parse::record::{array, record};
+use crate::parse::tokens::place_since;
+use crate::parse::{Notes, Quantity};
 use proc_macro2::Ident;
 use syn::Token;
 use syn::ext::IdentExt;
@@ -66,7 +66,7 @@ impl Origin {
 }
 
 impl Axis {
-    /// The direction at unit length; one that has it already is kept as it is.
+    /// The direction as a unit vector; one that has unit length already is not changed.
     pub(crate) fn unit(&self) -> [f64; 3] {
         let length = self.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
         if (length - 1.0).abs() < 1e-12 { self.direction } else { self.direction.map(|value| value / length) }
@@ -114,7 +114,7 @@ impl Limit {
                 LimitField::Velocity => &mut limit.velocity,
                 LimitField::Effort => &mut limit.effort,
             };
-            *slot = Some(Quantity::of(word, input, notes)?);
+            *slot = Some(notes.number(word, input)?);
             Ok(())
         })?;
         semicolon(input, "`limit`", notes);

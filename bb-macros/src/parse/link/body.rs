@@ -1,13 +1,13 @@
-//! What a link weighs, looks like and occupies: `inertial`, `visual` and `collision`, with URDF's meaning.
+//! Mass, appearance and extent of a link: `inertial`, `visual` and `collision`, as in URDF.
 
-use super::Notes;
-use super::block::{Head, colon, semicolon};
-use super::record::{array, record};
-use super::{Origin, Quantity};
+use super::Origin;
 use crate::language::{
     CollisionField, CylinderField, InertiaField, InertialField, MaterialField, MeshField, SphereField, VisualField,
     Word, words,
 };
+use crate::parse::block::{Head, colon, semicolon};
+use crate::parse::record::{array, record};
+use crate::parse::{Notes, Quantity};
 use proc_macro2::Ident;
 use syn::LitStr;
 use syn::parse::ParseStream;
@@ -54,7 +54,7 @@ impl Inertial {
         let mut inertial = Self { word: head.word, origin: None, mass: None, inertia: Default::default() };
         record(&words::INERTIAL, input, notes, |field, word, _, input, notes| {
             match field {
-                InertialField::Mass => inertial.mass = Some(Quantity::of(word, input, notes)?),
+                InertialField::Mass => inertial.mass = Some(notes.number(word, input)?),
                 InertialField::Origin => {
                     inertial.origin = Some(Origin::parse_value(word, input, notes)?);
                 }
@@ -83,7 +83,7 @@ fn inertia(
             InertiaField::Yz => &mut *yz,
             InertiaField::Zz => &mut *zz,
         };
-        *slot = Some(Quantity::of(word, input, notes)?);
+        *slot = Some(notes.number(word, input)?);
         Ok(())
     })
 }
@@ -150,7 +150,7 @@ impl Geometry {
                 CylinderField::Radius => &mut radius,
                 CylinderField::Length => &mut length,
             };
-            *slot = Some(Quantity::of(word, input, notes)?);
+            *slot = Some(notes.number(word, input)?);
             Ok(())
         })?;
         Ok(Self::Cylinder { radius, length })
@@ -160,7 +160,7 @@ impl Geometry {
         let mut radius = None;
         record(word, input, notes, |field, word, _, input, notes| {
             match field {
-                SphereField::Radius => radius = Some(Quantity::of(word, input, notes)?),
+                SphereField::Radius => radius = Some(notes.number(word, input)?),
             }
             Ok(())
         })?;
