@@ -25,23 +25,12 @@ impl Apart {
         path: &'static str,
         run: impl FnOnce() -> bool + Send + 'static,
     ) {
+        let number = self.0.add(path);
         if control.is_virtual() {
-            run();
-            return;
+            return self.0.returned(number, run());
         }
-        let number = {
-            let mut left = self.0.lock();
-            let number = left.last().map_or(0, |(last, _)| last + 1);
-            left.push((number, path));
-            number
-        };
         let shared = Arc::clone(&self.0);
-        control.pool().submit(Lane::Robot, move || {
-            if run() {
-                shared.lock().retain(|(other, _)| *other != number);
-                shared.changed.notify_all();
-            }
-        });
+        control.pool().submit(Lane::Robot, move || shared.returned(number, run()));
     }
 
     /// Drops a value of the component at `path`.
@@ -67,6 +56,20 @@ impl Apart {
 }
 
 impl Shared {
+    fn add(&self, path: &'static str) -> usize {
+        let mut left = self.lock();
+        let number = left.last().map_or(0, |(last, _)| last + 1);
+        left.push((number, path));
+        number
+    }
+
+    fn returned(&self, number: usize, is_done: bool) {
+        if is_done {
+            self.lock().retain(|(other, _)| *other != number);
+            self.changed.notify_all();
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, Vec<(usize, &'static str)>> {
         self.left.lock().unwrap_or_else(PoisonError::into_inner)
     }
