@@ -8,6 +8,7 @@ mod describe;
 mod error;
 mod handle;
 mod host;
+mod joints;
 mod live;
 mod machine;
 mod occupied;

@@ -23,6 +23,8 @@ mod hanging_code;
 mod hardware;
 mod health;
 mod hygiene;
+mod joint_replay;
+mod joints;
 mod journals;
 mod made_safe;
 mod navigation;

@@ -8,6 +8,12 @@ use bb_core::prelude::*;
 #[payload(joint_position)]
 pub(crate) struct Dice(pub(crate) f64);
 
+impl bb_core::JointPositions for Dice {
+    fn tell(&self, listener: &mut dyn FnMut(bb_core::JointReading<'_>)) {
+        listener(bb_core::JointReading::at(&[self.0]));
+    }
+}
+
 /// Xorshift with a multiplier: good enough to throw dice.
 #[derive(Clone, Debug)]
 pub(crate) struct Random(u64);

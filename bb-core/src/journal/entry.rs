@@ -2,6 +2,7 @@
 
 use crate::Payload;
 use crate::event::{ParameterValue, SafetyError};
+use crate::joints::PlacedInput;
 use crate::message::codec::{Reader, Shape, Writer};
 use crate::message::{DecodeError, Field, Finite};
 use crate::pubsub::DynamicMessage;
@@ -240,6 +241,13 @@ pub enum Event {
     ArmTimeout,
     /// The robot was stopped.
     Stop,
+    /// Where the inputs of a line's dispatches were that span moving joints.
+    Placed {
+        /// The number of that line.
+        cause: u64,
+        /// Each, in order.
+        inputs: Vec<PlacedInput>,
+    },
 }
 
 /// How long a callback took.

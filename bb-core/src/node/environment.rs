@@ -5,6 +5,7 @@ use super::shared::SharedNode;
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
 use crate::fault::Fault;
+use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
 use crate::message::{Origin, Payload, Stamped};
@@ -84,6 +85,7 @@ struct Inner {
     nodes: Box<[SharedNode]>,
     journal: Option<Journal>,
     telemetry: Option<Telemetry>,
+    joints: Joints,
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
     /// One bit, by which a thread knows which robots' islands it is inside.
@@ -159,6 +161,7 @@ pub(crate) struct EnvironmentParts {
     pub(crate) pool: Pool,
     pub(crate) journal: Option<Journal>,
     pub(crate) telemetry: Option<Telemetry>,
+    pub(crate) joints: Joints,
     pub(crate) start: MonotonicTime,
 }
 
@@ -174,6 +177,7 @@ impl Environment {
             pool,
             journal,
             telemetry,
+            joints,
             start,
         } = parts;
         Self(Arc::new(Inner {
@@ -188,6 +192,7 @@ impl Environment {
             nodes,
             journal,
             telemetry,
+            joints,
             start,
             bit: RobotBit::take(),
             drain: OnceLock::new(),
@@ -365,6 +370,12 @@ impl Environment {
         &self.0.pool
     }
 
+    /// The states of the joints.
+    #[inline]
+    pub(crate) fn joints(&self) -> &Joints {
+        &self.0.joints
+    }
+
     /// Where messages come in.
     #[inline]
     pub(crate) fn door(&self) -> &Door {
@@ -414,6 +425,7 @@ impl Environment {
         message: &Stamped<T>,
         now: MonotonicTime,
     ) -> u64 {
+        self.0.joints.hear(message, now);
         match &self.0.journal {
             None => {
                 topic.publish(message);
