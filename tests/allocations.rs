@@ -1,6 +1,7 @@
 //! From a sensor's publish to the outputs of all estimators downstream nothing is allocated. A binary of its own, since
 //! it replaces the allocator by one that counts.
 
+use bb_core::component::InputTransforms;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
 use bb_core::pubsub::Topic;
@@ -85,6 +86,98 @@ fn nothing_is_allocated_for_subscribers_that_are_full_or_awaited() {
 }
 
 /// Nor at a keyframe of the smoother, whatever happens there.
+/// What a camera saw.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+struct Flash;
+
+/// Where a camera was, m.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+struct Spot(Vector3<f64>);
+
+/// Says where its camera is.
+struct Spotter(Vector3<f64>);
+
+impl Estimator for Spotter {
+    type Options = NoOptions;
+    type Input = Flash;
+    type Output = Spot;
+    const HANDLES_MOVING_JOINTS: bool = true;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self(Vector3::zeros()))
+    }
+
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        self.0 = transforms.frame_from_driver()?.translation.vector;
+        Ok(())
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Flash>) -> Result<Reply<Spot>, Fault> {
+        Ok(Reply::emit(Spot(self.0)))
+    }
+}
+
+robot! {
+    robot Arm;
+
+    sensors { sensor bus: External<JointStates>(); }
+
+    link base {
+        estimator spot: Spotter() { input camera: sensor::base::shoulder::upper::elbow::lower::camera; }
+        joint shoulder: continuous {
+            axis: z;
+            transmission: { reduction: 10 };
+            sensor motor: External<MotorState>();
+            link upper {
+                joint elbow: prismatic {
+                    axis: x;
+                    limit: { lower: 0 m, upper: 1 m, velocity: 1 m/s, effort: 1 N };
+                    link lower { sensor camera: External<Flash>(); }
+                }
+            }
+        }
+    }
+}
+
+/// The first states of joints make room for a history; those after it, the estimator that is told transforms and others that ask for them
+/// need none, whether they get one or not.
+#[test]
+fn nothing_is_allocated_for_joints_and_transforms() -> Result<(), Box<dyn std::error::Error>> {
+    let builder = Arm::builder();
+    let spots = builder.subscribe(arm::estimator::base::spot);
+    let mut simulation = builder.simulate()?;
+    let handle = simulation.joints().between("base", "lower")?;
+    let names: std::sync::Arc<[String]> = ["elbow".to_owned()].into();
+    let time = |step: i64| MonotonicTime::from_nanos(step * 100_000);
+    let states = |step: i64| JointStates {
+        names: std::sync::Arc::clone(&names),
+        positions: vec![(step as f64 * 0.01).sin().abs()],
+        ..JointStates::default()
+    };
+    let mut told: Vec<JointStates> = (0..1100).map(states).collect();
+    let mut publish = |step: i64| {
+        let motor = MotorState { position: step as f64, velocity: Some(1.0), effort: None };
+        simulation.publish(arm::sensor::base::shoulder::motor, time(step), motor);
+        simulation.publish(arm::sensor::bus, time(step), told.pop().expect("there are enough"));
+        simulation.publish(arm::sensor::base::shoulder::upper::elbow::lower::camera, time(step), Flash);
+        let unknown = handle.at(time(step + 1)).is_err();
+        (handle.at(time(step)).is_ok(), unknown, handle.latest().is_ok())
+    };
+    for step in 0..10 {
+        publish(step);
+    }
+    spots.drain().for_each(drop);
+    let mut all = true;
+    let allocations = allocation_counter::measure(|| {
+        for step in 10..1010 {
+            all &= publish(step) == (true, true, true);
+        }
+    });
+    assert!(all && spots.drain().count() == 1000);
+    assert_eq!(allocations.count_total, 0);
+    Ok(())
+}
+
 #[test]
 fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>> {
     let sensors = EskfParams { longest_sample: 0.05, ..EskfParams::default() };

@@ -10,6 +10,7 @@
 //! | subscriptions | [`pubsub`] |
 //! | links, joints and the transforms between them | [`topology`] |
 //! | where the links of a moving robot are | [`kinematics`] |
+//! | what is known of the joints of a robot that runs, and of its frames at any time | [`joints`] |
 //! | what the runtime publishes about itself | [`event`] |
 //! | what `robot!` declares | [`declaration`] |
 //! | the journal of a run, and its replay | [`journal`], [`Replay`] |
@@ -31,6 +32,7 @@ extern crate self as bb_core;
 pub mod component;
 pub mod declaration;
 pub mod event;
+pub mod joints;
 pub mod journal;
 pub mod kinematics;
 pub mod message;
@@ -64,7 +66,7 @@ pub use event::{
     Safety,
 };
 pub use fault::Fault;
-pub use message::{Field, Finite, Frame, Origin, Payload, Stamped};
+pub use message::{Field, Finite, Frame, JointPositions, JointReading, JointSide, Origin, Payload, Stamped};
 pub use pubsub::{
     DynamicMessage, DynamicSubscription, Overflow, Payloads, Publisher, Select, Subscription, Unmatched,
 };
@@ -133,7 +135,7 @@ pub mod __private {
     pub use crate::message::codec::{
         DecodeError, EnumShape, FieldShape, Reader, RosLayout, Shape, StructShape, Writer,
     };
-    pub use crate::message::{Feeds, Finite, Frame, Stamp, Stamped};
+    pub use crate::message::{Feeds, Finite, Frame, JointPositions, JointReading, Stamp, Stamped};
     pub use crate::node::{
         Act, Environment, Island, IslandOf, IslandState, IslandWiring, Key, Member, Node, Turn, act, alone, enter,
         feed, island_of, receive, start,

@@ -2,11 +2,13 @@
 
 pub mod codec;
 mod finite;
+mod joint;
 pub(crate) mod nearest;
 mod stamped;
 
 pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};
 pub use finite::Finite;
+pub use joint::{JointPositions, JointReading, JointSide};
 pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 
 /// What a message carries: plain data in SI units. Derive it:
@@ -64,8 +66,18 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     const ROS: Option<RosLayout<Self>> = None;
 
     /// Whether it tells the position of the joint at which it is measured: `#[payload(joint_position)]` says so. Each joint
-    /// with an actuator needs a sensor, or an estimator in one, that publishes such a payload.
+    /// with an actuator needs a sensor, or an estimator in one, that publishes such a payload. It implements [`JointPositions`].
     const TELLS_JOINT_POSITION: bool = false;
+
+    /// Whether what it tells is seen from a frame: not the state of a joint or of a battery. `#[payload(no_frame)]` says that
+    /// it does not. An input of such a payload may span moving joints.
+    const DEPENDS_ON_FRAME: bool = true;
+
+    /// Calls `listener` with what it tells of joints, see [`JointPositions`].
+    #[doc(hidden)]
+    fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+        let _ = listener;
+    }
 
     /// False for the stand-in of a payload that is not known, in a robot that does not compile.
     #[doc(hidden)]

@@ -10,7 +10,7 @@
 //! | position and orientation | [`Orientation`], [`Pose`], [`PoseWithCovariance`], [`RelativePose`], [`Path`] |
 //! | motion and forces | [`Twist`], [`TwistWithCovariance`], [`Accel`], [`Wrench`] |
 //! | pose with motion | [`Odometry`] |
-//! | joints | [`JointState`], [`JointStates`] |
+//! | joints | [`JointState`], [`JointStates`], [`MotorState`], [`JointSnapshot`] |
 //! | commands to actuators, and their reports | [`PositionCommand`], [`VelocityCommand`], [`EffortCommand`], [`JointTrajectory`], [`BeginMotion`], [`EndMotion`] |
 
 mod actuator;
@@ -32,7 +32,7 @@ pub use attitude::{Orientation, Pose};
 pub use geometry::{Accel, PoseWithCovariance, TwistWithCovariance, Wrench};
 pub use gnss::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
 pub use image::Image;
-pub use joint::{JointState, JointStates};
+pub use joint::{JointSnapshot, JointState, JointStates, MotorState};
 pub use odometry::{Odometry, Twist};
 pub use path::{Path, PathPose, RelativePose};
 pub use power::{BatteryHealth, BatteryState, BatteryStatus, BatteryTechnology, PowerState};

@@ -10,6 +10,7 @@ mod ending;
 mod error;
 mod handle;
 mod host;
+mod joints;
 mod live;
 mod machine;
 mod occupied;

@@ -7,4 +7,5 @@ mod instant;
 
 pub use clock::Clock;
 pub use device::DeviceClock;
+pub(crate) use instant::nanos_of;
 pub use instant::{MonotonicTime, WallTime};

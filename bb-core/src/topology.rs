@@ -94,6 +94,32 @@ pub struct Mimic {
 pub struct Transmission {
     /// Turns of the motor for one of the joint.
     pub reduction: f64,
+    /// Where the joint is when the motor is at 0; rad or m.
+    pub offset: f64,
+    /// Whether the joint turns the other way than the motor.
+    pub is_reversed: bool,
+}
+
+impl Transmission {
+    /// What the motor moves for one unit of the joint; negative if it is reversed.
+    fn ratio(&self) -> f64 {
+        if self.is_reversed { -self.reduction } else { self.reduction }
+    }
+
+    /// The position of the joint for that of the motor in rad; rad or m.
+    pub fn joint_position(&self, motor: f64) -> f64 {
+        motor / self.ratio() + self.offset
+    }
+
+    /// The velocity of the joint for that of the motor in rad/s; rad/s or m/s.
+    pub fn joint_velocity(&self, motor: f64) -> f64 {
+        motor / self.ratio()
+    }
+
+    /// The torque or force at the joint for the torque of the motor in N·m, without losses; N·m or N.
+    pub fn joint_effort(&self, motor: f64) -> f64 {
+        motor * self.ratio()
+    }
 }
 
 /// How a joint moves (URDF's types).
@@ -197,6 +223,20 @@ impl Topology {
     /// The link of that name.
     pub fn link(&self, name: &str) -> Option<&'static Link> {
         self.links.iter().find(|link| link.name == name)
+    }
+
+    /// The joint that a joint follows in the end, and what it makes of its position, a multiplier and an offset: itself, 1 and
+    /// 0 if it mimics none.
+    pub fn followed(&self, joint: usize) -> (usize, f64, f64) {
+        let (mut owner, mut multiplier, mut offset) = (joint, 1.0, 0.0);
+        // A circle, which `robot!` refuses, must end too.
+        for _ in self.joints {
+            let Some(mimic) = self.joints.get(owner).and_then(|joint| joint.mimic) else { break };
+            offset += multiplier * mimic.offset;
+            multiplier *= mimic.multiplier;
+            owner = mimic.joint;
+        }
+        (owner, multiplier, offset)
     }
 
     /// The joint of that name.

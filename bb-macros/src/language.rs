@@ -235,6 +235,8 @@ language! {
         }
         TransmissionField in "`transmission`" {
             Reduction = REDUCTION,
+            Offset = OFFSET_OF_MOTOR,
+            Reversed = REVERSED,
         }
         InertialField in "`inertial`" {
             Mass = MASS,

@@ -48,7 +48,7 @@ fn pipeline(tokens: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
 
 /// Makes a struct or an enum the payload of messages; `#[payload(ros)]` if ROS has a message for it,
 /// `#[payload(name = "package/Name")]` for the name of its definition, `#[payload(joint_position)]` if it tells the position
-/// of the joint at which it is measured. `#[payload(non_finite)]` on a field that may hold
+/// of the joint at which it is measured, `#[payload(no_frame)]` if it is the same from every frame. `#[payload(non_finite)]` on a field that may hold
 /// NaN and infinities. See the trait.
 #[proc_macro_derive(Payload, attributes(payload))]
 pub fn payload(tokens: TokenStream) -> TokenStream {

@@ -4,7 +4,7 @@ use super::{code_below, code_of, root};
 use std::collections::BTreeSet;
 
 /// The folders of the runtime, from the bottom up.
-const LAYERS: [&str; 17] = [
+const LAYERS: [&str; 18] = [
     "fault",
     "time",
     "message",
@@ -12,6 +12,7 @@ const LAYERS: [&str; 17] = [
     "pubsub",
     "topology",
     "kinematics",
+    "joints",
     "event",
     "declaration",
     "journal",

@@ -1,11 +1,18 @@
 //! Small sensors and estimators that the robots of these tests are made of.
 
 use bb_core::prelude::*;
+use bb_core::{JointPositions, JointReading};
 
 /// A number; at a joint, its position.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(joint_position)]
 pub(crate) struct Number(pub(crate) f64);
+
+impl JointPositions for Number {
+    fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+        listener(JointReading::at(&[self.0]));
+    }
+}
 
 /// Options of [`Counter`].
 #[derive(Clone, Debug, Options)]

@@ -38,10 +38,9 @@ impl<const MOVING: bool> Estimator for Surveyor<MOVING> {
     fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
         let far = context.frame_from_input("far");
         let far = match far {
-            // Nobody knows the joint's position, so that there is no transform across it.
+            // It changes: each dispatch is told.
             Err(fault) if MOVING => {
-                let message =
-                    "there is a moving joint between the input `far` and the output, and its position is not known";
+                let message = "there is a moving joint between the input `far` and the output; `handle_transforms` is told where it is";
                 assert_eq!(fault.to_string(), message);
                 bb_core::nalgebra::Isometry3::identity()
             }

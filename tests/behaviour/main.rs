@@ -26,6 +26,8 @@ mod hanging_code;
 mod hardware;
 mod health;
 mod hygiene;
+mod joint_replay;
+mod joints;
 mod journals;
 mod late_code;
 mod left_behind;

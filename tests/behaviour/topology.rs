@@ -4,6 +4,9 @@ use crate::components::{Counter, Scale, Snapshot};
 use bb_core::prelude::*;
 use bb_core::topology::{Dynamics, Geometry, GraphFormat, Mimic, Origin, Transmission};
 
+/// A reduction of 50, and nothing else.
+const GEAR: Transmission = Transmission { reduction: 50.0, offset: 0.0, is_reversed: false };
+
 robot! {
     robot Gripper;
 
@@ -73,7 +76,7 @@ fn bodies_and_mechanics_are_data() {
     assert_eq!(palm.collisions[0].geometry, Geometry::Cylinder { radius: 0.05, length: 0.02 });
     let (left, right) = (topology.joint("left").expect("there"), topology.joint("right").expect("there"));
     assert_eq!(left.dynamics, Some(Dynamics { damping: 10.0, friction: 0.5 }));
-    assert_eq!(left.transmission, Some(Transmission { reduction: 50.0 }));
+    assert_eq!(left.transmission, Some(GEAR));
     assert_eq!(right.mimic, Some(Mimic { joint: 0, multiplier: 1.0, offset: 0.001 }));
     assert_eq!(right.axis, Some([-1.0, 0.0, 0.0]));
 }
@@ -109,7 +112,7 @@ fn components_are_declared_onto_a_urdf() -> Result<(), StartError> {
     assert_eq!(topology.root().name(), "base-link");
     let elbow = topology.joint("elbow").expect("it is in the file");
     assert_eq!(elbow.parent_from_joint, Origin { xyz: [0.0, 0.0, 0.1], rpy: [0.0, 0.0, 1.5] });
-    assert_eq!((elbow.axis, elbow.transmission), (Some([0.0, 1.0, 0.0]), Some(Transmission { reduction: 50.0 })));
+    assert_eq!((elbow.axis, elbow.transmission), (Some([0.0, 1.0, 0.0]), Some(GEAR)));
     let base = topology.link("base-link").expect("it is in the file");
     let grey = base.visuals[0].material.and_then(|material| material.color);
     assert_eq!(grey, Some([0.5, 0.5, 0.5, 1.0]));

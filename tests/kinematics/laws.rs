@@ -225,6 +225,23 @@ fn links_that_are_no_tree_and_joints_that_cannot_move_are_refused() {
     for axis in [None, Some([0.0; 3]), Some([f64::NAN, 0.0, 1.0]), Some([f64::INFINITY, 0.0, 0.0])] {
         assert_eq!(error(&[Joint { axis, ..JOINT }], 2), KinematicsError::NoAxis { joint: "joint" }, "{axis:?}");
     }
+    let limit = Limit { lower: Some(-1.0), upper: Some(1.0), velocity: Some(2.0), effort: Some(3.0) };
+    let refused = [
+        Limit { lower: Some(1.1), ..limit },
+        Limit { lower: Some(f64::NAN), ..limit },
+        Limit { upper: Some(f64::NAN), ..limit },
+        Limit { velocity: Some(f64::NAN), ..limit },
+        Limit { effort: Some(f64::NAN), lower: None, ..limit },
+    ];
+    for limit in refused {
+        let joint = Joint { limit: Some(limit), ..JOINT };
+        assert_eq!(error(&[joint], 2), KinematicsError::Limit { joint: "joint" }, "{limit:?}");
+        let joint = Joint { kind: JointKind::Continuous, ..joint };
+        assert_eq!(error(&[joint], 2), KinematicsError::Limit { joint: "joint" }, "{limit:?}");
+    }
+    let message = "the lower limit of the joint `joint` is above the upper one, or a limit is NaN";
+    assert_eq!(KinematicsError::Limit { joint: "joint" }.to_string(), message);
+    assert!(made(&[Joint { limit: Some(Limit { lower: Some(1.0), ..limit }), ..JOINT }], 2).is_ok());
     let mimic = |joint| Some(Mimic { joint, multiplier: 1.0, offset: 0.0 });
     assert_eq!(error(&[Joint { mimic: mimic(0), ..JOINT }], 2), KinematicsError::Mimic { joint: "joint" });
     assert_eq!(error(&[Joint { mimic: mimic(7), ..JOINT }], 2), KinematicsError::Mimic { joint: "joint" });

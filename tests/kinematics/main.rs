@@ -2,5 +2,6 @@
 
 mod inverse;
 mod laws;
+mod manipulator;
 mod pinocchio;
 mod robots;

@@ -9,6 +9,12 @@ use bb_tests::random::Random;
 #[payload(joint_position)]
 pub(crate) struct Dice(pub(crate) f64);
 
+impl bb_core::JointPositions for Dice {
+    fn tell(&self, listener: &mut dyn FnMut(bb_core::JointReading<'_>)) {
+        listener(bb_core::JointReading::at(&[self.0]));
+    }
+}
+
 /// Options of [`Storm`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct StormOptions {

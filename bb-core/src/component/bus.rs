@@ -4,6 +4,7 @@ use super::host::Host;
 use super::{Accepts, ActuatorLink, CommandInfo, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
+use crate::joints::Joints;
 use crate::message::nearest::nearest_path;
 use crate::message::{Payload, Stamp};
 use crate::pubsub::{
@@ -158,6 +159,11 @@ impl Bus {
     /// Why it may not be safe.
     pub fn disarm(&self) -> Result<(), DisarmError> {
         self.host.disarm()
+    }
+
+    /// The states of the joints, and all frames at any time.
+    pub fn joints(&self) -> Joints {
+        self.host.joints()
     }
 
     /// The clock of the run.

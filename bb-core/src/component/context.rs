@@ -87,10 +87,12 @@ impl Context {
     /// The identity where both are the same frame, and where the input has no frame (a robot-level sensor).
     ///
     /// # Errors
-    /// No input of that name is declared, or there is a moving joint between them, whose position nothing computes yet. (Only an
-    /// estimator that declares [`Estimator::HANDLES_MOVING_JOINTS`] may span one.)
+    /// No input of that name is declared, or there is a moving joint between them: where the input is then changes, and
+    /// [`Estimator::handle_transforms`] is told with each message. (Only an estimator that declares
+    /// [`Estimator::HANDLES_MOVING_JOINTS`] may span one.)
     ///
     /// [`Estimator::HANDLES_MOVING_JOINTS`]: super::Estimator::HANDLES_MOVING_JOINTS
+    /// [`Estimator::handle_transforms`]: super::Estimator::handle_transforms
     pub fn frame_from_input(&self, input: &str) -> Result<Isometry3<f64>, Fault> {
         let declared = self.declaration.inputs.iter().find(|declared| declared.name == input);
         let declared = declared.ok_or_else(|| Fault::new(format!("no input `{input}` is declared")))?;
@@ -141,7 +143,7 @@ fn transform_of(input: &InputDeclaration) -> Result<Isometry3<f64>, Fault> {
     let transform = input.frame_from_input.ok_or_else(|| {
         let name = input.name;
         Fault::new(format!(
-            "there is a moving joint between the input `{name}` and the output, and its position is not known"
+            "there is a moving joint between the input `{name}` and the output; `handle_transforms` is told where it is"
         ))
     })?;
     Ok(transform.isometry())

@@ -1,6 +1,6 @@
 //! The contract of an estimator.
 
-use super::{Context, Fault, Info, Inputs, Options, Outputs, Request, RequestCodec};
+use super::{Context, Fault, Info, InputTransforms, Inputs, Options, Outputs, Request, RequestCodec};
 
 /// Consumes messages and emits derived state. See the crate's README for one from scratch.
 ///
@@ -48,7 +48,8 @@ pub trait Estimator: Sized + Send + 'static {
     /// A payload, or a struct of several outputs.
     type Output: Outputs;
 
-    /// Whether it obtains the joints' positions itself, so that its inputs may span moving joints.
+    /// Whether it takes transforms that change, with [`handle_transforms`](Self::handle_transforms), so that its inputs may
+    /// span moving joints.
     const HANDLES_MOVING_JOINTS: bool = false;
 
     /// Makes it, at the start and at every restart.
@@ -63,6 +64,17 @@ pub trait Estimator: Sized + Send + 'static {
     /// # Errors
     /// Any error: it is reported, and the estimator is restarted with fresh state.
     fn handle_input(&mut self, input: <Self::Input as Inputs>::View<'_>) -> Result<Reply<Self::Output>, Fault>;
+
+    /// Takes where its inputs are, each at the time of its message, right before [`handle_input`](Self::handle_input); called
+    /// if it declares [`HANDLES_MOVING_JOINTS`](Self::HANDLES_MOVING_JOINTS). If a joint between an input that is not optional and
+    /// the output is unknown or too old, neither is called: the dispatch is dropped, counted and degrades its health.
+    ///
+    /// # Errors
+    /// As for [`handle_input`](Self::handle_input).
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        let _ = transforms;
+        Ok(())
+    }
 
     /// Handles a timer, a tick or a timeout that it has asked for. What it emits is stamped with the time now.
     ///

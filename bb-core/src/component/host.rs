@@ -4,6 +4,7 @@ use super::guardian::Guardian;
 use super::{CommandInfo, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
+use crate::joints::Joints;
 use crate::message::Origin;
 use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::time::Clock;
@@ -14,6 +15,7 @@ use std::fmt;
 pub(crate) trait Host: Guardian {
     fn origin(&self) -> Origin;
     fn clock(&self) -> &Clock;
+    fn joints(&self) -> Joints;
     fn is_stopping(&self) -> bool;
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;

@@ -36,6 +36,8 @@ pub enum HealthReason {
     Lost,
     /// A run was completed again, or enough good completions followed.
     Recovered,
+    /// A dispatch was dropped: a joint between an input and the output was unknown or too old.
+    NoTransform,
 }
 
 /// A change of an estimator's health, as published and as passed to commands.
@@ -86,6 +88,7 @@ impl fmt::Display for HealthReason {
             Self::Stopped => "stopped",
             Self::Lost => "lost",
             Self::Recovered => "recovered",
+            Self::NoTransform => "no transform",
         })
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::Payload;
 use crate::event::{ParameterValue, SafetyError};
+use crate::joints::PlacedInput;
 use crate::message::codec::{Reader, Shape, Writer};
 use crate::message::{DecodeError, Field, Finite};
 use crate::pubsub::DynamicMessage;
@@ -246,6 +247,13 @@ pub enum Event {
         estimator: usize,
         /// What happened.
         message: String,
+    },
+    /// Where the inputs of a line's dispatches were that span moving joints.
+    Placed {
+        /// The number of that line.
+        cause: u64,
+        /// Each, in order.
+        inputs: Vec<PlacedInput>,
     },
 }
 

@@ -86,17 +86,23 @@ impl Chain {
     /// Another number of positions than the robot has.
     pub fn transform(&self, positions: &[f64]) -> Result<Isometry3<f64>, KinematicsError> {
         check("positions", self.positions, positions)?;
+        Ok(self.at(positions))
+    }
+
+    /// The same for as many positions as there are.
+    #[inline]
+    pub(crate) fn at(&self, positions: &[f64]) -> Isometry3<f64> {
         let mut from_tip = self.body_from_tip;
         for step in self.to_tip.iter().rev() {
             from_tip = step.parent_from_joint * step.motion.carry(positions, &from_tip);
         }
         if self.to_base.is_empty() {
-            return Ok(from_tip);
+            return from_tip;
         }
         for step in &self.to_base {
             from_tip = step.motion.carry_back(positions, &(step.joint_from_parent * from_tip));
         }
-        Ok(self.base_from_body * from_tip)
+        self.base_from_body * from_tip
     }
 
     /// `base_from_tip`, and into `jacobian` the velocity of the tip relative to the base for a unit of each velocity: that of
@@ -142,8 +148,32 @@ impl Chain {
         self.to_tip.len() + self.to_base.len()
     }
 
-    /// Whether a velocity moves it.
-    pub(super) fn has(&self, velocity: usize) -> bool {
+    /// The same between frames fixed to the two links: takes points from that on the tip to that on the base.
+    pub(crate) fn between(mut self, base_from_frame: &Isometry3<f64>, tip_from_frame: &Isometry3<f64>) -> Self {
+        let frame_from_base = base_from_frame.inverse();
+        self.body_from_tip *= tip_from_frame;
+        match self.to_tip.first_mut() {
+            Some(first) if self.to_base.is_empty() => {
+                first.parent_from_joint = frame_from_base * first.parent_from_joint;
+                first.joint_from_parent = first.parent_from_joint.inverse();
+            }
+            None if self.to_base.is_empty() => self.body_from_tip = frame_from_base * self.body_from_tip,
+            _ => self.base_from_body = frame_from_base * self.base_from_body,
+        }
+        self
+    }
+
+    /// Has its positions renumbered by `renumber`, from those of the robot to as many of its own.
+    pub(crate) fn renumbered(mut self, positions: usize, renumber: impl Fn(usize) -> usize) -> Self {
+        for step in self.to_tip.iter_mut().chain(&mut self.to_base) {
+            step.motion.renumber(&renumber);
+        }
+        self.positions = positions;
+        self
+    }
+
+    /// Whether a velocity of the robot moves it.
+    pub(crate) fn has(&self, velocity: usize) -> bool {
         let mut has = false;
         for step in self.to_tip.iter().chain(&self.to_base) {
             step.motion.each_velocity(|moved, _| has |= moved == velocity);

@@ -105,6 +105,16 @@ impl Motion {
         }
     }
 
+    /// Where its positions are from now on.
+    pub(super) fn renumber(&mut self, renumber: impl Fn(usize) -> usize) {
+        match self {
+            Self::Turn(Coordinate { position, .. }) | Self::Slide(Coordinate { position, .. }) => {
+                *position = renumber(*position);
+            }
+            Self::Plane { position, .. } | Self::Free { position, .. } => *position = renumber(*position),
+        }
+    }
+
     /// The velocity, or the derivative of its components, from all velocities or their derivatives.
     pub(super) fn rate(&self, velocities: &[f64]) -> Rate {
         let v = velocities;

@@ -21,6 +21,11 @@ pub enum KinematicsError {
         /// The joint.
         joint: &'static str,
     },
+    /// The lower limit of that joint is above the upper one, or a limit is NaN.
+    Limit {
+        /// The joint.
+        joint: &'static str,
+    },
     /// That joint mimics one that it cannot follow: itself in the end, or one that has not exactly one degree of freedom.
     Mimic {
         /// The joint.
@@ -61,6 +66,9 @@ impl fmt::Display for KinematicsError {
                 write!(f, "the link `{link}` is carried by more than one joint, or is the root")
             }
             Self::NoAxis { joint } => write!(f, "the joint `{joint}` moves, and has no axis of finite length"),
+            Self::Limit { joint } => {
+                write!(f, "the lower limit of the joint `{joint}` is above the upper one, or a limit is NaN")
+            }
             Self::Mimic { joint } => {
                 write!(f, "the joint `{joint}` mimics itself, or a joint without exactly one degree of freedom")
             }

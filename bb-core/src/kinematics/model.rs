@@ -60,9 +60,10 @@ impl Kinematics {
     /// Of a robot, `Rover::TOPOLOGY`, or of links and joints made otherwise.
     ///
     /// # Errors
-    /// The links are no tree, a joint moves and has no axis, or mimics what it cannot follow. Robots that `robot!` declares
+    /// The links are no tree, a joint moves and has no axis, its limits exclude each other, or it mimics what it cannot follow. Robots that `robot!` declares
     /// have none of these.
     pub fn new(topology: &Topology) -> Result<Self, KinematicsError> {
+        topology.joints.iter().try_for_each(check_limit)?;
         let mut positions = 0;
         let mut velocities = 0;
         let own: Vec<JointCoordinates> = topology
@@ -222,6 +223,14 @@ impl Kinematics {
 pub(super) fn check(what: &'static str, expected: usize, given: &[f64]) -> Result<(), KinematicsError> {
     let given = given.len();
     if given == expected { Ok(()) } else { Err(KinematicsError::Coordinates { what, expected, given }) }
+}
+
+fn check_limit(joint: &Joint) -> Result<(), KinematicsError> {
+    let Some(limit) = joint.limit else { return Ok(()) };
+    let values = [limit.lower, limit.upper, limit.velocity, limit.effort];
+    let is_nan = values.into_iter().flatten().any(f64::is_nan);
+    let excludes = matches!((limit.lower, limit.upper), (Some(lower), Some(upper)) if lower > upper);
+    if is_nan || excludes { Err(KinematicsError::Limit { joint: joint.name }) } else { Ok(()) }
 }
 
 fn link_name(topology: &Topology, number: usize) -> &'static str {

@@ -20,6 +20,12 @@ impl Admission {
         Self { last: vec![never; inputs].into() }
     }
 
+    /// The time of the last message of an input that was accepted.
+    #[inline]
+    pub(super) fn last(&self, input: usize) -> Option<MonotonicTime> {
+        self.last.get(input).copied().filter(|last| last.as_nanos() > i64::MIN)
+    }
+
     /// Accepts `message`, which arrived at `now`, or returns why not. Equal times are in order.
     #[inline]
     pub(super) fn admit<T: Payload>(

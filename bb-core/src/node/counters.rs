@@ -4,6 +4,7 @@ use super::count::Count;
 use super::latency::{Latency, LatencyStatistics};
 use crate::declaration::EstimatorDeclaration;
 use crate::event::HealthState;
+use crate::joints::LookupError;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -23,6 +24,8 @@ pub enum DropReason {
     Stopped,
     /// The estimator was busy, and its inbox full.
     Overflow,
+    /// The driver arrived, and a joint between this input and the output was unknown or too old.
+    NoTransform,
 }
 
 /// Without a declared budget, one of this many callbacks is measured.
@@ -32,8 +35,15 @@ const REASONS: usize = DropReason::ALL.len();
 
 impl DropReason {
     /// All reasons.
-    pub const ALL: &'static [Self] =
-        &[Self::SyncMiss, Self::OutOfOrder, Self::NonFinite, Self::ClockSkew, Self::Stopped, Self::Overflow];
+    pub const ALL: &'static [Self] = &[
+        Self::SyncMiss,
+        Self::OutOfOrder,
+        Self::NonFinite,
+        Self::ClockSkew,
+        Self::Stopped,
+        Self::Overflow,
+        Self::NoTransform,
+    ];
 
     /// Its name in reports.
     pub const fn name(self) -> &'static str {
@@ -44,6 +54,7 @@ impl DropReason {
             Self::ClockSkew => "clock skew",
             Self::Stopped => "stopped",
             Self::Overflow => "inbox full",
+            Self::NoTransform => "no transform",
         }
     }
 }
@@ -127,6 +138,7 @@ impl Counters {
         declaration: &EstimatorDeclaration,
         health: HealthState,
         stopped: Option<String>,
+        last_gap: Option<LookupError>,
     ) -> EstimatorStatistics {
         let inputs = declaration.inputs.iter().zip(&self.inputs).map(|(declared, counters)| {
             let overflowed = counters.overflowed.load(Ordering::Relaxed);
@@ -149,6 +161,7 @@ impl Counters {
             last_divergence: *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner),
             last_drop: self.last_drop(declaration),
             stopped,
+            last_gap,
         }
     }
 }
@@ -182,6 +195,8 @@ pub struct EstimatorStatistics {
     pub last_drop: Option<(&'static str, DropReason)>,
     /// Why it does not run, if it does not.
     pub stopped: Option<String>,
+    /// Why a dispatch was dropped for want of a transform the last time: which joint, and how old.
+    pub last_gap: Option<LookupError>,
 }
 
 /// What an input has counted since the start.

@@ -6,6 +6,7 @@ use super::shared::SharedNode;
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
 use crate::fault::{Failed, Fault};
+use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
 use crate::message::{Origin, Payload, Stamped};
@@ -90,6 +91,7 @@ struct Inner {
     nodes: Box<[SharedNode]>,
     journal: Option<Journal>,
     telemetry: Option<Telemetry>,
+    joints: Joints,
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
     /// By which a thread knows which robots' islands it is inside.
@@ -137,6 +139,7 @@ pub(crate) struct EnvironmentParts {
     pub(crate) pool: Pool,
     pub(crate) journal: Option<Journal>,
     pub(crate) telemetry: Option<Telemetry>,
+    pub(crate) joints: Joints,
     pub(crate) start: MonotonicTime,
 }
 
@@ -152,6 +155,7 @@ impl Environment {
             pool,
             journal,
             telemetry,
+            joints,
             start,
         } = parts;
         Self(Arc::new(Inner {
@@ -166,6 +170,7 @@ impl Environment {
             nodes,
             journal,
             telemetry,
+            joints,
             start,
             mark: RobotMark::take(),
             drain: OnceLock::new(),
@@ -343,6 +348,12 @@ impl Environment {
         &self.0.pool
     }
 
+    /// The states of the joints.
+    #[inline]
+    pub(crate) fn joints(&self) -> &Joints {
+        &self.0.joints
+    }
+
     /// Where messages come in.
     #[inline]
     pub(crate) fn door(&self) -> &Door {
@@ -392,6 +403,7 @@ impl Environment {
         message: &Stamped<T>,
         now: MonotonicTime,
     ) -> u64 {
+        self.0.joints.hear(message, now);
         match &self.0.journal {
             None => {
                 topic.publish(message);

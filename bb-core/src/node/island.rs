@@ -259,6 +259,12 @@ impl<S: IslandState> Island<S> {
         {
             journal.write(now, wall_offset_nanos, Event::Measured { cause, callbacks: turn.take_measured() });
         }
+        if let Some((cause, _)) = line
+            && let Some(journal) = environment.journal()
+            && environment.joints().routes().has_any(S::DECLARATION.estimators)
+        {
+            journal.write(now, wall_offset_nanos, Event::Placed { cause, inputs: turn.take_placed() });
+        }
         result
     }
 

@@ -1,5 +1,6 @@
 //! One running estimator: its inputs, its outputs, and what happens when it fails.
 
+mod placing;
 mod recovery;
 mod requests;
 
@@ -20,6 +21,7 @@ use crate::lifecycle::{AsEstimator, Recipe, Slot};
 use crate::message::{Stamp, Stamped};
 use crate::telemetry::TelemetryEvent;
 use crate::time::MonotonicTime;
+use placing::{Placing, Unplaced};
 use std::fmt;
 use std::sync::Arc;
 
@@ -34,6 +36,8 @@ pub struct Node<E: Estimator> {
     make_cache: fn() -> <E::Input as Inputs>::Cache,
     admission: Admission,
     backlog: Backlog<Deliver<E>>,
+    /// Where its inputs are, if some of them span moving joints.
+    placing: Placing,
     health: Health,
     /// How many losses it knows of.
     epoch: u32,
@@ -62,6 +66,7 @@ enum Handled {
     Refused(DropReason),
     Stored,
     Missed(SyncMiss),
+    Unplaced(Unplaced),
     Ran,
 }
 
@@ -132,6 +137,7 @@ impl<E: Estimator> Node<E> {
             make_cache,
             admission: Admission::new(declaration.inputs.len()),
             backlog: Backlog::new(),
+            placing: Placing::new(number, declaration, environment),
             health: Health::default(),
             epoch: 0,
             was_good: false,
@@ -180,6 +186,7 @@ impl<E: Estimator> Node<E> {
         let declared = self.declaration.inputs.get(input)?;
         let AsEstimator(running) = self.slot.running()?;
         let (admission, cache) = (&mut self.admission, &mut self.cache);
+        let placing = &mut self.placing;
         let mut taken = Taken::new(emitted, &mut self.timers);
         let counters = self.shared.counters();
         let budget = self.declaration.health.latency_budget_nanos;
@@ -197,6 +204,11 @@ impl<E: Estimator> Node<E> {
                 }
                 return Ok(Handled::Stored);
             }
+            if E::HANDLES_MOVING_JOINTS
+                && let Err(unplaced) = placing.place(message.monotonic_time, admission, turn)
+            {
+                return Ok(Handled::Unplaced(unplaced));
+            }
             let view = match F::snapshot(cache, message) {
                 Ok(view) => view,
                 Err(miss) => return Ok(Handled::Missed(miss)),
@@ -204,6 +216,9 @@ impl<E: Estimator> Node<E> {
             let dispatched = counters.dispatched.increment();
             if budget.is_some() || dispatched.is_multiple_of(SAMPLED) {
                 start = Some(turn.begin_measure());
+            }
+            if E::HANDLES_MOVING_JOINTS {
+                running.handle_transforms(&placing.transforms())?;
             }
             taken.take(running.handle_input(view)?, turn.now());
             Ok(Handled::Ran)
@@ -234,6 +249,10 @@ impl<E: Estimator> Node<E> {
             }
             Ok(Handled::Missed(miss)) => {
                 self.miss(miss, turn);
+                None
+            }
+            Ok(Handled::Unplaced(unplaced)) => {
+                self.note_unplaced(&unplaced, turn);
                 None
             }
             Err(failed) => {

@@ -4,6 +4,7 @@ use super::EstimatorStatistics;
 use super::counters::Counters;
 use crate::declaration::EstimatorDeclaration;
 use crate::event::HealthState;
+use crate::joints::{LookupError, PlacedInput, Placement};
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, Ordering};
@@ -23,12 +24,16 @@ struct Inner {
     /// When the message of the last completed run arrived: for the watchdog.
     last_run_nanos: AtomicI64,
     stopped: Mutex<Option<Stopped>>,
+    /// Why a dispatch was dropped for want of a transform the last time.
+    last_gap: Mutex<Option<LookupError>>,
     /// One-way requests that wait.
     casts: AtomicU32,
     /// How long its callbacks are made to take on virtual time.
     pretended_latency_nanos: AtomicI64,
     /// How long they took, in a replay.
     replayed_latencies: Mutex<VecDeque<i64>>,
+    /// Where its inputs were, in a replay.
+    replayed_placements: Mutex<VecDeque<PlacedInput>>,
 }
 
 /// Why it does not run.
@@ -48,9 +53,11 @@ impl SharedNode {
             health: AtomicU8::new(0),
             last_run_nanos: AtomicI64::new(0),
             stopped: Mutex::new(None),
+            last_gap: Mutex::default(),
             casts: AtomicU32::new(0),
             pretended_latency_nanos: AtomicI64::new(0),
             replayed_latencies: Mutex::default(),
+            replayed_placements: Mutex::default(),
         }))
     }
 
@@ -75,7 +82,8 @@ impl SharedNode {
 
     pub(crate) fn statistics(&self) -> EstimatorStatistics {
         let stopped = lock(&self.0.stopped).clone().map(|stopped| stopped.reason);
-        self.0.counters.statistics(self.0.declaration, self.health(), stopped)
+        let last_gap = lock(&self.0.last_gap).clone();
+        self.0.counters.statistics(self.0.declaration, self.health(), stopped, last_gap)
     }
 
     pub(crate) fn health(&self) -> HealthState {
@@ -108,6 +116,10 @@ impl SharedNode {
         *lock(&self.0.stopped) = stopped;
     }
 
+    pub(super) fn set_last_gap(&self, error: LookupError) {
+        *lock(&self.0.last_gap) = Some(error);
+    }
+
     /// Takes one of `most` places for one-way requests; returns false if all are taken.
     pub(crate) fn begin_cast(&self, most: u32) -> bool {
         let taken = self
@@ -129,6 +141,18 @@ impl SharedNode {
     /// Sets how long the next measured callback takes in a replay.
     pub(crate) fn replay_latency(&self, nanos: i64) {
         lock(&self.0.replayed_latencies).push_back(nanos);
+    }
+
+    /// An input that it is about to ask for is there in a replay.
+    pub(crate) fn replay_placement(&self, placed: PlacedInput) {
+        lock(&self.0.replayed_placements).push_back(placed);
+    }
+
+    /// Where the input of that number was, as the journal has it.
+    pub(super) fn replayed_placement(&self, input: usize) -> Option<Placement> {
+        let mut placements = lock(&self.0.replayed_placements);
+        placements.front().filter(|placed| placed.input == input)?;
+        placements.pop_front().map(|placed| placed.placement)
     }
 
     /// How long a callback took on virtual time.

@@ -3,6 +3,7 @@
 use super::emission::handed_on;
 use super::environment::{Environment, Mode};
 use crate::declaration::EstimatorDeclaration;
+use crate::joints::PlacedInput;
 use crate::journal::{Callback, Event, Recorded, checksum};
 use crate::message::{Payload, Stamped};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
@@ -24,6 +25,8 @@ pub struct Turn<'a> {
     read_at: Cell<Option<MonotonicTime>>,
     /// How long measured callbacks took, if there is a journal.
     measured: RefCell<Vec<Callback>>,
+    /// Where inputs across moving joints were, if there is a journal.
+    placed: RefCell<Vec<PlacedInput>>,
     /// The estimator whose callback runs now, if the journal does not contain the request that it answers.
     answering: Cell<Option<&'static EstimatorDeclaration>>,
     /// The estimator whose outputs are such an answer.
@@ -49,6 +52,7 @@ impl<'a> Turn<'a> {
             running,
             read_at: Cell::new(None),
             measured: RefCell::default(),
+            placed: RefCell::default(),
             answering: Cell::new(None),
             unrecorded: Cell::new(None),
             has_emitted: Cell::new(false),
@@ -108,6 +112,17 @@ impl<'a> Turn<'a> {
         self.measured.take()
     }
 
+    /// Keeps where an input was, for the journal.
+    pub(super) fn keep_placed(&self, placed: PlacedInput) {
+        if self.environment.journal().is_some() {
+            self.placed.borrow_mut().push(placed);
+        }
+    }
+
+    pub(super) fn take_placed(&self) -> Vec<PlacedInput> {
+        self.placed.take()
+    }
+
     /// The journal does not contain the request that `estimator` is about to answer, so its outputs are recorded instead. What
     /// other estimators emit follows from these.
     pub(super) fn set_unrecorded(&self, estimator: &'static EstimatorDeclaration) {
@@ -136,8 +151,9 @@ impl<'a> Turn<'a> {
     /// An estimator emits `message` at the publisher of that number.
     #[inline]
     pub fn emit<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
-        if self.is_observed || topic.is_listened_to() {
+        if T::TELLS_JOINT_POSITION || self.is_observed || topic.is_listened_to() {
             handed_on(self.environment, topic.path(), || {
+                self.environment.joints().hear(message, self.now);
                 if self.is_observed {
                     self.follow(publisher, topic.path(), message);
                 }

@@ -1,6 +1,7 @@
 //! The state of joints.
 
 use crate::Payload;
+use crate::message::{JointPositions, JointReading, JointSide};
 use std::sync::Arc;
 
 /// The state of one joint (one row of `sensor_msgs/JointState`; the message's frame names the joint).
@@ -12,6 +13,19 @@ pub struct JointState {
     /// rad/s or m/s.
     pub velocity: Option<f64>,
     /// Torque in N·m or force in N.
+    pub effort: Option<f64>,
+}
+
+/// The state of the motor of a joint with a `transmission`: what an encoder on the motor's side of the gear reads. The
+/// runtime converts it to the joint's, see [`joints`](crate::joints).
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+#[payload(joint_position)]
+pub struct MotorState {
+    /// Angle of the motor in rad.
+    pub position: f64,
+    /// rad/s.
+    pub velocity: Option<f64>,
+    /// Torque of the motor in N·m.
     pub effort: Option<f64>,
 }
 
@@ -30,6 +44,21 @@ pub struct JointStates {
     pub efforts: Vec<f64>,
 }
 
+/// All joints of a robot at one time, as the runtime knows them (`sensor_msgs/JointState`); what
+/// [`JointPublisher`](crate::component::JointPublisher) publishes. Unlike [`JointStates`] it is no measurement.
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+#[payload(ros, no_frame)]
+pub struct JointSnapshot {
+    /// The joints whose state is known, in the order of their declaration, those that mimic others included.
+    pub names: Arc<[String]>,
+    /// Angles in rad of revolute and continuous joints; displacements in m of prismatic ones.
+    pub positions: Vec<f64>,
+    /// rad/s or m/s; empty if one of them is not measured.
+    pub velocities: Vec<f64>,
+    /// Torques in N·m or forces in N; empty if one of them is not measured.
+    pub efforts: Vec<f64>,
+}
+
 impl JointStates {
     /// The state of a joint. `None` if the joint is not listed or its position is not measured.
     pub fn joint(&self, name: &str) -> Option<JointState> {
@@ -40,4 +69,46 @@ impl JointStates {
             effort: self.efforts.get(index).copied(),
         })
     }
+}
+
+impl JointPositions for JointState {
+    fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+        let Self { position, velocity, effort } = self;
+        tell_one(None, JointSide::Joint, *position, *velocity, *effort, listener);
+    }
+}
+
+impl JointPositions for MotorState {
+    fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+        let Self { position, velocity, effort } = self;
+        tell_one(None, JointSide::Motor, *position, *velocity, *effort, listener);
+    }
+}
+
+impl JointPositions for JointStates {
+    fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+        for (index, (name, position)) in self.names.iter().zip(&self.positions).enumerate() {
+            let velocity = self.velocities.get(index).copied();
+            let effort = self.efforts.get(index).copied();
+            tell_one(Some(name), JointSide::Joint, *position, velocity, effort, listener);
+        }
+    }
+}
+
+fn tell_one(
+    joint: Option<&str>,
+    side: JointSide,
+    position: f64,
+    velocity: Option<f64>,
+    effort: Option<f64>,
+    listener: &mut dyn FnMut(JointReading<'_>),
+) {
+    let (velocity, effort) = (velocity.as_ref(), effort.as_ref());
+    listener(JointReading {
+        joint,
+        position: &[position],
+        velocity: velocity.map_or(&[], std::slice::from_ref),
+        effort: effort.map_or(&[], std::slice::from_ref),
+        side,
+    });
 }

@@ -6,7 +6,7 @@ use crate::Payload;
 ///
 /// ROS has degrees Celsius and ampere hours in numbers of four bytes where this has kelvin and coulomb.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
-#[payload(ros)]
+#[payload(ros, no_frame)]
 pub struct BatteryState {
     /// V
     pub voltage: f64,
@@ -106,6 +106,7 @@ pub enum BatteryTechnology {
 
 /// The state of a supply or of a rail that it feeds. ROS has no message for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
+#[payload(no_frame)]
 pub struct PowerState {
     /// Whether it is switched on.
     pub is_on: bool,

@@ -2,7 +2,7 @@
 
 use super::queue::Queue;
 use super::statistics::{SubscriberStatistics, TopicStatistics};
-use crate::message::{DecodeError, Payload, Schema, Stamp, Stamped};
+use crate::message::{DecodeError, JointReading, Payload, Schema, Stamp, Stamped};
 use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
@@ -24,6 +24,7 @@ pub(super) trait AnyMessage: Send + Sync {
     fn type_name(&self) -> &'static str;
     fn stamp(&self) -> Stamp;
     fn as_any(&self) -> &dyn Any;
+    fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>));
     fn fmt_payload(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
     fn encode(&self, bytes: &mut Vec<u8>);
     fn schema(&self) -> Schema;
@@ -73,6 +74,12 @@ impl DynamicMessage {
     /// The message, if its payload is a `T`.
     pub fn downcast<T: Payload>(&self) -> Option<&Stamped<T>> {
         self.message.as_any().downcast_ref()
+    }
+
+    /// Calls `listener` with what it tells of the positions of joints, if anything; see
+    /// [`JointPositions`](crate::JointPositions).
+    pub fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+        self.message.tell_joints(listener);
     }
 
     /// Appends the message with its stamp, bit for bit, as CDR that [`schema`](Self::schema) describes and
@@ -136,6 +143,9 @@ pub trait AnyTopic: Any + Send + Sync {
     fn path(&self) -> &'static str;
     /// The name of its payload's type.
     fn payload_name(&self) -> &'static str;
+    /// Whether what its messages tell is seen from a frame.
+    #[doc(hidden)]
+    fn depends_on_frame(&self) -> bool;
     /// Makes the definitions of its messages: the exact one, and those of ROS if it has any.
     #[doc(hidden)]
     fn schemas(&self) -> fn() -> Vec<Schema>;

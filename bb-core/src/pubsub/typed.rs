@@ -5,7 +5,7 @@ use super::statistics::{SubscriberStatistics, TopicStatistics};
 use super::subscribers::lock;
 use super::topic::Topic;
 use crate::message::codec::{encode, encode_as_ros, encode_companion, is_exact_as_ros, to_json};
-use crate::message::{DecodeError, Payload, Schema, Stamp, Stamped};
+use crate::message::{DecodeError, JointReading, Payload, Schema, Stamp, Stamped};
 use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
@@ -25,6 +25,10 @@ impl<T: Payload> AnyMessage for Stamped<T> {
     }
     fn as_any(&self) -> &dyn Any {
         self
+    }
+
+    fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+        self.payload.tell_joints(listener);
     }
     fn fmt_payload(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(&self.payload, f)
@@ -110,6 +114,10 @@ impl<T: Payload> AnyTopic for Topic<T> {
 
     fn as_any(&self) -> &dyn Any {
         self
+    }
+
+    fn depends_on_frame(&self) -> bool {
+        T::DEPENDS_ON_FRAME
     }
 
     fn statistics(&self) -> TopicStatistics {

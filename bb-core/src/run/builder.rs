@@ -5,6 +5,7 @@ use super::bound::refused_by_bound;
 use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
+use super::joints::known_joints;
 use super::machine::Machine;
 use super::running::STOP_WITHIN;
 use super::source::Assembly;
@@ -14,6 +15,7 @@ use crate::control::{Control, Declared, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterType, ParameterValues};
 use crate::event::ParameterValue;
 use crate::fault::caught;
+use crate::joints::{JointSettings, Joints};
 use crate::journal::{Entry, Event, Journal, Sink};
 use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
@@ -38,6 +40,7 @@ pub struct Builder<R: Robot> {
     system: Arc<SystemTopics>,
     pub(super) parameters: Vec<ParameterValue>,
     supervision: Supervision,
+    joints: JointSettings,
     journal: Option<Sink>,
     telemetry: Telemetry,
     node: &'static str,
@@ -56,6 +59,7 @@ impl<R: Robot> Builder<R> {
             system: Arc::new(system),
             parameters: R::PARAMETERS.iter().map(|parameter| parameter.default.into()).collect(),
             supervision: Supervision::default(),
+            joints: JointSettings::default(),
             journal: None,
             telemetry: Telemetry::default(),
             node: "local",
@@ -94,6 +98,11 @@ impl<R: Robot> Builder<R> {
     /// How components that fail are restarted.
     pub fn supervision(&mut self) -> &mut Supervision {
         &mut self.supervision
+    }
+
+    /// How much is kept of the states of joints, and for how long they are good.
+    pub fn joints(&mut self) -> &mut JointSettings {
+        &mut self.joints
     }
 
     /// Names the machine or process that runs the robot: the `node` of its messages' origin. `local` unless it is set.
@@ -203,8 +212,11 @@ impl<R: Robot> Builder<R> {
             return Err(StartError::component(path, Fault::new(message)));
         }
         let start = clock.now();
+        let joints = known_joints::<R>(&self.topics, self.joints, clock.clone());
+        let joints: Joints = joints.map_err(|error| StartError::component(R::NAME, Fault::from(error)))?;
         let parts = EnvironmentParts {
             mode,
+            joints: joints.clone(),
             origin,
             overseer: Arc::new(control.clone()),
             supervision: self.supervision,
@@ -221,6 +233,7 @@ impl<R: Robot> Builder<R> {
             control: control.clone(),
             journal: journal.clone(),
             door: environment.door().clone(),
+            joints,
             wiring: Arc::clone(&place),
         });
         control.set_host(&host);

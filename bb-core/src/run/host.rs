@@ -7,6 +7,7 @@ use crate::control::{Control, Islands, Wired};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::fault::Fault;
+use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::message::Origin;
 use crate::node::NodeEntry;
@@ -21,6 +22,7 @@ pub(super) struct RobotHost<R: Robot> {
     pub(super) control: Control,
     pub(super) journal: Option<Journal>,
     pub(super) door: Door,
+    pub(super) joints: Joints,
     pub(super) wiring: Arc<OnceLock<Weak<R::Wiring>>>,
 }
 
@@ -47,6 +49,10 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn clock(&self) -> &Clock {
         self.control.clock()
+    }
+
+    fn joints(&self) -> Joints {
+        self.joints.clone()
     }
 
     fn is_stopping(&self) -> bool {

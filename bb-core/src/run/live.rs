@@ -8,6 +8,7 @@ use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Permit,
 use crate::control::Execution;
 use crate::declaration::{ParameterError, ParameterType};
 use crate::event::{ArmError, DisarmError, Refusal, Safety};
+use crate::joints::Joints;
 use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
@@ -27,6 +28,11 @@ impl<R: Robot> Live<R> {
     /// Its clock.
     pub fn clock(&self) -> &Clock {
         self.0.environment.clock()
+    }
+
+    /// The states of the joints, and all frames at any time.
+    pub fn joints(&self) -> Joints {
+        self.0.environment.joints().clone()
     }
 
     /// Subscribes from now on, with room for 1024 messages.

@@ -214,6 +214,7 @@ impl<R: Robot> Machine<R> {
             estimators,
             sources: sources.iter().map(SharedSource::statistics).collect(),
             commands,
+            joints: self.environment.joints().statistics(),
             state,
             safety,
             faults,

@@ -6,6 +6,7 @@ use super::visit::Visitable;
 use super::{Live, Report, Robot};
 use crate::component::{HandleCall, HandleCast};
 use crate::declaration::ParameterValues;
+use crate::joints::PlacedInput;
 use crate::journal::{Callback, Entry, Event, Publishers, Recorded, Request, decoded};
 use crate::node::{Key, NodeEntry, Replayed, know_calls, know_casts};
 use crate::pubsub::{AnyTopic, DynamicMessage};
@@ -21,6 +22,7 @@ pub struct Replay<R: Robot> {
     /// Lines that were not played yet: the line of a measured turn waits for the one that says how long its callbacks took.
     waiting: VecDeque<Entry>,
     measured: HashMap<u64, Vec<Callback>>,
+    placed: HashMap<u64, Vec<PlacedInput>>,
     /// The number of the last line that was handed over.
     last: u64,
     has_begun: bool,
@@ -44,6 +46,7 @@ impl<R: Robot> Replay<R> {
             live: Live(Arc::new(machine)),
             waiting: VecDeque::new(),
             measured: HashMap::new(),
+            placed: HashMap::new(),
             last: 0,
             has_begun: false,
             is_virtual: false,
@@ -70,6 +73,9 @@ impl<R: Robot> Replay<R> {
             self.last = line;
             if let Event::Measured { cause, callbacks } = &entry.event {
                 self.measured.insert(*cause, callbacks.clone());
+            }
+            if let Event::Placed { cause, inputs } = &entry.event {
+                self.placed.insert(*cause, inputs.clone());
             }
             self.waiting.push_back(entry);
         }
@@ -129,7 +135,7 @@ impl<R: Robot> Replay<R> {
         Ok(())
     }
 
-    /// Whether it is not known yet how long the callbacks of a line took, or what was emitted in reply to a request.
+    /// Whether it is not known yet how long the callbacks of a line took, where inputs were, or what was emitted in reply to a request.
     fn is_open(&self, entry: &Entry) -> bool {
         let Some(number) = self.island_of(&entry.event) else { return false };
         if let Event::Request { request: Request { bytes: None, .. }, .. } = &entry.event
@@ -139,7 +145,10 @@ impl<R: Robot> Replay<R> {
         }
         let island = self.live.0.island(number);
         let is_measured = island.is_some_and(|island| island.declaration().is_measured);
-        is_measured && !self.measured.contains_key(&entry.number)
+        let routes = self.live.0.environment.joints().routes();
+        let is_placed = island.is_some_and(|island| routes.has_any(island.estimators()));
+        (is_measured && !self.measured.contains_key(&entry.number))
+            || (is_placed && !self.placed.contains_key(&entry.number))
     }
 
     /// The next line, of those that wait from `first` on, that an island processed or wrote while it did.
@@ -187,6 +196,9 @@ impl<R: Robot> Replay<R> {
         for Callback { estimator, nanos } in self.measured.remove(&number).unwrap_or_default() {
             machine.environment.node(estimator).replay_latency(nanos);
         }
+        for placed in self.placed.remove(&number).unwrap_or_default() {
+            machine.environment.node(placed.estimator).replay_placement(placed);
+        }
         match event {
             Event::Begin { .. } => return Err("the journal begins again".to_owned()),
             Event::WallClock { offset_nanos } => machine.environment.clock().set_wall_offset_nanos(offset_nanos),
@@ -220,7 +232,7 @@ impl<R: Robot> Replay<R> {
                 self.node(estimator, time, NodeEntry::Silence { epoch, last_run })?;
             }
             Event::Request { estimator, request } => self.request(number, estimator, time, request)?,
-            Event::Measured { .. } => {}
+            Event::Measured { .. } | Event::Placed { .. } => {}
             Event::Output { island, publisher, checksum } => self.compare(island, publisher, checksum)?,
             Event::Emission { publisher, is_first, message } => self.emit(publisher, is_first, time, message)?,
             Event::Report { estimator } => {

@@ -3,6 +3,7 @@
 use super::SourceStatistics;
 use crate::control::CommandStatistics;
 use crate::event::{ComponentFault, Safety};
+use crate::joints::{JointRefusal, JointStatistics};
 use crate::node::{DropReason, EstimatorStatistics};
 use crate::pubsub::TopicStatistics;
 use std::fmt;
@@ -19,6 +20,8 @@ pub struct Report {
     pub sources: Vec<SourceStatistics>,
     /// Every command.
     pub commands: Vec<CommandStatistics>,
+    /// Every joint that moves by itself, and names that messages gave of joints that there are not.
+    pub joints: Vec<JointStatistics>,
     /// The operational state.
     pub state: &'static str,
     /// The safety state.
@@ -72,6 +75,9 @@ impl fmt::Display for Report {
             if let Some(reason) = estimator.last_divergence {
                 writeln!(f, "{}: diverged {} times, last: {reason}", estimator.path, estimator.diverged)?;
             }
+            if let Some(gap) = &estimator.last_gap {
+                writeln!(f, "{}: a transform was missing, last: {gap}", estimator.path)?;
+            }
             for input in &estimator.inputs {
                 for reason in DropReason::ALL.iter().copied().filter(|reason| input.dropped(*reason) > 0) {
                     let (path, name, dropped) = (estimator.path, input.name, input.dropped(reason));
@@ -90,6 +96,12 @@ impl fmt::Display for Report {
             if let Some(refusal) = &command.last_refusal {
                 writeln!(f, "{} times refused, last: {refusal}", command.refused)?;
             }
+        }
+        let is_bad = |joint: &&JointStatistics| {
+            !joint.is_declared || JointRefusal::ALL.iter().any(|reason| joint.refused(*reason) > 0)
+        };
+        for joint in self.joints.iter().filter(is_bad) {
+            writeln!(f, "{joint}")?;
         }
         for fault in &self.faults {
             writeln!(f, "{fault}")?;

@@ -3,7 +3,7 @@
 use super::{Joint, JointKind, Topology};
 use crate::message::codec::ros::{Header, Time, TransformStamped, TransformsMessage};
 use crate::time::WallTime;
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 impl TransformsMessage {
     /// What does not move: the frame of a joint in that of the link it is mounted on, and of a fixed joint that of the link
@@ -23,13 +23,17 @@ impl TransformsMessage {
         Self { transforms: transforms.collect() }
     }
 
-    /// What the joints of these numbers carry, if they move, with the position of each: rad where it turns, m where it
-    /// slides. A joint with more than one degree of freedom is placed at rest.
-    pub fn moving(topology: &Topology, joints: impl IntoIterator<Item = (usize, f64)>, time: WallTime) -> Self {
+    /// What the joints of these numbers carry, if they move, with the position of each, in the coordinates of
+    /// [`kinematics`](crate::kinematics#coordinates); empty for one at rest.
+    pub fn moving(
+        topology: &Topology,
+        joints: impl IntoIterator<Item = (usize, impl AsRef<[f64]>)>,
+        time: WallTime,
+    ) -> Self {
         let name = |link: usize| topology.links.get(link).map_or("", |link| link.name);
         let transforms = joints.into_iter().filter_map(|(number, position)| {
             let joint = topology.joints.get(number).filter(|joint| joint.kind != JointKind::Fixed)?;
-            let motion = joint.motion(position);
+            let motion = joint.motion(position.as_ref());
             Some(match joint.name == name(joint.child) {
                 true => {
                     transform(time, name(joint.parent), joint.name, joint.parent_from_joint.isometry() * motion)
@@ -42,16 +46,29 @@ impl TransformsMessage {
 }
 
 impl Joint {
-    /// Takes points from the link that the joint carries to the joint's frame, at a position: rad or m.
-    pub fn motion(&self, position: f64) -> Isometry3<f64> {
+    /// Takes points from the link that the joint carries to the joint's frame, at a position in the coordinates of
+    /// [`kinematics`](crate::kinematics#coordinates). At rest if there are not as many numbers as the joint has.
+    pub fn motion(&self, position: &[f64]) -> Isometry3<f64> {
         let axis = Vector3::from(self.axis.unwrap_or([1.0, 0.0, 0.0]));
-        match self.kind {
-            JointKind::Revolute | JointKind::Continuous => {
-                let turn = UnitQuaternion::from_axis_angle(&Unit::new_normalize(axis), position);
+        match (self.kind, position) {
+            (JointKind::Revolute | JointKind::Continuous, [angle]) => {
+                let turn = UnitQuaternion::from_axis_angle(&Unit::new_normalize(axis), *angle);
                 Isometry3::from_parts(Translation3::identity(), turn)
             }
-            JointKind::Prismatic => Translation3::from(axis * position).into(),
-            JointKind::Fixed | JointKind::Planar | JointKind::Floating => Isometry3::identity(),
+            (JointKind::Prismatic, [length]) => Translation3::from(axis * *length).into(),
+            (JointKind::Planar, [x, y, angle]) => {
+                let axis = Unit::new_normalize(axis);
+                // As the kinematics have it where the axis is opposite to z.
+                let joint_from_plane = UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &axis)
+                    .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+                let moved = joint_from_plane * Vector3::new(*x, *y, 0.0);
+                Isometry3::from_parts(moved.into(), UnitQuaternion::from_axis_angle(&axis, *angle))
+            }
+            (JointKind::Floating, [x, y, z, w, i, j, k]) => {
+                let rotation = UnitQuaternion::new_normalize(Quaternion::new(*w, *i, *j, *k));
+                Isometry3::from_parts(Translation3::new(*x, *y, *z), rotation)
+            }
+            _ => Isometry3::identity(),
         }
     }
 }

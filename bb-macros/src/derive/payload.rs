@@ -15,6 +15,8 @@ struct Attributes {
     is_ros: bool,
     /// It tells the position of a joint.
     tells_position: bool,
+    /// It is the same from every frame.
+    has_no_frame: bool,
     /// The name of its definition, where that is not its own.
     name: Option<LitStr>,
 }
@@ -54,6 +56,14 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     let position = attributes.tells_position.then(|| {
         quote!(
             const TELLS_JOINT_POSITION: bool = true;
+            fn tell_joints(&self, listener: &mut dyn ::core::ops::FnMut(::bb_core::__private::JointReading<'_>)) {
+                ::bb_core::__private::JointPositions::tell(self, listener)
+            }
+        )
+    });
+    let frame = (attributes.has_no_frame || attributes.tells_position).then(|| {
+        quote!(
+            const DEPENDS_ON_FRAME: bool = false;
         )
     });
     quote! {
@@ -62,6 +72,7 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
             const NAME: &'static str = #text;
             #ros
             #position
+            #frame
         }
         #[automatically_derived]
         impl #generics ::bb_core::Finite for #name #arguments #bounds {
@@ -97,10 +108,12 @@ fn attributes(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Attributes {
                 attributes.is_ros = true;
             } else if meta.path.is_ident("joint_position") {
                 attributes.tells_position = true;
+            } else if meta.path.is_ident("no_frame") {
+                attributes.has_no_frame = true;
             } else if meta.path.is_ident("name") {
                 attributes.name = Some(meta.value()?.parse()?);
             } else {
-                return Err(meta.error("expected `ros`, `joint_position` or `name = \"package/Name\"`"));
+                return Err(meta.error("expected `ros`, `joint_position`, `no_frame` or `name = \"package/Name\"`"));
             }
             Ok(())
         });

@@ -132,7 +132,7 @@ fn outputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     known.collect()
 }
 
-/// No input spans a moving joint, unless the algorithm handles it.
+/// No input spans a moving joint, unless the algorithm handles that or the payload is the same from every frame.
 fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let robot = verified.robot;
     let mut checks = TokenStream::new();
@@ -143,12 +143,14 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
             let (name, kind) = (type_name(&estimator.component), types.estimator(id));
             let (input_name, joint_name) = (crate::names::text(&input.name), crate::names::text(&joint.name));
             let joint_kind = joint.kind_word.to_string();
+            let payload = types.payload(*source);
             checks.extend(spanned_call(
                 Place::of(&input.word),
                 quote!(::bb_core::__private::check_dynamic),
                 quote!(
                     #name,
-                    <#kind as ::bb_core::Estimator>::HANDLES_MOVING_JOINTS,
+                    <#kind as ::bb_core::Estimator>::HANDLES_MOVING_JOINTS
+                        || !<#payload as ::bb_core::Payload>::DEPENDS_ON_FRAME,
                     #input_name,
                     #joint_name,
                     #joint_kind

@@ -2,7 +2,7 @@
 
 use super::literal::{option, transform};
 use crate::model::{Joint, Link, LinkId, Mount, Robot};
-use crate::parse::{Dynamics, Geometry, Inertial, JointKind, Limit, Mimic, Origin, Quantity, Shape};
+use crate::parse::{Dynamics, Geometry, Inertial, JointKind, Limit, Mimic, Origin, Quantity, Shape, Transmission};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -39,6 +39,14 @@ fn link(robot: &Robot, id: LinkId, link: &Link) -> TokenStream {
     })
 }
 
+/// A reduction of 1 and no offset, where they are not given.
+fn transmission(given: &Transmission) -> TokenStream {
+    let value = |quantity: &Option<Quantity>, default: f64| quantity.as_ref().map_or(default, |given| given.value);
+    let (reduction, offset) = (value(&given.reduction, 1.0), value(&given.offset, 0.0));
+    let is_reversed = given.reversed;
+    quote!(__private::Transmission { reduction: #reduction, offset: #offset, is_reversed: #is_reversed })
+}
+
 fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
     let name = &joint.label;
     let kind = joint_kind(joint.kind);
@@ -51,11 +59,7 @@ fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
     let limit = option(joint.limits.first().map(limit));
     let dynamics = option(joint.dynamics.first().map(dynamics));
     let mimic = option(joint.mimics.first().and_then(|data| mimic(robot, data)));
-    let reduction = joint.transmissions.first().and_then(|transmission| transmission.reduction.as_ref());
-    let transmission = option(reduction.map(|reduction| {
-        let reduction = reduction.value;
-        quote!(__private::Transmission { reduction: #reduction })
-    }));
+    let transmission = option(joint.transmissions.first().map(transmission));
     quote!(__private::Joint {
         name: #name,
         kind: __private::JointKind::#kind,

@@ -41,6 +41,8 @@ impl Measure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Bounds {
     Any,
+    /// A number that is divided by.
+    NotZero,
     /// More than 0.
     Positive,
     /// A time that nanoseconds can hold.
@@ -59,13 +61,14 @@ impl Bounds {
     pub(crate) fn fault(self, value: f64) -> Option<&'static str> {
         let fault = match self {
             Self::Any => return None,
+            Self::NotZero if value == 0.0 => "this must not be 0",
             Self::Positive | Self::Time | Self::Rate if value <= 0.0 => "this must be more than 0",
             Self::Time if value > LONGEST_TIME_S => "this must be at most 292 years",
             Self::Rate if value > HIGHEST_RATE_HZ => "this must be at most 1 GHz",
             Self::Rate if 1.0 / value > LONGEST_TIME_S => {
                 "this rate is too low; it must be more than once in 292 years"
             }
-            Self::Positive | Self::Time | Self::Rate => return None,
+            Self::NotZero | Self::Positive | Self::Time | Self::Rate => return None,
         };
         Some(fault)
     }

@@ -74,8 +74,12 @@ words! {
         "its position when the other is at zero. Default: zero";
     TRANSMISSION: "transmission", Value::Other, Once, ": { reduction: 50 };",
         "the gear between motor and joint";
-    REDUCTION: "reduction", Value::Number(Measure::Of(Dimension::NONE), Bounds::Any), Once, ": 50",
-        "turns of the motor for one of the joint";
+    REDUCTION: "reduction", Value::Number(Measure::Of(Dimension::NONE), Bounds::NotZero), Once, ": 50",
+        "turns of the motor for one of the joint. Default: 1";
+    OFFSET_OF_MOTOR: "offset", Value::Number(Measure::Position, Bounds::Any), Once, ": 0 deg",
+        "the position of the joint when the motor is at zero. Default: zero";
+    REVERSED: "reversed", Value::Other, Once, ": true",
+        "whether the joint turns the other way than the motor. Default: false";
 
     // Of links.
     INERTIAL: "inertial", Value::Other, Once, ": { mass: 1.2 kg, inertia: { xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 } };",

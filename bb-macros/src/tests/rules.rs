@@ -70,6 +70,20 @@ fn joint_geometry() {
         &base("joint j: prismatic { axis: x; limit: { lower: 1 m, upper: 1 m }; link a; }"),
         &[("1 m", "the upper limit must be above the lower one")],
     );
+    // A joint without end needs no limit; one that it has is no other way round for that.
+    wrong(
+        &base("joint j: continuous { axis: x; limit: { lower: 1 deg, upper: -2 deg }; link a; }"),
+        &[("-2 deg", "the upper limit must be above the lower one")],
+    );
+    right(&base(
+        "joint j: revolute { axis: z; limit: { lower: 0 deg, upper: 1 deg }; transmission: { reduction: -2, offset: 1 deg, reversed: true }; link a; }",
+    ));
+    wrong(
+        &base(
+            "joint j: revolute { axis: z; limit: { lower: 0 deg, upper: 1 deg }; transmission: { reduction: 0 }; link a; }",
+        ),
+        &[("0", "this must not be 0")],
+    );
     wrong(
         &base("joint j: prismatic { axis: x; limit: { velocity: 1 m/s }; link a; }"),
         &[("limit", "the limit of a prismatic joint needs both `lower` and `upper`")],

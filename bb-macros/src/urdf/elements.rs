@@ -174,7 +174,7 @@ impl<'a, 'input> Reader<'a, 'input> {
                 None => 1.0,
             };
             let reduction = Some(self.quantity(reduction, Dimension::NONE));
-            Transmission { reduction }
+            Transmission { reduction, offset: None, reversed: false }
         });
         // A joint has one; further ones of other interfaces say the same.
         reductions.take(1).collect()

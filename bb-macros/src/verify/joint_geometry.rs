@@ -1,5 +1,5 @@
-//! Revolute, prismatic, continuous and planar joints have an axis; revolute and prismatic ones a limit with lower
-//! below upper; a fixed joint has neither. (A floating joint moves freely: no axis either.) An origin is not so far
+//! Revolute, prismatic, continuous and planar joints have an axis; revolute and prismatic ones a limit with `lower` and
+//! `upper`; a fixed joint has neither. A lower limit is below the upper one, whatever the joint. (A floating joint moves freely: no axis either.) An origin is not so far
 //! away that the transforms between joints could no longer be multiplied out.
 //!
 //! Right: `joint pan: revolute { axis: z; limit: { lower: -90 deg, upper: 90 deg }; link head { } }`
@@ -60,8 +60,13 @@ fn limit(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
         Some(limit) if joint.kind == JointKind::Fixed => {
             diagnostics.error(&limit.word, format!("a fixed joint has no limit; leave it out of `{name}`"));
         }
-        Some(limit) if needs_one => range(limit, kind.to_string().as_str(), diagnostics),
-        Some(_) => {}
+        Some(limit) => {
+            if needs_one && (limit.lower.is_none() || limit.upper.is_none()) {
+                let message = format!("the limit of a {kind} joint needs both `lower` and `upper`");
+                diagnostics.error(&limit.word, message);
+            }
+            range(limit, diagnostics);
+        }
         None if needs_one && complete => {
             let unit = if joint.kind == JointKind::Revolute { "deg" } else { "m" };
             let message = format!(
@@ -73,16 +78,12 @@ fn limit(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
     }
 }
 
-fn range(limit: &Limit, kind: &str, diagnostics: &mut Diagnostics) {
-    match (&limit.lower, &limit.upper) {
-        (Some(lower), Some(upper)) => {
-            if lower.dimension == upper.dimension && lower.value >= upper.value {
-                diagnostics.at(upper.place, "the upper limit must be above the lower one".into());
-            }
-        }
-        _ => {
-            let message = format!("the limit of a {kind} joint needs both `lower` and `upper`");
-            diagnostics.error(&limit.word, message);
-        }
+/// Whatever the kind of the joint: also where nothing needs a limit, one that excludes every position is a mistake.
+fn range(limit: &Limit, diagnostics: &mut Diagnostics) {
+    if let (Some(lower), Some(upper)) = (&limit.lower, &limit.upper)
+        && lower.dimension == upper.dimension
+        && lower.value >= upper.value
+    {
+        diagnostics.at(upper.place, "the upper limit must be above the lower one".into());
     }
 }

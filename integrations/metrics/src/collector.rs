@@ -196,6 +196,7 @@ fn reason_label(reason: DropReason) -> &'static str {
         DropReason::ClockSkew => "clock_skew",
         DropReason::Stopped => "stopped",
         DropReason::Overflow => "inbox_full",
+        DropReason::NoTransform => "no_transform",
         // A reason that is newer than this crate.
         _ => reason.name(),
     }

@@ -34,4 +34,10 @@ pub struct Angle {
     pub angle: f64,
 }
 
+impl bb_core::JointPositions for Angle {
+    fn tell(&self, listener: &mut dyn FnMut(bb_core::JointReading<'_>)) {
+        listener(bb_core::JointReading::at(&[self.angle]));
+    }
+}
+
 fn main() {}

@@ -11,6 +11,7 @@ robot! {
             link head { }
         }
         joint turn: continuous { axis: [0, 0, 0]; link disc { } }
+        joint spin: continuous { axis: z; limit: { lower: 1 deg, upper: -1 deg }; link top { } }
     }
 }
 

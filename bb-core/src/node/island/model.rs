@@ -8,6 +8,7 @@ use super::{Act, Island, IslandDeclaration, IslandState, IslandWiring, Key};
 use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
 use crate::fault::Failed;
+use crate::joints::Joints;
 use crate::journal::Event;
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
@@ -98,6 +99,7 @@ fn environment() -> Environment {
         pool: Pool::new(|| {}),
         journal: None,
         telemetry: None,
+        joints: Joints::of_none(Clock::virtual_at(NOW)),
         start: NOW,
     };
     Environment::new(parts, Box::default())

@@ -1,10 +1,10 @@
 //! Where the frames of the robot are, on the topics where viewers expect that: `/tf_static` and `/tf`.
 
-use bb_core::DynamicMessage;
 use bb_core::message::codec::ros::{Header, Time, TransformStamped, TransformsMessage, WORLD};
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use bb_core::payload::{JointState, JointStates, Odometry, Orientation, Pose, PoseWithCovariance};
+use bb_core::payload::{Odometry, Orientation, Pose, PoseWithCovariance};
 use bb_core::topology::Topology;
+use bb_core::{DynamicMessage, JointSide};
 
 /// What is known of the frames from the messages so far.
 #[derive(Debug)]
@@ -30,21 +30,20 @@ impl Frames {
     }
 
     /// All joints that move, at rest: where they are until a message says otherwise.
-    pub(super) fn at_rest(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(super) fn at_rest(&self) -> impl Iterator<Item = (usize, Vec<f64>)> + '_ {
         let joints = self.topology.joints.iter().enumerate();
-        joints.map(|(number, joint)| (number, joint.mimic.map_or(0.0, |mimic| mimic.offset)))
+        joints.map(|(number, _)| match self.topology.followed(number) {
+            (owner, ..) if owner == number => (number, Vec::new()),
+            (_, _, offset) => (number, vec![offset]),
+        })
     }
 
     /// The transforms that a message tells.
     pub(super) fn told(&mut self, message: &DynamicMessage) -> TransformsMessage {
         let stamp = message.stamp();
-        if let Some(state) = message.downcast::<JointState>() {
-            return self.joints(message, &[(stamp.frame.name(), state.position)]);
-        }
-        if let Some(states) = message.downcast::<JointStates>() {
-            let states: Vec<_> =
-                states.names.iter().map(String::as_str).zip(states.positions.iter().copied()).collect();
-            return self.joints(message, &states);
+        let joints = self.joints(message);
+        if !joints.is_empty() {
+            return TransformsMessage::moving(self.topology, self.moved(&joints), stamp.wall_time);
         }
         let Some((told, world_from_body)) = place(message) else { return NONE };
         let at = |child: &str| TransformStamped {
@@ -74,18 +73,38 @@ impl Frames {
         }
     }
 
-    /// The joints that are named, and those that follow them.
-    fn joints(&self, message: &DynamicMessage, states: &[(&str, f64)]) -> TransformsMessage {
-        let position = |number: usize| {
-            let joint = self.topology.joints.get(number)?;
-            states.iter().find(|(name, position)| *name == joint.name && position.is_finite()).map(|(_, at)| *at)
-        };
-        let moved = self.topology.joints.iter().enumerate().filter_map(|(number, joint)| {
-            let follows =
-                || joint.mimic.and_then(|mimic| Some(mimic.multiplier * position(mimic.joint)? + mimic.offset));
-            Some((number, position(number).or_else(follows)?))
+    /// The joints whose positions a message tells, and where they are.
+    fn joints(&self, message: &DynamicMessage) -> Vec<(usize, Vec<f64>)> {
+        let mut told = Vec::new();
+        let stamp = message.stamp();
+        message.tell_joints(&mut |reading| {
+            let name = reading.joint.unwrap_or_else(|| stamp.frame.name());
+            let mut joints = self.topology.joints.iter().enumerate();
+            let Some((number, joint)) = joints.find(|(_, joint)| joint.name == name) else { return };
+            let gear = joint.transmission.filter(|_| reading.side == JointSide::Motor);
+            let position: Vec<f64> = match (gear, reading.position) {
+                (Some(gear), [motor]) => vec![gear.joint_position(*motor)],
+                (_, position) => position.to_vec(),
+            };
+            if position.iter().all(|value| value.is_finite()) {
+                told.push((number, position));
+            }
         });
-        TransformsMessage::moving(self.topology, moved, message.stamp().wall_time)
+        told
+    }
+
+    /// These joints, and those that follow them.
+    fn moved(&self, told: &[(usize, Vec<f64>)]) -> Vec<(usize, Vec<f64>)> {
+        let position = |number: usize| told.iter().find(|(joint, _)| *joint == number).map(|(_, at)| at);
+        let moved = (0..self.topology.joints.len()).filter_map(|number| {
+            let (owner, multiplier, offset) = self.topology.followed(number);
+            let follows = || match position(owner)?.as_slice() {
+                [at] if owner != number => Some(vec![multiplier * at + offset]),
+                _ => None,
+            };
+            Some((number, position(number).cloned().or_else(follows)?))
+        });
+        moved.collect()
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod damage;
 mod kill;
+mod moving;
 mod robot;
 mod ros;
 mod round_trip;

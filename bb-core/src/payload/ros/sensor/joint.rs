@@ -2,7 +2,7 @@
 
 use super::super::ros_message;
 use crate::message::{DecodeError, Stamped};
-use crate::payload::{EffortCommand, JointState, JointStates, PositionCommand, VelocityCommand};
+use crate::payload::{EffortCommand, JointSnapshot, JointState, JointStates, PositionCommand, VelocityCommand};
 use std::sync::Arc;
 
 ros_message! {
@@ -12,6 +12,17 @@ ros_message! {
         position: Vec<f64> = joints.positions.clone(),
         velocity: Vec<f64> = joints.velocities.clone(),
         effort: Vec<f64> = joints.efforts.clone(),
+    }
+    read { Self { names: name, positions: position, velocities: velocity, efforts: effort } }
+}
+
+ros_message! {
+    JointSnapshot => JointStateMessage;
+    write(joints) {
+        name = Arc::clone(&joints.names),
+        position = joints.positions.clone(),
+        velocity = joints.velocities.clone(),
+        effort = joints.efforts.clone(),
     }
     read { Self { names: name, positions: position, velocities: velocity, efforts: effort } }
 }

@@ -5,6 +5,7 @@ use crate::parse::block::{Head, colon, semicolon};
 use crate::parse::record::record;
 use crate::parse::{Notes, Quantity};
 use proc_macro2::Ident;
+use syn::LitBool;
 use syn::parse::ParseStream;
 
 /// `dynamics: { damping: 0.1 N*m*s/rad, friction: 0.2 N*m };`
@@ -24,10 +25,12 @@ pub(crate) struct Mimic {
     pub(crate) offset: Option<Quantity>,
 }
 
-/// `transmission: { reduction: 50 };`
+/// `transmission: { reduction: 50, offset: 3 deg, reversed: true };`
 #[derive(Clone, Debug)]
 pub(crate) struct Transmission {
     pub(crate) reduction: Option<Quantity>,
+    pub(crate) offset: Option<Quantity>,
+    pub(crate) reversed: bool,
 }
 
 impl Dynamics {
@@ -67,10 +70,12 @@ impl Mimic {
 impl Transmission {
     pub(super) fn parse(head: Head, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<Self> {
         colon(input, &head.word, "its fields in braces")?;
-        let mut transmission = Self { reduction: None };
+        let mut transmission = Self { reduction: None, offset: None, reversed: false };
         record(&words::TRANSMISSION, input, notes, |field, word, _, input, notes| {
             match field {
                 TransmissionField::Reduction => transmission.reduction = Some(notes.number(word, input)?),
+                TransmissionField::Offset => transmission.offset = Some(notes.number(word, input)?),
+                TransmissionField::Reversed => transmission.reversed = input.parse::<LitBool>()?.value,
             }
             Ok(())
         })?;

@@ -1,0 +1,100 @@
+//! Where the inputs of an estimator are when it runs.
+
+use super::Fault;
+use crate::joints::LookupError;
+use nalgebra::Isometry3;
+
+/// Where the inputs of an estimator are at one dispatch, each at the time of its message; see
+/// [`Estimator::handle_transforms`](super::Estimator::handle_transforms).
+#[derive(Clone, Copy, Debug)]
+pub struct InputTransforms<'a> {
+    inputs: &'a [InputTransform],
+}
+
+/// Where one input is.
+#[derive(Clone, Debug)]
+pub struct InputTransform {
+    name: &'static str,
+    is_driver: bool,
+    placed: Placed,
+}
+
+#[derive(Clone, Debug)]
+enum Placed {
+    At(Isometry3<f64>),
+    /// Its payload is the same from every frame.
+    Nowhere,
+    /// No message of it takes part in this dispatch.
+    Absent,
+    Missing(LookupError),
+}
+
+impl InputTransform {
+    /// Of an input that takes part: takes points from its frame to that of the output. For tests of an estimator.
+    ///
+    /// ```
+    /// use bb_core::component::{InputTransform, InputTransforms};
+    /// use bb_core::nalgebra::Isometry3;
+    ///
+    /// # fn main() -> Result<(), bb_core::Fault> {
+    /// let inputs = [InputTransform::new("camera", Isometry3::translation(0.0, 0.0, 1.0))];
+    /// assert_eq!(InputTransforms::new(&inputs).frame_from_input("camera")?.translation.z, 1.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn new(name: &'static str, frame_from_input: Isometry3<f64>) -> Self {
+        Self { name, is_driver: true, placed: Placed::At(frame_from_input) }
+    }
+
+    /// At first: where it is if no joint moves between.
+    pub(crate) fn declared(name: &'static str, is_driver: bool, fixed: Option<Isometry3<f64>>) -> Self {
+        Self { name, is_driver, placed: fixed.map_or(Placed::Nowhere, Placed::At) }
+    }
+
+    pub(crate) fn set(&mut self, found: Result<Isometry3<f64>, LookupError>) {
+        self.placed = match found {
+            Ok(frame_from_input) => Placed::At(frame_from_input),
+            Err(error) => Placed::Missing(error),
+        };
+    }
+
+    pub(crate) fn set_absent(&mut self) {
+        self.placed = Placed::Absent;
+    }
+
+    fn get(&self) -> Result<Isometry3<f64>, Fault> {
+        let name = self.name;
+        match &self.placed {
+            Placed::At(frame_from_input) => Ok(*frame_from_input),
+            Placed::Nowhere => Err(Fault::new(format!("the input `{name}` depends on no frame"))),
+            Placed::Absent => Err(Fault::new(format!("the input `{name}` takes no part in this dispatch"))),
+            Placed::Missing(error) => Err(Fault::new(format!("the input `{name}` has no transform: {error}"))),
+        }
+    }
+}
+
+impl<'a> InputTransforms<'a> {
+    /// Of these inputs; the first one is the driver. For tests of an estimator.
+    pub fn new(inputs: &'a [InputTransform]) -> Self {
+        Self { inputs }
+    }
+
+    /// Takes points from the frame of `input`, at the time of its message, to that of the output.
+    ///
+    /// # Errors
+    /// No such input is declared, it takes no part in this dispatch, its payload depends on no frame, or it is optional and a
+    /// joint between is unknown or too old. (For an input that is not optional, there is no dispatch then.)
+    pub fn frame_from_input(&self, input: &str) -> Result<Isometry3<f64>, Fault> {
+        let declared = self.inputs.iter().find(|declared| declared.name == input);
+        declared.ok_or_else(|| Fault::new(format!("no input `{input}` is declared")))?.get()
+    }
+
+    /// The same for the driver, or for the only input.
+    ///
+    /// # Errors
+    /// Its payload depends on no frame.
+    pub fn frame_from_driver(&self) -> Result<Isometry3<f64>, Fault> {
+        let driver = self.inputs.iter().find(|declared| declared.is_driver);
+        driver.map_or_else(|| Ok(Isometry3::identity()), InputTransform::get)
+    }
+}

@@ -1,0 +1,125 @@
+//! Why there is no transform at a time.
+
+use crate::Payload;
+use crate::time::MonotonicTime;
+use std::fmt;
+use std::time::Duration;
+
+/// Why there is no transform between two frames at a time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LookupError {
+    /// No state of a joint between the frames has come yet.
+    UnknownJoint {
+        /// The joint.
+        joint: &'static str,
+    },
+    /// The history of a joint begins later.
+    TooOld {
+        /// The joint.
+        joint: &'static str,
+        /// How much later.
+        by: Duration,
+    },
+    /// The newest state of a joint is older than that.
+    InFuture {
+        /// The joint.
+        joint: &'static str,
+        /// How much older.
+        by: Duration,
+    },
+    /// No joints connect the two: the robot has no frame of that name.
+    NotConnected {
+        /// The frame or the path that there is not.
+        name: String,
+        /// The nearest that there is.
+        nearest: Option<String>,
+    },
+}
+
+/// The same of a joint by its number in the topology, as it is written into a journal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+pub enum Gap {
+    /// No state has come yet.
+    Unknown {
+        /// The joint.
+        joint: usize,
+    },
+    /// Its history begins later.
+    TooOld {
+        /// The joint.
+        joint: usize,
+        /// How much later.
+        nanos: i64,
+    },
+    /// Its newest state is older.
+    InFuture {
+        /// The joint.
+        joint: usize,
+        /// How much older.
+        nanos: i64,
+    },
+}
+
+impl Gap {
+    /// In words of the robot with these joints.
+    pub(super) fn error(self, name: impl Fn(usize) -> &'static str) -> LookupError {
+        let duration = |nanos: i64| Duration::from_nanos(nanos.unsigned_abs());
+        match self {
+            Self::Unknown { joint } => LookupError::UnknownJoint { joint: name(joint) },
+            Self::TooOld { joint, nanos } => LookupError::TooOld { joint: name(joint), by: duration(nanos) },
+            Self::InFuture { joint, nanos } => LookupError::InFuture { joint: name(joint), by: duration(nanos) },
+        }
+    }
+}
+
+/// Of one joint, which the caller knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Missing {
+    Unknown,
+    TooOld { nanos: i64 },
+    InFuture { nanos: i64 },
+}
+
+impl Missing {
+    pub(super) fn of(self, joint: usize) -> Gap {
+        match self {
+            Self::Unknown => Gap::Unknown { joint },
+            Self::TooOld { nanos } => Gap::TooOld { joint, nanos },
+            Self::InFuture { nanos } => Gap::InFuture { joint, nanos },
+        }
+    }
+
+    /// Asked for a time before the oldest state.
+    pub(super) fn before(oldest: i64, time: MonotonicTime) -> Self {
+        Self::TooOld { nanos: oldest.saturating_sub(time.as_nanos()) }
+    }
+
+    /// Asked for a time after the newest state.
+    pub(super) fn after(newest: i64, time: MonotonicTime) -> Self {
+        Self::InFuture { nanos: time.as_nanos().saturating_sub(newest) }
+    }
+}
+
+impl fmt::Display for LookupError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownJoint { joint } => write!(f, "nothing is known yet of the joint `{joint}`"),
+            Self::TooOld { joint, by } => {
+                write!(f, "the history of the joint `{joint}` begins {by:?} later")
+            }
+            Self::InFuture { joint, by } => {
+                write!(f, "the newest state of the joint `{joint}` is {by:?} older")
+            }
+            Self::NotConnected { name, nearest } => {
+                write!(f, "the robot has no frame `{name}`")?;
+                match nearest {
+                    Some(near) => write!(f, "; did you mean `{near}`?"),
+                    None => Ok(()),
+                }
+            }
+        }
+    }
+}
+
+impl std::error::Error for LookupError {}

@@ -1,0 +1,107 @@
+//! From any frame to any other, at any time.
+
+use super::error::LookupError;
+use super::route::{Latest, Place, Route, place_of};
+use super::store::Joints;
+use crate::message::nearest::nearest;
+use crate::time::{MonotonicTime, nanos_of};
+use nalgebra::Isometry3;
+use std::time::Duration;
+
+/// From a frame to another, prepared: fixed joints are multiplied out.
+#[derive(Clone, Debug)]
+pub struct TransformHandle {
+    joints: Joints,
+    route: Route,
+}
+
+impl Joints {
+    /// Prepares the transforms that take points from the frame `source` to the frame `target`: names of links or joints, or
+    /// paths of sensors, estimators and actuators, whose frames are meant then.
+    ///
+    /// # Errors
+    /// [`LookupError::NotConnected`]: the robot has no frame of that name, with the nearest that it has.
+    pub fn between(&self, target: &str, source: &str) -> Result<TransformHandle, LookupError> {
+        let find = |name: &str| self.place(name).ok_or_else(|| self.not_connected(name));
+        let (target, source) = (find(target)?, find(source)?);
+        let route = Route::new(self.topology(), self.kinematics(), &target, &source);
+        let route = route.ok_or_else(|| self.not_connected(""))?;
+        Ok(TransformHandle { joints: self.clone(), route })
+    }
+
+    /// `target_from_source` at a time: [`Self::between`] and [`TransformHandle::at`] at once, for those who ask rarely.
+    ///
+    /// # Errors
+    /// As for both.
+    pub fn transform(
+        &self,
+        target: &str,
+        source: &str,
+        time: MonotonicTime,
+    ) -> Result<Isometry3<f64>, LookupError> {
+        self.between(target, source)?.at(time)
+    }
+
+    fn place(&self, name: &str) -> Option<Place> {
+        let frame = self.component(name);
+        place_of(self.topology(), frame.map_or(name, |frame| frame.name()))
+    }
+
+    fn not_connected(&self, name: &str) -> LookupError {
+        let topology = self.topology();
+        let frames =
+            topology.links.iter().map(|link| link.name).chain(topology.joints.iter().map(|joint| joint.name));
+        let nearest = nearest(name, frames.chain(self.components()));
+        LookupError::NotConnected { name: name.to_owned(), nearest: nearest.map(str::to_owned) }
+    }
+}
+
+impl TransformHandle {
+    /// `target_from_source` at a time, interpolated between the states of the joints; exactly at the newest state at the
+    /// latest.
+    ///
+    /// # Errors
+    /// A joint between is unknown, its history begins later, or its newest state is older.
+    pub fn at(&self, time: MonotonicTime) -> Result<Isometry3<f64>, LookupError> {
+        self.within(time, 0)
+    }
+
+    /// The same, predicted where the newest state of a joint is older by no more than `tolerance`.
+    ///
+    /// # Errors
+    /// As for [`Self::at`].
+    pub fn at_within(&self, time: MonotonicTime, tolerance: Duration) -> Result<Isometry3<f64>, LookupError> {
+        self.within(time, nanos_of(tolerance))
+    }
+
+    #[inline]
+    fn within(&self, time: MonotonicTime, tolerance_nanos: i64) -> Result<Isometry3<f64>, LookupError> {
+        self.route.at(self.joints.states(), time, tolerance_nanos).map_err(|gap| self.joints.error(gap))
+    }
+
+    /// `target_from_source` at the newest time for which all joints between are known.
+    ///
+    /// # Errors
+    /// A joint between is unknown, or its history begins after the newest state of another.
+    pub fn latest(&self) -> Result<Latest, LookupError> {
+        let found = self.route.latest(&self.joints.states().lock());
+        found.map_err(|gap| self.joints.error(gap))
+    }
+
+    /// The same as [`Self::at`], after waiting for joints whose state at that time has not come yet, `timeout` at most. It
+    /// blocks the thread, so that commands, which share theirs, ask with [`Self::at`] and sleep in between. On virtual time
+    /// nothing comes meanwhile, and nothing is waited for.
+    ///
+    /// # Errors
+    /// As for [`Self::at`].
+    pub fn wait_until(&self, time: MonotonicTime, timeout: Duration) -> Result<Isometry3<f64>, LookupError> {
+        let timeout = if self.joints.clock().is_virtual() { Duration::ZERO } else { timeout };
+        let found = self.joints.states().wait(timeout, |states| self.route.sampled(states, time, 0));
+        found.map_err(|gap| self.joints.error(gap))
+    }
+
+    /// How many joints between the two move.
+    pub fn moving_joints(&self) -> usize {
+        self.route.moving_joints()
+    }
+}

@@ -1,0 +1,291 @@
+//! The last states of one joint.
+
+use super::error::Missing;
+use super::status::JointRefusal;
+use crate::time::MonotonicTime;
+use crate::topology::JointKind;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
+
+/// States of one joint in a ring, by their stamps. It allocates when the first one comes.
+#[derive(Debug)]
+pub(super) struct History {
+    kind: JointKind,
+    positions: usize,
+    velocities: usize,
+    capacity: usize,
+    span_nanos: i64,
+    times: Box<[i64]>,
+    /// Of each state its positions, then velocities, then efforts; NaN where a quantity is not measured.
+    rows: Box<[f64]>,
+    /// Where the next state goes.
+    next: usize,
+    length: usize,
+}
+
+/// A state. One that comes has empty slices where a quantity is not measured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct State<'a> {
+    pub(super) time: MonotonicTime,
+    pub(super) position: &'a [f64],
+    pub(super) velocity: &'a [f64],
+    pub(super) effort: &'a [f64],
+}
+
+impl History {
+    pub(super) fn new(kind: JointKind, capacity: usize, span_nanos: i64) -> Self {
+        let (positions, velocities) = match kind {
+            JointKind::Fixed => (0, 0),
+            JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic => (1, 1),
+            JointKind::Planar => (3, 3),
+            JointKind::Floating => (7, 6),
+        };
+        Self {
+            kind,
+            positions,
+            velocities,
+            capacity: capacity.max(2),
+            span_nanos,
+            times: Box::default(),
+            rows: Box::default(),
+            next: 0,
+            length: 0,
+        }
+    }
+
+    /// Adds a state, or says why not.
+    pub(super) fn add(&mut self, state: State<'_>) -> Result<(), JointRefusal> {
+        let is_measured = |values: &[f64]| !values.is_empty();
+        if state.position.len() != self.positions
+            || [state.velocity, state.effort]
+                .into_iter()
+                .any(|values| is_measured(values) && values.len() != self.velocities)
+        {
+            return Err(JointRefusal::OtherCoordinates);
+        }
+        let mut values = state.position.iter().chain(state.velocity).chain(state.effort);
+        if !values.all(|value| value.is_finite()) || !self.is_rotation(state.position) {
+            return Err(JointRefusal::NonFinite);
+        }
+        let time = state.time.as_nanos();
+        match self.newest() {
+            Some(newest) if time == newest => return Err(JointRefusal::Duplicate),
+            Some(newest) if time < newest => return Err(JointRefusal::OutOfOrder),
+            _ => {}
+        }
+        if self.times.is_empty() {
+            self.times = vec![0; self.capacity].into();
+            self.rows = vec![f64::NAN; self.capacity * self.stride()].into();
+        }
+        let unwound = self.unwound(&state);
+        let (index, stride) = (self.next, self.stride());
+        if let (Some(slot), Some(row)) =
+            (self.times.get_mut(index), self.rows.get_mut(index * stride..(index + 1) * stride))
+        {
+            *slot = time;
+            row.fill(f64::NAN);
+            let (position, rest) = row.split_at_mut(self.positions);
+            let (velocity, effort) = rest.split_at_mut(self.velocities);
+            position.copy_from_slice(state.position);
+            if let (Some(angle), Some(unwound)) = (position.first_mut(), unwound) {
+                *angle = unwound;
+            }
+            if is_measured(state.velocity) {
+                velocity.copy_from_slice(state.velocity);
+            }
+            if is_measured(state.effort) {
+                effort.copy_from_slice(state.effort);
+            }
+        }
+        self.next = (index + 1) % self.capacity;
+        self.length = (self.length + 1).min(self.capacity);
+        // The newest is kept, however old.
+        while self.length > 1 && time.saturating_sub(self.time(0)) > self.span_nanos {
+            self.length -= 1;
+        }
+        Ok(())
+    }
+
+    /// The quaternion of a floating joint must have a direction.
+    fn is_rotation(&self, position: &[f64]) -> bool {
+        self.kind != JointKind::Floating || position.iter().skip(3).map(|part| part * part).sum::<f64>() > 1e-12
+    }
+
+    /// The angle of a continuous joint, in the turn that is nearest to where the last state leads.
+    fn unwound(&self, state: &State<'_>) -> Option<f64> {
+        let told = *state.position.first()?;
+        let last = self.length.checked_sub(1)?;
+        if self.kind != JointKind::Continuous {
+            return None;
+        }
+        let before = *self.row(last).first()?;
+        let velocity_before = self.row(last).get(1).copied().unwrap_or(f64::NAN);
+        let velocity = match state.velocity.first() {
+            Some(velocity) if velocity_before.is_finite() => 0.5 * (velocity + velocity_before),
+            Some(velocity) => *velocity,
+            None => 0.0,
+        };
+        let expected = before + velocity * state.time.seconds_since(MonotonicTime::from_nanos(self.time(last)));
+        let unwound = told + TAU * ((expected - told) / TAU).round();
+        // Beyond what fits into a number, a turn more or less does not matter.
+        Some(if unwound.is_finite() { unwound } else { told })
+    }
+
+    const fn stride(&self) -> usize {
+        self.positions + 2 * self.velocities
+    }
+
+    /// The place in the ring of the state of that number, from the oldest.
+    #[inline]
+    fn place(&self, number: usize) -> usize {
+        let place = self.next + self.capacity - self.length + number;
+        if place >= self.capacity { place - self.capacity } else { place }
+    }
+
+    #[inline]
+    fn time(&self, number: usize) -> i64 {
+        self.times.get(self.place(number)).copied().unwrap_or(i64::MIN)
+    }
+
+    /// Positions, velocities, efforts.
+    #[inline]
+    fn row(&self, number: usize) -> &[f64] {
+        let (place, stride) = (self.place(number), self.stride());
+        self.rows.get(place * stride..(place + 1) * stride).unwrap_or(&[])
+    }
+
+    /// The stamp of the newest state.
+    #[inline]
+    pub(super) fn newest(&self) -> Option<i64> {
+        self.length.checked_sub(1).map(|last| self.time(last))
+    }
+
+    /// The newest state; NaN where a quantity was not measured.
+    pub(super) fn newest_state(&self) -> Option<State<'_>> {
+        let last = self.length.checked_sub(1)?;
+        let (position, rest) = self.row(last).split_at_checked(self.positions)?;
+        let (velocity, effort) = rest.split_at_checked(self.velocities)?;
+        Some(State { time: MonotonicTime::from_nanos(self.time(last)), position, velocity, effort })
+    }
+
+    /// The position at a time, at most `tolerance_nanos` after the newest state.
+    #[inline]
+    pub(super) fn sample(
+        &self,
+        time: MonotonicTime,
+        tolerance_nanos: i64,
+        position: &mut [f64],
+    ) -> Result<(), Missing> {
+        let asked = time.as_nanos();
+        let Some(last) = self.length.checked_sub(1) else { return Err(Missing::Unknown) };
+        let newest = self.time(last);
+        if asked >= newest {
+            let ahead = asked.saturating_sub(newest);
+            if ahead > tolerance_nanos {
+                return Err(Missing::after(newest, time));
+            }
+            let row = self.row(last);
+            if let Some(known) = row.get(..self.positions) {
+                position.copy_from_slice(known);
+            }
+            if ahead > 0 {
+                let velocity = row.get(self.positions..self.positions + self.velocities).unwrap_or(&[]);
+                predict(self.kind, position, velocity, ahead as f64 * 1e-9);
+            }
+            return Ok(());
+        }
+        let (before, after) = self.around(asked).ok_or_else(|| Missing::before(self.time(0), time))?;
+        let (from, to) = (self.time(before), self.time(after));
+        let share = asked.saturating_sub(from) as f64 / to.saturating_sub(from) as f64;
+        interpolate(self.kind, self.row(before), self.row(after), share, position);
+        Ok(())
+    }
+
+    /// The states before and after a time that is before the newest. Most ask for what has just been.
+    #[inline]
+    fn around(&self, asked: i64) -> Option<(usize, usize)> {
+        let last = self.length.checked_sub(1)?;
+        let second = last.checked_sub(1)?;
+        if self.time(second) <= asked {
+            return Some((second, last));
+        }
+        // Most joints are measured at a rate, so that the place follows from the time.
+        let (oldest, newest) = (self.time(0), self.time(second));
+        let share = asked.saturating_sub(oldest) as f64 / newest.saturating_sub(oldest) as f64;
+        let guess = (share * second as f64) as usize;
+        if guess < second && self.time(guess) <= asked && asked < self.time(guess + 1) {
+            return Some((guess, guess + 1));
+        }
+        // The first one that is later.
+        let (mut low, mut high) = (0, second);
+        while low < high {
+            let middle = usize::midpoint(low, high);
+            if self.time(middle) > asked {
+                high = middle;
+            } else {
+                low = middle + 1;
+            }
+        }
+        Some((high.checked_sub(1)?, high))
+    }
+}
+
+/// Moves a position on with its velocity, which is NaN if it is not measured.
+fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: f64) {
+    if velocity.iter().any(|value| value.is_nan()) {
+        return;
+    }
+    match (kind, position, velocity) {
+        (JointKind::Planar, [x, y, angle], [forward, left, rate]) => {
+            // Along the circle, in the axes at its middle: exact to the third order.
+            let (sin, cos) = (*angle + 0.5 * rate * duration_s).sin_cos();
+            *x += (cos * forward - sin * left) * duration_s;
+            *y += (sin * forward + cos * left) * duration_s;
+            *angle += rate * duration_s;
+        }
+        (JointKind::Floating, [x, y, z, rw, rx, ry, rz], [vx, vy, vz, wx, wy, wz]) => {
+            let rotation = UnitQuaternion::new_normalize(Quaternion::new(*rw, *rx, *ry, *rz));
+            let turn = Vector3::new(*wx, *wy, *wz) * duration_s;
+            let middle = rotation * UnitQuaternion::from_scaled_axis(turn * 0.5);
+            let moved = middle * Vector3::new(*vx, *vy, *vz) * duration_s;
+            [*x, *y, *z] = [*x + moved.x, *y + moved.y, *z + moved.z];
+            let turned = (rotation * UnitQuaternion::from_scaled_axis(turn)).into_inner();
+            [*rw, *rx, *ry, *rz] = [turned.w, turned.i, turned.j, turned.k];
+        }
+        (_, [position], [velocity]) => *position += velocity * duration_s,
+        _ => {}
+    }
+}
+
+/// From one position to the next.
+#[inline]
+fn interpolate(kind: JointKind, from: &[f64], to: &[f64], share: f64, position: &mut [f64]) {
+    let lerp = |from: f64, to: f64| from + (to - from) * share;
+    match (kind, position) {
+        (JointKind::Planar, [x, y, angle]) => {
+            let (&[x0, y0, from, ..], &[x1, y1, to, ..]) = (from, to) else { return };
+            let turn = to - from;
+            [*x, *y] = [lerp(x0, x1), lerp(y0, y1)];
+            *angle = from + (turn - TAU * (turn / TAU).round()) * share;
+        }
+        (JointKind::Floating, [x, y, z, rw, rx, ry, rz]) => {
+            let (&[x0, y0, z0, w0, i0, j0, k0, ..], &[x1, y1, z1, w1, i1, j1, k1, ..]) = (from, to) else { return };
+            [*x, *y, *z] = [lerp(x0, x1), lerp(y0, y1), lerp(z0, z1)];
+            let start = UnitQuaternion::new_normalize(Quaternion::new(w0, i0, j0, k0));
+            let end = UnitQuaternion::new_normalize(Quaternion::new(w1, i1, j1, k1));
+            let end = if start.dot(&end) < 0.0 { UnitQuaternion::new_unchecked(-end.into_inner()) } else { end };
+            let between = start * UnitQuaternion::from_scaled_axis((start.inverse() * end).scaled_axis() * share);
+            let between = between.into_inner();
+            [*rw, *rx, *ry, *rz] = [between.w, between.i, between.j, between.k];
+        }
+        (_, [position]) => {
+            if let (Some(from), Some(to)) = (from.first(), to.first()) {
+                *position = lerp(*from, *to);
+            }
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,162 @@
+//! Laws of one joint's history.
+
+use super::*;
+use proptest::prelude::*;
+
+fn state<'a>(millis: i64, position: &'a [f64], velocity: &'a [f64]) -> State<'a> {
+    State { time: MonotonicTime::from_nanos(millis * 1_000_000), position, velocity, effort: &[] }
+}
+
+fn sampled(history: &History, millis: i64, tolerance_millis: i64) -> Result<f64, Missing> {
+    let mut position = [f64::NAN];
+    let time = MonotonicTime::from_nanos(millis * 1_000_000);
+    history.sample(time, tolerance_millis * 1_000_000, &mut position).map(|()| position[0])
+}
+
+fn angle(from: f64, to: f64) -> f64 {
+    (to - from - TAU * ((to - from) / TAU).round()).abs()
+}
+
+#[test]
+fn it_forgets_by_count_and_by_time() {
+    let mut history = History::new(JointKind::Revolute, 4, 100_000_000);
+    for time in 0..10 {
+        history.add(state(time, &[time as f64], &[])).expect("it is newer");
+    }
+    assert_eq!(sampled(&history, 6, 0), Ok(6.0));
+    assert_eq!(sampled(&history, 5, 0), Err(Missing::TooOld { nanos: 1_000_000 }));
+    // Beyond the span all others are forgotten, and the last one is not.
+    history.add(state(1000, &[1.0], &[])).expect("it is newer");
+    assert_eq!(sampled(&history, 9, 0), Err(Missing::TooOld { nanos: 991_000_000 }));
+    assert_eq!((sampled(&history, 1000, 0), history.length), (Ok(1.0), 1));
+    history.add(state(1100, &[2.0], &[])).expect("it is newer");
+    assert_eq!(sampled(&history, 1050, 0), Ok(1.5));
+}
+
+#[test]
+fn the_extremes_of_time_are_no_panic() {
+    let mut history = History::new(JointKind::Prismatic, 8, i64::MAX);
+    let at = |nanos| State { time: MonotonicTime::from_nanos(nanos), position: &[1.0], velocity: &[], effort: &[] };
+    history.add(at(i64::MIN)).expect("it is the first");
+    let mut first = [0.0];
+    assert_eq!(history.sample(MonotonicTime::MAX, i64::MAX, &mut first), Ok(()));
+    history.add(at(i64::MAX)).expect("it is newer");
+    let mut position = [0.0];
+    for time in [i64::MIN, -1, 0, i64::MAX] {
+        let _ = history.sample(MonotonicTime::from_nanos(time), i64::MAX, &mut position);
+        assert!(position[0].is_finite(), "{time}");
+    }
+}
+
+#[test]
+fn coordinates_of_another_joint_are_refused() {
+    let mut history = History::new(JointKind::Planar, 4, i64::MAX);
+    assert_eq!(history.add(state(0, &[1.0], &[])), Err(JointRefusal::OtherCoordinates));
+    assert_eq!(history.add(state(0, &[1.0; 3], &[1.0])), Err(JointRefusal::OtherCoordinates));
+    assert_eq!(history.add(state(0, &[1.0; 3], &[f64::NAN; 3])), Err(JointRefusal::NonFinite));
+    let mut history = History::new(JointKind::Floating, 4, i64::MAX);
+    assert_eq!(history.add(state(0, &[0.0; 7], &[])), Err(JointRefusal::NonFinite), "no rotation");
+    assert_eq!(history.add(state(0, &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0], &[])), Ok(()));
+}
+
+/// A body that moves with a constant velocity in its own axes: a screw, which the interpolation and the prediction of floating
+/// and planar joints approximate to the second order.
+#[test]
+fn a_screw_is_followed_to_the_second_order() {
+    let (speed, rate) = (1.0, 0.8);
+    let planar = |time: f64| {
+        let angle = rate * time;
+        [speed / rate * angle.sin(), speed / rate * (1.0 - angle.cos()), angle]
+    };
+    let floating = |time: f64| {
+        let [x, y, angle] = planar(time);
+        [x, y, 0.3 * time, (0.5 * angle).cos(), 0.0, 0.0, (0.5 * angle).sin()]
+    };
+    let error = |step: f64| {
+        let mut flat = History::new(JointKind::Planar, 8, i64::MAX);
+        let mut free = History::new(JointKind::Floating, 8, i64::MAX);
+        let nanos = |time: f64| MonotonicTime::from_nanos((time * 1e9).round() as i64);
+        for time in [0.0, step] {
+            let velocity = [speed, 0.0, rate];
+            flat.add(State { time: nanos(time), position: &planar(time), velocity: &velocity, effort: &[] })
+                .expect("it is newer");
+            let velocity = [speed, 0.0, 0.3, 0.0, 0.0, rate];
+            free.add(State { time: nanos(time), position: &floating(time), velocity: &velocity, effort: &[] })
+                .expect("it is newer");
+        }
+        [0.5 * step, 2.0 * step].map(|time| {
+            let (mut on_plane, mut in_space) = ([0.0; 3], [0.0; 7]);
+            flat.sample(nanos(time), i64::MAX, &mut on_plane).expect("it is known");
+            free.sample(nanos(time), i64::MAX, &mut in_space).expect("it is known");
+            let far = |is: &[f64], expected: &[f64]| {
+                is.iter().zip(expected).map(|(is, expected)| (is - expected).abs()).fold(0.0, f64::max)
+            };
+            far(&on_plane, &planar(time)).max(far(&in_space, &floating(time)))
+        })
+    };
+    let (coarse, fine) = (error(0.1), error(0.05));
+    // Half the step: a quarter of the error of what is between, an eighth of what is beyond.
+    assert!((3.8..4.2).contains(&(coarse[0] / fine[0])), "{coarse:?} {fine:?}");
+    assert!((7.0..9.0).contains(&(coarse[1] / fine[1])), "{coarse:?} {fine:?}");
+    assert!(coarse[0] < 1.1e-3 && coarse[1] < 5e-5, "{coarse:?}");
+}
+
+proptest! {
+    /// Against the plain definition, over a list that is kept as a whole.
+    #[test]
+    fn samples_are_those_of_the_list(
+        steps in proptest::collection::vec((1..50_i64, -3.0..3.0_f64), 1..60),
+        capacity in 2..20_usize,
+        asked in -20..1600_i64,
+        tolerance in 0..60_i64,
+    ) {
+        let mut history = History::new(JointKind::Prismatic, capacity, i64::MAX);
+        let mut list = Vec::new();
+        let mut time = 0;
+        for (step, position) in steps {
+            time += step;
+            history.add(state(time, &[position], &[])).expect("it is newer");
+            list.push((time, position));
+        }
+        let kept = &list[list.len().saturating_sub(capacity)..];
+        let (newest, last) = kept[kept.len() - 1];
+        let expected = if asked > newest + tolerance {
+            Err(Missing::InFuture { nanos: (asked - newest) * 1_000_000 })
+        } else if asked >= newest {
+            Ok(last)
+        } else if asked < kept[0].0 {
+            Err(Missing::TooOld { nanos: (kept[0].0 - asked) * 1_000_000 })
+        } else {
+            let after = kept.iter().position(|(time, _)| *time > asked).expect("it is before the newest");
+            let ((from, start), (to, end)) = (kept[after - 1], kept[after]);
+            Ok(start + (end - start) * ((asked - from) as f64 / (to - from) as f64))
+        };
+        match (sampled(&history, asked, tolerance), expected) {
+            (Ok(is), Ok(expected)) => prop_assert!((is - expected).abs() < 1e-12, "{is} {expected}"),
+            (is, expected) => prop_assert_eq!(is, expected),
+        }
+    }
+
+    /// A joint that turns on and on, told in one turn: between two states it is where it was, whatever turn it was told in.
+    #[test]
+    fn turns_are_unwound(rate in -30.0..30.0_f64, start in -10.0..10.0_f64, told in 1..4_u32, is_measured: bool) {
+        // Without a velocity less than half a turn in a step can be told.
+        let rate = if is_measured { rate * 10.0 } else { rate };
+        let truth = |millis: f64| start + rate * millis * 1e-3;
+        let mut history = History::new(JointKind::Continuous, 64, i64::MAX);
+        for step in 0..20 {
+            let angle = truth(f64::from(step) * 100.0);
+            let wrapped = match told {
+                1 => angle.rem_euclid(TAU),
+                2 => angle - TAU * (angle / TAU).round(),
+                _ => angle,
+            };
+            let velocity = [rate];
+            history.add(state(i64::from(step) * 100, &[wrapped], if is_measured { &velocity } else { &[] })).expect("it is newer");
+        }
+        for asked in 0..1900 {
+            let is = sampled(&history, asked, 0).expect("it is known");
+            prop_assert!(angle(is, truth(asked as f64)) < 1e-9, "{asked}: {is}");
+        }
+    }
+}

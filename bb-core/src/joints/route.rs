@@ -1,0 +1,261 @@
+//! The joints between two frames, and what an estimator was told of them.
+
+use super::error::Gap;
+use super::states::{SharedStates, States};
+use crate::Payload;
+use crate::kinematics::{Chain, Kinematics, LinkId};
+use crate::message::Frame;
+use crate::time::MonotonicTime;
+use crate::topology::{JointKind, Topology};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Coordinates of a route up to which asking allocates nothing.
+const FEW: usize = 32;
+
+/// From one frame to another.
+#[derive(Clone, Debug)]
+pub(super) struct Route {
+    chain: Chain,
+    /// The joints whose positions it depends on, and where these are.
+    joints: Box<[(usize, Range<usize>)]>,
+    positions: usize,
+}
+
+/// The newest transform for which all joints between are known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Latest {
+    /// `target_from_source`.
+    pub transform: Isometry3<f64>,
+    /// When; none if no joint between moves.
+    pub time: Option<MonotonicTime>,
+}
+
+/// Where a frame is: fixed to a link.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    link: &'static str,
+    link_from_frame: Isometry3<f64>,
+}
+
+/// The frame of that name: a link's, or that of a joint at rest. What is no frame at all is at the root.
+pub(super) fn place_of(topology: &Topology, name: &str) -> Option<Place> {
+    if let Some(link) = topology.links.iter().find(|link| link.name == name) {
+        return Some(Place { link: link.name, link_from_frame: Isometry3::identity() });
+    }
+    let joint = topology.joints.iter().find(|joint| joint.name == name)?;
+    let link = topology.links.get(joint.parent)?.name;
+    Some(Place { link, link_from_frame: joint.parent_from_joint.isometry() })
+}
+
+impl Route {
+    /// None if a link is not the robot's.
+    pub(super) fn new(
+        topology: &Topology,
+        kinematics: &Kinematics,
+        target: &Place,
+        source: &Place,
+    ) -> Option<Self> {
+        let link = |place: &Place| -> Option<LinkId> { kinematics.link(place.link) };
+        let chain = kinematics.chain(link(target)?, link(source)?).ok()?;
+        let chain = chain.between(&target.link_from_frame, &source.link_from_frame);
+        let mut joints = Vec::new();
+        let mut starts = Vec::new();
+        let mut positions = 0;
+        for (number, joint) in topology.joints.iter().enumerate() {
+            if joint.mimic.is_some() || joint.kind == JointKind::Fixed {
+                continue;
+            }
+            let coordinates = kinematics.joint(joint.name)?;
+            if !chain.has(coordinates.velocities.start) {
+                continue;
+            }
+            let width = coordinates.positions.len();
+            joints.push((number, positions..positions + width));
+            starts.push((coordinates.positions.start, positions));
+            positions += width;
+        }
+        let renumber =
+            |position: usize| starts.iter().find(|(of_robot, _)| *of_robot == position).map_or(0, |(_, own)| *own);
+        Some(Self { chain: chain.renumbered(positions, renumber), joints: joints.into(), positions })
+    }
+
+    pub(super) fn moving_joints(&self) -> usize {
+        self.joints.len()
+    }
+
+    #[inline]
+    pub(super) fn at(
+        &self,
+        states: &SharedStates,
+        time: MonotonicTime,
+        tolerance_nanos: i64,
+    ) -> Result<Isometry3<f64>, Gap> {
+        if self.joints.is_empty() {
+            return Ok(self.chain.at(&[]));
+        }
+        // The lock is held while the joints are read, not while the transforms are multiplied.
+        self.with_positions(|positions| self.read(&states.lock(), time, tolerance_nanos, positions))
+    }
+
+    pub(super) fn sampled(
+        &self,
+        states: &States,
+        time: MonotonicTime,
+        tolerance_nanos: i64,
+    ) -> Result<Isometry3<f64>, Gap> {
+        self.with_positions(|positions| self.read(states, time, tolerance_nanos, positions))
+    }
+
+    pub(super) fn latest(&self, states: &States) -> Result<Latest, Gap> {
+        let mut time = None;
+        for (joint, _) in &self.joints {
+            let newest = states.newest(*joint)?;
+            time = Some(time.map_or(newest, |time: i64| time.min(newest)));
+        }
+        let time = time.map(MonotonicTime::from_nanos);
+        let transform = self.sampled(states, time.unwrap_or(MonotonicTime::ZERO), 0)?;
+        Ok(Latest { transform, time })
+    }
+
+    #[inline]
+    fn read(
+        &self,
+        states: &States,
+        time: MonotonicTime,
+        tolerance_nanos: i64,
+        positions: &mut [f64],
+    ) -> Result<(), Gap> {
+        for (joint, range) in &self.joints {
+            if let Some(position) = positions.get_mut(range.clone()) {
+                states.sample(*joint, time, tolerance_nanos, position)?;
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn with_positions(&self, fill: impl FnOnce(&mut [f64]) -> Result<(), Gap>) -> Result<Isometry3<f64>, Gap> {
+        let mut few = [0.0; FEW];
+        if let Some(positions) = few.get_mut(..self.positions) {
+            fill(positions)?;
+            return Ok(self.chain.at(positions));
+        }
+        let mut many = vec![0.0; self.positions];
+        fill(&mut many)?;
+        Ok(self.chain.at(&many))
+    }
+}
+
+/// One input of an estimator, as far as its transform is concerned.
+#[derive(Clone, Debug)]
+pub(crate) struct RouteOf {
+    /// The number of the input.
+    pub(crate) input: usize,
+    /// Where its messages are from.
+    pub(crate) source: Frame,
+    /// The frame of the estimator.
+    pub(crate) target: Frame,
+    /// How much older than a message the newest state of a joint may be; none: as declared for the robot.
+    pub(crate) tolerance_nanos: Option<i64>,
+}
+
+/// An input across moving joints.
+#[derive(Clone, Debug)]
+pub(crate) struct InputRoute {
+    pub(crate) input: usize,
+    tolerance_nanos: i64,
+    route: Route,
+}
+
+impl InputRoute {
+    #[inline]
+    pub(super) fn at(&self, states: &SharedStates, time: MonotonicTime) -> Result<Isometry3<f64>, Gap> {
+        self.route.at(states, time, self.tolerance_nanos)
+    }
+}
+
+/// The inputs across moving joints of each estimator.
+#[derive(Debug, Default)]
+pub(crate) struct Routes(Box<[Arc<[InputRoute]>]>);
+
+impl Routes {
+    pub(super) fn new(
+        topology: &Topology,
+        kinematics: &Kinematics,
+        stale_nanos: i64,
+        estimators: &[Vec<RouteOf>],
+    ) -> Self {
+        let route = |of: &RouteOf| -> Option<InputRoute> {
+            let (target, source) = (place_of(topology, of.target.name())?, place_of(topology, of.source.name())?);
+            let route = Route::new(topology, kinematics, &target, &source)?;
+            let tolerance_nanos = of.tolerance_nanos.unwrap_or(stale_nanos);
+            Some(InputRoute { input: of.input, tolerance_nanos, route })
+        };
+        Self(estimators.iter().map(|inputs| inputs.iter().filter_map(route).collect()).collect())
+    }
+
+    /// Those of an estimator, by its number.
+    pub(crate) fn of(&self, estimator: usize) -> Arc<[InputRoute]> {
+        self.0.get(estimator).cloned().unwrap_or_else(|| Arc::new([]))
+    }
+
+    /// Whether one of these estimators has any.
+    pub(crate) fn has_any(&self, estimators: &[usize]) -> bool {
+        let has = |estimator: &usize| self.0.get(*estimator).is_some_and(|routes| !routes.is_empty());
+        estimators.iter().any(has)
+    }
+}
+
+/// Where an input was at a dispatch, as a journal holds it.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct PlacedInput {
+    /// The estimator.
+    pub estimator: usize,
+    /// The number of its input.
+    pub input: usize,
+    /// What it was told.
+    pub placement: Placement,
+}
+
+/// What an estimator was told of an input.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub enum Placement {
+    /// `frame_from_input`.
+    At {
+        /// m
+        translation: [f64; 3],
+        /// w, x, y, z.
+        rotation: [f64; 4],
+    },
+    /// It is not known.
+    Missing {
+        /// Why.
+        gap: Gap,
+    },
+}
+
+impl Placement {
+    pub(crate) fn of(found: &Result<Isometry3<f64>, Gap>) -> Self {
+        match found {
+            Ok(transform) => {
+                let Quaternion { coords } = *transform.rotation;
+                let rotation = [coords.w, coords.x, coords.y, coords.z];
+                Self::At { translation: transform.translation.vector.into(), rotation }
+            }
+            Err(gap) => Self::Missing { gap: *gap },
+        }
+    }
+
+    /// The same, bit by bit.
+    pub(crate) fn found(&self) -> Result<Isometry3<f64>, Gap> {
+        match *self {
+            Self::At { translation, rotation: [w, x, y, z] } => Ok(Isometry3::from_parts(
+                Translation3::from(Vector3::from(translation)),
+                UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)),
+            )),
+            Self::Missing { gap } => Err(gap),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! What is known and counted of joints.
+
+use crate::time::MonotonicTime;
+use std::fmt;
+
+/// Why a joint's state was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum JointRefusal {
+    /// It was older than the last one of its joint.
+    OutOfOrder,
+    /// It had the stamp of the last one of its joint.
+    Duplicate,
+    /// It held a NaN or an infinity, or a rotation without direction.
+    NonFinite,
+    /// Its stamp was more than a second ahead of the clock.
+    ClockSkew,
+    /// It had another number of coordinates than the joint has.
+    OtherCoordinates,
+}
+
+impl JointRefusal {
+    /// All reasons.
+    pub const ALL: &'static [Self] =
+        &[Self::OutOfOrder, Self::Duplicate, Self::NonFinite, Self::ClockSkew, Self::OtherCoordinates];
+
+    /// As people read it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OutOfOrder => "out of order",
+            Self::Duplicate => "duplicate",
+            Self::NonFinite => "non-finite",
+            Self::ClockSkew => "clock skew",
+            Self::OtherCoordinates => "other coordinates",
+        }
+    }
+}
+
+pub(super) const REFUSALS: usize = JointRefusal::ALL.len();
+
+/// What a joint has counted since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct JointStatistics {
+    /// Its name; what a message has called it, if there is no such joint.
+    pub joint: String,
+    /// Whether the robot has it.
+    pub is_declared: bool,
+    /// States that were kept.
+    pub states: u64,
+    /// States of a joint that there is not.
+    pub unknown: u64,
+    pub(super) refused: [u64; REFUSALS],
+}
+
+impl JointStatistics {
+    /// How many states were refused for `reason`.
+    pub fn refused(&self, reason: JointRefusal) -> u64 {
+        self.refused[reason as usize]
+    }
+}
+
+impl fmt::Display for JointStatistics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let joint = &self.joint;
+        if !self.is_declared {
+            return write!(f, "{} states of `{joint}`, which is no moving joint of this robot", self.unknown);
+        }
+        write!(f, "joint {joint}: {} states", self.states)?;
+        for reason in JointRefusal::ALL.iter().copied().filter(|reason| self.refused(*reason) > 0) {
+            write!(f, ", {} refused: {}", self.refused(reason), reason.name())?;
+        }
+        Ok(())
+    }
+}
+
+/// What is known of a joint now.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct JointStatus {
+    /// Its name.
+    pub joint: &'static str,
+    /// The stamp of its newest state; none if nothing is known.
+    pub time: Option<MonotonicTime>,
+    /// Whether that is older than [`JointSettings::stale_after`](super::JointSettings).
+    pub is_stale: bool,
+    /// Its position then, as many numbers as it has coordinates; empty if nothing is known.
+    pub position: Vec<f64>,
+    /// Its velocity then; empty if it was not measured.
+    pub velocity: Vec<f64>,
+    /// Its effort then; empty if it was not measured.
+    pub effort: Vec<f64>,
+}

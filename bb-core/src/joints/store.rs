@@ -1,0 +1,251 @@
+//! Where the states of joints are kept.
+
+use super::error::{Gap, LookupError};
+use super::history::State;
+use super::reading::{Converted, at_joint};
+use super::route::{InputRoute, RouteOf, Routes};
+use super::states::{SharedStates, States};
+use super::status::{JointStatistics, JointStatus, REFUSALS};
+use crate::kinematics::{Kinematics, KinematicsError};
+use crate::message::{Frame, JointReading, Payload, Stamp, Stamped};
+use crate::time::{Clock, MonotonicTime, nanos_of};
+use crate::topology::{Joint, JointKind, Topology};
+use nalgebra::Isometry3;
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How much is kept of joints, and for how long a state is good.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JointSettings {
+    /// States older than that are forgotten: 10 s.
+    pub history: Duration,
+    /// So many states of a joint are kept at most: 1024, which is 10 s at 100 Hz.
+    pub states: usize,
+    /// A joint whose newest state is older than that is stale: 100 ms. An estimator with a `sync_tolerance` takes that instead.
+    pub stale_after: Duration,
+}
+
+impl Default for JointSettings {
+    fn default() -> Self {
+        Self { history: Duration::from_secs(10), states: 1024, stale_after: Duration::from_millis(100) }
+    }
+}
+
+/// The states of a robot's joints, and its frames at any time. See the [module](super). Clones are the same.
+///
+/// [`Live::joints`](crate::Live::joints) and [`Bus::joints`](crate::Bus::joints) give it.
+#[derive(Clone)]
+pub struct Joints(Arc<Inner>);
+
+struct Inner {
+    topology: &'static Topology,
+    kinematics: Kinematics,
+    settings: JointSettings,
+    clock: Clock,
+    /// Numbers of joints by name and by path.
+    names: HashMap<String, usize>,
+    /// The frames of components, by path.
+    components: HashMap<&'static str, Frame>,
+    routes: Routes,
+    states: SharedStates,
+}
+
+impl Joints {
+    /// Of a robot with these components, by path. `routes` are those of the inputs of its estimators.
+    pub(crate) fn new(
+        topology: &'static Topology,
+        settings: JointSettings,
+        clock: Clock,
+        components: HashMap<&'static str, Frame>,
+        estimators: &[Vec<RouteOf>],
+    ) -> Result<Self, KinematicsError> {
+        let kinematics = Kinematics::new(topology)?;
+        let names =
+            topology.joints.iter().enumerate().flat_map(|(number, joint)| {
+                [(joint.name.to_owned(), number), (joint_path(topology, joint), number)]
+            });
+        let routes = Routes::new(topology, &kinematics, nanos_of(settings.stale_after), estimators);
+        let states = SharedStates::new(topology, settings.states, settings.history);
+        let names = names.collect();
+        Ok(Self(Arc::new(Inner { topology, kinematics, settings, clock, names, components, routes, states })))
+    }
+
+    /// Of a robot without links.
+    #[cfg(all(test, loom))]
+    pub(crate) fn of_none(clock: Clock) -> Self {
+        const NONE: Topology = Topology { links: &[], joints: &[] };
+        let joints = Self::new(&NONE, JointSettings::default(), clock, HashMap::new(), &[]);
+        joints.expect("nothing is wrong with no joints")
+    }
+
+    /// Keeps what a message tells of joints.
+    #[inline]
+    pub(crate) fn hear<T: Payload>(&self, message: &Stamped<T>, now: MonotonicTime) {
+        if T::TELLS_JOINT_POSITION {
+            // The payload's code runs without the lock.
+            message.payload.tell_joints(&mut |reading| self.keep(message.stamp(), &reading, now));
+        }
+    }
+
+    fn keep(&self, stamp: Stamp, reading: &JointReading<'_>, now: MonotonicTime) {
+        let name = reading.joint.unwrap_or_else(|| stamp.frame.name());
+        let number = self.0.names.get(name).copied();
+        let Some((number, joint)) = number.and_then(|number| Some((number, self.0.topology.joints.get(number)?)))
+        else {
+            return self.note_unknown(name);
+        };
+        if joint.kind == JointKind::Fixed {
+            return self.note_unknown(name);
+        }
+        // It follows from the joint that it mimics.
+        if joint.mimic.is_some() {
+            return;
+        }
+        let mut converted = Converted::default();
+        let reading = at_joint(joint, reading, &mut converted);
+        let JointReading { position, velocity, effort, .. } = reading;
+        let state = State { time: stamp.monotonic_time, position, velocity, effort };
+        if let Some(reason) = self.0.states.add(number, state, now) {
+            let (joint, reason) = (joint.name, reason.name());
+            tracing::warn!(joint, reason, "a state of a joint was refused; more are only counted");
+        }
+    }
+
+    #[cold]
+    fn note_unknown(&self, name: &str) {
+        if self.0.states.add_unknown(name) {
+            tracing::warn!(joint = name, "a message tells the state of what is no moving joint of this robot");
+        }
+    }
+
+    pub(super) fn states(&self) -> &SharedStates {
+        &self.0.states
+    }
+
+    pub(super) fn stale_nanos(&self) -> i64 {
+        nanos_of(self.0.settings.stale_after)
+    }
+
+    pub(super) fn clock(&self) -> &Clock {
+        &self.0.clock
+    }
+
+    pub(super) fn topology(&self) -> &'static Topology {
+        self.0.topology
+    }
+
+    pub(super) fn kinematics(&self) -> &Kinematics {
+        &self.0.kinematics
+    }
+
+    pub(super) fn component(&self, path: &str) -> Option<Frame> {
+        self.0.components.get(path).copied()
+    }
+
+    pub(super) fn components(&self) -> impl Iterator<Item = &'static str> + '_ {
+        self.0.components.keys().copied()
+    }
+
+    pub(crate) fn routes(&self) -> &Routes {
+        &self.0.routes
+    }
+
+    /// In words.
+    pub(crate) fn error(&self, gap: Gap) -> LookupError {
+        gap.error(|number| self.0.topology.joints.get(number).map_or("?", |joint| joint.name))
+    }
+
+    /// `frame_from_input` of an estimator's input at the time of a message.
+    #[inline]
+    pub(crate) fn placed(&self, input: &InputRoute, time: MonotonicTime) -> Result<Isometry3<f64>, Gap> {
+        input.at(&self.0.states, time)
+    }
+
+    /// What is known of the joint of that name or path, one that mimics another included; `None` if there is no such joint, or
+    /// it does not move.
+    pub fn status(&self, joint: &str) -> Option<JointStatus> {
+        let number = *self.0.names.get(joint)?;
+        self.status_of(&self.0.states.lock(), number)
+    }
+
+    /// What is known of all joints that move, in the order of their declaration.
+    pub fn all(&self) -> Vec<JointStatus> {
+        let states = self.0.states.lock();
+        (0..self.0.topology.joints.len()).filter_map(|number| self.status_of(&states, number)).collect()
+    }
+
+    fn status_of(&self, states: &States, number: usize) -> Option<JointStatus> {
+        let joint = self.0.topology.joints.get(number).filter(|joint| joint.kind != JointKind::Fixed)?;
+        let (owner, multiplier, offset) = self.0.topology.followed(number);
+        let newest = states.history(owner)?.newest_state();
+        let stale_nanos = self.stale_nanos();
+        let scaled = |values: &[f64], factor: f64| -> Vec<f64> {
+            values.iter().filter(|value| !value.is_nan()).map(|value| value * factor).collect()
+        };
+        let mut status = JointStatus {
+            joint: joint.name,
+            time: None,
+            is_stale: true,
+            position: Vec::new(),
+            velocity: Vec::new(),
+            effort: Vec::new(),
+        };
+        let Some(State { time, position, velocity, effort }) = newest else { return Some(status) };
+        status.time = Some(time);
+        status.is_stale = self.0.clock.now().nanos_since(time) > stale_nanos;
+        status.position = scaled(position, multiplier);
+        status.velocity = scaled(velocity, multiplier);
+        if owner == number {
+            status.effort = scaled(effort, 1.0);
+        } else {
+            status.position.iter_mut().for_each(|position| *position += offset);
+        }
+        Some(status)
+    }
+
+    /// What was counted: each moving joint of the robot, and names that messages gave of joints that there are not.
+    pub fn statistics(&self) -> Vec<JointStatistics> {
+        let states = self.0.states.lock();
+        let joints = self.0.topology.joints.iter().zip(states.known());
+        let declared = joints.filter(|(joint, _)| joint.kind != JointKind::Fixed && joint.mimic.is_none());
+        let declared = declared.map(|(joint, known)| JointStatistics {
+            joint: joint.name.to_owned(),
+            is_declared: true,
+            states: known.states,
+            unknown: 0,
+            refused: known.refused,
+        });
+        let unknown = states.unknown().iter().map(|(name, count)| JointStatistics {
+            joint: name.clone(),
+            is_declared: false,
+            states: 0,
+            unknown: *count,
+            refused: [0; REFUSALS],
+        });
+        declared.chain(unknown).collect()
+    }
+}
+
+/// Links and joints from the root: `base/pan`.
+fn joint_path(topology: &Topology, joint: &Joint) -> String {
+    let mut names = vec![joint.name];
+    let mut link = topology.links.get(joint.parent);
+    // A declared robot is a tree; this ends also where it is none.
+    for _ in 0..=topology.links.len() {
+        let Some(at) = link else { break };
+        names.push(at.name);
+        let Some(carrier) = at.parent_joint.and_then(|number| topology.joints.get(number)) else { break };
+        names.push(carrier.name);
+        link = topology.links.get(carrier.parent);
+    }
+    names.reverse();
+    names.join("/")
+}
+
+impl fmt::Debug for Joints {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Joints").field("joints", &self.0.topology.joints.len()).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,70 @@
+//! What a message tells of joints.
+
+/// What a payload tells of one joint: as many numbers as the joint has, in the order that
+/// [`kinematics`](crate::kinematics#coordinates) gives; one for a joint that turns or slides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointReading<'a> {
+    /// The joint, by its name or its path; none for the one at which it is measured, which the message's frame names.
+    pub joint: Option<&'a str>,
+    /// Angles in rad, lengths in m.
+    pub position: &'a [f64],
+    /// rad/s, m/s; empty if it is not measured.
+    pub velocity: &'a [f64],
+    /// Torques in N·m, forces in N; empty if it is not measured.
+    pub effort: &'a [f64],
+    /// On which side of the joint's transmission.
+    pub side: JointSide,
+}
+
+/// Where something is measured at a joint with a transmission.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum JointSide {
+    /// At the joint itself.
+    #[default]
+    Joint,
+    /// At its motor: the declared transmission lies between.
+    Motor,
+}
+
+impl<'a> JointReading<'a> {
+    /// A position at the joint itself, where the message was measured.
+    pub fn at(position: &'a [f64]) -> Self {
+        Self { joint: None, position, velocity: &[], effort: &[], side: JointSide::Joint }
+    }
+
+    /// Of the joint of that name.
+    pub fn of(self, joint: &'a str) -> Self {
+        Self { joint: Some(joint), ..self }
+    }
+}
+
+/// A payload that tells the positions of joints, and says so with `#[payload(joint_position)]`: the runtime keeps what it
+/// tells, see [`joints`](crate::joints).
+///
+/// ```
+/// use bb_core::prelude::*;
+/// use bb_core::{JointPositions, JointReading};
+///
+/// /// What an absolute encoder reads.
+/// #[derive(Clone, Debug, Payload)]
+/// #[payload(joint_position)]
+/// pub struct Ticks {
+///     /// 4096 in a turn.
+///     pub count: u16,
+/// }
+///
+/// impl JointPositions for Ticks {
+///     fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
+///         listener(JointReading::at(&[f64::from(self.count) * std::f64::consts::TAU / 4096.0]));
+///     }
+/// }
+/// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not tell the position of a joint",
+    label = "no `JointPositions`",
+    note = "`#[payload(joint_position)]` promises it; implement `bb_core::JointPositions` for it"
+)]
+pub trait JointPositions {
+    /// Calls `listener` with each joint it knows.
+    fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>));
+}

@@ -1,0 +1,118 @@
+//! Where the inputs of an estimator are, across moving joints, at the times of their messages.
+
+use super::Node;
+use crate::component::{Estimator, InputTransform, InputTransforms};
+use crate::declaration::EstimatorDeclaration;
+use crate::event::HealthReason;
+use crate::joints::{Gap, InputRoute, LookupError, PlacedInput, Placement};
+use crate::node::DropReason;
+use crate::node::admission::Admission;
+use crate::node::environment::{Environment, Mode};
+use crate::node::health::Event;
+use crate::node::shared::SharedNode;
+use crate::node::turn::Turn;
+use crate::time::MonotonicTime;
+use nalgebra::Isometry3;
+use std::sync::Arc;
+
+/// The transforms of an estimator's inputs.
+pub(super) struct Placing {
+    declaration: &'static EstimatorDeclaration,
+    shared: SharedNode,
+    routes: Arc<[InputRoute]>,
+    inputs: Box<[InputTransform]>,
+}
+
+/// An input without which a dispatch is dropped, and why nothing is known of where it is.
+#[derive(Debug)]
+pub(super) struct Unplaced {
+    input: usize,
+    error: LookupError,
+}
+
+impl Placing {
+    pub(super) fn new(
+        number: usize,
+        declaration: &'static EstimatorDeclaration,
+        environment: &Environment,
+    ) -> Self {
+        let inputs = declaration.inputs.iter().map(|input| {
+            let fixed = input.frame_from_input.map(|transform| transform.isometry());
+            InputTransform::declared(input.name, input.driver, fixed)
+        });
+        Self {
+            declaration,
+            shared: environment.node(number),
+            routes: environment.joints().routes().of(number),
+            inputs: inputs.collect(),
+        }
+    }
+
+    /// Finds where the inputs are at a dispatch by a message of the driver. `admission` knows when the others were measured.
+    pub(super) fn place(
+        &mut self,
+        driver_time: MonotonicTime,
+        admission: &Admission,
+        turn: &Turn<'_>,
+    ) -> Result<(), Unplaced> {
+        for route in self.routes.iter() {
+            let (Some(declared), Some(input)) =
+                (self.declaration.inputs.get(route.input), self.inputs.get_mut(route.input))
+            else {
+                continue;
+            };
+            let time = if declared.driver { Some(driver_time) } else { admission.last(route.input) };
+            // What is missing or too old takes no part; if it is needed, that is what the dispatch is dropped for.
+            let Some(time) = time.filter(|time| !declared.is_too_old(driver_time.nanos_since(*time))) else {
+                input.set_absent();
+                continue;
+            };
+            let found = find(&self.shared, route, time, turn);
+            let found = found.map_err(|gap| turn.environment().joints().error(gap));
+            if let (Err(error), false) = (&found, declared.optional) {
+                return Err(Unplaced { input: route.input, error: error.clone() });
+            }
+            input.set(found);
+        }
+        Ok(())
+    }
+
+    pub(super) fn transforms(&self) -> InputTransforms<'_> {
+        InputTransforms::new(&self.inputs)
+    }
+}
+
+/// Looks it up; in a replay, takes what the journal has.
+fn find(
+    shared: &SharedNode,
+    route: &InputRoute,
+    time: MonotonicTime,
+    turn: &Turn<'_>,
+) -> Result<Isometry3<f64>, Gap> {
+    let environment = turn.environment();
+    if environment.mode() == Mode::Replay
+        && let Some(placement) = shared.replayed_placement(route.input)
+    {
+        return placement.found();
+    }
+    let found = environment.joints().placed(route, time);
+    turn.keep_placed(PlacedInput {
+        estimator: shared.number(),
+        input: route.input,
+        placement: Placement::of(&found),
+    });
+    found
+}
+
+impl<E: Estimator> Node<E> {
+    #[cold]
+    pub(super) fn note_unplaced(&mut self, unplaced: &Unplaced, turn: &Turn<'_>) {
+        self.shared.counters().drop(unplaced.input, DropReason::NoTransform);
+        let Some(input) = self.declaration.inputs.get(unplaced.input) else { return };
+        let (estimator, name, error) = (self.declaration.path, input.name, &unplaced.error);
+        tracing::debug!(estimator, input = name, %error, "dispatch dropped for want of a transform");
+        self.shared.set_last_gap(error.clone());
+        self.tell_drop(name, DropReason::NoTransform.name());
+        self.judge(Event::Bad(HealthReason::NoTransform), input.source, turn.now());
+    }
+}

@@ -1,0 +1,48 @@
+//! What the store of joint states knows of a robot: the frames of its components, and which inputs of its estimators span
+//! moving joints.
+
+use super::Robot;
+use crate::declaration::EstimatorDeclaration;
+use crate::joints::{JointSettings, Joints, RouteOf};
+use crate::kinematics::KinematicsError;
+use crate::message::Frame;
+use crate::time::Clock;
+use std::collections::HashMap;
+
+pub(super) fn known_joints<R: Robot>(
+    topics: &R::Topics,
+    settings: JointSettings,
+    clock: Clock,
+) -> Result<Joints, KinematicsError> {
+    let sensors = R::SENSORS.iter().map(|declared| (declared.path, declared.frame));
+    let actuators = R::ACTUATORS.iter().map(|declared| (declared.path, Frame::new(declared.joint)));
+    let estimators = R::ESTIMATORS.iter().flat_map(|declared| {
+        let outputs = declared.outputs.iter().map(|path| (*path, declared.frame));
+        [(declared.path, declared.frame)].into_iter().chain(outputs)
+    });
+    let frames: HashMap<&'static str, Frame> = sensors.chain(actuators).chain(estimators).collect();
+    let topics = R::all_topics(topics);
+    let frameless = topics.iter().filter(|topic| !topic.depends_on_frame()).map(|topic| topic.path());
+    let frameless: Vec<&'static str> = frameless.collect();
+    let routes: Vec<Vec<RouteOf>> =
+        R::ESTIMATORS.iter().map(|declared| routes(declared, &frames, &frameless)).collect();
+    Joints::new(R::TOPOLOGY, settings, clock, frames, &routes)
+}
+
+/// The inputs across moving joints whose transforms are asked for.
+fn routes(
+    declared: &EstimatorDeclaration,
+    frames: &HashMap<&'static str, Frame>,
+    frameless: &[&'static str],
+) -> Vec<RouteOf> {
+    let moving = declared.inputs.iter().filter(|input| input.frame_from_input.is_none());
+    let placed = moving.filter(|input| !frameless.contains(&input.source));
+    // What is fused in one dispatch is as close in time as the estimator asks of its inputs.
+    let others = declared.inputs.iter().filter(|input| !input.driver);
+    let tolerance_nanos = others.filter_map(|input| input.tolerance_nanos).min();
+    let route = placed.filter_map(|input| {
+        let source = *frames.get(input.source)?;
+        Some(RouteOf { input: input.index, source, target: declared.frame, tolerance_nanos })
+    });
+    route.collect()
+}

@@ -1,0 +1,440 @@
+//! States of joints, and the transforms across them.
+
+use crate::components::at;
+use bb_core::SensorHandle;
+use bb_core::component::{InputTransforms, JointPublisher};
+use bb_core::joints::{JointRefusal, LookupError};
+use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use bb_core::prelude::*;
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
+
+/// What a camera sees.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub(crate) struct Pixel(pub(crate) f64);
+
+/// Where an input was, m, and its x axis.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub(crate) struct Spot {
+    pub(crate) at: Vector3<f64>,
+    pub(crate) x: Vector3<f64>,
+}
+
+/// Says where its input is.
+#[derive(Debug, Default)]
+pub(crate) struct Spotter {
+    frame_from_camera: Isometry3<f64>,
+}
+
+impl Estimator for Spotter {
+    type Options = NoOptions;
+    type Input = Pixel;
+    type Output = Spot;
+    const HANDLES_MOVING_JOINTS: bool = true;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self::default())
+    }
+
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        self.frame_from_camera = transforms.frame_from_driver()?;
+        Ok(())
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Pixel>) -> Result<Reply<Spot>, Fault> {
+        let Isometry3 { translation, rotation } = self.frame_from_camera;
+        Ok(Reply::emit(Spot { at: translation.vector, x: rotation * Vector3::x() }))
+    }
+}
+
+/// From the base, from the tip, and from a joint.
+#[derive(Clone, Copy, Debug, Inputs)]
+pub(crate) struct Views<'a> {
+    pub(crate) imu: Input<'a, Pixel>,
+    #[allow(dead_code, reason = "it is placed, and not looked at")]
+    pub(crate) camera: Option<Input<'a, Pixel>>,
+    pub(crate) lift: Option<Input<'a, JointState>>,
+}
+
+/// What [`Fusion`] was told.
+#[derive(Clone, Debug, PartialEq, Payload)]
+pub(crate) struct Told {
+    /// Where the camera was, or why that is not known.
+    pub(crate) camera: String,
+    pub(crate) lift: Option<f64>,
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Fusion {
+    camera: String,
+}
+
+impl Estimator for Fusion {
+    type Options = NoOptions;
+    type Input = Views<'static>;
+    type Output = Told;
+    const HANDLES_MOVING_JOINTS: bool = true;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self::default())
+    }
+
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        assert_eq!(transforms.frame_from_input("imu")?, Isometry3::identity());
+        let lift = transforms.frame_from_input("lift").expect_err("it depends on no frame");
+        assert_eq!(lift.to_string(), "the input `lift` depends on no frame");
+        self.camera = match transforms.frame_from_input("camera") {
+            Ok(camera) => format!("{:.3}", camera.translation.vector.x),
+            Err(fault) => fault.to_string(),
+        };
+        Ok(())
+    }
+
+    fn handle_input(&mut self, views: Views<'_>) -> Result<Reply<Told>, Fault> {
+        assert!(views.imu.0 >= 0.0);
+        Ok(Reply::emit(Told { camera: self.camera.clone(), lift: views.lift.map(|lift| lift.position) }))
+    }
+}
+
+/// Passes on the position of a joint beyond another that moves, though it knows of fixed transforms only.
+#[derive(Debug)]
+struct Watch;
+
+impl Estimator for Watch {
+    type Options = NoOptions;
+    type Input = JointState;
+    type Output = Pixel;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, joint: &Stamped<JointState>) -> Result<Reply<Pixel>, Fault> {
+        Ok(Reply::emit(Pixel(joint.position)))
+    }
+}
+
+robot! {
+    robot Reach;
+
+    sensors { sensor bus: External<JointStates>(); }
+    bridges { bridge joint_states: JointPublisher() { rate: 100 Hz; } }
+
+    link base {
+        sensor imu: External<Pixel>();
+        estimator spot: Spotter() { input camera: sensor::base::shoulder::arm::lift::carriage::camera; recover_after: 2; }
+        estimator fusion: Fusion() {
+            input imu: sensor::base::imu, driver;
+            input camera: sensor::base::shoulder::arm::lift::carriage::camera, optional;
+            input lift: sensor::base::shoulder::arm::lift::encoder, optional;
+            sync_tolerance: 20 ms;
+        }
+        estimator watch: Watch() { input lift: sensor::base::shoulder::arm::lift::encoder; }
+        joint shoulder: continuous {
+            axis: z;
+            transmission: { reduction: 50, offset: 90 deg, reversed: true };
+            sensor encoder: External<JointState>();
+            sensor motor: External<MotorState>();
+            link arm {
+                joint lift: prismatic {
+                    axis: x;
+                    limit: { lower: 0 m, upper: 2 m, velocity: 1 m/s, effort: 10 N };
+                    sensor encoder: External<JointState>();
+                    link carriage { sensor camera: External<Pixel>(); }
+                }
+                joint counter: prismatic {
+                    axis: x;
+                    limit: { lower: -2 m, upper: 2 m, velocity: 1 m/s, effort: 10 N };
+                    mimic: { joint: lift, multiplier: -0.5, offset: 10 cm };
+                    link weight;
+                }
+                joint plate: fixed { origin: { xyz: [0 m, 0 m, 1 m] }; link top; }
+            }
+        }
+    }
+}
+
+const SHOULDER: SensorHandle<Reach, External<JointState>> = reach::sensor::base::shoulder::encoder;
+const MOTOR: SensorHandle<Reach, External<MotorState>> = reach::sensor::base::shoulder::motor;
+const LIFT: SensorHandle<Reach, External<JointState>> = reach::sensor::base::shoulder::arm::lift::encoder;
+const CAMERA: SensorHandle<Reach, External<Pixel>> = reach::sensor::base::shoulder::arm::lift::carriage::camera;
+
+fn joint(position: f64) -> JointState {
+    JointState { position, velocity: None, effort: None }
+}
+
+fn moving(position: f64, velocity: f64) -> JointState {
+    JointState { velocity: Some(velocity), ..joint(position) }
+}
+
+#[test]
+fn a_transform_is_that_of_the_time_of_the_message() -> Result<(), StartError> {
+    let builder = Reach::builder();
+    let spots = builder.subscribe(reach::estimator::base::spot);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(SHOULDER, at(0), joint(0.0));
+    simulation.publish(LIFT, at(0), moving(1.0, 0.5));
+    simulation.publish(SHOULDER, at(20), joint(FRAC_PI_2));
+    simulation.publish(LIFT, at(20), moving(1.4, 2.0));
+    // Interpolated: the camera was late, and is placed where it was.
+    simulation.publish(CAMERA, at(5), Pixel(1.0));
+    // Predicted: one joint by its velocity, the other is held.
+    simulation.publish(CAMERA, at(70), Pixel(2.0));
+    let spots: Vec<_> = spots.drain().collect();
+    let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2 / 4.0);
+    assert!((spots[0].at - quarter * Vector3::new(1.1, 0.0, 0.0)).norm() < 1e-12, "{:?}", spots[0]);
+    assert!((spots[0].x - quarter * Vector3::x()).norm() < 1e-12);
+    assert_eq!((spots[0].monotonic_time, spots[0].frame.name()), (at(5), "base"));
+    assert!((spots[1].at - Vector3::new(0.0, 1.5, 0.0)).norm() < 1e-12, "{:?}", spots[1]);
+    assert_eq!(spots.len(), 2);
+    Ok(())
+}
+
+#[test]
+fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() -> Result<(), StartError> {
+    let builder = Reach::builder();
+    let spots = builder.subscribe(reach::estimator::base::spot);
+    let health = builder.subscribe(system::Health);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(CAMERA, at(1), Pixel(1.0));
+    let gap = |simulation: &Simulation<Reach>| {
+        let report = simulation.report();
+        let spot = report.estimator("estimator/base/spot").expect("it is declared");
+        let dropped = spot.inputs[0].dropped(bb_core::run::DropReason::NoTransform);
+        (dropped, spot.last_gap.as_ref().map(ToString::to_string).unwrap_or_default())
+    };
+    assert_eq!(gap(&simulation), (1, "nothing is known yet of the joint `shoulder`".into()));
+    simulation.publish(SHOULDER, at(2), joint(0.0));
+    simulation.publish(CAMERA, at(3), Pixel(1.0));
+    assert_eq!(gap(&simulation), (2, "nothing is known yet of the joint `lift`".into()));
+    simulation.publish(LIFT, at(4), joint(1.0));
+    // Older than what is known.
+    simulation.publish(CAMERA, at(3), Pixel(1.0));
+    assert_eq!(gap(&simulation), (3, "the history of the joint `lift` begins 1ms later".into()));
+    simulation.publish(CAMERA, at(102), Pixel(1.0));
+    assert_eq!(gap(&simulation).0, 3, "100 ms are not too old");
+    simulation.publish(CAMERA, at(103), Pixel(1.0));
+    assert_eq!(gap(&simulation), (4, "the newest state of the joint `shoulder` is 101ms older".into()));
+    let changes: Vec<String> = health.drain().map(|change| change.payload.to_string()).collect();
+    let shown =
+        "estimator/base/spot healthy -> degraded (no transform; sensor/base/shoulder/arm/lift/carriage/camera)";
+    assert_eq!(changes, [format!("0.001000000 s: {shown}")]);
+    assert_eq!(spots.drain().count(), 1);
+    // Good again.
+    simulation.publish(SHOULDER, at(104), joint(0.0));
+    simulation.publish(LIFT, at(104), joint(1.0));
+    simulation.publish(CAMERA, at(105), Pixel(1.0));
+    simulation.publish(CAMERA, at(106), Pixel(1.0));
+    let changes: Vec<_> = health.drain().map(|change| (change.to, change.reason)).collect();
+    assert_eq!(changes, [(HealthState::Healthy, HealthReason::Recovered)]);
+    Ok(())
+}
+
+#[test]
+fn an_optional_input_is_told_why_it_has_no_transform() -> Result<(), StartError> {
+    let builder = Reach::builder();
+    let told = builder.subscribe(reach::estimator::base::fusion);
+    let mut simulation = builder.simulate()?;
+    let imu = reach::sensor::base::imu;
+    let next = |simulation: &mut Simulation<Reach>, ms| {
+        simulation.publish(imu, at(ms), Pixel(0.0));
+        told.drain().last().map(|told| told.payload)
+    };
+    let some = |camera: &str, lift| Some(Told { camera: camera.into(), lift });
+    assert_eq!(next(&mut simulation, 1), some("the input `camera` takes no part in this dispatch", None));
+    simulation.publish(CAMERA, at(2), Pixel(0.0));
+    let unknown = "the input `camera` has no transform: nothing is known yet of the joint `shoulder`";
+    assert_eq!(next(&mut simulation, 3), some(unknown, None));
+    simulation.publish(SHOULDER, at(4), joint(0.0));
+    simulation.publish(LIFT, at(4), joint(0.5));
+    simulation.publish(CAMERA, at(20), Pixel(0.0));
+    assert_eq!(next(&mut simulation, 24), some("0.500", Some(0.5)));
+    // Its own tolerance, 20 ms, not that of the robot.
+    simulation.publish(CAMERA, at(26), Pixel(0.0));
+    let old = "the input `camera` has no transform: the newest state of the joint `shoulder` is 22ms older";
+    assert_eq!(next(&mut simulation, 26), some(old, None));
+    // An input that depends on no frame spans joints as it likes.
+    assert_eq!(simulation.report().estimator("estimator/base/watch").map(|watch| watch.emitted), Some(1));
+    Ok(())
+}
+
+#[test]
+fn any_frame_can_be_looked_up_at_any_time() -> Result<(), Box<dyn std::error::Error>> {
+    let mut simulation = Reach::builder().simulate()?;
+    let joints = simulation.joints();
+    let handle = joints.between("base", "sensor/base/shoulder/arm/lift/carriage/camera")?;
+    assert_eq!(handle.moving_joints(), 2);
+    assert_eq!(handle.at(at(0)), Err(LookupError::UnknownJoint { joint: "shoulder" }));
+    assert_eq!(handle.latest(), Err(LookupError::UnknownJoint { joint: "shoulder" }));
+    simulation.publish(SHOULDER, at(10), joint(0.0));
+    simulation.publish(SHOULDER, at(30), joint(0.2));
+    simulation.publish(LIFT, at(12), joint(1.0));
+    simulation.publish(LIFT, at(20), joint(2.0));
+    let ms = Duration::from_millis;
+    assert_eq!(handle.at(at(11)), Err(LookupError::TooOld { joint: "lift", by: ms(1) }));
+    assert_eq!(handle.at(at(9)), Err(LookupError::TooOld { joint: "shoulder", by: ms(1) }));
+    assert_eq!(handle.at(at(25)), Err(LookupError::InFuture { joint: "lift", by: ms(5) }));
+    assert!((handle.at_within(at(25), ms(5))?.translation.vector.norm() - 2.0).abs() < 1e-12);
+    assert_eq!(handle.at_within(at(26), ms(5)), Err(LookupError::InFuture { joint: "lift", by: ms(6) }));
+    // Nothing comes on virtual time.
+    assert!(handle.wait_until(at(26), Duration::from_secs(3600)).is_err());
+    let latest = handle.latest()?;
+    assert_eq!(latest.time, Some(at(20)));
+    assert_eq!(latest.transform, handle.at(at(20))?);
+    let expected = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.06) * Vector3::new(1.5, 0.0, 0.0);
+    assert!((handle.at(at(16))?.translation.vector - expected).norm() < 1e-12);
+    // The way back is the inverse; what follows a joint moves with it; fixed joints cost no state.
+    let back = joints.transform("carriage", "base", at(16))?;
+    assert!(((back * handle.at(at(16))?).translation.vector).norm() < 1e-12);
+    let weight = joints.transform("arm", "weight", at(16))?;
+    assert!((weight.translation.vector - Vector3::new(-0.65, 0.0, 0.0)).norm() < 1e-12, "{weight}");
+    let fixed = joints.between("top", "plate")?.latest()?;
+    assert_eq!((fixed.time, fixed.transform), (None, Isometry3::identity()));
+    assert_eq!(joints.transform("arm", "top", at(-1))?.translation.vector, Vector3::z());
+    // The frame of a joint is fixed to what it is mounted on.
+    assert_eq!(joints.transform("base", "shoulder", at(-1))?, Isometry3::identity());
+    let error = joints.between("base", "carage").expect_err("there is none");
+    assert_eq!(error.to_string(), "the robot has no frame `carage`; did you mean `carriage`?");
+    assert_eq!(simulation.bus().joints().status("lift").map(|lift| lift.position), Some(vec![2.0]));
+    Ok(())
+}
+
+#[test]
+fn angles_without_limits_wrap() -> Result<(), Box<dyn std::error::Error>> {
+    let mut simulation = Reach::builder().simulate()?;
+    let handle = simulation.joints().between("base", "arm")?;
+    let x = |ms| -> Result<Vector3<f64>, LookupError> { Ok(handle.at(at(ms))? * Vector3::x()) };
+    simulation.publish(SHOULDER, at(0), joint(3.0));
+    simulation.publish(SHOULDER, at(10), joint(-3.0));
+    // The short way goes through half a turn.
+    let middle = x(5)?;
+    assert!((middle + Vector3::x()).norm() < 1e-12, "{middle}");
+    // A whole number of turns in one step, by its velocity.
+    simulation.publish(SHOULDER, at(110), JointState { velocity: Some(20.0 * PI), ..joint(-3.0) });
+    simulation.publish(SHOULDER, at(210), JointState { velocity: Some(20.0 * PI), ..joint(-3.0) });
+    let shown = simulation.joints().status("shoulder").expect("it is declared");
+    // 3 rad and 2 π - 6 on, then one turn and a half by the mean velocity, that is one or two, then two and a half.
+    let turns = (shown.position[0] - (2.0 * PI - 3.0)) / (2.0 * PI);
+    assert!((turns - turns.round()).abs() < 1e-12 && turns >= 1.0, "{turns}");
+    Ok(())
+}
+
+#[test]
+fn a_motor_is_seen_through_its_transmission() -> Result<(), Box<dyn std::error::Error>> {
+    let mut simulation = Reach::builder().simulate()?;
+    simulation.publish(MOTOR, at(0), MotorState { position: 5.0, velocity: Some(10.0), effort: Some(0.2) });
+    let shoulder = simulation.joints().status("shoulder").expect("it is declared");
+    assert_eq!(shoulder.time, Some(at(0)));
+    assert!((shoulder.position[0] - (FRAC_PI_2 - 0.1)).abs() < 1e-15);
+    assert!((shoulder.velocity[0] + 0.2).abs() < 1e-15 && (shoulder.effort[0] + 10.0).abs() < 1e-15);
+    // A joint-side encoder needs none.
+    simulation.publish(SHOULDER, at(1), joint(0.25));
+    assert_eq!(simulation.joints().status("shoulder").map(|shoulder| shoulder.position), Some(vec![0.25]));
+    Ok(())
+}
+
+#[test]
+fn what_does_not_fit_is_refused_and_counted() -> Result<(), StartError> {
+    let mut simulation = Reach::builder().simulate()?;
+    let bus = |simulation: &mut Simulation<Reach>, ms: i64, names: &[&str], positions: &[f64]| {
+        let names: Arc<[String]> = names.iter().map(|name| (*name).to_owned()).collect();
+        let states = JointStates { names, positions: positions.to_vec(), ..JointStates::default() };
+        simulation.publish(reach::sensor::bus, at(ms), states);
+    };
+    simulation.run_until(at(5000));
+    // By name and by path; what follows another is not told.
+    bus(&mut simulation, 10, &["shoulder", "base/shoulder/arm/lift", "counter"], &[0.1, 0.2, 0.3]);
+    bus(&mut simulation, 10, &["shoulder"], &[0.2]);
+    bus(&mut simulation, 9, &["shoulder"], &[0.2]);
+    bus(&mut simulation, 11, &["shoulder", "lift"], &[f64::NAN, 0.4]);
+    bus(&mut simulation, 12, &["lift"], &[f64::INFINITY]);
+    bus(&mut simulation, 13, &["wrist", "plate"], &[0.0, 0.0]);
+    bus(&mut simulation, 14, &["wrist"], &[0.0]);
+    // A second ahead is the clock's fault, more is the sender's.
+    bus(&mut simulation, 6_000, &["shoulder"], &[0.3]);
+    // Sent at 5 s.
+    simulation.publish(SHOULDER, at(5_000), joint(0.3));
+    let shoulder = simulation.joints().status("shoulder").expect("it is declared");
+    let report = simulation.report();
+    let count = |name: &str| report.joints.iter().find(|joint| joint.joint == name).expect("it was counted");
+    let reasons =
+        |name: &str| JointRefusal::ALL.iter().map(|reason| count(name).refused(*reason)).collect::<Vec<_>>();
+    assert_eq!(shoulder.position, [0.3]);
+    assert_eq!((count("lift").states, reasons("lift")), (2, vec![0, 0, 1, 0, 0]));
+    assert_eq!((count("wrist").unknown, count("plate").unknown, count("wrist").is_declared), (2, 1, false));
+    let text = report.to_string();
+    assert!(text.contains("2 states of `wrist`, which is no moving joint of this robot"), "{text}");
+    assert!(text.contains("joint lift: 2 states, 1 refused: non-finite"), "{text}");
+    assert_eq!(reasons("shoulder")[..4], [2, 1, 1, 0], "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_joint_that_falls_silent_is_stale() -> Result<(), StartError> {
+    let mut simulation = Reach::builder().simulate()?;
+    let joints = simulation.joints();
+    let unknown = joints.status("counter").expect("it moves");
+    assert_eq!((unknown.time, unknown.is_stale, unknown.position.len()), (None, true, 0));
+    simulation.publish(LIFT, at(0), JointState { position: 1.0, velocity: Some(0.5), effort: Some(3.0) });
+    let stale = |ms, simulation: &mut Simulation<Reach>| {
+        simulation.run_until(at(ms));
+        joints.status("counter").map(|counter| counter.is_stale)
+    };
+    assert_eq!((stale(100, &mut simulation), stale(101, &mut simulation)), (Some(false), Some(true)));
+    let counter = joints.status("counter").expect("it moves");
+    assert_eq!(
+        (counter.time, &counter.position[..], &counter.velocity[..]),
+        (Some(at(0)), &[-0.4][..], &[-0.25][..])
+    );
+    assert!(joints.status("plate").is_none(), "it does not move");
+    assert_eq!(joints.all().iter().map(|joint| joint.joint).collect::<Vec<_>>(), ["shoulder", "lift", "counter"]);
+    Ok(())
+}
+
+#[test]
+fn all_joints_are_published_as_a_whole() -> Result<(), StartError> {
+    let builder = Reach::builder();
+    let published = builder.subscribe(reach::bridge::joint_states);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(LIFT, at(1), moving(1.0, 1.0));
+    simulation.publish(LIFT, at(9), moving(1.8, 1.0));
+    simulation.publish(SHOULDER, at(5), moving(0.5, 0.0));
+    simulation.run_until(at(35));
+    let snapshots: Vec<_> = published.drain().collect();
+    assert_eq!(snapshots.len(), 1, "nothing new came");
+    assert_eq!(&snapshots[0].names[..], ["shoulder", "lift", "counter"]);
+    assert_eq!(snapshots[0].monotonic_time, at(5));
+    let expected = [0.5, 1.4, -0.6];
+    assert!(snapshots[0].positions.iter().zip(expected).all(|(is, expected)| (is - expected).abs() < 1e-12));
+    assert_eq!((&snapshots[0].velocities[..], snapshots[0].efforts.len()), (&[0.0, 1.0, -0.5][..], 0));
+    // One that has fallen silent is left out, and the others go on.
+    simulation.run_until(at(150));
+    simulation.publish(LIFT, at(151), moving(1.8, 0.0));
+    simulation.run_until(at(165));
+    let last = published.drain().last().expect("it was published");
+    assert_eq!((&last.names[..], last.monotonic_time), (&["lift".to_owned(), "counter".to_owned()][..], at(151)));
+    assert_eq!(simulation.report().joints.iter().filter(|joint| !joint.is_declared).count(), 0);
+    Ok(())
+}
+
+#[test]
+fn a_thread_waits_for_a_state_that_comes() -> Result<(), Box<dyn std::error::Error>> {
+    let running = Reach::builder().start()?;
+    let live = running.live();
+    let handle = live.joints().between("arm", "carriage")?;
+    let start = live.clock().now();
+    assert_eq!(
+        handle.wait_until(start, Duration::from_millis(5)),
+        Err(LookupError::UnknownJoint { joint: "lift" })
+    );
+    live.publish(LIFT, start, joint(0.0));
+    let waits =
+        std::thread::spawn(move || handle.wait_until(start + Duration::from_micros(1), Duration::from_secs(60)));
+    while !waits.is_finished() {
+        live.publish(LIFT, live.clock().now(), joint(1.0));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(waits.join().map_err(|_| "it panicked")?.is_ok());
+    running.stop();
+    Ok(())
+}
