@@ -9,6 +9,7 @@ mod command_faults;
 mod components;
 mod contention;
 mod control;
+mod covariances;
 mod disarm_first;
 mod drivers;
 mod end;
