@@ -47,6 +47,8 @@ pub struct NavigationStatus {
     pub barometer_bias: f64,
     /// How often samples of the IMU were missing for longer than a sample may take.
     pub gaps: u32,
+    /// How often the filter was wrong, and began again where fixes or poses agree.
+    pub resets: u32,
 }
 
 /// What became of a sensor's measurements since the start.
@@ -146,6 +148,8 @@ pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Opt
         hard_iron: estimate.vector::<S>(Optional::HardIron),
         barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
         gaps: filter.eskf().gaps(),
+        // The start is the first.
+        resets: filter.eskf().resets().saturating_sub(1),
     })
 }
 
