@@ -290,8 +290,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(estimate)
     }
 
-    /// Covariance of all errors, `N × N`, in the order of the constants [`POSITION`] to [`GYROSCOPE_BIAS`] and then of
-    /// the optional states. Symmetric to the last bit.
+    /// Covariance of all errors, `N × N`, in the order of the constants [`POSITION`] to
+    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states. Symmetric to the last bit.
     pub fn covariance(&self) -> &SMatrix<f64, N, N> {
         self.covariance.matrix()
     }
