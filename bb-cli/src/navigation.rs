@@ -4,6 +4,7 @@ mod bag;
 mod command;
 mod csv;
 mod data;
+mod doubt;
 mod errors;
 mod evaluate;
 mod filters;
@@ -12,6 +13,7 @@ mod picture;
 mod player;
 mod report;
 mod trace;
+mod verdicts;
 
 pub use bag::{
     BagOptions, BiasDeviation, FromBag, Mount, NavigationBag, Origin, Place, RelativeDeviation, StartFrom,

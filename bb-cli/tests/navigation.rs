@@ -80,6 +80,35 @@ fn a_smoother_tells_of_its_window() {
     assert_eq!((output.code, &rows[0]["position_smoothed_rmse_m"]), (Some(0), &Value::Null));
 }
 
+/// Each by its file, its line and its column.
+#[test]
+fn numbers_that_nothing_can_have_are_named() {
+    let zeros = |line: &str, of: std::ops::Range<usize>, with: &str| {
+        let cells = line.split(',').enumerate();
+        cells.map(|(i, cell)| if of.contains(&i) { with } else { cell }).collect::<Vec<_>>().join(",")
+    };
+    for (file, columns, with, said) in [
+        ("init", 3..7, "0", "_init.csv, line 2: columns qw to qz are no rotation"),
+        ("init", 3..7, "nan", "_init.csv, line 2: columns qw to qz are no rotation"),
+        ("init", 17..18, "1e-160", "_init.csv, line 2: a column sigma is not between 1e-9 and 1e9"),
+        ("gps", 5..6, "1e-160", "_gps.csv, line 2: a column sigma is not between 1e-9 and 1e9"),
+        ("gps", 6..7, "nan", "_gps.csv, line 2: a column sigma is not between 1e-9 and 1e9"),
+        ("gps", 2..3, "1e300", "_gps.csv, line 2: a position is NaN, or not near the Earth"),
+        ("noise", 0..1, "1e-160", "`gyroscope_noise`"),
+        ("imu", 7..8, "0", "_imu.csv, line 2: column dt must be positive"),
+    ] {
+        let prefix = drive("absurd");
+        let file = PathBuf::from(format!("{}_{file}.csv", prefix.display()));
+        let text = std::fs::read_to_string(&file).expect("is there");
+        let mut lines: Vec<_> = text.lines().map(str::to_owned).collect();
+        lines[1] = zeros(&lines[1], columns, with);
+        std::fs::write(&file, lines.join("\n")).expect("there is room");
+        let output = bb(&["eval", "navigation", prefix.to_str().expect("is text"), "--filter", "eskf-single"]);
+        assert!(output.code == Some(1) && output.err.contains(said), "{said}: {}", output.err);
+        assert!(!output.out.contains("NaN"), "{}", output.out);
+    }
+}
+
 #[test]
 fn mistakes_are_named() {
     let good = drive("good");

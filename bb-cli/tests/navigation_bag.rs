@@ -135,6 +135,7 @@ fn a_start_is_at_rest_or_at_a_pose_or_at_the_truth() {
     let course =
         ["--truth", "/truth", "--start", "align", "--set", "heading_from_course=true", "--origin", drive::ORIGIN];
     let row = rows(&[&[text(&moving)], &course[..]].concat());
+    // It turns by 14° a second: a course of fixes a second apart lags by 7° but for the gyroscope, and their noise adds 8° at first.
     assert!(number(&row[0], "orientation_rmse_deg") < 8.0, "{}", row[0]);
     let output = bb(&["eval", "navigation", text(&moving), "--truth", "/truth", "--start", "align"]);
     assert!(output.code == Some(1) && output.err.contains("the IMU is never at rest"), "{}", output.err);
@@ -285,6 +286,82 @@ fn what_is_wrong_with_a_bag_is_said() {
         (&["--set", "heading=ten"], "`heading` is `ten`"),
     ] {
         fault(&fixes, "typed.mcap", arguments, 2, said);
+    }
+}
+
+/// Figures are printed all the same, beside why not to trust them.
+#[test]
+fn figures_of_less_than_half_of_a_bag_are_an_error() {
+    let drive = Drive::new(11, 100);
+    let fixes = Bagged { fixes: true, ..Bagged::default() };
+    let distrusted = |bagged: &Bagged, name: &str, said: &[&str]| {
+        let bag = drive.bag(name, bagged);
+        let output =
+            bb(&["eval", "navigation", "--json", text(&bag), "--truth", "/truth", "--origin", drive::ORIGIN]);
+        assert_eq!(output.code, Some(1), "{}", output.err);
+        for said in [said, &["more than half, so its figures are not to be trusted"]].concat() {
+            assert!(output.err.contains(said), "{said}: {}", output.err);
+        }
+        let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+        assert_eq!(rows.len(), 1);
+    };
+    let stuck = Bagged { stuck: true, ..fixes };
+    distrusted(&stuck, "stuck.mcap", &["700 of 1001 messages of /imu are not stamped after the one before"]);
+    let beyond = Bagged { beyond_the_pole: true, ..fixes };
+    distrusted(
+        &beyond,
+        "pole.mcap",
+        &["10 of 10 fixes of /fix are nowhere on the Earth, the first at latitude 91.1"],
+    );
+    let nan = Bagged { nan: (300, 10_000), ..fixes };
+    distrusted(&nan, "mostly_nan.mcap", &["samples of the IMU were refused (the first: a value is not finite)"]);
+    // In what is told of the other half it is a note.
+    let few = drive.bag("few_nan.mcap", &Bagged { nan: (300, 500), ..fixes });
+    let output = bb(&["eval", "navigation", text(&few), "--truth", "/truth", "--origin", drive::ORIGIN]);
+    assert_eq!(output.code, Some(0), "{}", output.err);
+}
+
+/// A pose that is in another world than the truth, as all of them are.
+#[test]
+fn measurements_of_which_most_were_refused_are_an_error() {
+    let drive = Drive::new(12, 100);
+    let prefix = drive.files("refused_poses", &["vio", "anchor"]);
+    let anchors = prefix.with_file_name("refused_poses_anchor.csv");
+    let told = std::fs::read_to_string(&anchors).expect("is there");
+    let elsewhere = told.lines().enumerate().map(|(i, line)| {
+        let mut cells: Vec<_> = line.split(',').map(str::to_owned).collect();
+        if i > 0 {
+            // Each somewhere else.
+            cells[2] = (f64::from(u32::try_from(i % 7).expect("is small")) * 1e4).to_string();
+        }
+        cells.join(",") + "\n"
+    });
+    std::fs::write(&anchors, elsewhere.collect::<String>()).expect("there is room");
+    let output = bb(&["eval", "navigation", text(&prefix), "--filter", "eskf-single"]);
+    assert!(
+        output.code == Some(1)
+            && output.err.contains(" poses were refused (the first: normalised innovation squared"),
+        "{}",
+        output.err
+    );
+}
+
+/// Of which none begins the world, nor the filter.
+#[test]
+fn a_bag_begins_where_fixes_agree() {
+    let drive = Drive::new(13, 300);
+    let fixes = Bagged { fixes: true, wheels: true, rest: true, ..Bagged::default() };
+    let options = ["--truth", "none", "--start", "align", "--odometry-topic", "/wheels", "--filter", "eskf-single"];
+    let figures = |bagged: &Bagged, name: &str| {
+        let bag = drive.bag(name, bagged);
+        let precise = ["--gnss-topic", "/fix", "--truth", "/precise"];
+        rows(&[&[text(&bag)], &precise[..], &options[2..]].concat()).remove(0)
+    };
+    let precise = Bagged { precise: true, ..fixes };
+    let right = figures(&precise, "right_first.mcap");
+    let wrong = figures(&Bagged { wrong_fixes: 1, ..precise }, "wrong_first.mcap");
+    for row in [right, wrong] {
+        assert!(number(&row, "position_rmse_m") < 1.0 && row["refused"] == 0, "{row}");
     }
 }
 

@@ -204,6 +204,10 @@ fn what_gives_no_noise_is_an_error() {
     constant.iter_mut().for_each(|(_, rate, _)| rate.y = 0.01);
     let out = fault(&constant, "constant.mcap", "accelerometer x: all samples are the same");
     assert!(out.contains("accelerometer y: ") && out.contains("gyroscope y: none"), "{out}");
+    // So small that its square is no number that can be divided by.
+    let tiny: Vec<_> = good.iter().map(|(time, rate, force)| (*time, rate * 1e-160, force * 1e-160)).collect();
+    let out = fault(&tiny, "tiny.mcap", "gyroscope x: samples vary by");
+    assert!(!out.contains("NaN"), "{out}");
     fault(&turning, "turning.mcap", "gyroscope z reads 0.30 rad/s on average: the IMU turns, or is not in rad/s");
     fault(&shaken, "shaken.mcap", "s are at rest without a gap, and 10 s are the least (gyroscope");
     fault(&good[..500], "short.mcap", "at most 5.0 s are at rest without a gap");

@@ -40,6 +40,8 @@ mod state;
 #[cfg(any(feature = "smoother", feature = "eskf"))]
 pub mod state_estimator;
 mod stream;
+mod track;
+mod upkeep;
 
 pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
@@ -47,8 +49,8 @@ pub use consistency::{Consistency, nees};
 pub use eskf::{Eskf, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
 #[cfg(feature = "runtime")]
 pub use estimator::{
-    EskfEstimator, NavigationInputs, NavigationOptions, NavigationOutput, NavigationOutputs, NavigationStatus,
-    Verdicts,
+    Course, EskfEstimator, NavigationInputs, NavigationOptions, NavigationOutput, NavigationOutputs,
+    NavigationStatus, Verdicts,
 };
 pub use fused::Fused;
 pub use geodesy::{Geodetic, LocalFrame};
@@ -69,3 +71,4 @@ pub use state::{
     States, VELOCITY, Wheeled, offset,
 };
 pub use stream::{Counts, Stream, StreamParams};
+pub use track::{CONFIRMED, Track, TrackPoint};

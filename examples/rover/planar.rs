@@ -16,8 +16,10 @@ fn main() -> std::process::ExitCode {
 
 #[cfg(test)]
 mod tests {
-    use crate::{run, simulated};
+    use crate::drive::seconds;
+    use crate::{recorded, run, simulated};
     use std::error::Error;
+    use std::path::Path;
 
     #[test]
     fn the_drive_is_the_stored_one() -> Result<(), Box<dyn Error>> {
@@ -25,6 +27,23 @@ mod tests {
         // To renew it: cargo run --example rover_planar > examples/rover/expected_planar.txt
         assert_eq!(outcome.to_string(), include_str!("expected_planar.txt"));
         assert_eq!(outcome.missing(), Vec::<String>::new());
+        Ok(())
+    }
+
+    /// On a plane and without wheels, as `--data` plays it.
+    #[test]
+    fn the_recorded_drive_keeps_within_its_bounds() -> Result<(), Box<dyn Error>> {
+        let prefix = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/navigation/kitti_s2");
+        if !prefix.with_file_name("kitti_s2_imu.csv").exists() {
+            println!("no recorded drive in ../shared/data: skipped");
+            return Ok(());
+        }
+        let mut drive = recorded::drive(&prefix)?;
+        // The rest of it is driven by the command alone.
+        drive.events.retain(|(time, _)| seconds(*time) < 205.0);
+        let outcome = run::of_record(&drive)?;
+        assert_eq!(outcome.missing(), Vec::<String>::new(), "{outcome}");
+        assert!(outcome.points.len() > 190);
         Ok(())
     }
 }

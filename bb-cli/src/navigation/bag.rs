@@ -3,6 +3,7 @@
 mod align;
 mod frames;
 mod messages;
+mod notes;
 mod options;
 mod sensors;
 mod start;
@@ -18,6 +19,7 @@ use crate::progress::Progress;
 use bb_mcap::Bag;
 use frames::Frames;
 use messages::Messages;
+use notes::Notes;
 use std::path::{Path, PathBuf};
 use topics::Topics;
 
@@ -41,6 +43,8 @@ pub struct FromBag {
     pub data: DataSet,
     /// What was left out or assumed.
     pub notes: Vec<String>,
+    /// So much was left out that figures of the rest mislead: why.
+    pub doubts: Vec<String>,
 }
 
 impl NavigationBag {
@@ -76,11 +80,12 @@ impl NavigationBag {
     /// A frame that is not connected, nothing to start from, or no sample left; in words.
     pub fn data_set(&self, settings: &[NavigationSetting], is_smoother: bool) -> Result<FromBag, String> {
         let (params, sensors) = bag_params(settings)?;
-        let mut notes = Vec::new();
+        let mut notes = Notes::default();
         let imu = self.messages.samples(&self.topics.imu, &mut notes)?;
         let sensors = self.sensors(&imu, &sensors, &mut notes)?;
         let start = self.start(&imu, &sensors, &params, &mut notes)?;
         let data = timeline::data_set(self, &imu, sensors, start, params.longest_sample, is_smoother, &mut notes)?;
-        Ok(FromBag { data, notes })
+        let Notes { notes, doubts } = notes;
+        Ok(FromBag { data, notes, doubts })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::bag::{BagOptions, NavigationBag};
 use super::data::DataSet;
-use super::evaluate::play;
+use super::evaluate::{Played, play};
 use super::filters::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting, listed};
 use super::picture::{Drawn, draw};
 use super::report::{self, Scored};
@@ -14,7 +14,8 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str =
-    "Exit code: 0; 1 if a data set could not be evaluated, or not to its end; 2 for a wrong use.
+    "Exit code: 0; 1 if a data set could not be evaluated, or not to its end, or most of it was left
+out or refused; 2 for a wrong use.
 
 Examples:
   bb eval navigation drive.mcap --truth /ground_truth --plot drive.svg
@@ -159,14 +160,24 @@ impl NavigationArguments {
                         done.notes.push(note);
                     }
                 }
+                // Of several filters each has the same.
+                for doubt in &made.doubts {
+                    let doubt = format!("{}: {doubt}", file.display());
+                    if !done.faults.contains(&doubt) {
+                        done.faults.push(doubt);
+                    }
+                }
                 &made.data
             }
         };
         let progress = Progress::new("evaluating", data.keyframes.len() as u64);
         let mut trace = self.plot.is_some().then(Trace::default);
-        let score = play(data, filter, &self.settings, self.window, trace.as_mut(), || progress.add(1));
+        let played = play(data, filter, &self.settings, self.window, trace.as_mut(), || progress.add(1));
         progress.finish();
-        done.scores.push((file.to_owned(), filter.name, score?));
+        let Played { score, doubts } = played?;
+        done.scores.push((file.to_owned(), filter.name, score));
+        let named = |doubt| format!("{}: {}: {doubt}", file.display(), filter.name);
+        done.faults.extend(doubts.into_iter().map(named));
         let name = format!("{}, {}", file.file_name().unwrap_or(file.as_os_str()).to_string_lossy(), filter.name);
         done.drawn.extend(trace.map(|trace| Drawn { name, trace }));
         Ok(())

@@ -1,7 +1,7 @@
 //! A data set as CSV files with one prefix: `_imu`, `_keyframes`, `_truth`, `_init`, `_noise`, and whichever there are of
 //! `_vio`, `_anchor` and `_gps`.
 
-use super::data::{DataSet, Keyframe, Noise, Sample, Truth, nanoseconds};
+use super::data::{DEVIATIONS, DataSet, Keyframe, Noise, Sample, Truth, nanoseconds};
 use bb_core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{AbsolutePose, GnssPosition, RelativePose, Start};
 use std::collections::HashMap;
@@ -47,34 +47,41 @@ impl DataSet {
             return Err(format!("{}_keyframes.csv: needs two keyframes or more, in order", prefix.display()));
         }
         let start = init.first(|row| {
-            let (rotation, position, velocity) = (row.0[16], row.0[17], row.0[18]);
+            let (rotation, position) = (row.deviation(16)?, row.deviation(17)?);
+            let velocity = row.deviation(18)?;
             let first_ns = nanoseconds(keyframes[0].time_s);
             let velocity = (row.vector(7), velocity);
-            Start {
+            Ok(Start {
                 gyroscope_bias: row.vector(10),
-                gyroscope_bias_deviation: row.0[19],
+                gyroscope_bias_deviation: row.deviation(19)?,
                 accelerometer_bias: row.vector(13),
-                accelerometer_bias_deviation: row.0[20],
-                ..Start::at(first_ns, (row.vector(0), position), velocity, (row.orientation(3), rotation))
-            }
+                accelerometer_bias_deviation: row.deviation(20)?,
+                ..Start::at(first_ns, (row.position(0)?, position), velocity, (row.rotation(3)?, rotation))
+            })
         })?;
-        let noise = noise.first(|row| Noise {
-            gyroscope: row.0[0],
-            gyroscope_bias: row.0[1],
-            accelerometer: row.0[2],
-            accelerometer_bias: row.0[3],
-            gravity: row.0[4],
+        let noise = noise.first(|row| {
+            Ok(Noise {
+                gyroscope: row.0[0],
+                gyroscope_bias: row.0[1],
+                accelerometer: row.0[2],
+                accelerometer_bias: row.0[3],
+                gravity: row.0[4],
+            })
         })?;
         let relative = Rows::read_if_there(prefix, "vio", 12)?.map(|row| {
-            let (translation, rotation) = ((row.vector(3), row.0[11]), (row.orientation(6), row.0[10]));
+            let translation = (row.position(3)?, row.deviation(11)?);
+            let rotation = (row.rotation(6)?, row.deviation(10)?);
             Ok((row.index(1)? as u64, RelativePose::new(row.index(0)? as u64, translation, rotation)))
         })?;
         let anchors = Rows::read_if_there(prefix, "anchor", 11)?.map(|row| {
-            let (position, orientation) = ((row.vector(2), row.0[9]), (row.orientation(5), row.0[10]));
+            let position = (row.position(2)?, row.deviation(9)?);
+            let orientation = (row.rotation(5)?, row.deviation(10)?);
             Ok((row.index(0)? as u64, AbsolutePose::new(position, orientation)))
         })?;
-        let fixes = Rows::read_if_there(prefix, "gps", 7)?
-            .map(|row| Ok((row.index(0)? as u64, GnssPosition::new(row.vector(2), row.0[5], row.0[6]))))?;
+        let fixes = Rows::read_if_there(prefix, "gps", 7)?.map(|row| {
+            let (horizontal, vertical) = (row.deviation(5)?, row.deviation(6)?);
+            Ok((row.index(0)? as u64, GnssPosition::new(row.position(2)?, horizontal, vertical)))
+        })?;
         let data = Self {
             prefix: prefix.to_owned(),
             samples,
@@ -108,13 +115,17 @@ pub(crate) fn inertial(file: &Path) -> Result<Vec<Inertial>, String> {
     rows.map(|row| Ok((row.0[0], row.vector(1), row.vector(4))))
 }
 
+/// Farther from the origin of its world nothing is, m.
+const FARTHEST: f64 = 1e8;
+
 /// The numbers of a file, a header row left out.
 struct Rows {
     file: PathBuf,
     rows: Vec<Row>,
 }
 
-struct Row(Vec<f64>);
+/// With the line of its file.
+struct Row(Vec<f64>, usize);
 
 impl Rows {
     fn read(prefix: &Path, what: &str, columns: usize) -> Result<Self, String> {
@@ -145,20 +156,22 @@ impl Rows {
             if numbers.len() < columns {
                 return Err(fault(format!("{} columns, but must be {columns}", numbers.len())));
             }
-            rows.push(Row(numbers));
+            rows.push(Row(numbers, index + 1));
         }
         Ok(Self { file, rows })
     }
 
     fn map<T>(&self, read: impl Fn(&Row) -> Result<T, &'static str>) -> Result<Vec<T>, String> {
-        let located = |(index, row): (usize, &Row)| {
-            read(row).map_err(|fault| format!("{}, row {}: {fault}", self.file.display(), index + 1))
-        };
-        self.rows.iter().enumerate().map(located).collect()
+        self.rows.iter().map(|row| self.located(row, &read)).collect()
     }
 
-    fn first<T>(&self, read: impl Fn(&Row) -> T) -> Result<T, String> {
-        self.rows.first().map(read).ok_or_else(|| format!("{}: has no row", self.file.display()))
+    fn first<T>(&self, read: impl Fn(&Row) -> Result<T, &'static str>) -> Result<T, String> {
+        let first = self.rows.first().ok_or_else(|| format!("{}: has no row", self.file.display()))?;
+        self.located(first, &read)
+    }
+
+    fn located<T>(&self, row: &Row, read: &impl Fn(&Row) -> Result<T, &'static str>) -> Result<T, String> {
+        read(row).map_err(|fault| format!("{}, line {}: {fault}", self.file.display(), row.1))
     }
 }
 
@@ -171,6 +184,26 @@ impl Row {
     fn orientation(&self, first: usize) -> UnitQuaternion<f64> {
         let [w, x, y, z] = [0, 1, 2, 3].map(|i| self.0[first + i]);
         UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+    }
+
+    /// Whether it has a rotation there: 1 is the norm of one.
+    fn rotation(&self, first: usize) -> Result<UnitQuaternion<f64>, &'static str> {
+        let norm = self.0.iter().skip(first).take(4).map(|x| x * x).sum::<f64>().sqrt();
+        (norm - 1.0).abs().lt(&0.1).then(|| self.orientation(first)).ok_or("columns qw to qz are no rotation")
+    }
+
+    /// A position, m.
+    fn position(&self, first: usize) -> Result<Vector3<f64>, &'static str> {
+        let position = self.vector(first);
+        let is_near = position.iter().all(|x| x.abs() <= FARTHEST);
+        is_near.then_some(position).ok_or("a position is NaN, or not near the Earth")
+    }
+
+    /// A standard deviation.
+    fn deviation(&self, column: usize) -> Result<f64, &'static str> {
+        let deviation = self.0[column];
+        let is_one = DEVIATIONS.contains(&deviation);
+        is_one.then_some(deviation).ok_or("a column sigma is not between 1e-9 and 1e9")
     }
 
     fn index(&self, column: usize) -> Result<usize, &'static str> {

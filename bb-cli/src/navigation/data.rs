@@ -5,6 +5,9 @@ use bb_estimators::navigation::{AbsolutePose, BodyVelocity, GnssPosition, Relati
 use std::collections::HashMap;
 use std::path::PathBuf;
 
+/// What may be known so well or so badly, in m, rad, m/s², rad/s: the square of less is no number that can be divided by.
+pub(crate) const DEVIATIONS: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
 /// A drive or a flight: what was measured, and the truth at keyframes. The world is ENU, the body the IMU's.
 #[derive(Clone, Debug)]
 pub struct DataSet {

@@ -5,6 +5,7 @@ use super::errors::Errors;
 use super::filters::{NavigationFilter, NavigationSetting};
 use super::player::{Known, Player};
 use super::trace::Trace;
+use super::verdicts::Verdicts;
 use bb_core::nalgebra::Vector3;
 
 /// Keyframes at the start that are not scored: a tenth of all, but not more than these.
@@ -69,7 +70,14 @@ pub fn evaluate_navigation(
     window: usize,
     progress: impl FnMut(),
 ) -> Result<NavigationScore, String> {
-    play(data, filter, settings, window, None, progress)
+    play(data, filter, settings, window, None, progress).map(|played| played.score)
+}
+
+/// What playing a data set gave.
+pub(crate) struct Played {
+    pub(crate) score: NavigationScore,
+    /// Why its figures mislead: most of what the filter needs was refused.
+    pub(crate) doubts: Vec<String>,
 }
 
 /// The same; what happens on the way goes into the trace, if there is one.
@@ -80,19 +88,21 @@ pub(crate) fn play(
     window: usize,
     mut trace: Option<&mut Trace>,
     mut progress: impl FnMut(),
-) -> Result<NavigationScore, String> {
+) -> Result<Played, String> {
     let mut player = Player::new(filter, data, settings, window)?;
     player.start(&data.start).map_err(|error| format!("cannot start: {error}"))?;
     let left_out = MOST_LEFT_OUT.min(data.keyframes.len().saturating_sub(1) / 10);
     let (mut newest, mut oldest) = (Sums::default(), Sums::default());
     let (mut propagation_s, mut samples) = (0.0, 0_usize);
     let (mut refused, mut allocations) = (0, 0);
+    let mut verdicts = Verdicts::default();
     let mut keyframe_ms = Vec::with_capacity(data.keyframes.len());
     for (k, pair) in data.keyframes.windows(2).enumerate().map(|(k, pair)| (k + 1, pair)) {
         let step = player.play(data, k, &pair[0], &pair[1])?;
         propagation_s += step.propagation_s;
         samples += pair[1].sample - pair[0].sample;
         refused += step.refused;
+        verdicts.add(&step, pair[1].sample - pair[0].sample);
         keyframe_ms.push(step.keyframe_s * 1e3);
         progress();
         let known = if trace.is_some() || pair[1].scored { player.newest() } else { None };
@@ -120,7 +130,7 @@ pub(crate) fn play(
         keyframe_ms.get((last as f64 * part).round() as usize).copied().unwrap_or(f64::NAN)
     };
     let rms = |sum: f64, count: usize| (count > 0).then(|| (sum / count as f64).sqrt());
-    Ok(NavigationScore {
+    let score = NavigationScore {
         position_rmse_m: rms(newest.position, newest.keyframes).unwrap_or(f64::NAN),
         orientation_rmse_deg: rms(newest.orientation, newest.orientations).map(f64::to_degrees),
         velocity_rmse_mps: rms(newest.velocity, newest.velocities),
@@ -134,7 +144,8 @@ pub(crate) fn play(
         refused,
         allocations: filter.is_smoother().then_some(allocations),
         rss_mb: resident_mb(),
-    })
+    };
+    Ok(Played { score, doubts: verdicts.doubts() })
 }
 
 /// Memory of this process that is in use, MB, where Linux tells.

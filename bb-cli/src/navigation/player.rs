@@ -58,6 +58,8 @@ impl Known {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Step {
     pub(crate) refused: u64,
+    /// Samples of the IMU among them, and why the first was.
+    pub(crate) samples: (u64, Option<Refusal>),
     /// With the samples for a filter; without for a smoother, whose samples are integrated as they come.
     pub(crate) keyframe_s: f64,
     pub(crate) propagation_s: f64,
@@ -145,7 +147,10 @@ impl Player {
             match propagated {
                 Ok(()) => {}
                 Err(error @ Refusal::Gap { .. }) => return Err(format!("at {time_s} s: {error}")),
-                Err(_) => step.refused += 1,
+                Err(error) => {
+                    step.refused += 1;
+                    step.samples = (step.samples.0 + 1, step.samples.1.or(Some(error)));
+                }
             }
         }
         step.propagation_s = began.elapsed().as_secs_f64();

@@ -56,6 +56,12 @@ pub(crate) struct Bagged {
     pub(crate) nan: (i64, i64),
     /// Three samples have the stamp of an earlier one.
     pub(crate) back: bool,
+    /// So have all after the third second.
+    pub(crate) stuck: bool,
+    /// Fixes of a receiver that mistakes the pole.
+    pub(crate) beyond_the_pole: bool,
+    /// So many fixes at the beginning are ten kilometres off.
+    pub(crate) wrong_fixes: usize,
     pub(crate) no_truth: bool,
     /// The frame of the receiver is not connected.
     pub(crate) apart: bool,
@@ -256,7 +262,14 @@ impl Drive {
             if (bagged.nan.0..bagged.nan.1).contains(&i) {
                 angular_velocity.y = f64::NAN;
             }
-            let back = if bagged.back && (500..503).contains(&i) { 10 * PERIOD_NS } else { 0 };
+            let stuck = if bagged.stuck && i > 300 { (i - 300) * PERIOD_NS } else { 0 };
+            let back = if stuck > 0 {
+                stuck
+            } else if bagged.back && (500..503).contains(&i) {
+                10 * PERIOD_NS
+            } else {
+                0
+            };
             let time = START_NS + i * PERIOD_NS;
             if bagged.gap && (300..350).contains(&i) {
                 continue;
@@ -320,7 +333,7 @@ impl Drive {
                 let variance = deviation * deviation;
                 NavSatFix {
                     header: header(time, "gps"),
-                    latitude: at.latitude.to_degrees(),
+                    latitude: at.latitude.to_degrees() + if bagged.beyond_the_pole { 43.0 } else { 0.0 },
                     longitude: at.longitude.to_degrees(),
                     altitude: at.height,
                     position_covariance: [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance],
@@ -330,7 +343,10 @@ impl Drive {
             };
             let mast = world_from_imu.rotation * antenna;
             if bagged.fixes && k > 0 && k % 10 == 0 {
-                let at = measured.fix - pose.translation.vector + world_from_imu.translation.vector + mast;
+                let off = if k / 10 <= bagged.wrong_fixes { 10_000.0 } else { 0.0 };
+                let at = measured.fix + V::new(off, 0.0, 0.0) - pose.translation.vector
+                    + world_from_imu.translation.vector
+                    + mast;
                 messages.push((arrived, "/fix", "sensor_msgs/msg/NavSatFix", little(&fix(at, FIX))));
             }
             if bagged.precise {

@@ -28,6 +28,6 @@ pub struct Pose {
     pub position: Vector3<f64>,
     /// Takes vectors of the body to the world.
     pub world_from_body: UnitQuaternion<f64>,
-    /// Covariance: position in the world (m²), then orientation as a small rotation of the body (rad²).
+    /// Covariance of position (m²) and of orientation as a small rotation (rad²), both about the axes of the world, as ROS has it.
     pub covariance: Option<Matrix6<f64>>,
 }

@@ -74,7 +74,7 @@ pub struct Known {
 }
 
 /// Why the noise cannot be computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AllanError {
     /// There are too few samples.
     TooShort {
@@ -85,6 +85,11 @@ pub enum AllanError {
     },
     /// All samples are the same.
     Constant,
+    /// Samples vary by less than any sensor can tell, or by more than can be computed with.
+    Unlikely {
+        /// An Allan deviation, in the unit of the samples.
+        deviation: f64,
+    },
     /// A sample is NaN or infinite, or the period is not positive.
     NonFinite,
 }
@@ -94,12 +99,18 @@ impl fmt::Display for AllanError {
         match self {
             Self::TooShort { samples, least } => write!(f, "{samples} samples are too few: {least} are the least"),
             Self::Constant => f.write_str("all samples are the same"),
+            Self::Unlikely { deviation } => {
+                write!(f, "samples vary by {deviation:.1e}, which no sensor does: are they scaled by mistake?")
+            }
             Self::NonFinite => f.write_str("a sample is not finite"),
         }
     }
 }
 
 impl Error for AllanError {}
+
+/// What a sensor's samples may vary by: beyond, the powers of it that the fit takes are no longer numbers.
+const DEVIATIONS: core::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
 /// Replaces samples by their integral in samples, the mean taken away: `out[k]` is the sum of the first k. The slice begins with
 /// one element more, which is ignored; n samples have n + 1 integrals.
@@ -164,6 +175,9 @@ pub fn sensor_noise(integrals: &[f64], period_s: f64) -> Result<SensorNoise, All
         let deviation = allan_deviation(integrals, m).unwrap_or(0.0);
         if deviation <= 0.0 {
             return Err(AllanError::Constant);
+        }
+        if !DEVIATIONS.contains(&deviation) {
+            return Err(AllanError::Unlikely { deviation });
         }
         curve.points[curve.count] = AllanPoint { time_s: m as f64 * period_s, deviation, relative_error: 0.0 };
         curve.count += 1;

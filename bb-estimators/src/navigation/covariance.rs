@@ -2,7 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 
 use super::math::{ln, sqrt};
 
@@ -110,6 +110,14 @@ impl<const N: usize> Covariance<N> {
                 self.rows_mut()[first + i][first + j] = 0.5 * (block[(i, j)] + block[(j, i)]);
             }
         }
+    }
+
+    /// Sets the covariance of two states; they are uncorrelated with all others.
+    pub(in crate::navigation) fn set_pair(&mut self, first: usize, block: &Matrix2<f64>) {
+        (0..2).for_each(|i| self.forget(first + i, block[(i, i)]));
+        let between = 0.5 * (block[(0, 1)] + block[(1, 0)]);
+        self.rows_mut()[first][first + 1] = between;
+        self.rows_mut()[first + 1][first] = between;
     }
 
     /// Makes `target` the same random variable as `source`, up to `variance`.

@@ -17,16 +17,21 @@
 //! the last bit. The noise of a scalar is taken as at least 1e-10 of its predicted variance, which bounds what rounding
 //! can do; a Cholesky decomposition every 1024 updates checks it, and [`Eskf::repairs`] counts what it found.
 
+mod elsewhere;
 mod filter;
 mod params;
 mod propagation;
+mod sample;
+mod start;
 #[cfg(test)]
 mod tests;
 
-pub use filter::{Eskf, ImuMean, Start};
-pub(super) use filter::{LONGEST_GAP_S, seconds_between};
+pub use filter::Eskf;
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};
 #[cfg(feature = "smoother")]
 pub(super) use propagation::{Transition, rows};
+pub use sample::ImuMean;
+pub(super) use sample::{LONGEST_GAP_S, seconds_between};
+pub use start::Start;

@@ -9,11 +9,13 @@ mod input;
 pub(super) mod measured;
 mod options;
 mod output;
+pub(super) mod refuted;
 mod report;
 mod running;
 mod states;
 pub(super) mod world;
 
+pub use course::Course;
 pub use input::NavigationInputs;
 pub use options::NavigationOptions;
 pub use output::{NavigationOutput, NavigationOutputs};
@@ -148,9 +150,12 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// The world is a local tangent frame, x east, y north, z up. Its origin is where the first fix was; without satellites, where
-/// the filter started. It starts once the IMU has been at rest for a second, with the heading of the options, or, with
-/// `heading_from_course`, once fixes show in which direction the robot travels. Until then it emits nothing.
+/// The world is a local tangent frame, x east, y north, z up. Its origin is where the first fix was that the next agreed with; without
+/// satellites, where the filter started. It starts once the IMU has been at rest for a second, with the heading of the options, or,
+/// with `heading_from_course`, once three fixes show in which direction the robot travels. Until then it emits nothing.
+///
+/// Fixes, or poses, that are refused although they agree among each other, and are more than those that the filter rests on, show
+/// that it is wrong: its position is set to theirs, and `resets` in its status counts that.
 ///
 /// Measurements are fused at the time of their stamps, up to a second late. A gate for each sensor refuses what does not fit; what
 /// it has refused is in the status. The health of the estimator says when the position was dead-reckoned for too long, is less

@@ -74,6 +74,8 @@ pub enum Placed {
 /// A filter with the last `SAMPLES` samples, `MEASUREMENTS` measurements, and `STATES` states of itself, evenly between the
 /// samples.
 ///
+/// They are on the heap with the feature `std`, allocated when the history is made, and within it without.
+///
 /// It reaches back by about `SAMPLES` samples. More states cost memory and save time: a late measurement costs its own delay, and
 /// half the time between two states.
 #[derive(Clone, Debug)]
@@ -128,6 +130,24 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             longest_lead_ns,
             counts: Arrivals::default(),
         })
+    }
+
+    /// Goes on with a filter that has begun elsewhere: what was measured before is forgotten. Nothing is allocated.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NotStarted`]; the history is then as it was.
+    pub fn restart(&mut self, started: F) -> Result<(), Refusal> {
+        if started.time_ns().is_none() {
+            return Err(Refusal::NotStarted);
+        }
+        self.samples.clear();
+        self.measurements.clear();
+        self.states.clear();
+        self.states.push(started.clone());
+        self.since_state = 0;
+        self.now = started;
+        Ok(())
     }
 
     /// The filter at the time of the last sample.

@@ -25,6 +25,9 @@ params! {
         /// How many measurements in a row the gate refuses before it takes the filter to be wrong, not the sensor: the next
         /// is fused with the covariance raised to fit it; 0 for never.
         ///
+        /// All errors take a part of the difference then, those of attitude and biases too: a filter that is kilometres off is
+        /// better [moved](super::Eskf::relocate).
+        ///
         /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long.
         patience: u32 = 3;
         /// Part of good measurements that are weighed down as outliers are, by Huber's function of their Mahalanobis
@@ -138,6 +141,12 @@ impl Stream {
     /// What its variance is multiplied by, from [`StreamParams::variance_factor`] and [`StreamParams::adaptation`].
     pub fn noise_factor(&self) -> f64 {
         self.noise_factor * self.params.variance_factor
+    }
+
+    /// Forgets that measurements were refused in a row: the filter is elsewhere now.
+    #[cfg(feature = "runtime")]
+    pub(crate) fn forgive(&mut self) {
+        self.counts.gate_in_a_row = 0;
     }
 
     /// How a measurement is fused, or that it is refused.

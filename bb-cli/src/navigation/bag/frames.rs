@@ -1,7 +1,8 @@
 //! Where the sensors are on the body, which is the IMU.
 
 use super::messages::Messages;
-use super::options::{BagOptions, Mount, Place};
+use super::notes::Notes;
+use super::options::{BagOptions, FARTHEST, Mount, Place};
 use super::topics::TF_STATIC;
 use bb_core::nalgebra::Isometry3;
 use std::collections::HashMap;
@@ -22,8 +23,10 @@ impl Frames {
             let (parent, child) = (plain(&transform.header.frame_id), plain(&transform.child_frame_id));
             let pose = transform.transform;
             let is_rotation = (pose.rotation.norm() - 1.0).abs() < 0.1;
-            if !is_rotation || !pose.translation.vector.iter().all(|x| x.is_finite()) {
-                return Err(format!("{TF_STATIC}: the transform from {child} to {parent} is none"));
+            let is_near = pose.translation.vector.iter().all(|x| x.abs() <= FARTHEST);
+            if !is_rotation || !is_near {
+                let what = if is_rotation { "a translation of more than a kilometre" } else { "no rotation" };
+                return Err(format!("{TF_STATIC}: the transform from {child} to {parent} is none: it has {what}"));
             }
             edges.push((parent, child, pose));
         }
@@ -40,7 +43,7 @@ impl Frames {
         &self,
         topic: &str,
         imu_topic: &str,
-        notes: &mut Vec<String>,
+        notes: &mut Notes,
     ) -> Result<Isometry3<f64>, String> {
         let of = |topic: &str| self.of_topics.get(topic).cloned().unwrap_or_default();
         let imu = of(imu_topic);

@@ -1,5 +1,6 @@
 //! The messages of the chosen topics.
 
+use super::notes::Notes;
 use super::topics::{POSE_WITH_COVARIANCE, TF_STATIC, TRANSFORM, Topics};
 use crate::progress::Progress;
 use bb_core::message::codec::ros::{Header, TransformStamped, TransformsMessage};
@@ -125,7 +126,7 @@ impl Messages {
     }
 
     /// The messages of the IMU, each after the one before.
-    pub(super) fn samples(&self, topic: &str, notes: &mut Vec<String>) -> Result<Vec<Inertial>, String> {
+    pub(super) fn samples(&self, topic: &str, notes: &mut Notes) -> Result<Vec<Inertial>, String> {
         let mut samples: Vec<Inertial> = Vec::with_capacity(self.imu.len());
         let mut back = 0;
         for sample in &self.imu {
@@ -135,12 +136,9 @@ impl Messages {
                 back += 1;
             }
         }
-        if back > 0 {
-            let count = self.imu.len();
-            notes.push(format!(
-                "{back} of {count} messages of {topic} are not stamped after the one before: left out"
-            ));
-        }
+        let count = self.imu.len();
+        let note = format!("{back} of {count} messages of {topic} are not stamped after the one before: left out");
+        notes.left_out(back, count, note);
         match samples.len() {
             0 => Err(format!("{topic} holds no message, so there is nothing to play")),
             1 => Err(format!("{topic} holds one message with a time of its own, and two are the least to play")),

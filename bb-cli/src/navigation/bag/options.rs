@@ -1,5 +1,6 @@
 //! Which topics of a bag are what, and what the bag does not say.
 
+use crate::navigation::data::DEVIATIONS;
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use bb_estimators::navigation::Geodetic;
 use clap::Args;
@@ -107,9 +108,19 @@ impl FromStr for Mount {
     }
 }
 
+/// The farthest that a sensor may be from another on the same robot, m.
+pub(super) const FARTHEST: f64 = 1000.0;
+
 fn pose(text: &str) -> Result<Isometry3<f64>, String> {
     let pose = |x, y, z, rotation| Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation);
-    match *numbers(text)? {
+    let numbers = numbers(text)?;
+    if let Some(far) = numbers.iter().take(3).find(|metres| metres.abs() > FARTHEST) {
+        return Err(format!("`{far}` is no place on a robot: at most {FARTHEST} m"));
+    }
+    if let Some(turn) = numbers.iter().skip(3).find(|degrees| degrees.abs() > 360.0) {
+        return Err(format!("`{turn}` is no angle: from -360 to 360 degrees"));
+    }
+    match *numbers {
         [x, y, z] => Ok(pose(x, y, z, UnitQuaternion::identity())),
         [x, y, z, roll, pitch, yaw] => {
             let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_radians);
@@ -118,6 +129,9 @@ fn pose(text: &str) -> Result<Isometry3<f64>, String> {
         _ => Err(format!("`{text}` must be X,Y,Z in m, or X,Y,Z,ROLL,PITCH,YAW in m and degrees")),
     }
 }
+
+/// Heights of something on or above the Earth, m.
+const HEIGHTS: std::ops::RangeInclusive<f64> = -1e4..=1e6;
 
 /// Where the origin of the world is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,10 +142,12 @@ impl FromStr for Origin {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match *numbers(text)? {
-            [latitude, longitude, height] if latitude.abs() <= 90.0 && longitude.abs() <= 360.0 => {
+            [latitude, longitude, height]
+                if latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && HEIGHTS.contains(&height) =>
+            {
                 Ok(Self(Geodetic::from_degrees(latitude, longitude, height)))
             }
-            _ => Err("must be LATITUDE,LONGITUDE,HEIGHT in degrees and m, as 48.1,11.6,520".into()),
+            _ => Err("must be LATITUDE,LONGITUDE,HEIGHT on the Earth, in degrees and m, as 48.1,11.6,520".into()),
         }
     }
 }
@@ -174,7 +190,11 @@ impl FromStr for BiasDeviation {
 
 fn deviations(text: &str, example: &str) -> Result<[f64; 2], String> {
     match *numbers(text)? {
-        [a, b] if a > 0.0 && b > 0.0 => Ok([a, b]),
+        [a, b] if DEVIATIONS.contains(&a) && DEVIATIONS.contains(&b) => Ok([a, b]),
+        [a, b] if a > 0.0 && b > 0.0 => {
+            let (least, most) = (DEVIATIONS.start(), DEVIATIONS.end());
+            Err(format!("must be two numbers from {least:e} to {most:e}, as {example}"))
+        }
         _ => Err(format!("must be two positive numbers, as {example}")),
     }
 }
@@ -208,6 +228,9 @@ mod tests {
             ("gps=1,2", "must be X,Y,Z in m"),
             ("gps=1,two,3", "`two` is no number"),
             ("gps=1,inf,3", "`inf` is no number"),
+            ("gps=1,nan,3", "`nan` is no number"),
+            ("gps=1e300,0,0", "is no place on a robot: at most 1000 m"),
+            ("gps=0,0,0,1e20,0,0", "is no angle: from -360 to 360 degrees"),
         ] {
             let said = text.parse::<Mount>().expect_err("is none");
             assert!(said.contains(fault), "{text}: {said}");
@@ -217,11 +240,11 @@ mod tests {
     #[test]
     fn numbers_out_of_their_range_are_refused() {
         assert!("48.1,11.6,520".parse::<Origin>().is_ok());
-        for text in ["91,0,0", "48,11", "48,11,nan"] {
+        for text in ["91,0,0", "48,11", "48,11,nan", "48,11,1e300"] {
             assert!(text.parse::<Origin>().is_err(), "{text}");
         }
         assert!("0.02,0.001".parse::<RelativeDeviation>().is_ok());
-        for text in ["0,0.1", "0.1", "0.1,-1", "a,b"] {
+        for text in ["0,0.1", "0.1", "0.1,-1", "a,b", "1e-160,0.1", "0.1,1e200"] {
             assert!(text.parse::<RelativeDeviation>().is_err() && text.parse::<BiasDeviation>().is_err(), "{text}");
         }
     }

@@ -2,11 +2,12 @@
 
 use super::NavigationBag;
 use super::messages::{Inertial, Time, Told};
+use super::notes::Notes;
 use super::truth::{TrueTrack, isometry};
 use bb_core::nalgebra::{Isometry3, Vector3};
-use bb_core::payload::Odometry;
+use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Odometry};
 use bb_estimators::navigation::{
-    AbsolutePose, BodyVelocity, Geodetic, GnssPosition, LocalFrame, NavigationOptions,
+    AbsolutePose, BodyVelocity, Course, Geodetic, GnssPosition, LocalFrame, NavigationOptions,
 };
 
 /// In the order of time.
@@ -50,7 +51,7 @@ impl NavigationBag {
         &self,
         imu: &[Inertial],
         options: &NavigationOptions,
-        notes: &mut Vec<String>,
+        notes: &mut Notes,
     ) -> Result<Sensors, String> {
         let (topics, messages) = (&self.topics, &self.messages);
         if imu.iter().all(|sample| !is_finite(&sample.angular_velocity) || !is_finite(&sample.specific_force)) {
@@ -63,13 +64,25 @@ impl NavigationBag {
         let (antenna, wheels) = (imu_from(&topics.gnss)?, imu_from(&topics.odometry)?);
         let (camera, map) = (imu_from(&topics.relative)?, imu_from(&topics.pose)?);
         let (start, truth) = (imu_from(&topics.start)?, imu_from(&topics.truth)?);
-        let frame = self.world(notes);
+        let frame = self.world(options.gnss_deviation, notes);
         let fix =
             |fix| GnssPosition::of_fix(fix, frame.as_ref()?, antenna.translation.vector, options.gnss_deviation);
         let fixes: Vec<_> = messages.gnss.iter().filter_map(|(time, of)| Some((*time, fix(of)?))).collect();
-        let without = messages.gnss.len() - fixes.len();
+        let count = messages.gnss.len();
+        let (nowhere, first) = nowhere(&messages.gnss);
+        if let Some(GeodeticPosition { latitude_rad, longitude_rad, altitude }) = first {
+            let (latitude, longitude) = (latitude_rad.to_degrees(), longitude_rad.to_degrees());
+            let height = altitude.unwrap_or(0.0);
+            let note = format!(
+                "{nowhere} of {count} fixes of {} are nowhere on the Earth, the first at latitude {latitude}°, longitude \
+                 {longitude}°, {height} m: left out",
+                topics.gnss.as_deref().unwrap_or_default()
+            );
+            notes.left_out(nowhere, count, note);
+        }
+        let without = count - fixes.len() - nowhere;
         if without > 0 {
-            notes.push(format!("{without} of {} fixes have no position", messages.gnss.len()));
+            notes.push(format!("{without} of {count} fixes have no position"));
         }
         let velocity = |of: &Odometry| BodyVelocity::of_odometry(of, &wheels, options.odometry_deviation);
         let pose = |of: &_| AbsolutePose::of_pose(of, &map, options.pose_deviation);
@@ -97,16 +110,22 @@ impl NavigationBag {
     }
 
     /// Where the world begins, if there are positions on the Earth.
-    fn world(&self, notes: &mut Vec<String>) -> Option<LocalFrame> {
+    fn world(&self, deviation: f64, notes: &mut Notes) -> Option<LocalFrame> {
         let messages = &self.messages;
-        let of_truth = messages.truth.iter().filter_map(|(_, told)| match told {
+        let mut of_truth = messages.truth.iter().filter_map(|(_, told)| match told {
             Told::OnEarth(at) => *at,
             _ => None,
         });
-        let fixes = messages.gnss.iter().filter_map(|(_, fix)| Geodetic::of_fix(fix, 0.0));
-        let first = fixes
-            .chain(of_truth)
-            .find(|at| [at.latitude, at.longitude, at.height].iter().all(|x| x.is_finite()))?;
+        let is_number = |at: &Geodetic| [at.latitude, at.longitude, at.height].iter().all(|x| x.is_finite());
+        // A receiver may begin with zeros, or with where it was switched off.
+        let mut course = Course::within(None);
+        for (time, fix) in &messages.gnss {
+            course.add(*time, fix, deviation);
+            if course.newest(*time).is_some() {
+                break;
+            }
+        }
+        let first = course.frame().map(|frame| *frame.origin()).or_else(|| of_truth.find(is_number))?;
         if let Some(origin) = &self.options.origin {
             return Some(LocalFrame::new(origin.0));
         }
@@ -172,6 +191,14 @@ impl NavigationBag {
         };
         Ok(poses.iter().enumerate().map(pose).collect())
     }
+}
+
+/// How many fixes have a position that is none, and the first of these.
+fn nowhere(fixes: &[(Time, GnssFix)]) -> (usize, Option<GeodeticPosition>) {
+    let is_nowhere = |fix: &GnssFix| fix.status != GnssStatus::NoFix && Geodetic::of_fix(fix, 0.0).is_none();
+    let mut positions = fixes.iter().filter(|(_, fix)| is_nowhere(fix)).filter_map(|(_, fix)| fix.position);
+    let first = positions.next();
+    (positions.count() + usize::from(first.is_some()), first)
 }
 
 fn is_finite(vector: &Vector3<f64>) -> bool {

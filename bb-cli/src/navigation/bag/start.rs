@@ -3,6 +3,7 @@
 use super::NavigationBag;
 use super::align::align;
 use super::messages::{Inertial, Time};
+use super::notes::Notes;
 use super::options::StartFrom;
 use super::sensors::Sensors;
 use crate::navigation::data::Truth;
@@ -28,7 +29,7 @@ impl NavigationBag {
         imu: &[Inertial],
         sensors: &Sensors,
         params: &EskfParams,
-        notes: &mut Vec<String>,
+        notes: &mut Notes,
     ) -> Result<Start, String> {
         let first_ns = imu.first().map_or(0, |sample| sample.time_ns);
         let mut start = match (&self.options.start, &self.topics.start) {

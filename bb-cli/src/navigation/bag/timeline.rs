@@ -2,6 +2,7 @@
 
 use super::NavigationBag;
 use super::messages::{Inertial, Time};
+use super::notes::Notes;
 use super::sensors::Sensors;
 use crate::navigation::data::{DataSet, Keyframe, Sample};
 use bb_estimators::navigation::{RelativePose, Start};
@@ -21,7 +22,7 @@ pub(super) fn data_set(
     start: Start,
     longest_s: f64,
     is_smoother: bool,
-    notes: &mut Vec<String>,
+    notes: &mut Notes,
 ) -> Result<DataSet, String> {
     let start_ns = start.time_ns;
     let scored = scored(&sensors, start_ns);
@@ -41,6 +42,7 @@ pub(super) fn data_set(
     }
 
     let mut walk = Walk::new(start_ns);
+    let all = times.range(start_ns.saturating_add(1)..).count();
     let mut next = times.range(start_ns.saturating_add(1)..).copied().peekable();
     for pair in imu.windows(2) {
         let [before, after] = pair else { continue };
@@ -61,21 +63,15 @@ pub(super) fn data_set(
     let beyond = next.count();
     let Walk { samples, mut keyframes, numbers, in_gaps, .. } = walk;
     let imu_topic = &bag.topics.imu;
-    if in_gaps > 0 {
-        notes.push(format!(
-            "{in_gaps} instants at which something was measured are in gaps of {imu_topic} of more than {longest_s} s: left out"
-        ));
-    }
-    if beyond > 0 {
-        notes.push(format!(
-            "{beyond} instants at which something was measured are after the last of {imu_topic}: left out"
-        ));
-    }
     if keyframes.len() < 2 {
         return Err(format!(
             "nothing was measured while {imu_topic} was there, after the start: are all stamped by one clock?"
         ));
     }
+    let of_all = format!("of {all} instants at which something was measured are");
+    let note = format!("{in_gaps} {of_all} in gaps of {imu_topic} of more than {longest_s} s: left out");
+    notes.left_out(in_gaps, all, note);
+    notes.left_out(beyond, all, format!("{beyond} {of_all} after the last of {imu_topic}: left out"));
     for (time, number) in &numbers {
         let Some(keyframe) = usize::try_from(*number).ok().and_then(|index| keyframes.get_mut(index)) else {
             continue;
@@ -159,7 +155,8 @@ struct Moved {
     /// The longest way that is gone.
     period_ns: i64,
     farthest_ns: i64,
-    dropped: u64,
+    dropped: usize,
+    all: usize,
 }
 
 impl Moved {
@@ -171,13 +168,14 @@ impl Moved {
         let mut periods: Vec<_> = nodes.windows(2).map(|pair| pair[1] - pair[0]).collect();
         periods.sort_unstable();
         let period_ns = periods.get(periods.len() / 2).copied().unwrap_or(0);
-        Self { nodes, period_ns, farthest_ns: 0, dropped: 0 }
+        Self { nodes, period_ns, farthest_ns: 0, dropped: 0, all: 0 }
     }
 
     fn to(&mut self, time: Time) -> Option<Time> {
         if self.nodes.is_empty() {
             return Some(time);
         }
+        self.all += 1;
         let next = self.nodes.partition_point(|node| *node < time);
         let near =
             [next.checked_sub(1), Some(next)].into_iter().flatten().filter_map(|index| self.nodes.get(index));
@@ -190,19 +188,17 @@ impl Moved {
         Some(nearest)
     }
 
-    fn tell(&self, notes: &mut Vec<String>) {
+    fn tell(&self, notes: &mut Notes) {
         if self.farthest_ns > 0 {
             notes.push(format!(
                 "a smoother takes measurements at the nearest relative pose: by up to {:.1} ms away",
                 self.farthest_ns as f64 * 1e-6
             ));
         }
-        if self.dropped > 0 {
-            notes.push(format!(
-                "{} measurements are farther than a period from a relative pose: left out",
-                self.dropped
-            ));
-        }
+        let Self { dropped, all, .. } = *self;
+        let note =
+            format!("{dropped} of {all} measurements are farther than a period from a relative pose: left out");
+        notes.left_out(dropped, all, note);
     }
 }
 
@@ -224,7 +220,7 @@ fn relative(sensors: &Sensors, numbers: &Numbers) -> HashMap<u64, RelativePose> 
 }
 
 /// Says why nothing is scored.
-fn no_truth(bag: &NavigationBag, sensors: &Sensors, is_scored: bool, notes: &mut Vec<String>) {
+fn no_truth(bag: &NavigationBag, sensors: &Sensors, is_scored: bool, notes: &mut Notes) {
     if let Some(why) = &bag.topics.no_truth {
         notes.push(format!("no truth, so no errors: {why}"));
     } else if let Some(topic) = &bag.topics.truth {

@@ -1,10 +1,12 @@
 //! The filter: samples of the IMU move it, measurements correct it.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
 
 use super::params::{EskfParams, ImuDensities};
 use super::propagation::Transition;
-use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE, ParamsError};
+use super::sample::{ImuMean, LONGEST_GAP_S, seconds_between};
+use super::start::Start;
+use crate::attitude::ParamsError;
 use crate::navigation::covariance::{Covariance, MOST_ROTATION, MOST_VARIANCE};
 use crate::navigation::fused::Fused;
 use crate::navigation::fusion::{Weighed, innovation, prepared};
@@ -12,18 +14,14 @@ use crate::navigation::math::{Integrals, exp};
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
-    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
-    States, VELOCITY, distinct, offset,
+    Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, distinct, offset,
 };
 use crate::navigation::stream::{Gate, Stream};
+use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
 /// A correction of the rotation below this squared angle, rad², leaves the covariance as it is: to rounding, the same.
 const RESET: f64 = 1e-12;
-
-/// What a keyframe differs from the pose that it copies by, as a part of the variance: 3 µm where a pose is known to a
-/// metre.
-const COPY: f64 = 1e-11;
 
 /// The largest variances of position, velocity and rotation.
 const LIMITS: [f64; 9] = [
@@ -37,143 +35,6 @@ const LIMITS: [f64; 9] = [
     MOST_ROTATION,
     MOST_ROTATION,
 ];
-
-/// The longest gap that is bridged at all, s: a body may be anywhere after it.
-pub(in crate::navigation) const LONGEST_GAP_S: f64 = 60.0;
-
-/// One sample of the IMU, body axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImuMean {
-    /// The end of the interval, nanoseconds since any fixed moment. It begins where the last one ended.
-    pub time_ns: i64,
-    /// Mean angular velocity over the interval, rad/s.
-    pub angular_velocity: Vector3<f64>,
-    /// Mean specific force over the interval, m/s²: at rest one g upwards.
-    pub specific_force: Vector3<f64>,
-}
-
-impl ImuMean {
-    /// Whether it may have been measured.
-    pub(in crate::navigation) fn check(&self) -> Result<(), Refusal> {
-        // Within its limit is no NaN.
-        let within = |vector: &Vector3<f64>, limit: f64| vector.iter().all(|x| (-limit..=limit).contains(x));
-        if within(&self.angular_velocity, MAX_ANGULAR_VELOCITY) && within(&self.specific_force, MAX_SPECIFIC_FORCE)
-        {
-            return Ok(());
-        }
-        let mut components = self.angular_velocity.iter().chain(self.specific_force.iter());
-        let is_finite = components.all(|x| x.is_finite());
-        Err(if is_finite { Refusal::OutOfRange } else { Refusal::NonFinite })
-    }
-}
-
-/// What is known when a filter starts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start {
-    /// When, nanoseconds since any fixed moment.
-    pub time_ns: i64,
-    /// Position in the world, m.
-    pub position: Vector3<f64>,
-    /// Velocity in the world, m/s.
-    pub velocity: Vector3<f64>,
-    /// Takes body coordinates to the world.
-    pub world_from_body: UnitQuaternion<f64>,
-    /// Of the accelerometer, body axes, m/s².
-    pub accelerometer_bias: Vector3<f64>,
-    /// Of the gyroscope, body axes, rad/s.
-    pub gyroscope_bias: Vector3<f64>,
-    /// Covariance of the position, m².
-    pub position_covariance: Matrix3<f64>,
-    /// Covariance of the velocity, m²/s².
-    pub velocity_covariance: Matrix3<f64>,
-    /// Covariance of the rotation error, world axes, rad².
-    pub rotation_covariance: Matrix3<f64>,
-    /// Standard deviation of the accelerometer's bias, m/s².
-    pub accelerometer_bias_deviation: f64,
-    /// Standard deviation of the gyroscope's bias, rad/s.
-    pub gyroscope_bias_deviation: f64,
-}
-
-impl Start {
-    /// A pose that is known up to standard deviations that are alike along all axes, m, m/s, rad. Biases are zero up to
-    /// 0.2 m/s² and 0.02 rad/s.
-    pub fn at(
-        time_ns: i64,
-        position: (Vector3<f64>, f64),
-        velocity: (Vector3<f64>, f64),
-        world_from_body: (UnitQuaternion<f64>, f64),
-    ) -> Self {
-        let isotropic = |deviation: f64| Matrix3::identity() * (deviation * deviation);
-        Self {
-            time_ns,
-            position: position.0,
-            velocity: velocity.0,
-            world_from_body: world_from_body.0,
-            accelerometer_bias: Vector3::zeros(),
-            gyroscope_bias: Vector3::zeros(),
-            position_covariance: isotropic(position.1),
-            velocity_covariance: isotropic(velocity.1),
-            rotation_covariance: isotropic(world_from_body.1),
-            accelerometer_bias_deviation: 0.2,
-            gyroscope_bias_deviation: 0.02,
-        }
-    }
-
-    /// The state and the covariance that it says.
-    fn state<S: States, const N: usize>(
-        &self,
-        params: &EskfParams,
-    ) -> Result<(Estimate<N>, Covariance<N>), Refusal> {
-        let mut covariance = Covariance::new();
-        covariance.set(POSITION, &self.position_covariance);
-        covariance.set(VELOCITY, &self.velocity_covariance);
-        covariance.set(ROTATION, &self.rotation_covariance);
-        for i in 0..3 {
-            let square = |x: f64| x * x;
-            covariance.forget(ACCELEROMETER_BIAS + i, square(self.accelerometer_bias_deviation));
-            covariance.forget(GYROSCOPE_BIAS + i, square(self.gyroscope_bias_deviation));
-        }
-        for state in S::OPTIONAL {
-            let variance = params.process(*state).map_or(1.0, |process| process.deviation * process.deviation);
-            let Some(first) = offset::<S>(*state) else { continue };
-            for i in first..first + state.dimension() {
-                // 0 would make the matrix singular; the state is known all the same.
-                covariance.forget(i, variance.max(1e-24));
-            }
-        }
-        let norm = self.world_from_body.norm();
-        let estimate = Estimate {
-            time_ns: self.time_ns,
-            position: self.position,
-            velocity: self.velocity,
-            world_from_body: UnitQuaternion::new_normalize(self.world_from_body.into_inner()),
-            accelerometer_bias: self.accelerometer_bias,
-            gyroscope_bias: self.gyroscope_bias,
-            angular_velocity: Vector3::zeros(),
-            specific_force: Vector3::zeros(),
-            keyframe: None,
-            optional: SVector::zeros(),
-        };
-        if !estimate.is_finite() || !(0.5..2.0).contains(&norm) {
-            return Err(Refusal::NonFinite);
-        }
-        if !covariance.is_positive_definite() {
-            return Err(Refusal::Noise);
-        }
-        Ok((estimate, covariance))
-    }
-
-    /// The state and the information that it says: the inverse of the covariance.
-    #[cfg(feature = "smoother")]
-    pub(in crate::navigation) fn information<S: States, const N: usize>(
-        &self,
-        params: &EskfParams,
-    ) -> Result<(Estimate<N>, SMatrix<f64, N, N>), Refusal> {
-        let (estimate, covariance) = self.state::<S, N>(params)?;
-        let information = nalgebra::linalg::Cholesky::new(*covariance.matrix()).ok_or(Refusal::Noise)?;
-        Ok((estimate, information.inverse()))
-    }
-}
 
 /// An error-state Kalman filter with the optional states `S` and `N` errors in all; see the [module](super).
 ///
@@ -196,14 +57,11 @@ impl Start {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
-    params: EskfParams,
+    pub(super) params: EskfParams,
     densities: ImuDensities,
-    estimate: Option<Estimate<N>>,
-    covariance: Covariance<N>,
-    resets: u32,
-    gaps: u32,
-    /// When the position was last corrected by one of the world.
-    fixed_ns: i64,
+    pub(super) estimate: Option<Estimate<N>>,
+    pub(super) covariance: Covariance<N>,
+    pub(super) upkeep: Upkeep,
     states: core::marker::PhantomData<S>,
 }
 
@@ -222,7 +80,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let densities = params.densities();
         let covariance = Covariance::new();
         let states = core::marker::PhantomData;
-        Ok(Self { params, densities, estimate: None, covariance, resets: 0, gaps: 0, fixed_ns: 0, states })
+        Ok(Self { params, densities, estimate: None, covariance, upkeep: Upkeep::default(), states })
     }
 
     /// The parameters that the filter was made with.
@@ -238,8 +96,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// not positive definite. The filter is then as it was.
     pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         let (estimate, covariance) = start.state::<S, N>(&self.params)?;
-        self.resets = self.resets.wrapping_add(1);
-        self.fixed_ns = start.time_ns;
+        self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
         Ok(())
@@ -305,7 +162,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         transition.apply(self.covariance.rows_mut(), &self.params.gap_densities());
         self.covariance.bound(&LIMITS);
-        self.gaps = self.gaps.wrapping_add(1);
+        self.upkeep.bridged();
         self.decay(dt);
         Ok(())
     }
@@ -365,7 +222,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.estimate = Some(corrected);
         self.covariance.update(&weighed.innovation);
         if Self::fixes_position(&model) {
-            self.fixed_ns = corrected.time_ns;
+            self.upkeep.fixed_ns = corrected.time_ns;
         }
         self.reset_rotation(ROTATION, &error);
         if let Some(index) = offset::<S>(Optional::Keyframe) {
@@ -404,125 +261,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
         }
     }
 
-    /// Starts afresh from what another estimator of the same robot estimates, with the correlations of all that both estimate:
-    /// a prediction beside it, or another noise. Optional states that the other has not are zero, with the deviations of the
-    /// parameters.
-    ///
-    /// # Errors
-    ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if the covariance is not positive definite. The
-    /// filter is then as it was.
-    pub fn adopt<T: States, const M: usize>(
-        &mut self,
-        other: &Estimate<M>,
-        covariance: &SMatrix<f64, M, M>,
-    ) -> Result<(), Refusal> {
-        let mut adopted = Covariance::new();
-        let mut estimate = Estimate {
-            time_ns: other.time_ns,
-            position: other.position,
-            velocity: other.velocity,
-            world_from_body: other.world_from_body,
-            accelerometer_bias: other.accelerometer_bias,
-            gyroscope_bias: other.gyroscope_bias,
-            angular_velocity: other.angular_velocity,
-            specific_force: other.specific_force,
-            keyframe: None,
-            optional: SVector::zeros(),
-        };
-        // Where each error is in the other's; none if it has it not.
-        let mut places: [Option<usize>; N] = core::array::from_fn(|i| (i < NAVIGATION).then_some(i));
-        for state in S::OPTIONAL.iter().filter(|state| **state != Optional::Keyframe) {
-            let (Some(first), Some(theirs)) = (offset::<S>(*state), offset::<T>(*state)) else { continue };
-            for i in 0..state.dimension() {
-                places[first + i] = Some(theirs + i);
-                estimate.optional[first + i] = other.optional[theirs + i];
-            }
-        }
-        for state in S::OPTIONAL {
-            let variance = self.params.process(*state).map_or(1.0, |process| process.deviation * process.deviation);
-            let Some(first) = offset::<S>(*state) else { continue };
-            (first..first + state.dimension()).for_each(|i| adopted.forget(i, variance.max(1e-24)));
-        }
-        for i in 0..N {
-            for j in 0..N {
-                if let (Some(row), Some(column)) = (places[i], places[j]) {
-                    adopted.rows_mut()[i][j] = 0.5 * (covariance[(row, column)] + covariance[(column, row)]);
-                }
-            }
-        }
-        if !estimate.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
-            return Err(Refusal::NonFinite);
-        }
-        if !adopted.is_positive_definite() {
-            return Err(Refusal::Noise);
-        }
-        self.resets = self.resets.wrapping_add(1);
-        self.fixed_ns = estimate.time_ns;
-        self.estimate = Some(estimate);
-        self.covariance = adopted;
-        Ok(())
-    }
-
-    /// Makes the present pose the keyframe that relative poses refer to. A filter without [`Optional::Keyframe`] ignores
-    /// it.
-    pub fn set_keyframe(&mut self, id: u64) {
-        let (Some(estimate), Some(first)) = (&mut self.estimate, offset::<S>(Optional::Keyframe)) else { return };
-        let (position, world_from_body) = (estimate.position, estimate.world_from_body);
-        estimate.keyframe = Some(Keyframe { id, position, world_from_body });
-        for i in 0..3 {
-            // Far above rounding, far below what any sensor resolves. It keeps the covariance regular.
-            let differs = |index: usize| COPY * self.covariance.matrix()[(index, index)];
-            let (position, rotation) = (differs(POSITION + i), differs(ROTATION + i));
-            self.covariance.copy(POSITION + i, first + i, position);
-            self.covariance.copy(ROTATION + i, first + 3 + i, rotation);
-        }
-    }
-
-    /// Moves the filter to another world, a local frame nearer by: `new_from_old` takes coordinates of the present one there.
-    ///
-    /// # Errors
-    ///
-    /// [`Refusal::NonFinite`] if that has a component that is not finite. The filter is then as it was.
-    pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
-        let Some(estimate) = &mut self.estimate else { return Ok(()) };
-        let mut components = new_from_old.translation.vector.iter().chain(new_from_old.rotation.coords.iter());
-        if !components.all(|x| x.is_finite()) {
-            return Err(Refusal::NonFinite);
-        }
-        let rotation = new_from_old.rotation;
-        estimate.position = new_from_old.transform_point(&estimate.position.into()).coords;
-        estimate.velocity = rotation * estimate.velocity;
-        estimate.world_from_body = rotation * estimate.world_from_body;
-        if let Some(keyframe) = &mut estimate.keyframe {
-            keyframe.position = new_from_old.transform_point(&keyframe.position.into()).coords;
-            keyframe.world_from_body = rotation * keyframe.world_from_body;
-        }
-        // Errors are in the world's axes.
-        let rotation = rotation.to_rotation_matrix().into_inner();
-        for first in [POSITION, VELOCITY, ROTATION] {
-            self.covariance.transform(first, &rotation);
-        }
-        if let Some(first) = offset::<S>(Optional::Keyframe) {
-            self.covariance.transform(first, &rotation);
-            self.covariance.transform(first + 3, &rotation);
-        }
-        Ok(())
-    }
-
-    /// Adds to the variance of an error, for those who know of something that the model does not.
-    ///
-    /// # Errors
-    ///
-    /// [`Refusal::Noise`] if the variance is not one, or there is no such error.
-    pub fn inflate(&mut self, error: usize, variance: f64) -> Result<(), Refusal> {
-        if error >= N || !(0.0..1e18).contains(&variance) {
-            return Err(Refusal::Noise);
-        }
-        self.covariance.inflate(error, variance);
-        Ok(())
-    }
-
     /// What is estimated, at the end of the last sample; none before the start.
     pub fn estimate(&self) -> Option<&Estimate<N>> {
         self.estimate.as_ref()
@@ -552,8 +290,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(estimate)
     }
 
-    /// Covariance of all errors, `N × N`, in the order of the constants [`POSITION`] to [`GYROSCOPE_BIAS`] and then of
-    /// the optional states. Symmetric to the last bit.
+    /// Covariance of all errors, `N × N`, in the order of the constants [`POSITION`] to
+    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states. Symmetric to the last bit.
     pub fn covariance(&self) -> &SMatrix<f64, N, N> {
         self.covariance.matrix()
     }
@@ -564,38 +302,5 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Matrix6::from_fn(|i, j| self.covariance.matrix()[(index(i), index(j))])
     }
 
-    /// Whether the covariance is positive definite now, by a Cholesky decomposition.
-    pub fn is_consistent(&self) -> bool {
-        self.covariance.is_positive_definite()
-    }
-
-    /// How often rounding had made the covariance indefinite, and variances were raised.
-    pub fn repairs(&self) -> u64 {
-        self.covariance.repairs()
-    }
-
-    /// How often the filter was started.
-    pub fn resets(&self) -> u32 {
-        self.resets
-    }
-
-    /// For how long the horizontal position has not been corrected by one in the world, s: relative poses, velocities and
-    /// heights do not count. 0 before the start.
-    pub fn dead_reckoning_s(&self) -> f64 {
-        self.estimate.map_or(0.0, |estimate| estimate.time_ns.saturating_sub(self.fixed_ns) as f64 * 1e-9)
-    }
-
-    /// How many gaps were bridged.
-    pub fn gaps(&self) -> u32 {
-        self.gaps
-    }
-}
-
-/// From one stamp to a later one, s.
-pub(in crate::navigation) fn seconds_between(previous_ns: i64, time_ns: i64) -> Result<f64, Refusal> {
-    if time_ns <= previous_ns {
-        return Err(Refusal::TimeNotIncreasing { previous_ns, time_ns });
-    }
-    // The difference of two stamps can be wider than their type.
-    Ok(time_ns.checked_sub(previous_ns).unwrap_or(i64::MAX) as f64 * 1e-9)
+    upkeep_methods!();
 }

@@ -194,4 +194,11 @@ impl EskfParams {
             Optional::BarometerBias => Some(self.barometer_bias),
         }
     }
+
+    /// The variance of a component of an optional state at the start.
+    pub(in crate::navigation) fn variance(&self, state: Optional) -> f64 {
+        let variance = self.process(state).map_or(1.0, |process| process.deviation * process.deviation);
+        // 0 would make the matrix singular; the state is known all the same.
+        variance.max(1e-24)
+    }
 }

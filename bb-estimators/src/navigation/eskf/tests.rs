@@ -9,8 +9,8 @@ mod transition;
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::filter::{Eskf, ImuMean, Start};
 use super::params::EskfParams;
+use super::{Eskf, ImuMean, Start};
 use crate::navigation::state::{Estimate, Optional, States};
 
 /// Everything that there is.

@@ -52,6 +52,7 @@ impl Aligning {
         }
         self.first_ns = self.first_ns.or(Some(sample.time_ns));
         self.last_ns = sample.time_ns;
+        self.course.turn(sample);
         self.course.see(inputs.gnss, options.gnss_deviation);
         let start = self.start(options, mounting).ok()?;
         Some((start, World::new(self.course.frame())))
@@ -62,10 +63,10 @@ impl Aligning {
             let heading = (options.heading, options.heading_deviation);
             return self.alignment.at_rest((-mounting.link(), ORIGIN), heading);
         }
-        let fix = self.course.newest().ok_or(Refusal::NotObservable)?;
+        let fix = self.course.newest(self.last_ns).ok_or(Refusal::NotObservable)?;
         let position = (fix.position, fix.deviation());
         let start = if options.heading_from_course {
-            let velocity = self.course.velocity().ok_or(Refusal::NotObservable)?;
+            let velocity = self.course.velocity(self.last_ns).ok_or(Refusal::NotObservable)?;
             self.alignment.in_motion(position, velocity, &Vector3::x(), SLIP)?
         } else {
             self.alignment.at_rest(position, (options.heading, options.heading_deviation))?

@@ -3,18 +3,20 @@
 use super::health::{Sight, largest_deviation};
 use super::input::keyframe_at;
 use super::options::NavigationOptions;
+use super::refuted::Found;
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
+use crate::navigation::math::skew;
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssPosition, MagneticHeading, NonHolonomic, RelativePose,
     WheelSpeed,
 };
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{Estimate, POSITION, States};
+use crate::navigation::state::{Estimate, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::stream::{Counts, Stream, StreamParams};
 use bb_core::Fault;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
 /// See the [module](self).
 #[derive(Clone, Debug)]
@@ -40,16 +42,18 @@ pub(super) enum Measured {
 
 /// The streams of sensors: wheels have a second one, for what they do not do.
 const SENSORS: usize = 7;
+const GNSS: usize = 0;
+const POSE: usize = 3;
 const NAMES: [&str; SENSORS] =
     ["gnss", "odometry", "odometry, sideways", "pose", "relative", "magnetic_field", "pressure"];
 
 impl Measured {
     fn sensor(&self) -> usize {
         match self {
-            Self::Gnss(_) => 0,
+            Self::Gnss(_) => GNSS,
             Self::Odometry(_) | Self::Wheels(_) => 1,
             Self::Sideways(_) => 2,
-            Self::Pose(_) => 3,
+            Self::Pose(_) => POSE,
             Self::Relative(..) => 4,
             Self::MagneticField(_) => 5,
             Self::Pressure(_) => 6,
@@ -66,7 +70,12 @@ impl<S: States, const N: usize> Filter<S, N> {
         let mut eskf = Eskf::new(options.params())?;
         eskf.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let stream = Stream::new(StreamParams { patience: options.patience, ..StreamParams::default() });
-        Ok(Self { eskf, streams: [stream; SENSORS] })
+        let mut streams = [stream; SENSORS];
+        // A filter that these refute is moved instead: see `refuted.rs`.
+        for sensor in [GNSS, POSE] {
+            streams[sensor] = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
+        }
+        Ok(Self { eskf, streams })
     }
 
     pub(super) fn eskf(&self) -> &Eskf<S, N> {
@@ -98,9 +107,40 @@ impl<S: States, const N: usize> Filter<S, N> {
         Some(Sight {
             now_ns: self.time_ns()?,
             counts,
+            resets: self.eskf.resets(),
             dead_reckoning_s: self.eskf.dead_reckoning_s(),
             deviation: self.horizontal_deviation(),
         })
+    }
+
+    /// What became of fixes, and of poses.
+    pub(super) fn positions(&self) -> [&Counts; 2] {
+        [GNSS, POSE].map(|sensor| self.streams[sensor].counts())
+    }
+
+    /// Moves it to where the sensor of `found` was found to be: at `lever_arm` in the body, m, turned as `orientation` says, if
+    /// that is known.
+    pub(super) fn relocate(
+        &mut self,
+        found: &Found,
+        lever_arm: &Vector3<f64>,
+        orientation: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
+    ) -> Result<(), Refusal> {
+        let estimate = *self.estimate().ok_or(Refusal::NotStarted)?;
+        let block = |first: usize| self.eskf.covariance().fixed_view::<3, 3>(first, first).into_owned();
+        let own = (estimate.velocity, block(VELOCITY));
+        let velocity = found.new_velocity(&own.0, &own.1);
+        let (speed, of_speed) = velocity.unwrap_or(own);
+        let (rotation, of_rotation) = orientation.unwrap_or((estimate.world_from_body, block(ROTATION)));
+        let (position, covariance) = found.at(estimate.time_ns, &speed, &of_speed);
+        let arm = rotation * lever_arm;
+        let by_rotation = skew(&arm);
+        let covariance = covariance + by_rotation * of_rotation * by_rotation.transpose();
+        self.eskf.relocate((position - arm, covariance), velocity, orientation)?;
+        for sensor in [GNSS, POSE] {
+            self.streams[sensor].forgive();
+        }
+        Ok(())
     }
 
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {

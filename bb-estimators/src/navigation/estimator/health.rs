@@ -14,6 +14,9 @@ pub(in crate::navigation) struct Watch {
     limits: Limits,
     recoveries: u64,
     distrusted_until_ns: i64,
+    /// After the start.
+    resets: u32,
+    moved_until_ns: i64,
 }
 
 /// What an estimate may be at most.
@@ -30,6 +33,8 @@ pub(in crate::navigation) struct Limits {
 pub(in crate::navigation) struct Sight<'a> {
     pub(in crate::navigation) now_ns: i64,
     pub(in crate::navigation) counts: &'a [&'a Counts],
+    /// How often the filter was started or moved.
+    pub(in crate::navigation) resets: u32,
     pub(in crate::navigation) dead_reckoning_s: f64,
     /// Standard deviation of the horizontal position, in the direction where it is least known, m.
     pub(in crate::navigation) deviation: f64,
@@ -37,7 +42,7 @@ pub(in crate::navigation) struct Sight<'a> {
 
 impl Watch {
     pub(in crate::navigation) fn new(limits: Limits) -> Self {
-        Self { limits, recoveries: 0, distrusted_until_ns: i64::MIN }
+        Self { limits, recoveries: 0, distrusted_until_ns: i64::MIN, resets: 1, moved_until_ns: i64::MIN }
     }
 
     /// Why the estimate is not to be trusted, if it is not.
@@ -48,6 +53,13 @@ impl Watch {
             self.distrusted_until_ns = sight.now_ns.saturating_add(DISTRUST_NS);
         }
         self.recoveries = recoveries;
+        if sight.resets > self.resets {
+            self.resets = sight.resets;
+            self.moved_until_ns = sight.now_ns.saturating_add(DISTRUST_NS);
+        }
+        if sight.now_ns < self.moved_until_ns {
+            return Some("it was wrong, and began again where positions agree");
+        }
         let is_storm = sight.counts.iter().any(|counts| counts.gate_in_a_row >= STORM);
         if sight.now_ns < self.distrusted_until_ns || is_storm {
             return Some("its sensors do not agree with it");

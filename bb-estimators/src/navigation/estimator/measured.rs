@@ -72,9 +72,7 @@ impl AbsolutePose {
         let (position, rotation) = match told(pose.covariance) {
             Some(covariance) => {
                 let block = |first: usize| covariance.fixed_view::<3, 3>(first, first).into_owned();
-                // Of the orientation it is the covariance of a small rotation of the sensor.
-                let of_sensor = pose.world_from_body.to_rotation_matrix().into_inner();
-                (block(0), of_sensor * block(3) * of_sensor.transpose())
+                (block(0), block(3))
             }
             None => (isotropic(deviation), isotropic(0.1 * deviation)),
         };

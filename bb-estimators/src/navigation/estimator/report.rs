@@ -47,6 +47,8 @@ pub struct NavigationStatus {
     pub barometer_bias: f64,
     /// How often samples of the IMU were missing for longer than a sample may take.
     pub gaps: u32,
+    /// How often the filter was wrong, and began again where fixes or poses agree.
+    pub resets: u32,
 }
 
 /// What became of a sensor's measurements since the start.
@@ -91,17 +93,16 @@ pub(super) fn odometry_of<S: States, const N: usize>(
     let position_rotation = block(POSITION, ROTATION) + from_rotation * block(ROTATION, ROTATION);
     let first_from_frame = world.first_from_frame();
     let turned = first_from_frame.rotation.to_rotation_matrix().into_inner();
-    // Rotations of the body, as a pose has them.
-    let to_body = rotation.transpose();
     let pose = Pose {
         position: first_from_frame.transform_point(&(estimate.position + arm).into()).coords,
         world_from_body: first_from_frame.rotation * estimate.world_from_body,
         covariance: Some(symmetric(
             turned * position * turned.transpose(),
-            turned * position_rotation * to_body.transpose(),
-            to_body * block(ROTATION, ROTATION) * to_body.transpose(),
+            turned * position_rotation * turned.transpose(),
+            turned * block(ROTATION, ROTATION) * turned.transpose(),
         )),
     };
+    let to_body = rotation.transpose();
     // Rᵀ v + ω × l: errors of v, of R by Rᵀ [v]ₓ, and of the gyroscope's bias by [l]ₓ.
     let of_rotation = to_body * skew(&estimate.velocity);
     let of_bias = skew(&link);
@@ -147,6 +148,8 @@ pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Opt
         hard_iron: estimate.vector::<S>(Optional::HardIron),
         barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
         gaps: filter.eskf().gaps(),
+        // The start is the first.
+        resets: filter.eskf().resets().saturating_sub(1),
     })
 }
 

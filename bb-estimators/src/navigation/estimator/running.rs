@@ -5,15 +5,19 @@ use super::health::{Limits, Watch};
 use super::height::Heights;
 use super::input::{Mounting, NavigationInputs};
 use super::options::NavigationOptions;
+use super::refuted::{Found, Refuted};
 use super::report::{NavigationStatus, odometry_of, status_of};
 use super::world::World;
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::history::History;
+use crate::navigation::measurement::AbsolutePose;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{NAVIGATION, Navigation, Optional, States, Wheeled, offset};
+use crate::navigation::track::TrackPoint;
 use bb_core::Fault;
 use bb_core::payload::Odometry;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::any::TypeId;
 use std::fmt::Debug;
 
@@ -59,6 +63,11 @@ struct Running<S: States, const N: usize> {
     world: World,
     heights: Heights,
     watch: Watch,
+    /// Fixes, and poses.
+    fixes: Refuted,
+    poses: Refuted,
+    /// How the last pose was turned.
+    orientation: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
 }
 
 /// A filter that has started.
@@ -102,7 +111,15 @@ fn running<S: States + Send + 'static, const N: usize>(
 ) -> Result<Box<dyn Core>, Fault> {
     let filter = Filter::<S, N>::new(options, start)?;
     let past = Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
-    Ok(Box::new(Running { past, world, heights: Heights::default(), watch: Watch::new(limits) }))
+    Ok(Box::new(Running {
+        past,
+        world,
+        heights: Heights::default(),
+        watch: Watch::new(limits),
+        fixes: Refuted::default(),
+        poses: Refuted::default(),
+        orientation: None,
+    }))
 }
 
 impl<S: States, const N: usize> Running<S, N> {
@@ -110,6 +127,44 @@ impl<S: States, const N: usize> Running<S, N> {
         if let Err(refusal) = self.past.update(time_ns, &measured) {
             tracing::debug!(%refusal, sensor = measured.name(), "measurement refused");
         }
+    }
+
+    /// If fixes or poses agree among each other and not with the filter, it is moved there.
+    fn go_where_positions_agree(
+        &mut self,
+        options: &NavigationOptions,
+        mounting: &Mounting,
+    ) -> Result<(), Refusal> {
+        let now = self.past.now();
+        let [of_fixes, of_poses] = now.positions();
+        let (found, lever_arm, orientation, world) =
+            if let Some(found) = self.fixes.verdict(of_fixes, options.patience) {
+                let jump = now.position().map_or(0.0, |position| (found.point.position - position).norm());
+                let world = self.world.corrected(&found.point.position, jump);
+                let position = self.world.position_in(&world, &found.point.position);
+                let found = Found { point: TrackPoint { position, ..found.point }, ..found };
+                (found, mounting.antenna(), None, world)
+            } else if let Some(found) = self.poses.verdict(of_poses, options.patience) {
+                (found, Vector3::zeros(), self.orientation, self.world)
+            } else {
+                return Ok(());
+            };
+        let mut filter = now.clone();
+        filter.relocate(&found, &lever_arm, orientation)?;
+        tracing::warn!(position = ?found.point.position, "it was wrong, and begins again where positions agree");
+        // The barometer is read anew from here.
+        self.heights = Heights::default();
+        let [of_fixes, of_poses] = filter.positions();
+        self.fixes.begin(of_fixes);
+        self.poses.begin(of_poses);
+        self.begin_again(filter, world)
+    }
+
+    /// Goes on with a filter that is elsewhere or in another world: what is in the history belongs to what is left.
+    fn begin_again(&mut self, filter: Filter<S, N>, world: World) -> Result<(), Refusal> {
+        self.past.restart(filter)?;
+        self.world = world;
+        Ok(())
     }
 }
 
@@ -125,7 +180,9 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
         if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
             && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
         {
-            self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
+            let time_ns = fix.monotonic_time.as_nanos();
+            self.world.point(time_ns, &fix.payload, options).into_iter().for_each(|point| self.fixes.see(point));
+            self.fuse(time_ns, Measured::Gnss(measured));
         }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
             let time_ns = odometry.monotonic_time.as_nanos();
@@ -139,7 +196,11 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
         }
         if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
             let measured = self.world.pose(&pose.payload, options, mounting);
-            self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
+            let time_ns = pose.monotonic_time.as_nanos();
+            let AbsolutePose { position, position_covariance: covariance, .. } = measured;
+            self.poses.see(TrackPoint { time_ns, position, covariance, yaw: 0.0 });
+            self.orientation = Some((measured.world_from_body, measured.rotation_covariance));
+            self.fuse(time_ns, Measured::Pose(measured));
         }
         if let Some(relative) = inputs.relative.filter(|relative| relative.is_new()) {
             let end_ns = relative.end.as_nanos();
@@ -158,13 +219,14 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
                 self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
             }
         }
+        self.go_where_positions_agree(options, mounting)?;
         let mut world = self.world;
         if let Some(new_from_old) = self.past.now().position().and_then(|position| world.moves_on(&position)) {
-            // What is in the history belongs to the world that is left.
             let mut filter = self.past.now().clone();
             filter.move_world(&new_from_old)?;
-            self.past = Past::new(filter, LONGEST_LEAD_NS)?;
-            self.world = world;
+            self.fixes.move_world();
+            self.poses.move_world();
+            self.begin_again(filter, world)?;
         }
         Ok(())
     }

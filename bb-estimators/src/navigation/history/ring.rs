@@ -1,16 +1,35 @@
-//! A queue of bounded length, without allocation.
+//! A queue of bounded length, which allocates at most when it is made.
+
+#[cfg(feature = "std")]
+use std::boxed::Box;
+
+/// Where there is a heap they are there from the beginning: hundreds of kilobytes are too much for the stack of a thread, which
+/// without optimisation holds a copy for each function that they go through.
+#[cfg(feature = "std")]
+type Slots<T, const N: usize> = Box<[Option<T>]>;
+#[cfg(not(feature = "std"))]
+type Slots<T, const N: usize> = [Option<T>; N];
 
 /// Up to `N` values, the oldest first.
 #[derive(Clone, Debug)]
 pub(super) struct Ring<T, const N: usize> {
-    slots: [Option<T>; N],
+    slots: Slots<T, N>,
     first: usize,
     len: usize,
 }
 
 impl<T, const N: usize> Ring<T, N> {
     pub(super) fn new() -> Self {
-        Self { slots: core::array::from_fn(|_| None), first: 0, len: 0 }
+        #[cfg(feature = "std")]
+        let slots = core::iter::repeat_with(|| None).take(N).collect();
+        #[cfg(not(feature = "std"))]
+        let slots = core::array::from_fn(|_| None);
+        Self { slots, first: 0, len: 0 }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.truncate(0);
+        self.first = 0;
     }
 
     pub(super) fn len(&self) -> usize {

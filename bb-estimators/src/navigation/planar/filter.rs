@@ -15,6 +15,7 @@ use crate::navigation::math::{exp, wrapped};
 use crate::navigation::measurement::Linearised;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Gate, Stream};
+use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
 /// The largest variances of position, heading and velocity.
@@ -73,11 +74,8 @@ impl PlanarStart {
         let mut covariance = Covariance::new();
         for i in 0..2 {
             covariance.forget(VELOCITY + i, square(self.velocity_deviation));
-            covariance.forget(POSITION + i, self.position_covariance[(i, i)]);
         }
-        let between = 0.5 * (self.position_covariance[(0, 1)] + self.position_covariance[(1, 0)]);
-        covariance.rows_mut()[POSITION][POSITION + 1] = between;
-        covariance.rows_mut()[POSITION + 1][POSITION] = between;
+        covariance.set_pair(POSITION, &self.position_covariance);
         covariance.forget(HEADING, square(self.heading_deviation));
         covariance.forget(GYROSCOPE_BIAS, square(self.gyroscope_bias_deviation));
         covariance.forget(WHEEL_SCALE, square(params.wheel_scale.deviation));
@@ -106,10 +104,7 @@ pub struct PlanarEkf {
     params: PlanarParams,
     estimate: Option<PlanarEstimate>,
     covariance: Covariance<STATES>,
-    resets: u32,
-    gaps: u32,
-    /// When the position was last corrected by one of the world.
-    fixed_ns: i64,
+    upkeep: Upkeep,
 }
 
 impl PlanarEkf {
@@ -120,7 +115,7 @@ impl PlanarEkf {
     /// The first parameter outside its accepted range, by name.
     pub fn new(params: PlanarParams) -> Result<Self, ParamsError> {
         params.check()?;
-        Ok(Self { params, estimate: None, covariance: Covariance::new(), resets: 0, gaps: 0, fixed_ns: 0 })
+        Ok(Self { params, estimate: None, covariance: Covariance::new(), upkeep: Upkeep::default() })
     }
 
     /// The parameters that the filter was made with.
@@ -136,8 +131,7 @@ impl PlanarEkf {
     /// is then as it was.
     pub fn start(&mut self, start: &PlanarStart) -> Result<(), Refusal> {
         let (estimate, covariance) = start.state(&self.params)?;
-        self.resets = self.resets.wrapping_add(1);
-        self.fixed_ns = start.time_ns;
+        self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
         Ok(())
@@ -164,7 +158,9 @@ impl PlanarEkf {
         estimate.yaw_rate = if is_gap { 0.0 } else { sample.angular_velocity.z - estimate.gyroscope_bias };
         let densities = if is_gap { self.params.gap_densities() } else { self.params.densities() };
         Transition::advance(estimate, dt).apply(self.covariance.rows_mut(), &densities);
-        self.gaps = self.gaps.wrapping_add(u32::from(is_gap));
+        if is_gap {
+            self.upkeep.bridged();
+        }
         let scale = self.params.wheel_scale;
         if scale.time_s != f64::INFINITY {
             let factor = exp(-dt / scale.time_s);
@@ -212,9 +208,48 @@ impl PlanarEkf {
         self.covariance.update(&weighed.innovation);
         let sees_position = |row: &[f64; STATES]| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0;
         if model.jacobian.iter().any(sees_position) {
-            self.fixed_ns = corrected.time_ns;
+            self.upkeep.fixed_ns = corrected.time_ns;
         }
         Ok(weighed.fused())
+    }
+
+    /// Moves the filter to where it was found to be, m, after it was wrong: position and, if given, velocity (in the world, m/s)
+    /// and heading (rad), each with its covariance. What is known of the rest stays, uncorrelated with what is new. It counts as
+    /// a reset.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if a covariance is not positive definite. The filter
+    /// is then as it was.
+    pub fn relocate(
+        &mut self,
+        position: (Vector2<f64>, Matrix2<f64>),
+        velocity: Option<(Vector2<f64>, Matrix2<f64>)>,
+        heading: Option<(f64, f64)>,
+    ) -> Result<(), Refusal> {
+        let mut estimate = self.estimate.ok_or(Refusal::NotStarted)?;
+        let mut covariance = self.covariance;
+        estimate.position = position.0;
+        covariance.set_pair(POSITION, &position.1);
+        if let Some((heading, variance)) = heading {
+            estimate.heading = wrapped(heading);
+            covariance.forget(HEADING, variance.max(KNOWN));
+        }
+        if let Some((velocity, of_velocity)) = velocity {
+            let body_from_world = estimate.world_from_body().transpose();
+            estimate.velocity = body_from_world * velocity;
+            covariance.set_pair(VELOCITY, &(body_from_world * of_velocity * body_from_world.transpose()));
+        }
+        if !estimate.is_finite() {
+            return Err(Refusal::NonFinite);
+        }
+        if !covariance.is_positive_definite() {
+            return Err(Refusal::Noise);
+        }
+        self.estimate = Some(estimate);
+        self.covariance = covariance;
+        self.upkeep.started(estimate.time_ns);
+        Ok(())
     }
 
     /// What is estimated, at the end of the last sample; none before the start.
@@ -251,28 +286,5 @@ impl PlanarEkf {
         self.covariance.matrix().fixed_view::<3, 3>(POSITION, POSITION).into_owned()
     }
 
-    /// Whether the covariance is positive definite now, by a Cholesky decomposition.
-    pub fn is_consistent(&self) -> bool {
-        self.covariance.is_positive_definite()
-    }
-
-    /// How often rounding had made the covariance indefinite, and variances were raised.
-    pub fn repairs(&self) -> u64 {
-        self.covariance.repairs()
-    }
-
-    /// How often the filter was started.
-    pub fn resets(&self) -> u32 {
-        self.resets
-    }
-
-    /// For how long the position has not been corrected by one in the world, s. 0 before the start.
-    pub fn dead_reckoning_s(&self) -> f64 {
-        self.estimate.map_or(0.0, |estimate| estimate.time_ns.saturating_sub(self.fixed_ns) as f64 * 1e-9)
-    }
-
-    /// How many gaps were bridged.
-    pub fn gaps(&self) -> u32 {
-        self.gaps
-    }
+    upkeep_methods!();
 }

@@ -26,7 +26,7 @@ pub enum Optional {
     RelativeScale,
     /// Position of the GNSS antenna in the body, m.
     GnssLeverArm,
-    /// How much later than its stamp a GNSS measurement was taken, s.
+    /// How long before its stamp a GNSS measurement was taken, s.
     GnssDelay,
     /// Scale of the wheel speed, less 1: `measured = (1 + s) true`.
     WheelScale,

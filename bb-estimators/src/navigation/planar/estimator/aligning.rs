@@ -7,7 +7,8 @@ use crate::navigation::estimator::course::{Course, SLIP};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::planar::estimate::left;
 use crate::navigation::planar::filter::PlanarStart;
-use nalgebra::{Matrix2, Rotation2, Vector2};
+use crate::navigation::track::CLEARLY;
+use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
 use std::f64::consts::PI;
 
 /// How long a start may take, ns, before that is reported.
@@ -18,9 +19,6 @@ const ORIGIN: f64 = 0.01;
 
 /// How fast a robot may be that starts without a word about it, m/s, standard deviation.
 const SPEED: f64 = 1.0;
-
-/// Fixes show a course if their velocity is this many times its standard deviation.
-const CLEARLY: f64 = 5.0;
 
 /// Gathers what a start needs.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +56,8 @@ impl Aligning {
     ) -> Option<(PlanarStart, Option<LocalFrame>)> {
         self.first_ns = self.first_ns.or(Some(sample.time_ns));
         self.last_ns = self.last_ns.max(sample.time_ns);
+        // On a plane up is z, whatever the accelerometer says.
+        self.course.turn(&ImuMean { specific_force: Vector3::z(), ..*sample });
         self.course.see(inputs.gnss, options.gnss_deviation);
         if let Some(orientation) = inputs.orientation {
             let measured = mounting.heading(&orientation.payload, options);
@@ -83,7 +83,7 @@ impl Aligning {
             let position = -(turn * mounting.body_from_link.translation.vector.xy());
             return Some((PlanarStart { position, ..start }, None));
         }
-        let fix = self.course.newest()?;
+        let fix = self.course.newest(self.last_ns)?;
         let antenna = turn * mounting.antenna();
         let across = left(&antenna);
         let own: Matrix2<f64> = fix.covariance.fixed_view::<2, 2>(0, 0).into_owned();
@@ -94,7 +94,7 @@ impl Aligning {
 
     /// What the course of the fixes shows.
     fn in_motion(&self) -> Option<Moving> {
-        let (velocity, deviation) = self.course.velocity()?;
+        let (velocity, deviation) = self.course.velocity(self.last_ns)?;
         let speed = velocity.xy().norm();
         // Nor if it is not a number.
         if speed.is_nan() || speed <= CLEARLY * deviation {

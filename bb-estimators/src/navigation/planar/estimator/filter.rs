@@ -3,14 +3,16 @@
 use super::options::PlanarOptions;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::health::{Sight, largest_deviation};
+use crate::navigation::estimator::refuted::Found;
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
-use crate::navigation::planar::estimate::{POSITION, PlanarEstimate};
+use crate::navigation::planar::estimate::{HEADING, POSITION, PlanarEstimate, VELOCITY, left};
 use crate::navigation::planar::filter::{PlanarEkf, PlanarStart};
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Counts, Stream, StreamParams};
 use bb_core::Fault;
+use nalgebra::{Matrix2, Matrix3, Rotation2, Vector2};
 
 /// See the [module](self).
 #[derive(Clone, Debug)]
@@ -50,7 +52,9 @@ impl Filter {
         let mut ekf = PlanarEkf::new(options.params())?;
         ekf.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let stream = Stream::new(StreamParams { patience: options.patience, ..StreamParams::default() });
-        Ok(Self { ekf, gnss: stream, odometry: stream, yaw_rate: stream, pose: stream, orientation: stream })
+        // A filter that these refute is moved instead: see `refuted.rs`.
+        let position = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
+        Ok(Self { ekf, gnss: position, odometry: stream, yaw_rate: stream, pose: position, orientation: stream })
     }
 
     pub(super) fn ekf(&self) -> &PlanarEkf {
@@ -81,11 +85,51 @@ impl Filter {
         [&self.gnss, &self.odometry, &self.yaw_rate, &self.pose, &self.orientation].map(Stream::counts)
     }
 
+    /// What became of fixes, and of poses.
+    pub(super) fn positions(&self) -> [&Counts; 2] {
+        [self.gnss.counts(), self.pose.counts()]
+    }
+
+    /// Moves it to where the sensor of `found` was found to be: at `lever_arm` in the body, m, with that heading and its variance,
+    /// rad, if it is known.
+    pub(super) fn relocate(
+        &mut self,
+        found: &Found,
+        lever_arm: &Vector2<f64>,
+        heading: Option<(f64, f64)>,
+    ) -> Result<(), Refusal> {
+        let estimate = *self.ekf.estimate().ok_or(Refusal::NotStarted)?;
+        let covariance = self.ekf.covariance();
+        let world_from_body = estimate.world_from_body();
+        let in_world = |of_body: &Matrix2<f64>| {
+            let mut matrix = Matrix3::zeros();
+            let turned = world_from_body * of_body * world_from_body.transpose();
+            matrix.fixed_view_mut::<2, 2>(0, 0).copy_from(&turned);
+            matrix
+        };
+        let own = (world_from_body * estimate.velocity).push(0.0);
+        let of_own = in_world(&covariance.fixed_view::<2, 2>(VELOCITY, VELOCITY).into_owned());
+        let velocity = found.new_velocity(&own, &of_own);
+        let (speed, of_speed) = velocity.unwrap_or((own, of_own));
+        let (turned, variance) = heading.unwrap_or((estimate.heading, covariance[(HEADING, HEADING)]));
+        let (position, own) = found.at(estimate.time_ns, &speed, &of_speed);
+        let arm = Rotation2::new(turned) * lever_arm;
+        let across = left(&arm);
+        let flat = |matrix: &Matrix3<f64>| matrix.fixed_view::<2, 2>(0, 0).into_owned();
+        let own = flat(&own) + across * across.transpose() * variance;
+        let velocity = velocity.map(|(velocity, covariance)| (velocity.xy(), flat(&covariance)));
+        self.ekf.relocate((position.xy() - arm, own), velocity, heading)?;
+        self.gnss.forgive();
+        self.pose.forgive();
+        Ok(())
+    }
+
     /// What its health is judged by.
     pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
         Some(Sight {
             now_ns: self.time_ns()?,
             counts,
+            resets: self.ekf.resets(),
             dead_reckoning_s: self.ekf.dead_reckoning_s(),
             deviation: self.deviation(),
         })

@@ -120,10 +120,7 @@ impl Mounting {
         let arm = (UnitQuaternion::from_euler_angles(0.0, 0.0, heading) * body_from_sensor.translation.vector).xy();
         let square = |x: f64| x * x;
         let (position, of_heading) = match told(pose.covariance) {
-            Some(covariance) => {
-                let rotation = covariance.fixed_view::<3, 3>(3, 3).into_owned();
-                (covariance.fixed_view::<2, 2>(0, 0).into_owned(), about_up(&pose.world_from_body, &rotation))
-            }
+            Some(covariance) => (covariance.fixed_view::<2, 2>(0, 0).into_owned(), covariance[(5, 5)]),
             None => (Matrix2::identity() * square(options.pose_deviation), square(0.1 * options.pose_deviation)),
         };
         // The body's origin is where the heading says: it errs with that.

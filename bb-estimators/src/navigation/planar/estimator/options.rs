@@ -41,7 +41,8 @@ params! {
         /// Standard deviation of the heading of an orientation that says nothing about its own.
         orientation_deviation: f64 = 0.1, in 1e-5..=4.0, unit "rad";
         /// How many measurements of a sensor in a row the gate refuses before the filter is taken to be wrong, and not the
-        /// sensor: the next is then fused, however far it is off. 0: never.
+        /// sensor: the next is then fused, with the covariance raised to fit it. Fixes and poses that agree among each other move
+        /// the filter to where they are instead, and fewer do if it rests on fewer yet. 0: never.
         patience: u32 = 50;
         /// How long the position may be dead-reckoned before the estimate is not to be trusted, if there are fixes or
         /// poses to correct it.

@@ -54,6 +54,8 @@ pub struct PlanarStatus {
     pub orientation: Verdicts,
     /// How often samples of the IMU were missing for longer than a sample may take.
     pub gaps: u32,
+    /// How often the filter was wrong, and began again where fixes or poses agree.
+    pub resets: u32,
 }
 
 /// The outputs of `PlanarEkf<PlanarOutputs>`: `output odometry;`, `output status;`.
@@ -160,6 +162,8 @@ impl PlanarOutput for PlanarOutputs {
             pose,
             orientation,
             gaps: ekf.gaps(),
+            // The start is the first.
+            resets: ekf.resets().saturating_sub(1),
         };
         Some(Self { odometry: Some(Odometry::of(filter, mounting)?), status: Some(status) })
     }

@@ -1,0 +1,25 @@
+//! What there is to say of a data set beside its figures.
+
+use crate::navigation::doubt::{distrusted, is_most};
+
+/// What was assumed, and what was left out.
+#[derive(Debug, Default)]
+pub(super) struct Notes {
+    pub(super) notes: Vec<String>,
+    pub(super) doubts: Vec<String>,
+}
+
+impl Notes {
+    pub(super) fn push(&mut self, note: String) {
+        self.notes.push(note);
+    }
+
+    /// Says that a part was left out. Where that is more than half, the figures are those of something else.
+    pub(super) fn left_out(&mut self, part: usize, all: usize, note: String) {
+        if is_most(part as u64, all as u64) {
+            self.doubts.push(distrusted(&note));
+        } else if part > 0 {
+            self.notes.push(note);
+        }
+    }
+}

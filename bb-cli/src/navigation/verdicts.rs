@@ -1,0 +1,51 @@
+//! Whether a filter has taken what it was given.
+
+use super::doubt::{distrusted, is_most};
+use super::measured::Sensor;
+use super::player::Step;
+use bb_estimators::navigation::Refusal;
+
+/// Of one sensor.
+#[derive(Clone, Copy, Debug, Default)]
+struct Verdict {
+    all: u64,
+    refused: u64,
+    first: Option<Refusal>,
+}
+
+/// What became of the samples of the IMU and of the measurements.
+#[derive(Debug, Default)]
+pub(crate) struct Verdicts {
+    samples: Verdict,
+    measured: [Verdict; Sensor::ALL.len()],
+}
+
+impl Verdicts {
+    /// Adds what happened on the way to a keyframe, over so many samples.
+    pub(crate) fn add(&mut self, step: &Step, samples: usize) {
+        let (refused, first) = step.samples;
+        self.samples.all += samples as u64;
+        self.samples.refused += refused;
+        self.samples.first = self.samples.first.or(first);
+        for (verdict, answer) in self.measured.iter_mut().zip(&step.answers) {
+            let Some(answer) = answer else { continue };
+            verdict.all += 1;
+            if let Err(refusal) = answer {
+                verdict.refused += 1;
+                verdict.first = verdict.first.or(Some(*refusal));
+            }
+        }
+    }
+
+    /// Of which more than half were refused, and why the first was.
+    pub(crate) fn doubts(&self) -> Vec<String> {
+        let names = Sensor::ALL.iter().map(|sensor| sensor.name());
+        let all = std::iter::once(("samples of the IMU", &self.samples)).chain(names.zip(&self.measured));
+        let refused = all.filter(|(_, verdict)| is_most(verdict.refused, verdict.all));
+        let said = |(name, Verdict { all, refused, first }): (&str, &Verdict)| {
+            let why = first.map_or_else(String::new, |refusal| format!(" (the first: {refusal})"));
+            distrusted(&format!("{refused} of {all} {name} were refused{why}"))
+        };
+        refused.map(said).collect()
+    }
+}

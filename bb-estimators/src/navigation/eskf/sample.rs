@@ -1,0 +1,44 @@
+//! What an IMU measures from one instant to the next.
+
+use nalgebra::Vector3;
+
+use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
+use crate::navigation::refusal::Refusal;
+
+/// The longest gap that is bridged at all, s: a body may be anywhere after it.
+pub(in crate::navigation) const LONGEST_GAP_S: f64 = 60.0;
+
+/// One sample of the IMU, body axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuMean {
+    /// The end of the interval, nanoseconds since any fixed moment. It begins where the last one ended.
+    pub time_ns: i64,
+    /// Mean angular velocity over the interval, rad/s.
+    pub angular_velocity: Vector3<f64>,
+    /// Mean specific force over the interval, m/s²: at rest one g upwards.
+    pub specific_force: Vector3<f64>,
+}
+
+impl ImuMean {
+    /// Whether it may have been measured.
+    pub(in crate::navigation) fn check(&self) -> Result<(), Refusal> {
+        // Within its limit is no NaN.
+        let within = |vector: &Vector3<f64>, limit: f64| vector.iter().all(|x| (-limit..=limit).contains(x));
+        if within(&self.angular_velocity, MAX_ANGULAR_VELOCITY) && within(&self.specific_force, MAX_SPECIFIC_FORCE)
+        {
+            return Ok(());
+        }
+        let mut components = self.angular_velocity.iter().chain(self.specific_force.iter());
+        let is_finite = components.all(|x| x.is_finite());
+        Err(if is_finite { Refusal::OutOfRange } else { Refusal::NonFinite })
+    }
+}
+
+/// From one stamp to a later one, s.
+pub(in crate::navigation) fn seconds_between(previous_ns: i64, time_ns: i64) -> Result<f64, Refusal> {
+    if time_ns <= previous_ns {
+        return Err(Refusal::TimeNotIncreasing { previous_ns, time_ns });
+    }
+    // The difference of two stamps can be wider than their type.
+    Ok(time_ns.checked_sub(previous_ns).unwrap_or(i64::MAX) as f64 * 1e-9)
+}

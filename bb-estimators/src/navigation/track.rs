@@ -1,0 +1,165 @@
+//! Which positions agree among each other: those that a filter may start at, and those that show that it is wrong.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::math::{cos, sin, sqrt};
+
+#[cfg(test)]
+mod tests;
+
+/// So many positions that agree are no coincidence: two define a straight line, the third is on it.
+pub const CONFIRMED: u32 = 3;
+
+/// Standard deviations that two positions may differ by.
+const SIGMAS: f64 = 5.0;
+
+/// What no robot does, m/s and m/s².
+const FASTEST: f64 = 150.0;
+const STRONGEST: f64 = 10.0;
+
+/// Positions that are farther apart in time tell nothing of each other, ns.
+const LONGEST_NS: i64 = 60_000_000_000;
+
+/// The time between two positions that show a velocity, ns. A car turns into the next street within more.
+const BASELINE_NS: core::ops::RangeInclusive<i64> = 500_000_000..=5_000_000_000;
+
+/// A velocity that is so many times its standard deviation shows a course.
+pub(in crate::navigation) const CLEARLY: f64 = 5.0;
+
+/// A measured position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackPoint {
+    /// When, ns.
+    pub time_ns: i64,
+    /// In the world, m.
+    pub position: Vector3<f64>,
+    /// m².
+    pub covariance: Matrix3<f64>,
+    /// How far the robot has turned about up since any moment, rad, as a gyroscope says; the same for all where nothing does.
+    pub yaw: f64,
+}
+
+impl TrackPoint {
+    /// Standard deviation of the horizontal position, m.
+    pub fn deviation(&self) -> f64 {
+        sqrt((self.covariance.fixed_view::<2, 2>(0, 0).trace() / 2.0).max(0.0))
+    }
+}
+
+/// Positions one after the other, as a robot may have measured them on its way: each is where the two before lead to, up to their
+/// noise and an acceleration of 1 g. One that is not begins a new track.
+///
+/// ```
+/// use bb_estimators::navigation::{CONFIRMED, Track, TrackPoint};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let mut track = Track::default();
+/// // A receiver that begins with where it was switched off.
+/// for (second, east) in [(0, 9000.0), (1, 0.0), (2, 10.0), (3, 20.0)] {
+///     let position = Vector3::new(east, 0.0, 0.0);
+///     let (time_ns, covariance) = (second * 1_000_000_000, Matrix3::identity());
+///     track.add(TrackPoint { time_ns, position, covariance, yaw: 0.0 });
+/// }
+/// assert_eq!(track.count(), CONFIRMED);
+/// assert!(track.velocity().is_some_and(|(velocity, _)| (velocity.x - 10.0).abs() < 1e-9));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Track {
+    count: u32,
+    newest: Option<TrackPoint>,
+    before: Option<TrackPoint>,
+    /// The other end of the velocity.
+    older: Option<TrackPoint>,
+}
+
+impl Track {
+    /// Adds a position; `false` if it does not agree with those before, and begins a new track. One that is not newer is left out.
+    pub fn add(&mut self, point: TrackPoint) -> bool {
+        let Some(newest) = self.newest else {
+            self.begin(point);
+            return true;
+        };
+        if point.time_ns <= newest.time_ns {
+            return true;
+        }
+        if !self.leads_to(&newest, &point) {
+            self.begin(point);
+            return false;
+        }
+        self.count = self.count.saturating_add(1);
+        let longest_ns = *BASELINE_NS.end();
+        if self.older.is_none_or(|older| point.time_ns.saturating_sub(older.time_ns) > longest_ns) {
+            self.older = Some(newest);
+        }
+        self.before = Some(newest);
+        self.newest = Some(point);
+        true
+    }
+
+    fn begin(&mut self, point: TrackPoint) {
+        *self = Self { count: 1, newest: Some(point), before: None, older: Some(point) };
+    }
+
+    fn leads_to(&self, newest: &TrackPoint, point: &TrackPoint) -> bool {
+        let since_ns = point.time_ns.saturating_sub(newest.time_ns);
+        if since_ns > LONGEST_NS {
+            return false;
+        }
+        let since_s = since_ns as f64 * 1e-9;
+        let apart = point.position - newest.position;
+        let (off, covariance, slack) = match &self.before {
+            None => (apart, point.covariance + newest.covariance, FASTEST * since_s),
+            Some(before) => {
+                let between_s = newest.time_ns.saturating_sub(before.time_ns) as f64 * 1e-9;
+                let ratio = since_s / between_s;
+                let own = point.covariance + newest.covariance * ((1.0 + ratio) * (1.0 + ratio));
+                let bent = 0.5 * STRONGEST * since_s * (since_s + between_s);
+                let ahead = (newest.position - before.position) * ratio;
+                // A velocity from two positions that are close in time is no more than a guess.
+                let slack = bent.min(2.0 * FASTEST * since_s);
+                (apart - ahead, own + before.covariance * (ratio * ratio), slack)
+            }
+        };
+        let horizontal = (covariance[(0, 0)] + covariance[(1, 1)]) / 2.0;
+        let is_near = |distance: f64, variance: f64| distance <= SIGMAS * sqrt(variance.max(0.0)) + slack;
+        // Nor if it is not a number.
+        is_near(off.xy().norm(), horizontal) && is_near(off.z.abs(), covariance[(2, 2)])
+    }
+
+    /// How many positions agree, the newest among them.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The newest position.
+    pub fn newest(&self) -> Option<&TrackPoint> {
+        self.newest.as_ref()
+    }
+
+    /// The velocity in the world with its standard deviation, m/s, which grows with the turn on the way: between the last two positions if those show it
+    /// clearly, else over the last seconds. None of positions less than 0.5 s or more than 5 s apart.
+    pub fn velocity(&self) -> Option<(Vector3<f64>, f64)> {
+        let is_clear = |(velocity, deviation): &(Vector3<f64>, f64)| velocity.xy().norm() > CLEARLY * deviation;
+        self.since(self.before).filter(is_clear).or_else(|| self.since(self.older))
+    }
+
+    fn since(&self, older: Option<TrackPoint>) -> Option<(Vector3<f64>, f64)> {
+        let (newest, older) = (self.newest?, older?);
+        let between_ns = newest.time_ns.saturating_sub(older.time_ns);
+        if !BASELINE_NS.contains(&between_ns) {
+            return None;
+        }
+        let seconds = between_ns as f64 * 1e-9;
+        let (one, other) = (newest.deviation(), older.deviation());
+        let noise = sqrt(one * one + other * other) / seconds;
+        let mean = (newest.position - older.position) / seconds;
+        // On an arc the chord lags by half of the turn, and is shorter; where on the way it turned is not known.
+        let turn = newest.yaw - older.yaw;
+        let half = turn.clamp(-1.5, 1.5) / 2.0;
+        let longer = if half.abs() < 1e-3 { 1.0 } else { half / sin(half) };
+        let (along, across) = (longer * cos(half), longer * sin(half));
+        let velocity = Vector3::new(along * mean.x - across * mean.y, across * mean.x + along * mean.y, mean.z);
+        let swing = velocity.xy().norm() * turn.abs() / 4.0;
+        Some((velocity, sqrt(noise * noise + swing * swing)))
+    }
+}
