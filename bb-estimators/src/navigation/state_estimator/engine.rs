@@ -34,8 +34,18 @@ const FITS: f64 = 3.0;
 /// Farther from the origin nothing is, m.
 const FARTHEST: f64 = 1e7;
 
-/// Refusals in a row that are more than outliers.
+/// Refused relative poses in a row that are more than outliers.
 const STORM: u64 = 3;
+
+/// Refused positions in a row that are: there is one a second.
+const DOUBT: u64 = 2;
+
+/// Normalised innovation squared over the dimension at which one position is enough to doubt the estimate, and at which what
+/// overrules it does not correct it but begins again: thirty standard deviations.
+const FAR: f64 = 1000.0;
+
+/// So much time is taken to have passed while the clock was set back, ns: twice of what it takes to believe it.
+const SET_BACK_GAP_NS: i64 = 1_000_000_000;
 
 /// See the module.
 #[derive(Clone, Debug)]
@@ -60,6 +70,8 @@ pub(super) struct Engine<F: ProvidedFactor> {
     degraded_ns: Option<(i64, i64)>,
     /// How many positions must still fit.
     unconfirmed: u32,
+    /// How often positions have overruled it since they last did.
+    overruled: u32,
     left: Option<(Pose, Sources)>,
 }
 
@@ -98,6 +110,7 @@ impl<F: ProvidedFactor> Engine<F> {
             is_anchor_degraded: false,
             degraded_ns: None,
             unconfirmed: 0,
+            overruled: 0,
             left: None,
         })
     }
@@ -168,8 +181,36 @@ impl<F: ProvidedFactor> Engine<F> {
         (poses.into_iter().map(|pose| (pose, this.sources_at(pose.time_ns))), is_smoothed)
     }
 
-    pub(super) fn keyframe_ns(&self) -> i64 {
-        self.strategy.keyframe_ns()
+    /// The time from which samples of the IMU are needed, to run on and to predict.
+    pub(super) fn needed_ns(&self) -> i64 {
+        let now_ns = self.now_ns.unwrap_or(i64::MIN);
+        match self.phase {
+            Phase::Running => now_ns.min(self.strategy.keyframe_ns()),
+            Phase::Starting(_) | Phase::Lost => now_ns,
+        }
+    }
+
+    /// The clock of the IMU was set back: all that is known stays, but not when it was measured. A receiver that was not let
+    /// in stays out.
+    pub(super) fn set_clock_back(&mut self, sample_ns: i64, config: &StateEstimatorConfig) {
+        (self.key, self.now_ns) = (Key::FIRST, None);
+        self.sources = Sources::default();
+        self.gate.forget_times();
+        self.marks.clear();
+        (self.degraded_ns, self.left) = (None, None);
+        match self.phase {
+            Phase::Starting(_) => self.phase = Phase::Starting(Starter::new(config)),
+            Phase::Lost => {}
+            Phase::Running => {
+                let resumed_ns = sample_ns.saturating_sub(SET_BACK_GAP_NS);
+                if self.strategy.set_clock(resumed_ns).is_ok() {
+                    self.now_ns = Some(resumed_ns);
+                    self.unconfirmed = CONFIRMATIONS;
+                } else {
+                    self.phase = Phase::Lost;
+                }
+            }
+        }
     }
 
     pub(super) fn keyframes(&self) -> usize {
@@ -210,7 +251,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => {
                 let gaps = self.strategy.gaps();
                 let result = self.strategy.propagate(sample);
-                if self.strategy.gaps() != gaps {
+                if self.strategy.gaps() != gaps || self.unconfirmed > 0 {
                     self.distrust(sample.time_ns);
                 }
                 match result {
@@ -342,16 +383,14 @@ impl<F: ProvidedFactor> Engine<F> {
             return Err(Refusal::NotStarted.into());
         }
         let result = self.strategy.measure(measured);
-        let is_position = !matches!(measured, Measured::Relative(_));
-        let is_storm = self.strategy.refused_in_a_row() >= STORM;
+        let is_relative = matches!(measured, Measured::Relative(_));
         match &result {
-            Ok(fused) if is_position && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
-            Ok(fused) if is_position && fused.nis <= FITS * fused.dimension as f64 => {
-                self.unconfirmed = self.unconfirmed.saturating_sub(1);
-            }
-            _ if is_position && self.unconfirmed > 0 => self.unconfirmed = CONFIRMATIONS,
+            // Where it was cannot be relied on either.
+            Ok(fused) if is_relative && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
+            result if !is_relative => self.weigh_position(result),
             _ => {}
         }
+        let is_storm = is_relative && self.strategy.refused_relative() >= STORM;
         if let (true, Some(now_ns)) = (is_storm || self.unconfirmed > 0, self.now_ns) {
             self.distrust(now_ns);
         }
@@ -361,6 +400,29 @@ impl<F: ProvidedFactor> Engine<F> {
             return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
         }
         Ok(fused)
+    }
+
+    /// What a position says of the estimate itself.
+    fn weigh_position(&mut self, result: &Result<Fused, Failure>) {
+        let is_doubtful = match result {
+            Err(Failure::Refused(Refusal::Gate { nis, .. })) => *nis > FAR * 6.0,
+            _ => false,
+        } || self.strategy.refused_positions() >= DOUBT;
+        match result {
+            Ok(fused) if fused.raised > 1.0 => {
+                self.unconfirmed = CONFIRMATIONS;
+                self.overruled += 1;
+            }
+            Ok(fused) if fused.nis <= FITS * fused.dimension as f64 => {
+                self.unconfirmed = self.unconfirmed.saturating_sub(1);
+                if self.unconfirmed == 0 {
+                    self.overruled = 0;
+                }
+            }
+            _ if self.unconfirmed > 1 => self.unconfirmed = CONFIRMATIONS,
+            _ if is_doubtful => self.unconfirmed = self.unconfirmed.max(1),
+            _ => {}
+        }
     }
 
     fn vio(&mut self, vio: &VioOutput, config: &StateEstimatorConfig) -> Result<Option<Fused>, Trouble> {
@@ -390,8 +452,9 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => false,
         };
         if can_start {
-            let world = *self.world.get_or_insert_with(|| World::new(anchor.position));
-            self.start(&at_anchor(now_ns, anchor, &world, config, self.bias.as_ref()), StartedFrom::Anchor)?;
+            self.start_at(now_ns, anchor, config)?;
+            // One alone may be an outlier.
+            self.unconfirmed = self.unconfirmed.max(1);
             self.sources.anchored(anchor.time_ns, &config.params);
             self.is_anchor_degraded = anchor.is_covariance_degraded;
             return Ok(None);
@@ -399,6 +462,10 @@ impl<F: ProvidedFactor> Engine<F> {
         let world = self.world.ok_or(Refusal::NotStarted)?;
         let measured = world.anchor(anchor);
         let fused = self.measure(&Measured::Anchor(measured))?;
+        if fused.raised > FAR || (fused.raised > 1.0 && self.overruled > 1) {
+            // Far off, or not helped by the last correction: then nothing of it can be relied on.
+            self.start_at(now_ns, anchor, config)?;
+        }
         self.sources.anchored(anchor.time_ns, &config.params);
         self.is_anchor_degraded = anchor.is_covariance_degraded;
         if let Some(position) = self.strategy.position() {
@@ -406,6 +473,11 @@ impl<F: ProvidedFactor> Engine<F> {
             *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
         }
         Ok(Some(fused))
+    }
+
+    fn start_at(&mut self, now_ns: i64, anchor: &PoseAnchor, config: &StateEstimatorConfig) -> Result<(), Reason> {
+        let world = *self.world.get_or_insert_with(|| World::new(anchor.position));
+        self.start(&at_anchor(now_ns, anchor, &world, config, self.bias.as_ref()), StartedFrom::Anchor)
     }
 
     fn fix(

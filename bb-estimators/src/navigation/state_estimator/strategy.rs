@@ -208,10 +208,20 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.keyframes())
     }
 
-    /// How many measurements of one kind the gate has refused since it let one pass; those of receivers do not count.
-    pub(super) fn refused_in_a_row(&self) -> u64 {
-        let Streams { relative, anchors, provided, .. } = each!(self, strategy => strategy.streams());
-        [relative, anchors, provided].iter().map(|stream| stream.counts().gate_in_a_row).max().unwrap_or(0)
+    /// How many relative poses the gate has refused since it let one pass.
+    pub(super) fn refused_relative(&self) -> u64 {
+        each!(self, strategy => strategy.streams()).relative.counts().gate_in_a_row
+    }
+
+    /// How many anchors, or factors of providers, the gate has refused since it let one pass. Fixes of a receiver do not count.
+    pub(super) fn refused_positions(&self) -> u64 {
+        let Streams { anchors, provided, .. } = each!(self, strategy => strategy.streams());
+        anchors.counts().gate_in_a_row.max(provided.counts().gate_in_a_row)
+    }
+
+    /// What is estimated is from now on what was so at another time; keyframes are forgotten.
+    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+        each!(self, strategy => strategy.set_clock(time_ns))
     }
 
     /// Moves to another world.

@@ -50,12 +50,17 @@ impl EskfStrategy {
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filter.start(start)?;
-        self.filter.set_keyframe(id_of(start.time_ns));
-        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (start.time_ns, start.time_ns);
+        self.begin(start.time_ns);
+        Ok(())
+    }
+
+    /// The present is the first keyframe.
+    fn begin(&mut self, time_ns: i64) {
+        self.filter.set_keyframe(id_of(time_ns));
+        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (time_ns, time_ns);
         self.is_next = false;
         self.past.clear();
         self.past.extend(self.pose());
-        Ok(())
     }
 
     pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
@@ -152,6 +157,14 @@ impl EskfStrategy {
 
     pub(super) fn keyframes(&self) -> usize {
         self.past.len()
+    }
+
+    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+        let estimate = Estimate { time_ns, ..*self.filter.estimate().ok_or(Refusal::NotStarted)? };
+        let covariance = *self.filter.covariance();
+        self.filter.adopt::<Navigated, NAVIGATED>(&estimate, &covariance)?;
+        self.begin(time_ns);
+        Ok(())
     }
 
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {

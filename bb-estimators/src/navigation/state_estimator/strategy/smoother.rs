@@ -236,6 +236,18 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     /// The window begins again with the newest keyframe.
+    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+        if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
+            return Err(refusal);
+        }
+        let covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
+        let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
+        self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
+        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (time_ns, time_ns);
+        Ok(())
+    }
+
+    /// The window begins again with the newest keyframe.
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
         // Samples since the newest keyframe would be lost.
         if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
