@@ -14,7 +14,7 @@ use super::input::{GnssReading, ImuBias, PoseAnchor, TakeoffOrigin, VioOutput, b
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, at_anchor, warm};
-use super::strategy::{Failure, Measured, Pose, Predictor, Strategy, id_of};
+use super::strategy::{Failure, Measured, Pose, Predictor, Strategy, Trust, id_of};
 use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
@@ -44,6 +44,10 @@ const DOUBT: u64 = 2;
 /// overrules it does not correct it but begins again: thirty standard deviations.
 const FAR: f64 = 1000.0;
 
+/// After so long without a camera or an anchor, a receiver that is trusted may overrule the estimate, ns: the IMU alone knows
+/// less.
+const ALONE_NS: i64 = 60_000_000_000;
+
 /// So much time is taken to have passed while the clock was set back, ns: twice of what it takes to believe it.
 const SET_BACK_GAP_NS: i64 = 1_000_000_000;
 
@@ -68,6 +72,8 @@ pub(super) struct Engine<F: ProvidedFactor> {
     is_anchor_degraded: bool,
     /// From when to when the estimate is distrusted.
     degraded_ns: Option<(i64, i64)>,
+    /// When something else than the IMU and the receiver was fused last.
+    independent_ns: Option<i64>,
     /// How many positions must still fit.
     unconfirmed: u32,
     /// How often positions have overruled it since they last did.
@@ -109,6 +115,7 @@ impl<F: ProvidedFactor> Engine<F> {
             nis: None,
             is_anchor_degraded: false,
             degraded_ns: None,
+            independent_ns: None,
             unconfirmed: 0,
             overruled: 0,
             left: None,
@@ -198,6 +205,8 @@ impl<F: ProvidedFactor> Engine<F> {
         self.gate.forget_times();
         self.marks.clear();
         (self.degraded_ns, self.left) = (None, None);
+        // As if it were now: a receiver must not gain by it.
+        self.independent_ns = self.independent_ns.and(Some(sample_ns));
         match self.phase {
             Phase::Starting(_) => self.phase = Phase::Starting(Starter::new(config)),
             Phase::Lost => {}
@@ -387,7 +396,13 @@ impl<F: ProvidedFactor> Engine<F> {
         match &result {
             // Where it was cannot be relied on either.
             Ok(fused) if is_relative && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
-            result if !is_relative => self.weigh_position(result),
+            result if !is_relative => {
+                let refused = match measured {
+                    Measured::Gnss(.., trust) => self.strategy.refused_fixes(*trust),
+                    _ => self.strategy.refused_positions(),
+                };
+                self.weigh_position(result, refused >= DOUBT);
+            }
             _ => {}
         }
         let is_storm = is_relative && self.strategy.refused_relative() >= STORM;
@@ -395,6 +410,9 @@ impl<F: ProvidedFactor> Engine<F> {
             self.distrust(now_ns);
         }
         let fused = result?;
+        if !matches!(measured, Measured::Gnss(..)) {
+            self.independent_ns = self.now_ns;
+        }
         // Finite, but nowhere on the Earth.
         if !self.strategy.position().is_some_and(|position| position.norm() < FARTHEST) {
             return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
@@ -403,11 +421,12 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     /// What a position says of the estimate itself.
-    fn weigh_position(&mut self, result: &Result<Fused, Failure>) {
+    fn weigh_position(&mut self, result: &Result<Fused, Failure>, is_repeated: bool) {
+        let is_far = |nis: f64| nis > FAR * 6.0;
         let is_doubtful = match result {
-            Err(Failure::Refused(Refusal::Gate { nis, .. })) => *nis > FAR * 6.0,
+            Err(Failure::Refused(Refusal::Gate { nis, .. })) => is_repeated || is_far(*nis),
             _ => false,
-        } || self.strategy.refused_positions() >= DOUBT;
+        };
         match result {
             Ok(fused) if fused.raised > 1.0 => {
                 self.unconfirmed = CONFIRMATIONS;
@@ -496,7 +515,9 @@ impl<F: ProvidedFactor> Engine<F> {
             *rejection = Some(rejected);
             return Err(Trouble::Degraded(Reason::Gate(rejected)));
         }
-        let fused = self.measure(&Measured::Gnss(measured, velocity))?;
+        let is_alone = |at_ns: i64| fix.time_ns.saturating_sub(at_ns) > ALONE_NS;
+        let trust = if self.independent_ns.is_none_or(is_alone) { Trust::Alone } else { Trust::Beside };
+        let fused = self.measure(&Measured::Gnss(measured, velocity, trust))?;
         self.sources.anchored(fix.time_ns, &config.params);
         Ok(Some(fused))
     }

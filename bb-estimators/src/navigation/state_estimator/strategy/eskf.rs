@@ -96,19 +96,19 @@ impl EskfStrategy {
     }
 
     pub(super) fn measure<F: ProvidedFactor>(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
-        let Streams { relative, anchors, positions, velocities, provided } = &mut self.streams;
+        let streams = &mut self.streams;
         let fused = match measured {
-            Measured::Relative(pose) => self.filter.update(relative, pose)?,
-            Measured::Anchor(pose) => self.filter.update(anchors, pose)?,
-            Measured::Gnss(position, velocity) => {
-                let fused = self.filter.update(positions, position)?;
+            Measured::Relative(pose) => self.filter.update(&mut streams.relative, pose)?,
+            Measured::Anchor(pose) => self.filter.update(&mut streams.anchors, pose)?,
+            Measured::Gnss(position, velocity, trust) => {
+                let fused = self.filter.update(streams.of_fixes(*trust), position)?;
                 if let Some(velocity) = velocity {
                     // A receiver whose position is good is trusted, whether its velocity is or not.
-                    let _ = self.filter.update(velocities, velocity);
+                    let _ = self.filter.update(&mut streams.velocities, velocity);
                 }
                 fused
             }
-            Measured::Provided(factor) => update(&mut self.filter, provided, *factor)?,
+            Measured::Provided(factor) => update(&mut self.filter, &mut streams.provided, *factor)?,
         };
         let pose = self.pose().filter(Pose::is_finite).ok_or(Failure::Fatal(Refusal::NonFinite))?;
         // What was measured at a keyframe belongs to it.

@@ -152,14 +152,15 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                 };
                 self.smoother.add(&mut self.streams.anchors, id, Held::Navigation(factor.into()))?
             }
-            Measured::Gnss(position, velocity) => {
+            Measured::Gnss(position, velocity, trust) => {
                 let way = self.way()?;
                 let moved = GnssPosition {
                     position: position.position - way.position,
                     covariance: position.covariance + way.covariance,
                     ..*position
                 };
-                let fused = self.smoother.add(&mut self.streams.positions, id, Held::Navigation(moved.into()))?;
+                let stream = self.streams.of_fixes(*trust);
+                let fused = self.smoother.add(stream, id, Held::Navigation(moved.into()))?;
                 if let Some(velocity) = velocity {
                     let moved = GnssVelocity { velocity: velocity.velocity - way.velocity, ..*velocity };
                     // A receiver whose position is good is trusted, whether its velocity is or not.
