@@ -291,7 +291,9 @@ impl<F: ProvidedFactor> Engine<F> {
             // It is the first that is known; the first sample goes on from there.
             self.now_ns = self.now_ns.or(Some(entry.key.time_ns));
         }
-        let Some(now_ns) = self.now_ns else {
+        // What is told before the first sample counts as well.
+        let is_told = matches!(entry.payload, Payload::Attitude(_) | Payload::Health(_) | Payload::Frame);
+        let Some(now_ns) = self.now_ns.or(is_told.then_some(entry.key.time_ns)) else {
             return (Outcome::Degraded(Refusal::NotStarted.into()), None);
         };
         let mut rejection = None;
