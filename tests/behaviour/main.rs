@@ -16,6 +16,8 @@ mod everything;
 mod external;
 mod fan_in;
 mod faults;
+mod flight_logs;
+mod flights;
 mod frames;
 mod good_runs;
 mod guards;

@@ -81,8 +81,8 @@ mod world;
 
 #[cfg(feature = "runtime")]
 pub use declared::{
-    AnchorReading, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents, FlightHealth, FlightInputs,
-    FlightOptions, FlightOutputs, GpsReport, RelativePoseReading, TracingSink,
+    AnchorReading, AttitudeReport, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents, FlightHealth,
+    FlightInputs, FlightOptions, FlightOutputs, GpsReport, RelativePoseReading, TracingSink, WarmStartReport,
 };
 pub use error::{EstimatorError, OriginError, Reason};
 pub use estimator::{Added, StateEstimator};
