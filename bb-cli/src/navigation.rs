@@ -7,6 +7,7 @@ mod data;
 mod errors;
 mod evaluate;
 mod filters;
+mod flown;
 mod measured;
 mod picture;
 mod player;
