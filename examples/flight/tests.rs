@@ -71,7 +71,6 @@ fn a_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<dyn 
 }
 
 #[test]
-#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
 fn every_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<dyn Error>> {
     for name in ["simflight", "simflight_stress", "euroc_mh01"] {
         let Some(flight) = recorded(name)? else { return Ok(()) };
