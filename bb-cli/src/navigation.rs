@@ -8,6 +8,7 @@ mod doubt;
 mod errors;
 mod evaluate;
 mod filters;
+mod flown;
 mod measured;
 mod picture;
 mod player;

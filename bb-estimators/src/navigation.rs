@@ -62,6 +62,8 @@ pub use measurement::{
 };
 pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
 pub use refusal::Refusal;
+#[cfg(feature = "autodiff")]
+pub use smoother::{Automatic, Differentiable, Expectation};
 #[cfg(any(feature = "smoother", feature = "eskf"))]
 pub use smoother::{Factor, Kernel, NavigationFactor, Rows};
 #[cfg(feature = "smoother")]

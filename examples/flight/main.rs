@@ -3,20 +3,27 @@
 //! A drone takes off with satellite navigation, which is then spoofed and refused; it goes on by its camera from one
 //! satellite image to the next, loses both in fog, finds itself again, and lets the receiver in once that is healthy for ten
 //! seconds and the next image agrees with it. On virtual time, so that it takes seconds and is the same every time. It
-//! fails if that is not what happened.
+//! fails if that is not what happened. With `--data` it flies a recorded flight again, whose labels must be those that follow
+//! from when something was measured.
 
 mod drone;
+mod expected;
 mod outcome;
+mod recorded;
 mod sensors;
 #[cfg(test)]
 mod tests;
 mod timeline;
 mod trajectory;
 
+use crate::expected::Expected;
+use crate::outcome::Outcome;
+use crate::recorded::Recorded;
 use clap::Parser;
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Flies without satellite navigation, and shows what the state estimator makes of it.
 #[derive(Debug, Parser)]
@@ -25,6 +32,10 @@ struct Arguments {
     /// What does the work.
     #[arg(long, default_value = "smoother", value_parser = ["smoother", "eskf"])]
     strategy: String,
+    /// Flies a recorded flight again in place of the simulated one: the prefix of its CSV files, `folder/name` for
+    /// `folder/name_imu.csv` and the others.
+    #[arg(long, value_name = "PREFIX")]
+    data: Option<PathBuf>,
     /// Records estimates, health and events: a flight-data recorder, MCAP.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -46,7 +57,19 @@ fn main() -> ExitCode {
 
 /// Flies; whether all happened that should.
 fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
-    let outcome = drone::fly(&arguments.strategy, arguments.record.as_deref())?;
+    let (outcome, missing) = match &arguments.data {
+        None => {
+            let outcome = drone::fly(&arguments.strategy, arguments.record.as_deref())?;
+            let missing = simulated(&outcome);
+            (outcome, missing)
+        }
+        Some(prefix) => {
+            let recorded = Arc::new(Recorded::read(prefix)?);
+            let outcome = drone::fly_again(&arguments.strategy, &recorded, arguments.record.as_deref())?;
+            let missing = again(&outcome, &recorded);
+            (outcome, missing)
+        }
+    };
     for line in outcome.timeline() {
         println!("{line}");
     }
@@ -54,14 +77,35 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     if let Some(file) = &arguments.plot {
         outcome.picture().write(file)?;
     }
-    let missing = timeline::missing(&outcome.happened).or_else(|| {
-        let fault = |is_fault: bool, text: &str| is_fault.then(|| text.to_owned());
-        fault(!outcome.grows_while_dead_reckoning(), "a covariance that grows while it is dead reckoning")
-            .or_else(|| fault(!outcome.is_gate_open(), "a receiver that is let in at the end"))
-    });
     match &missing {
         None => println!("\nAll that was expected happened, in its order."),
         Some(missing) => println!("\nmissing: {missing}"),
     }
     Ok(missing.is_none())
+}
+
+/// What has not happened on the simulated flight.
+fn simulated(outcome: &Outcome) -> Option<String> {
+    let fault = |is_fault: bool, text: &str| is_fault.then(|| text.to_owned());
+    timeline::missing(&outcome.happened)
+        .or_else(|| {
+            let text = "a covariance that grows while it is dead reckoning";
+            fault(!outcome.grows_while_dead_reckoning(), text)
+        })
+        .or_else(|| fault(!outcome.is_gate_open(), "a receiver that is let in at the end"))
+}
+
+/// What has not happened on a recorded flight: its labels follow from when something was measured.
+fn again(outcome: &Outcome, recorded: &Recorded) -> Option<String> {
+    let start = "started from flight_controller";
+    if outcome.happened.iter().filter(|one| one.what.starts_with("started")).any(|one| one.what != start) {
+        return Some("one start, from the flight controller".into());
+    }
+    let length_s = recorded.sent.last().map_or(0.0, |(time, _)| time.as_nanos() as f64 * 1e-9);
+    // Five a second.
+    let least = (4.9 * length_s) as usize;
+    if outcome.labels().count() < least {
+        return Some(format!("{least} estimates"));
+    }
+    Expected::of(recorded).fault(outcome.labels())
 }

@@ -2,8 +2,8 @@
 
 use crate::sensors::frame;
 use crate::timeline::Happened;
-use crate::trajectory::motion;
 use bb_cli::{Line, PALETTE, Panel, Picture};
+use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use bb_estimators::navigation::Geodetic;
 use bb_estimators::navigation::state_estimator::{
@@ -22,9 +22,12 @@ struct Point {
     covariance_norm: f64,
 }
 
+/// Where the drone was at a time, s, in the tangent frame at its origin, as far as that is known.
+type Truth = Box<dyn Fn(f64) -> Option<Vector3<f64>>>;
+
 /// See the module.
-#[derive(Default)]
 pub(crate) struct Outcome {
+    truth: Truth,
     pub(crate) happened: Vec<Happened>,
     points: Vec<Point>,
     pub(crate) keyframes: usize,
@@ -32,13 +35,23 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
+    /// Nothing yet, beside a truth.
+    pub(crate) fn new(truth: impl Fn(f64) -> Option<Vector3<f64>> + 'static) -> Self {
+        Self { truth: Box::new(truth), happened: Vec::new(), points: Vec::new(), keyframes: 0, health: None }
+    }
+
+    /// The label of each estimate, and its time, s.
+    pub(crate) fn labels(&self) -> impl Iterator<Item = (f64, SourceLabel)> {
+        self.points.iter().map(|point| (point.time_s, point.label))
+    }
+
     pub(crate) fn take(
         &mut self,
         estimates: impl Iterator<Item = Stamped<FlightEstimate>>,
         health: impl Iterator<Item = Stamped<FlightHealth>>,
         events: impl Iterator<Item = Stamped<FlightEvents>>,
     ) {
-        self.points.extend(estimates.filter_map(|estimate| Point::of(&estimate.payload)));
+        self.points.extend(estimates.filter_map(|estimate| Point::of(&estimate.payload, &self.truth)));
         self.health = health.last().map(|health| health.payload).or(self.health);
         for event in events.flat_map(|events| events.payload.events) {
             self.keyframes += usize::from(event.keyframe.is_some());
@@ -124,7 +137,7 @@ impl Outcome {
 }
 
 impl Point {
-    fn of(estimate: &FlightEstimate) -> Option<Self> {
+    fn of(estimate: &FlightEstimate, truth: &Truth) -> Option<Self> {
         let time_s = estimate.time.as_nanos() as f64 * 1e-9;
         let position = estimate.position;
         let position = Geodetic {
@@ -135,7 +148,7 @@ impl Point {
         let variance: f64 = (0..3).map(|i| estimate.covariance[(i, i)]).sum();
         Some(Self {
             time_s,
-            error_m: (frame().position(&position) - motion(time_s).position).norm(),
+            error_m: (frame().position(&position) - truth(time_s)?).norm(),
             deviation_m: variance.sqrt(),
             age_s: estimate.anchor_age_ms.map(|age_ms| age_ms as f64 * 1e-3),
             label: estimate.label,

@@ -1,10 +1,16 @@
 //! The flight happens as it is told, with both strategies, and its recorder holds it.
 
-use crate::drone::fly;
+use crate::again;
+use crate::drone::{fly, fly_again};
+use crate::expected::Expected;
+use crate::recorded::Recorded;
 use crate::timeline::{Happened, missing};
 use bb_estimators::navigation::state_estimator::{FlightEvents, Level};
 use bb_mcap::Recording;
 use std::error::Error;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
 
 #[test]
 fn both_strategies_fly() -> Result<(), Box<dyn Error>> {
@@ -34,4 +40,93 @@ fn both_strategies_fly() -> Result<(), Box<dyn Error>> {
 fn a_flight_in_which_something_is_missing_fails() {
     let happened = Happened { time_s: 1.2, what: "started from origin".into() };
     assert_eq!(missing(&[happened]), Some("label satellite_anchored, from 1 s to 3 s".into()));
+}
+
+/// A recorded flight where there is one: none where `../shared/data` is missing.
+fn recorded(name: &str) -> Result<Option<Arc<Recorded>>, Box<dyn Error>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/navigation");
+    if !folder.exists() {
+        println!("skipped: there is no {}", folder.display());
+        return Ok(None);
+    }
+    Ok(Some(Arc::new(Recorded::read(&folder.join(name))?)))
+}
+
+/// Its camera is blind for five seconds, anchors are up to nine seconds apart, and some are of another place.
+#[test]
+fn a_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<dyn Error>> {
+    let Some(flight) = recorded("simflight_stress")? else { return Ok(()) };
+    let outcome = fly_again("eskf", &flight, None)?;
+    assert_eq!(again(&outcome, &flight), None, "{:#?}", outcome.timeline());
+    assert!(outcome.worst_m() < 15.0, "{} m", outcome.worst_m());
+    for label in ["dead_reckoned", "visual_propagated", "satellite_anchored"] {
+        let happened = outcome.happened.iter().any(|one| one.what == format!("label {label}"));
+        // It begins with the first.
+        assert!(happened, "{label}");
+    }
+    // A camera that saw all the time is not what was recorded.
+    let seeing = Expected::of(&flight).without_breaks();
+    assert!(seeing.fault(outcome.labels()).is_some_and(|fault| fault.contains("dead_reckoned")));
+    Ok(())
+}
+
+#[test]
+fn every_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<dyn Error>> {
+    for name in ["simflight", "simflight_stress", "euroc_mh01"] {
+        let Some(flight) = recorded(name)? else { return Ok(()) };
+        for strategy in ["smoother", "eskf"] {
+            let outcome = fly_again(strategy, &flight, None)?;
+            assert_eq!(again(&outcome, &flight), None, "{name}, {strategy}: {:#?}", outcome.timeline());
+            assert!(outcome.worst_m() < 15.0, "{name}, {strategy}: {} m", outcome.worst_m());
+        }
+    }
+    Ok(())
+}
+
+const FILE: &str = "FLIGHT_TEST_FILE";
+
+/// What is killed: it flies and records.
+#[test]
+fn child() {
+    let Ok(file) = std::env::var(FILE) else { return };
+    fly("eskf", Some(Path::new(&file))).expect("it flies until it is killed");
+}
+
+/// The flight-data recorder of a process that was killed in the middle of it holds all up to the last chunk that was written, in order.
+#[test]
+fn the_recorder_of_a_killed_flight_can_be_read() -> Result<(), Box<dyn Error>> {
+    let mut least = 100_000;
+    for round in 0..2 {
+        let file = std::env::temp_dir().join(format!("flight-killed-{round}-{}.mcap", std::process::id()));
+        let mut child = Command::new(std::env::current_exe()?)
+            .args(["--exact", "tests::child"])
+            .env(FILE, &file)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()?;
+        while std::fs::metadata(&file).map_or(0, |data| data.len()) < least {
+            assert!(child.try_wait()?.is_none(), "it flies on");
+            std::thread::yield_now();
+        }
+        child.kill()?;
+        child.wait()?;
+        let recording = Recording::open(&file)?;
+        assert!(recording.broken().is_some(), "it was killed in the middle");
+        let (mut kinds, mut keyframes) = (Vec::new(), Vec::new());
+        for message in recording.messages::<FlightEvents>("estimator/base/navigation/events")? {
+            // The last may be cut.
+            let Ok(message) = message else { break };
+            for event in &message.events {
+                kinds.push(event.kind.clone());
+                keyframes.extend(event.keyframe.as_ref().map(|keyframe| keyframe.time.as_nanos()));
+            }
+        }
+        std::fs::remove_file(&file)?;
+        assert_eq!(kinds[0], "ready");
+        assert_eq!(kinds.iter().filter(|kind| *kind == "started").count(), 1);
+        assert!(keyframes.len() > 50 * (round + 1), "{} keyframes", keyframes.len());
+        assert!(keyframes.windows(2).all(|two| two[0] < two[1]), "in order, each once");
+        least *= 3;
+    }
+    Ok(())
 }

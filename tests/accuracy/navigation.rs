@@ -128,6 +128,51 @@ fn a_tuned_smoother_agrees_with_gtsam() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// The state estimator adds a queue, stamps, places on the Earth, gates and labels to a strategy; none of it may cost accuracy.
+#[test]
+#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
+fn the_state_estimator_errs_as_its_strategy_does() -> Result<(), Box<dyn Error>> {
+    let Some(folder) = navigation()? else { return Ok(()) };
+    let named = |name: &str| {
+        NAVIGATION_FILTERS.iter().find(|filter| filter.name == name).ok_or_else(|| format!("no filter {name}"))
+    };
+    let tuned = ["gyroscope_noise=5e-3", "accelerometer_noise=5e-2"];
+    // Position in m and NEES of the state estimator.
+    for (name, settings, strategy, position, nees) in [
+        ("simflight", &[][..], "smoother", 1.052, 6.29),
+        ("simflight", &[], "eskf", 1.041, 5.29),
+        ("simflight_stress", &[], "smoother", 1.027, 6.51),
+        ("simflight_stress", &[], "eskf", 1.005, 5.30),
+        ("euroc_mh01", &[], "smoother", 0.560, 8.07),
+        ("euroc_mh01", &[], "eskf", 0.566, 8.13),
+        ("kitti_s2", &tuned, "smoother", 0.376, 0.91),
+        ("kitti_s2", &tuned, "eskf", 0.377, 0.92),
+    ] {
+        let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
+        let data = DataSet::read(&folder.join(name))?;
+        let [state, bare] = [format!("state-{strategy}"), format!("{strategy}-single")];
+        let state = evaluate_navigation(&data, named(&state)?, &settings, 20, || {})?;
+        let bare = evaluate_navigation(&data, named(&bare)?, &settings, 20, || {})?;
+        println!(
+            "{name}, {strategy}: {:.3} m, {:.3?}°, NEES {:.2}; bare {:.3} m, {:.3?}°, NEES {:.2}",
+            state.position_rmse_m,
+            state.orientation_rmse_deg,
+            state.nees,
+            bare.position_rmse_m,
+            bare.orientation_rmse_deg,
+            bare.nees
+        );
+        assert!((state.position_rmse_m / position - 1.0).abs() < 0.02, "{name}, {strategy}");
+        assert!((state.nees / nees - 1.0).abs() < 0.03, "{name}, {strategy}");
+        assert!((state.position_rmse_m / bare.position_rmse_m - 1.0).abs() < 0.02, "{name}, {strategy}");
+        let turned = state.orientation_rmse_deg.zip(bare.orientation_rmse_deg);
+        assert!(turned.is_none_or(|(state, bare)| (state / bare - 1.0).abs() < 0.01), "{name}, {strategy}");
+        // On the flights every keyframe is scored: there was an estimate at each.
+        assert_eq!(state.keyframes, bare.keyframes, "{name}, {strategy}");
+    }
+    Ok(())
+}
+
 /// Without the bank, and tuned by hand as GTSAM was, the filter gives GTSAM's figures: they are the same problem.
 #[test]
 fn one_tuned_filter_agrees_with_a_smoother() -> Result<(), Box<dyn Error>> {

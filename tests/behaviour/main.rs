@@ -20,6 +20,8 @@ mod external;
 mod failed_starts;
 mod fan_in;
 mod faults;
+mod flight_logs;
+mod flights;
 mod frames;
 mod good_runs;
 mod guards;

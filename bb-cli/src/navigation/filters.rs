@@ -2,6 +2,7 @@
 
 use super::data::DataSet;
 use crate::filters::parameters;
+use bb_estimators::navigation::state_estimator::StrategyKind;
 use bb_estimators::navigation::{Aiding, EskfParams, NavigationOptions};
 use bb_estimators::params::Params;
 use std::str::FromStr;
@@ -23,10 +24,11 @@ pub(crate) enum Kind {
     Single,
     Smoother,
     SmootherSingle,
+    State(StrategyKind),
 }
 
 /// All there are; the first is the default.
-pub const NAVIGATION_FILTERS: [NavigationFilter; 4] = [
+pub const NAVIGATION_FILTERS: [NavigationFilter; 6] = [
     NavigationFilter {
         name: "eskf",
         about: "error-state Kalman filters over multiples of the data sheets' noise, weighed by their likelihood",
@@ -46,6 +48,16 @@ pub const NAVIGATION_FILTERS: [NavigationFilter; 4] = [
         name: "smoother-single",
         about: "a fixed-lag smoother with the noise as it is given",
         kind: Kind::SmootherSingle,
+    },
+    NavigationFilter {
+        name: "state-eskf",
+        about: "the state estimator of flights with the filter: its queue, gates and labels around `eskf-single`",
+        kind: Kind::State(StrategyKind::Eskf),
+    },
+    NavigationFilter {
+        name: "state-smoother",
+        about: "the state estimator of flights with the smoother: its queue, gates and labels around `smoother-single`",
+        kind: Kind::State(StrategyKind::FixedLagSmoother),
     },
 ];
 
@@ -96,7 +108,7 @@ pub(crate) fn listed() -> String {
 impl NavigationFilter {
     /// Whether it holds a window of keyframes.
     pub(crate) fn is_smoother(&self) -> bool {
-        matches!(self.kind, Kind::Smoother | Kind::SmootherSingle)
+        matches!(self.kind, Kind::Smoother | Kind::SmootherSingle | Kind::State(StrategyKind::FixedLagSmoother))
     }
 }
 

@@ -11,7 +11,7 @@ pub(crate) struct Measured {
     pub(crate) relative: Option<RelativePose>,
     pub(crate) anchor: Option<AbsolutePose>,
     /// Whether a filter uses the fix.
-    filters_take_fixes: bool,
+    pub(crate) filters_take_fixes: bool,
     pub(crate) fix: Option<GnssPosition>,
     pub(crate) velocity: Option<BodyVelocity>,
 }

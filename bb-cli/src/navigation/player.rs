@@ -2,6 +2,7 @@
 
 use super::data::{DataSet, Keyframe, nanoseconds};
 use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
+use super::flown::Flown;
 use super::measured::{Answers, Measured, refused};
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{
@@ -24,6 +25,7 @@ type Smoother = FixedLagSmoother<Scaled, { Scaled::DIMENSION }>;
 pub(crate) enum Player {
     Filter(Box<Navigator>),
     Smoother(Box<Smoothed>),
+    State(Box<Flown>),
 }
 
 /// A smoother and the filters whose noise it takes.
@@ -103,11 +105,23 @@ impl Player {
             Kind::Single => navigator(false).map(Self::Filter),
             Kind::Smoother => smoothed(true),
             Kind::SmootherSingle => smoothed(false),
+            Kind::State(strategy) => {
+                let flown = Flown::new(data, strategy, sensors, window, filter.is_smoother())?;
+                Ok(Self::State(Box::new(flown)))
+            }
         }
     }
 
-    pub(crate) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+    pub(crate) fn start(&mut self, start: &Start) -> Result<(), String> {
+        if let Self::State(flown) = self {
+            return flown.start(start);
+        }
+        self.start_filter(start).map_err(|refusal| refusal.to_string())
+    }
+
+    fn start_filter(&mut self, start: &Start) -> Result<(), Refusal> {
         match self {
+            Self::State(_) => {}
             Self::Filter(navigator) => {
                 navigator.start(start)?;
                 navigator.set_keyframe(0);
@@ -133,6 +147,10 @@ impl Player {
         to: &Keyframe,
     ) -> Result<Step, String> {
         let mut step = Step::default();
+        if let Self::State(flown) = self {
+            flown.play(data, k, from, to, &mut step)?;
+            return Ok(step);
+        }
         let began = Instant::now();
         // Time is that of the keyframe and the lengths of the samples since, as the samples' own stamps may jitter.
         let mut time_s = from.time_s;
@@ -143,6 +161,7 @@ impl Player {
             let propagated = match self {
                 Self::Filter(navigator) => navigator.propagate(&sample),
                 Self::Smoother(smoothed) => smoothed.smoother.propagate(&sample),
+                Self::State(_) => Ok(()),
             };
             match propagated {
                 Ok(()) => {}
@@ -165,6 +184,7 @@ impl Player {
                 step.keyframe_s = began.elapsed().as_secs_f64();
             }
             Self::Smoother(smoothed) => smoothed.play(data, k as u64, (from, to), &mut step)?,
+            Self::State(_) => {}
         }
         Ok(step)
     }
@@ -182,12 +202,17 @@ impl Player {
                 let smoother = &smoothed.smoother;
                 Some(Known::of(&smoother.estimate()?, smoother.pose_covariance()?))
             }
+            Self::State(flown) => flown.newest(),
         }
     }
 
     /// The oldest keyframe of a full window, by its number.
     pub(crate) fn oldest(&mut self) -> Option<(usize, Known)> {
-        let Self::Smoother(smoothed) = self else { return None };
+        let smoothed = match self {
+            Self::Smoother(smoothed) => smoothed,
+            Self::State(flown) => return flown.oldest(),
+            Self::Filter(_) => return None,
+        };
         let smoother = &mut smoothed.smoother;
         if smoother.keyframes().len() < smoother.params().window {
             return None;

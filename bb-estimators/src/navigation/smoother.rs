@@ -22,6 +22,8 @@
 //! Nothing is inverted that may be singular, and no system is refused as indeterminate: what is not known has a variance that
 //! says so.
 
+#[cfg(feature = "autodiff")]
+mod automatic;
 #[cfg(feature = "smoother")]
 mod elimination;
 #[cfg(feature = "smoother")]
@@ -49,6 +51,8 @@ mod solution;
 #[cfg(all(test, feature = "smoother"))]
 mod tests;
 
+#[cfg(feature = "autodiff")]
+pub use automatic::{Automatic, Differentiable, Expectation};
 pub use factor::{Factor, NavigationFactor};
 #[cfg(feature = "smoother")]
 pub use filter::FixedLagSmoother;

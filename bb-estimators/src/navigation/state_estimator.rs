@@ -55,6 +55,7 @@
 //! As in [`navigation`](super). Positions are WGS 84, orientations and covariances in the tangent frame at the position. The
 //! world of the strategies moves on where the robot is more than 5 km from its origin.
 
+mod clock;
 #[cfg(feature = "runtime")]
 mod declared;
 mod emission;
@@ -80,8 +81,8 @@ mod world;
 
 #[cfg(feature = "runtime")]
 pub use declared::{
-    AnchorReading, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents, FlightHealth, FlightInputs,
-    FlightOptions, FlightOutputs, GpsReport, RelativePoseReading, TracingSink,
+    AnchorReading, AttitudeReport, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents, FlightHealth,
+    FlightInputs, FlightOptions, FlightOutputs, GpsReport, RelativePoseReading, TracingSink, WarmStartReport,
 };
 pub use error::{EstimatorError, OriginError, Reason};
 pub use estimator::{Added, StateEstimator};

@@ -1,5 +1,6 @@
 //! The transition and every Jacobian against numeric differentiation, and the laws of the filter.
 
+mod adopt;
 mod cases;
 mod consistency;
 mod jacobians;

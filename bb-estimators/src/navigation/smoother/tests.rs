@@ -1,5 +1,7 @@
 //! Preintegration, factors and elimination, each against another way to the same, and the laws of the smoother.
 
+#[cfg(feature = "autodiff")]
+mod automatic;
 // Matrices of any size need the allocator's part of nalgebra.
 #[cfg(feature = "std")]
 mod batch;

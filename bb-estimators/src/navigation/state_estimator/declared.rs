@@ -5,7 +5,7 @@ mod log;
 mod options;
 mod output;
 
-pub use input::{AnchorReading, FlightInputs, GpsReport, RelativePoseReading};
+pub use input::{AnchorReading, AttitudeReport, FlightInputs, GpsReport, RelativePoseReading, WarmStartReport};
 pub use log::TracingSink;
 pub use options::FlightOptions;
 pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOutputs};
@@ -13,7 +13,7 @@ pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, Flight
 use super::{EstimatorOutput, Event, EventKind, EventSink, HealthState, Level, StateEstimator};
 use bb_core::component::{Info, Request};
 use bb_core::{Context, Estimator, Fault, Reply};
-use nalgebra::Isometry3;
+use input::Mounting;
 use std::time::Duration;
 
 /// Position, velocity and attitude of a flight as an estimator of a robot: [`StateEstimator`] with an IMU, relative poses, poses
@@ -23,7 +23,7 @@ use std::time::Duration;
 /// # fn main() {}
 /// use bb_core::prelude::*;
 /// use bb_estimators::StateEstimator;
-/// use bb_estimators::navigation::state_estimator::{AnchorReading, GpsReport, RelativePoseReading};
+/// use bb_estimators::navigation::state_estimator::{AnchorReading, GpsReport, RelativePoseReading, WarmStartReport};
 ///
 /// robot! {
 ///     robot Drone;
@@ -34,6 +34,7 @@ use std::time::Duration;
 ///         sensor matcher: External<AnchorReading>();
 ///         sensor gps: External<GnssFix>();
 ///         sensor gps_report: External<GpsReport>();
+///         sensor state: External<WarmStartReport>();
 ///         // The smoother takes a millisecond now and then: on a worker it holds up no sample of the IMU.
 ///         estimator navigation: StateEstimator(strategy = "smoother") {
 ///             input imu: sensor::base::imu, driver;
@@ -41,6 +42,7 @@ use std::time::Duration;
 ///             input anchor: sensor::base::matcher, optional;
 ///             input gnss: sensor::base::gps, optional;
 ///             input gps_health: sensor::base::gps_report, optional;
+///             input warm_start: sensor::base::state, optional;
 ///             output estimate;
 ///             output health;
 ///             output events;
@@ -59,8 +61,9 @@ use std::time::Duration;
 /// }
 /// ```
 ///
-/// It starts at the origin of the options once it was at rest for a second, or at the first anchor where they name none. The
-/// body is the IMU, with the axes of the link.
+/// It starts at the origin of the options, levelled by the input `attitude`, or once it was at rest for a second; from the input
+/// `warm_start`, with its deviations doubled; or at the first anchor. The body is the IMU, with the axes of the link; where the
+/// antenna of `gnss` is in it, the joints tell.
 ///
 /// Estimates are emitted at the output's rate, with the health; events at the levels error, warn and info, and keyframes that
 /// leave the window, whenever there are any: record `events` for a flight-data recorder. All events go to `tracing` as well,
@@ -68,7 +71,7 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct FlightEstimator {
     estimator: StateEstimator<Sink>,
-    link_from_imu: Isometry3<f64>,
+    mounting: Mounting,
     period_ns: i64,
     /// The last sample of the IMU, and ticks since.
     last_ns: i64,
@@ -122,6 +125,23 @@ impl FlightEstimator {
     }
 }
 
+impl FlightEstimator {
+    /// What an estimator takes that does not know where it is. One that does would refuse it.
+    fn start(&mut self, inputs: &FlightInputs<'_>) {
+        if !matches!(self.estimator.health().state, HealthState::Init | HealthState::Lost) {
+            return;
+        }
+        if let Some(attitude) = inputs.attitude.filter(|attitude| attitude.is_new()) {
+            let _ = self.estimator.add_attitude(input::attitude(attitude.message()));
+        }
+        if let Some(state) = inputs.warm_start.filter(|state| state.is_new())
+            && let Some(state) = input::warm_start(state.message())
+        {
+            let _ = self.estimator.warm_start(state);
+        }
+    }
+}
+
 impl Estimator for FlightEstimator {
     type Options = FlightOptions;
     type Input = FlightInputs<'static>;
@@ -137,14 +157,15 @@ impl Estimator for FlightEstimator {
         // The IMU may fall silent; what follows from that must not wait for it.
         context.request(Request::Tick(period.max(SLOWEST_LOOK)));
         let period_ns = period.max(SLOWEST_LOOK).as_nanos() as i64;
-        let link_from_imu = context.frame_from_driver()?;
-        Ok(Self { estimator, link_from_imu, period_ns, last_ns: context.now().as_nanos(), ticks: 0, health: None })
+        let mounting = Mounting::of(context)?;
+        Ok(Self { estimator, mounting, period_ns, last_ns: context.now().as_nanos(), ticks: 0, health: None })
     }
 
     /// What is refused is told by events.
     fn handle_input(&mut self, inputs: FlightInputs<'_>) -> Result<Reply<FlightOutputs>, Fault> {
-        let sample = input::sample(inputs.imu.message(), &self.link_from_imu);
+        let sample = input::sample(inputs.imu.message(), &self.mounting);
         (self.last_ns, self.ticks) = (sample.time_ns, 0);
+        self.start(&inputs);
         let _ = self.estimator.add_imu(&sample);
         if let Some(report) = inputs.gps_health.filter(|report| report.is_new()) {
             let _ = self.estimator.add_gps_health(input::health(report.message()));
@@ -158,7 +179,7 @@ impl Estimator for FlightEstimator {
             let _ = self.estimator.add_pose_anchor(anchor);
         }
         if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
-            && let Some(fix) = input::fix(fix.message())
+            && let Some(fix) = input::fix(fix.message(), &self.mounting)
         {
             let _ = self.estimator.add_gnss(fix);
         }

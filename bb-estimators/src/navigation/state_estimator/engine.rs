@@ -14,7 +14,7 @@ use super::input::{GnssReading, ImuBias, PoseAnchor, TakeoffOrigin, VioOutput, b
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, at_anchor, warm};
-use super::strategy::{Failure, Measured, Pose, Predictor, Strategy, id_of};
+use super::strategy::{Failure, Measured, Pose, Predictor, Strategy, Trust, id_of};
 use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
@@ -34,8 +34,22 @@ const FITS: f64 = 3.0;
 /// Farther from the origin nothing is, m.
 const FARTHEST: f64 = 1e7;
 
-/// Refusals in a row that are more than outliers.
+/// Refused relative poses in a row that are more than outliers.
 const STORM: u64 = 3;
+
+/// Refused positions in a row that are: there is one a second.
+const DOUBT: u64 = 2;
+
+/// Normalised innovation squared over the dimension at which one position is enough to doubt the estimate, and at which what
+/// overrules it does not correct it but begins again: thirty standard deviations.
+const FAR: f64 = 1000.0;
+
+/// After so long without a camera or an anchor, a receiver that is trusted may overrule the estimate, ns: the IMU alone knows
+/// less.
+const ALONE_NS: i64 = 60_000_000_000;
+
+/// So much time is taken to have passed while the clock was set back, ns: twice of what it takes to believe it.
+const SET_BACK_GAP_NS: i64 = 1_000_000_000;
 
 /// See the module.
 #[derive(Clone, Debug)]
@@ -58,8 +72,12 @@ pub(super) struct Engine<F: ProvidedFactor> {
     is_anchor_degraded: bool,
     /// From when to when the estimate is distrusted.
     degraded_ns: Option<(i64, i64)>,
+    /// When something else than the IMU and the receiver was fused last.
+    independent_ns: Option<i64>,
     /// How many positions must still fit.
     unconfirmed: u32,
+    /// How often positions have overruled it since they last did.
+    overruled: u32,
     left: Option<(Pose, Sources)>,
 }
 
@@ -97,7 +115,9 @@ impl<F: ProvidedFactor> Engine<F> {
             nis: None,
             is_anchor_degraded: false,
             degraded_ns: None,
+            independent_ns: None,
             unconfirmed: 0,
+            overruled: 0,
             left: None,
         })
     }
@@ -168,8 +188,38 @@ impl<F: ProvidedFactor> Engine<F> {
         (poses.into_iter().map(|pose| (pose, this.sources_at(pose.time_ns))), is_smoothed)
     }
 
-    pub(super) fn keyframe_ns(&self) -> i64 {
-        self.strategy.keyframe_ns()
+    /// The time from which samples of the IMU are needed, to run on and to predict.
+    pub(super) fn needed_ns(&self) -> i64 {
+        let now_ns = self.now_ns.unwrap_or(i64::MIN);
+        match self.phase {
+            Phase::Running => now_ns.min(self.strategy.keyframe_ns()),
+            Phase::Starting(_) | Phase::Lost => now_ns,
+        }
+    }
+
+    /// The clock of the IMU was set back: all that is known stays, but not when it was measured. A receiver that was not let
+    /// in stays out.
+    pub(super) fn set_clock_back(&mut self, sample_ns: i64, config: &StateEstimatorConfig) {
+        (self.key, self.now_ns) = (Key::FIRST, None);
+        self.sources = Sources::default();
+        self.gate.forget_times();
+        self.marks.clear();
+        (self.degraded_ns, self.left) = (None, None);
+        // As if it were now: a receiver must not gain by it.
+        self.independent_ns = self.independent_ns.and(Some(sample_ns));
+        match self.phase {
+            Phase::Starting(_) => self.phase = Phase::Starting(Starter::new(config)),
+            Phase::Lost => {}
+            Phase::Running => {
+                let resumed_ns = sample_ns.saturating_sub(SET_BACK_GAP_NS);
+                if self.strategy.set_clock(resumed_ns).is_ok() {
+                    self.now_ns = Some(resumed_ns);
+                    self.unconfirmed = CONFIRMATIONS;
+                } else {
+                    self.phase = Phase::Lost;
+                }
+            }
+        }
     }
 
     pub(super) fn keyframes(&self) -> usize {
@@ -210,7 +260,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => {
                 let gaps = self.strategy.gaps();
                 let result = self.strategy.propagate(sample);
-                if self.strategy.gaps() != gaps {
+                if self.strategy.gaps() != gaps || self.unconfirmed > 0 {
                     self.distrust(sample.time_ns);
                 }
                 match result {
@@ -241,7 +291,9 @@ impl<F: ProvidedFactor> Engine<F> {
             // It is the first that is known; the first sample goes on from there.
             self.now_ns = self.now_ns.or(Some(entry.key.time_ns));
         }
-        let Some(now_ns) = self.now_ns else {
+        // What is told before the first sample counts as well.
+        let is_told = matches!(entry.payload, Payload::Attitude(_) | Payload::Health(_) | Payload::Frame);
+        let Some(now_ns) = self.now_ns.or(is_told.then_some(entry.key.time_ns)) else {
             return (Outcome::Degraded(Refusal::NotStarted.into()), None);
         };
         let mut rejection = None;
@@ -342,25 +394,56 @@ impl<F: ProvidedFactor> Engine<F> {
             return Err(Refusal::NotStarted.into());
         }
         let result = self.strategy.measure(measured);
-        let is_position = !matches!(measured, Measured::Relative(_));
-        let is_storm = self.strategy.refused_in_a_row() >= STORM;
+        let is_relative = matches!(measured, Measured::Relative(_));
         match &result {
-            Ok(fused) if is_position && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
-            Ok(fused) if is_position && fused.nis <= FITS * fused.dimension as f64 => {
-                self.unconfirmed = self.unconfirmed.saturating_sub(1);
+            // Where it was cannot be relied on either.
+            Ok(fused) if is_relative && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
+            result if !is_relative => {
+                let refused = match measured {
+                    Measured::Gnss(.., trust) => self.strategy.refused_fixes(*trust),
+                    _ => self.strategy.refused_positions(),
+                };
+                self.weigh_position(result, refused >= DOUBT);
             }
-            _ if is_position && self.unconfirmed > 0 => self.unconfirmed = CONFIRMATIONS,
             _ => {}
         }
+        let is_storm = is_relative && self.strategy.refused_relative() >= STORM;
         if let (true, Some(now_ns)) = (is_storm || self.unconfirmed > 0, self.now_ns) {
             self.distrust(now_ns);
         }
         let fused = result?;
+        if !matches!(measured, Measured::Gnss(..)) {
+            self.independent_ns = self.now_ns;
+        }
         // Finite, but nowhere on the Earth.
         if !self.strategy.position().is_some_and(|position| position.norm() < FARTHEST) {
             return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
         }
         Ok(fused)
+    }
+
+    /// What a position says of the estimate itself.
+    fn weigh_position(&mut self, result: &Result<Fused, Failure>, is_repeated: bool) {
+        let is_far = |nis: f64| nis > FAR * 6.0;
+        let is_doubtful = match result {
+            Err(Failure::Refused(Refusal::Gate { nis, .. })) => is_repeated || is_far(*nis),
+            _ => false,
+        };
+        match result {
+            Ok(fused) if fused.raised > 1.0 => {
+                self.unconfirmed = CONFIRMATIONS;
+                self.overruled += 1;
+            }
+            Ok(fused) if fused.nis <= FITS * fused.dimension as f64 => {
+                self.unconfirmed = self.unconfirmed.saturating_sub(1);
+                if self.unconfirmed == 0 {
+                    self.overruled = 0;
+                }
+            }
+            _ if self.unconfirmed > 1 => self.unconfirmed = CONFIRMATIONS,
+            _ if is_doubtful => self.unconfirmed = self.unconfirmed.max(1),
+            _ => {}
+        }
     }
 
     fn vio(&mut self, vio: &VioOutput, config: &StateEstimatorConfig) -> Result<Option<Fused>, Trouble> {
@@ -390,8 +473,9 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => false,
         };
         if can_start {
-            let world = *self.world.get_or_insert_with(|| World::new(anchor.position));
-            self.start(&at_anchor(now_ns, anchor, &world, config, self.bias.as_ref()), StartedFrom::Anchor)?;
+            self.start_at(now_ns, anchor, config)?;
+            // One alone may be an outlier.
+            self.unconfirmed = self.unconfirmed.max(1);
             self.sources.anchored(anchor.time_ns, &config.params);
             self.is_anchor_degraded = anchor.is_covariance_degraded;
             return Ok(None);
@@ -399,6 +483,10 @@ impl<F: ProvidedFactor> Engine<F> {
         let world = self.world.ok_or(Refusal::NotStarted)?;
         let measured = world.anchor(anchor);
         let fused = self.measure(&Measured::Anchor(measured))?;
+        if fused.raised > FAR || (fused.raised > 1.0 && self.overruled > 1) {
+            // Far off, or not helped by the last correction: then nothing of it can be relied on.
+            self.start_at(now_ns, anchor, config)?;
+        }
         self.sources.anchored(anchor.time_ns, &config.params);
         self.is_anchor_degraded = anchor.is_covariance_degraded;
         if let Some(position) = self.strategy.position() {
@@ -406,6 +494,11 @@ impl<F: ProvidedFactor> Engine<F> {
             *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
         }
         Ok(Some(fused))
+    }
+
+    fn start_at(&mut self, now_ns: i64, anchor: &PoseAnchor, config: &StateEstimatorConfig) -> Result<(), Reason> {
+        let world = *self.world.get_or_insert_with(|| World::new(anchor.position));
+        self.start(&at_anchor(now_ns, anchor, &world, config, self.bias.as_ref()), StartedFrom::Anchor)
     }
 
     fn fix(
@@ -424,7 +517,9 @@ impl<F: ProvidedFactor> Engine<F> {
             *rejection = Some(rejected);
             return Err(Trouble::Degraded(Reason::Gate(rejected)));
         }
-        let fused = self.measure(&Measured::Gnss(measured, velocity))?;
+        let is_alone = |at_ns: i64| fix.time_ns.saturating_sub(at_ns) > ALONE_NS;
+        let trust = if self.independent_ns.is_none_or(is_alone) { Trust::Alone } else { Trust::Beside };
+        let fused = self.measure(&Measured::Gnss(measured, velocity, trust))?;
         self.sources.anchored(fix.time_ns, &config.params);
         Ok(Some(fused))
     }

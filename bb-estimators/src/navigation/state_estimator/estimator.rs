@@ -16,7 +16,7 @@ use super::input::{
 use super::label::{SourceLabel, Sources};
 use super::output::{EstimatorHealth, EstimatorOutput, HealthState};
 use super::params::StateEstimatorConfig;
-use super::queue::{Queue, QueueCounts, Told};
+use super::queue::{Queue, QueueCounts, Sampled, Told};
 use super::strategy::Pose;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
@@ -163,19 +163,23 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     ///
     /// # Errors
     ///
-    /// [`EstimatorError::Degraded`] if it is refused, or follows a gap; [`EstimatorError::Fatal`] if there is no room for it.
+    /// [`EstimatorError::Degraded`] if it is refused, or follows a gap. The first sample waits until another stamp agrees with its
+    /// own.
     pub fn add_imu(&mut self, sample: &ImuMean) -> Result<(), EstimatorError> {
         self.add_samples(core::slice::from_ref(sample))
     }
 
     fn add_samples(&mut self, samples: &[ImuMean]) -> Result<(), EstimatorError> {
         let mut first = Ok(());
+        let mut waits = false;
         for sample in samples {
-            let result = match self.queue.add_sample(sample, &self.config) {
-                Ok(false) => Ok(()),
-                Ok(true) => Err(EstimatorError::Degraded(Reason::Bridged)),
+            let sampled = self.queue.add_sample(sample, &self.config);
+            let result = match sampled {
+                Ok(Sampled::Taken | Sampled::Waits) => Ok(()),
+                Ok(Sampled::Bridged) => Err(EstimatorError::Degraded(Reason::Bridged)),
                 Err(reason) => Err(failed(reason)),
             };
+            waits = sampled == Ok(Sampled::Waits);
             self.drain();
             if let Err(error) = result {
                 self.fail(sample.time_ns, InputKind::Imu, error);
@@ -183,7 +187,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
             first = first.and(result);
         }
         if let (Ok(()), Some(last)) = (first, samples.last()) {
-            self.tell(last.time_ns, EventKind::Added { input: InputKind::Imu, nis: None, waits: false });
+            self.tell(last.time_ns, EventKind::Added { input: InputKind::Imu, nis: None, waits });
         }
         first
     }
@@ -292,6 +296,10 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
                 Told::Started(time_ns, from) => self.tell(time_ns, EventKind::Started { from }),
                 Told::Broken(time_ns, reason) => {
                     self.fail(time_ns, InputKind::Imu, EstimatorError::Fatal(reason));
+                }
+                Told::Dropped(time_ns, count) => self.tell(time_ns, EventKind::SamplesDropped { count }),
+                Told::SetBack(time_ns, by_ns) => {
+                    self.tell(time_ns, EventKind::ClockSetBack { seconds: by_ns as f64 * 1e-9 });
                 }
                 Told::Left(pose, sources) => {
                     let is_smoothed = self.is_smoothing();

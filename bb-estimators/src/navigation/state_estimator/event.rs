@@ -166,6 +166,17 @@ pub enum EventKind {
         /// Why.
         rejection: Rejection,
     },
+    /// The clock of the IMU was set back: it goes on by the new one, degraded until positions confirm it.
+    ClockSetBack {
+        /// By how much, s.
+        seconds: f64,
+    },
+    /// Samples of the IMU left before their time, as more came than there is room for. Inputs that are late by less than they may
+    /// be are refused.
+    SamplesDropped {
+        /// How many.
+        count: u64,
+    },
     /// The covariance has grown.
     CovarianceGrowing {
         /// Its norm over that of the steady one.
@@ -197,6 +208,8 @@ impl EventKind {
             Self::Label { .. } => "label",
             Self::Gate { .. } => "gate",
             Self::Rejected { .. } => "rejected",
+            Self::ClockSetBack { .. } => "clock_set_back",
+            Self::SamplesDropped { .. } => "samples_dropped",
             Self::CovarianceGrowing { .. } => "covariance_growing",
             Self::FallbackImminent => "fallback_imminent",
             Self::FallbackEngaged => "fallback_engaged",
@@ -211,9 +224,11 @@ impl Event {
     pub fn level(&self) -> Level {
         match self.kind {
             EventKind::Fatal { .. } | EventKind::FallbackImminent | EventKind::FallbackEngaged => Level::Error,
-            EventKind::Degraded { .. } | EventKind::Rejected { .. } | EventKind::CovarianceGrowing { .. } => {
-                Level::Warn
-            }
+            EventKind::Degraded { .. }
+            | EventKind::Rejected { .. }
+            | EventKind::ClockSetBack { .. }
+            | EventKind::SamplesDropped { .. }
+            | EventKind::CovarianceGrowing { .. } => Level::Warn,
             EventKind::Ready { .. }
             | EventKind::Started { .. }
             | EventKind::Label { .. }
@@ -241,6 +256,10 @@ impl Event {
                     text(format_args!("NAV GPS rejected: anchor {distance_m:.0} m off"))
                 }
             },
+            EventKind::ClockSetBack { seconds } => {
+                text(format_args!("NAV IMU clock set back {seconds:.0} s: goes on"))
+            }
+            EventKind::SamplesDropped { count } => text(format_args!("NAV queue full: {count} samples dropped")),
             EventKind::CovarianceGrowing { ratio } => text(format_args!("NAV covariance {ratio:.1} times steady")),
             EventKind::FallbackImminent => text(format_args!("NAV no estimate: fallback imminent")),
             EventKind::FallbackEngaged => text(format_args!("NAV no estimate: FALL BACK TO FC IMU")),

@@ -198,6 +198,12 @@ impl SpoofGate {
         Some(Err(Rejection::Disagrees { distance_m }))
     }
 
+    /// The clock was set back: what was reported has no time any more.
+    pub(super) fn forget_times(&mut self) {
+        let state = if self.state.is_open() { GateState::Open } else { GateState::Blocked };
+        *self = Self { state, ..Self::default() };
+    }
+
     fn restart(&mut self, time_ns: i64) {
         self.state = GateState::Dwelling { since_ns: time_ns };
         self.candidate = None;

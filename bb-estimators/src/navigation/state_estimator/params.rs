@@ -66,6 +66,16 @@ params! {
         ///
         /// Source: two seconds of keyframes at 10 Hz, and the time that a satellite image takes.
         lateness: f64 = 2.0, in 0.05..=10.0, unit "s";
+        /// The most samples of the IMU a second. Memory is taken for as many, see
+        /// [`StateEstimatorParams::room`](Self::room).
+        ///
+        /// Small: if more come, the oldest are dropped, and what is late is refused sooner. Large: costs memory, 56 bytes a
+        /// sample.
+        imu_rate: f64 = 400.0, in 1.0..=10_000.0, unit "Hz";
+        /// The most inputs a second that are no samples of the IMU; a frame of the camera counts twice.
+        ///
+        /// Small: if more come, they are refused as an overflow. Large: costs memory, about 700 bytes an input.
+        input_rate: f64 = 128.0, in 1.0..=10_000.0, unit "Hz";
         /// How far ahead of the newest sample of the IMU an input may be stamped.
         lead: f64 = 0.5, in 0.0..=10.0, unit "s";
         /// Without camera frames, a keyframe is made after this time. It must be longer than the time between two frames.
@@ -133,6 +143,38 @@ impl StateEstimatorConfig {
         Err(ParamsError { parameter: "window", value, min, max, unit: "" })
     }
 }
+
+/// The most that the queue holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Rooms {
+    pub(super) samples: usize,
+    pub(super) inputs: usize,
+}
+
+impl Rooms {
+    pub(super) fn of(params: &StateEstimatorParams) -> Self {
+        let [samples, inputs] = params.room();
+        Self { samples, inputs }
+    }
+}
+
+impl StateEstimatorParams {
+    /// The most samples of the IMU and the most other inputs that are held: `imu_rate (1.25 lateness + keyframe_interval + 1)`
+    /// and `input_rate (1.25 lateness + lead + 1)`. Room for them is taken when the estimator is made.
+    ///
+    /// Samples are needed from the oldest copy of the estimate on, which is as old as an input may be late and at most a fifth
+    /// of that older, and from the keyframe before it.
+    pub fn room(&self) -> [usize; 2] {
+        let late = 1.25 * self.lateness + 1.0;
+        // A cast saturates.
+        let samples = self.imu_rate * (late + self.keyframe_interval);
+        let inputs = self.input_rate * (late + self.lead);
+        [samples, inputs].map(|most| (most as usize).max(LEAST_ROOM))
+    }
+}
+
+/// There is room for so many whatever the rates.
+const LEAST_ROOM: usize = 32;
 
 /// Seconds as nanoseconds.
 pub(super) fn ns(seconds: f64) -> i64 {

@@ -7,6 +7,7 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use super::clock::{Clock, Stamped, follows};
 use super::engine::{Condition, Engine};
 use super::entry::{Entry, Key, Outcome, Payload};
 use super::error::Reason;
@@ -15,22 +16,18 @@ use super::factor::ProvidedFactor;
 use super::gate::Rejection;
 use super::input::TakeoffOrigin;
 use super::label::Sources;
-use super::params::{StateEstimatorConfig, ns};
+use super::params::{Rooms, StateEstimatorConfig, ns};
 use super::strategy::{Pose, Predictor};
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S};
+use crate::navigation::eskf::ImuMean;
 use crate::navigation::refusal::Refusal;
 
-/// Room for samples of the IMU: twice the longest lateness at 400 Hz.
-const SAMPLES: usize = 8192;
-/// Room for other inputs.
-const INPUTS: usize = 512;
 /// Copies of the engine.
 const COPIES: usize = 8;
 /// How far the engine may be behind the IMU, ns.
 const LONGEST_TAIL_NS: i64 = 250_000_000;
-/// Two samples that agree on a leap of time are no more than this apart, ns.
-const AGREED_NS: i64 = 1_000_000_000;
+/// The part of the samples that leaves at once where there is no room.
+const LEAVING: usize = 8;
 
 /// How inputs arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,6 +46,20 @@ pub struct QueueCounts {
     pub invalid: u64,
     /// How often the engine was run again from an earlier copy.
     pub reruns: u64,
+    /// Samples of the IMU that left before their time, as more came than there is room for.
+    pub dropped: u64,
+    /// How often the clock of the IMU was set back, and the estimator went on by the new one.
+    pub set_back: u64,
+}
+
+/// What became of a sample of the IMU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sampled {
+    Taken,
+    /// It follows a gap.
+    Bridged,
+    /// It is the first: the next tells whether its stamp can be believed.
+    Waits,
 }
 
 #[expect(clippy::large_enum_variant, reason = "its room is taken once")]
@@ -67,6 +78,10 @@ pub(super) enum Told {
     Left(Pose, Sources),
     /// The IMU broke the estimate.
     Broken(i64, Reason),
+    /// Samples left before their time.
+    Dropped(i64, u64),
+    /// The clock of the IMU was set back, by so many ns.
+    SetBack(i64, i64),
 }
 
 /// See the module.
@@ -78,8 +93,10 @@ pub(super) struct Queue<F: ProvidedFactor> {
     copies: VecDeque<Engine<F>>,
     predictor: Option<Predictor>,
     newest: Option<ImuMean>,
-    /// A sample that is too far ahead to be believed alone.
-    leap_ns: Option<i64>,
+    /// The first sample, as long as nothing agrees with its stamp.
+    first: Option<ImuMean>,
+    clock: Clock,
+    rooms: Rooms,
     counts: QueueCounts,
     started: Option<(i64, StartedFrom)>,
     left_ns: i64,
@@ -91,14 +108,17 @@ impl<F: ProvidedFactor> Queue<F> {
         let engine = Engine::new(config)?;
         let mut copies = VecDeque::with_capacity(COPIES + 1);
         copies.push_back(engine.clone());
+        let rooms = Rooms::of(&config.params);
         Ok(Self {
-            samples: VecDeque::with_capacity(SAMPLES),
-            inputs: VecDeque::with_capacity(INPUTS),
+            samples: VecDeque::with_capacity(rooms.samples),
+            inputs: VecDeque::with_capacity(rooms.inputs),
             engine,
             copies,
             predictor: None,
             newest: None,
-            leap_ns: None,
+            first: None,
+            clock: Clock::default(),
+            rooms,
             counts: QueueCounts::default(),
             started: None,
             left_ns: i64::MIN,
@@ -108,7 +128,7 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// Whether nothing has come in yet.
     pub(super) fn is_empty(&self) -> bool {
-        self.newest.is_none() && self.inputs.is_empty()
+        self.newest.is_none() && self.first.is_none() && self.inputs.is_empty()
     }
 
     pub(super) fn set_origin(&mut self, origin: &TakeoffOrigin) {
@@ -167,39 +187,31 @@ impl<F: ProvidedFactor> Queue<F> {
         self.count(refusal.into())
     }
 
-    /// Takes a sample of the IMU; whether it follows a gap.
-    pub(super) fn add_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
+    /// Takes a sample of the IMU.
+    pub(super) fn add_sample(
+        &mut self,
+        sample: &ImuMean,
+        config: &StateEstimatorConfig,
+    ) -> Result<Sampled, Reason> {
         let result = self.place_sample(sample, config);
         result.map_err(|reason| self.count(reason))
     }
 
-    fn place_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
+    fn place_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
         sample.check()?;
         let time_ns = sample.time_ns;
-        let Some(newest) = self.newest else {
-            self.newest = Some(*sample);
-            self.samples.push_back(*sample);
-            self.drop_strangers(time_ns, config);
-            self.settle(time_ns, config);
-            return Ok(false);
-        };
-        let ahead_ns = time_ns.saturating_sub(newest.time_ns);
-        if ahead_ns <= 0 {
-            self.place_late_sample(sample, &newest, config)?;
-            return Ok(false);
-        }
-        if ahead_ns > ns(LONGEST_GAP_S) {
-            // One alone may have a broken stamp, which would make all that follow too old.
-            let is_agreed =
-                self.leap_ns.is_some_and(|leap_ns| (1..=AGREED_NS).contains(&time_ns.saturating_sub(leap_ns)));
-            self.leap_ns = (!is_agreed).then_some(time_ns);
-            if !is_agreed {
-                return Err(Refusal::InTheFuture { time_ns }.into());
+        let Some(newest) = self.newest else { return self.place_first(sample, config) };
+        match self.clock.judge(time_ns, newest.time_ns, ns(config.params.lateness)) {
+            Stamped::Next => {}
+            Stamped::Late => return self.place_late_sample(sample, config),
+            Stamped::Ahead => return Err(Refusal::InTheFuture { time_ns }.into()),
+            Stamped::TooOld => return Err(Refusal::TooOld { time_ns }.into()),
+            Stamped::SetBack => {
+                self.set_back(sample, newest.time_ns, config);
+                return Ok(Sampled::Bridged);
             }
         }
-        if self.samples.len() >= SAMPLES {
-            return Err(Reason::Overflow);
-        }
+        self.make_room(config);
         self.newest = Some(*sample);
         self.samples.push_back(*sample);
         if self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample).is_err()) {
@@ -213,26 +225,71 @@ impl<F: ProvidedFactor> Queue<F> {
         } else if let Some(last) = self.inputs.iter().rev().find(|entry| waits(entry)).map(|entry| entry.key) {
             self.settle(last.time_ns, config);
         }
-        Ok(ahead_ns > ns(config.sensors.longest_sample))
+        let is_gap = time_ns.saturating_sub(newest.time_ns) > ns(config.sensors.longest_sample);
+        Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
     }
 
-    fn place_late_sample(
-        &mut self,
-        sample: &ImuMean,
-        newest: &ImuMean,
-        config: &StateEstimatorConfig,
-    ) -> Result<(), Reason> {
+    /// The first sample sets the time, once another stamp agrees with its own.
+    fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
         let time_ns = sample.time_ns;
-        if newest.time_ns.saturating_sub(time_ns) > ns(config.params.lateness) {
-            return Err(Refusal::TooOld { time_ns }.into());
+        let before = self.first.take();
+        if let Some(first) = before.filter(|first| follows(time_ns, first.time_ns)) {
+            self.begin(&first, config);
+            return self.place_sample(sample, config);
         }
-        if self.samples.len() >= SAMPLES {
-            return Err(Reason::Overflow);
+        if let Some(first) = before {
+            // Neither is known to be wrong, but the later one may be confirmed yet.
+            let (key, refusal) = (Key::of_sample(first.time_ns), stranger(first.time_ns, time_ns));
+            let reason = self.count(refusal.into());
+            self.told.push(Told::Taken(key, InputKind::Imu, Outcome::Degraded(reason)));
         }
-        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
-        if self.samples.get(index).is_some_and(|other| other.time_ns == time_ns) {
+        if self.inputs.iter().any(|entry| self.is_near(entry.key.time_ns, time_ns, config)) {
+            self.begin(sample, config);
+            return Ok(Sampled::Taken);
+        }
+        self.first = Some(*sample);
+        Ok(Sampled::Waits)
+    }
+
+    fn begin(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) {
+        self.newest = Some(*sample);
+        self.samples.push_back(*sample);
+        self.drop_strangers(sample.time_ns, config);
+        self.settle(sample.time_ns, config);
+    }
+
+    /// The clock of the IMU was set back: the engine goes on by the new one, without the past.
+    fn set_back(&mut self, sample: &ImuMean, newest_ns: i64, config: &StateEstimatorConfig) {
+        self.settle(newest_ns, config);
+        for entry in self.inputs.drain(..) {
+            if let (None, Some(kind)) = (entry.outcome, entry.payload.kind()) {
+                self.counts.too_old += 1;
+                let reason = Refusal::TooOld { time_ns: entry.key.time_ns }.into();
+                self.told.push(Told::Taken(entry.key, kind, Outcome::Degraded(reason)));
+            }
+        }
+        self.engine.set_clock_back(sample.time_ns, config);
+        self.samples.clear();
+        self.copies.clear();
+        self.copies.push_back(self.engine.clone());
+        self.left_ns = i64::MIN;
+        self.counts.set_back += 1;
+        self.told.push(Told::SetBack(sample.time_ns, newest_ns.saturating_sub(sample.time_ns)));
+        self.newest = Some(*sample);
+        self.samples.push_back(*sample);
+        self.settle(sample.time_ns, config);
+    }
+
+    fn place_late_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
+        let time_ns = sample.time_ns;
+        if self.samples.binary_search_by_key(&time_ns, |other| other.time_ns).is_ok() {
             return Err(Reason::Duplicate);
         }
+        self.make_room(config);
+        if !self.reaches(Key::of_sample(time_ns)) {
+            return Err(Refusal::TooOld { time_ns }.into());
+        }
+        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
         self.samples.insert(index, *sample);
         self.counts.late += 1;
         let engine_ns = self.engine.now_ns().unwrap_or(i64::MIN);
@@ -241,26 +298,67 @@ impl<F: ProvidedFactor> Queue<F> {
         } else {
             self.predict();
         }
-        Ok(())
+        Ok(Sampled::Taken)
+    }
+
+    /// Whether there is a copy from before an input. For what is within the lateness there is, unless samples were dropped or the
+    /// clock was set back.
+    fn reaches(&self, key: Key) -> bool {
+        let is_before =
+            |copy: &Engine<F>| copy.key() < key && copy.now_ns().is_none_or(|now_ns| now_ns <= key.time_ns);
+        self.copies.front().is_some_and(is_before)
+    }
+
+    /// If there is no room for another sample, the oldest leave: first those that only an input that is late needs, which is
+    /// then refused as too old.
+    fn make_room(&mut self, config: &StateEstimatorConfig) {
+        let most = self.rooms.samples;
+        if self.samples.len() < most {
+            return;
+        }
+        let newest_ns = self.newest.map_or(i64::MIN, |newest| newest.time_ns);
+        self.run(newest_ns, config);
+        let held = self.samples.len();
+        while self.samples.len() >= most && self.copies.len() > 1 {
+            self.copies.pop_front();
+            self.trim();
+        }
+        if self.samples.len() >= most {
+            self.copies.clear();
+            self.copies.push_back(self.engine.clone());
+            self.trim();
+        }
+        if self.samples.len() >= most {
+            // They are needed since the newest keyframe: the prediction has to bridge them.
+            self.samples.drain(..(most / LEAVING).max(1));
+        }
+        self.predict();
+        let dropped = held.saturating_sub(self.samples.len()) as u64;
+        self.counts.dropped += dropped;
+        self.told.push(Told::Dropped(newest_ns, dropped));
+    }
+
+    /// Whether an input may belong to a sample.
+    fn is_near(&self, input_ns: i64, sample_ns: i64, config: &StateEstimatorConfig) -> bool {
+        let (oldest_ns, latest_ns) = (
+            sample_ns.saturating_sub(ns(config.params.lateness)),
+            sample_ns.saturating_add(ns(config.params.lead)),
+        );
+        (oldest_ns..=latest_ns).contains(&input_ns)
     }
 
     /// Inputs that came before the IMU and are not of its time.
     fn drop_strangers(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
-        let (lateness, lead) = (ns(config.params.lateness), ns(config.params.lead));
         let mut index = 0;
         while let Some(entry) = self.inputs.get(index) {
             let (key, kind) = (entry.key, entry.payload.kind());
-            let refusal = if key.time_ns < time_ns.saturating_sub(lateness) {
-                Refusal::TooOld { time_ns: key.time_ns }
-            } else if key.time_ns > time_ns.saturating_add(lead) {
-                Refusal::InTheFuture { time_ns: key.time_ns }
-            } else {
+            if self.is_near(key.time_ns, time_ns, config) {
                 index += 1;
                 continue;
-            };
+            }
             self.inputs.remove(index);
             if let Some(kind) = kind {
-                let reason = self.count(refusal.into());
+                let reason = self.count(stranger(key.time_ns, time_ns).into());
                 self.told.push(Told::Taken(key, kind, Outcome::Degraded(reason)));
             }
         }
@@ -288,24 +386,24 @@ impl<F: ProvidedFactor> Queue<F> {
         let newest_ns = self.newest.map(|newest| newest.time_ns);
         let oldest_ns =
             newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(ns(config.params.lateness)));
-        if time_ns < oldest_ns {
+        let key = payload.key(time_ns);
+        if time_ns < oldest_ns || !self.reaches(key) {
             return Err(Refusal::TooOld { time_ns }.into());
         }
         if newest_ns.is_some_and(|newest_ns| time_ns > newest_ns.saturating_add(ns(config.params.lead))) {
             return Err(Refusal::InTheFuture { time_ns }.into());
         }
-        let key = payload.key(time_ns);
         if self.inputs.binary_search_by(|entry| entry.key.cmp(&key)).is_ok() {
             return Err(Reason::Duplicate);
         }
-        if self.inputs.len() + 1 + frames.len() > INPUTS {
+        if self.inputs.len() + 1 + frames.len() > self.rooms.inputs {
             return Err(Reason::Overflow);
         }
         let mut first = key;
         self.insert(key, payload);
         for frame_ns in frames.iter().filter(|frame_ns| **frame_ns >= oldest_ns) {
             let frame = Payload::<F>::Frame.key(*frame_ns);
-            if self.inputs.binary_search_by(|entry| entry.key.cmp(&frame)).is_err() {
+            if self.reaches(frame) && self.inputs.binary_search_by(|entry| entry.key.cmp(&frame)).is_err() {
                 self.insert(frame, Payload::Frame);
                 first = first.min(frame);
             }
@@ -464,9 +562,14 @@ impl<F: ProvidedFactor> Queue<F> {
         while self.copies.len() > COPIES || self.copies.get(1).is_some_and(is_old) {
             self.copies.pop_front();
         }
+        self.trim();
+    }
+
+    /// Drops what no copy needs any more, to run on or to predict.
+    fn trim(&mut self) {
         let Some(oldest) = self.copies.front() else { return };
         let key = oldest.key();
-        let kept_ns = oldest.now_ns().unwrap_or(i64::MIN).min(self.engine.keyframe_ns());
+        let kept_ns = oldest.needed_ns().min(self.engine.needed_ns());
         while self.samples.front().is_some_and(|sample| sample.time_ns <= kept_ns) {
             self.samples.pop_front();
         }
@@ -487,4 +590,9 @@ impl<F: ProvidedFactor> Queue<F> {
             }
         }
     }
+}
+
+/// Why an input is not placed that is not of the time of a sample.
+fn stranger(time_ns: i64, sample_ns: i64) -> Refusal {
+    if time_ns < sample_ns { Refusal::TooOld { time_ns } } else { Refusal::InTheFuture { time_ns } }
 }

@@ -55,8 +55,17 @@ impl Pose {
 pub(super) enum Measured<'a, F> {
     Relative(RelativePose),
     Anchor(AbsolutePose),
-    Gnss(GnssPosition, Option<GnssVelocity>),
+    Gnss(GnssPosition, Option<GnssVelocity>, Trust),
     Provided(&'a F),
+}
+
+/// What a receiver of satellite navigation may do that does not fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Trust {
+    /// Nothing: a camera or anchors tell where it is, and one that is spoofed is patient.
+    Beside,
+    /// Overrule the estimate, as there is nothing else.
+    Alone,
 }
 
 /// Why something was not taken in.
@@ -80,16 +89,25 @@ pub(super) struct Streams {
     pub(super) relative: Stream,
     pub(super) anchors: Stream,
     pub(super) positions: Stream,
+    /// Of a receiver that is alone.
+    pub(super) lone: Stream,
     pub(super) velocities: Stream,
     pub(super) provided: Stream,
 }
 
 impl Streams {
+    /// That of a receiver's positions.
+    fn of_fixes(&mut self, trust: Trust) -> &mut Stream {
+        match trust {
+            Trust::Beside => &mut self.positions,
+            Trust::Alone => &mut self.lone,
+        }
+    }
+
     fn new() -> Self {
-        // A receiver that is spoofed is patient: its fixes never overrule the gate.
         let firm = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
         let usual = Stream::default();
-        Self { relative: usual, anchors: usual, positions: firm, velocities: firm, provided: usual }
+        Self { relative: usual, anchors: usual, positions: firm, lone: usual, velocities: firm, provided: usual }
     }
 }
 
@@ -208,10 +226,26 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.keyframes())
     }
 
-    /// How many measurements of one kind the gate has refused since it let one pass; those of receivers do not count.
-    pub(super) fn refused_in_a_row(&self) -> u64 {
-        let Streams { relative, anchors, provided, .. } = each!(self, strategy => strategy.streams());
-        [relative, anchors, provided].iter().map(|stream| stream.counts().gate_in_a_row).max().unwrap_or(0)
+    /// How many relative poses the gate has refused since it let one pass.
+    pub(super) fn refused_relative(&self) -> u64 {
+        each!(self, strategy => strategy.streams()).relative.counts().gate_in_a_row
+    }
+
+    /// How many anchors, or factors of providers, the gate has refused since it let one pass.
+    pub(super) fn refused_positions(&self) -> u64 {
+        let Streams { anchors, provided, .. } = each!(self, strategy => strategy.streams());
+        anchors.counts().gate_in_a_row.max(provided.counts().gate_in_a_row)
+    }
+
+    /// How many fixes the gate has refused since it let one pass.
+    pub(super) fn refused_fixes(&self, trust: Trust) -> u64 {
+        let Streams { positions, lone, .. } = each!(self, strategy => strategy.streams());
+        if trust == Trust::Alone { lone.counts().gate_in_a_row } else { positions.counts().gate_in_a_row }
+    }
+
+    /// What is estimated is from now on what was so at another time; keyframes are forgotten.
+    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+        each!(self, strategy => strategy.set_clock(time_ns))
     }
 
     /// Moves to another world.

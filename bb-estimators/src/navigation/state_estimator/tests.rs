@@ -1,5 +1,6 @@
 //! The rows of the design, on every strategy that was built.
 
+mod clock;
 mod errors;
 mod flight;
 mod gate;

@@ -3,12 +3,13 @@
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::state_estimator::{
-    GnssReading, GpsHealth, GpsHealthReading, ImuBias, PoseAnchor, VioOutput,
+    AttitudeReading, FlightControllerState, GnssReading, GpsHealth, GpsHealthReading, ImuBias, PoseAnchor,
+    VioOutput,
 };
 use bb_core::message::Stamped;
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Imu};
 use bb_core::time::MonotonicTime;
-use bb_core::{Input, Inputs, Payload};
+use bb_core::{Context, Fault, Input, Inputs, Payload};
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 /// The inputs of [`FlightEstimator`](super::FlightEstimator).
@@ -24,6 +25,10 @@ pub struct FlightInputs<'a> {
     pub gnss: Option<Input<'a, GnssFix>>,
     /// What the flight controller says of that.
     pub gps_health: Option<Input<'a, GpsReport>>,
+    /// The flight controller's attitude, which levels the start.
+    pub attitude: Option<Input<'a, AttitudeReport>>,
+    /// What the flight controller knows of its state: where the estimator starts, and starts again when it is lost.
+    pub warm_start: Option<Input<'a, WarmStartReport>>,
 }
 
 /// The pose of the body at a camera frame relative to an earlier one; it is stamped with the time of the later frame.
@@ -65,11 +70,76 @@ pub struct GpsReport {
     pub health: GpsHealth,
 }
 
-pub(super) fn sample(imu: &Stamped<Imu>, link_from_imu: &Isometry3<f64>) -> ImuMean {
+/// The attitude that the flight controller estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct AttitudeReport {
+    /// Takes coordinates of the link to the tangent frame: x east, y north, z up.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// Standard deviation of roll and pitch, rad.
+    pub tilt_deviation: f64,
+    /// Standard deviation of the heading, rad.
+    pub heading_deviation: f64,
+}
+
+/// What the flight controller knows of its state.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct WarmStartReport {
+    /// Its attitude.
+    pub attitude: AttitudeReport,
+    /// Of the body's origin. One without a height is not used.
+    pub position: GeodeticPosition,
+    /// Covariance of the position, in the tangent frame, m².
+    pub position_covariance: Matrix3<f64>,
+    /// In the tangent frame, m/s.
+    pub velocity: Vector3<f64>,
+    /// Covariance of the velocity, m²/s².
+    pub velocity_covariance: Matrix3<f64>,
+}
+
+/// Where the sensors are. The body has the axes of the link, and its origin where the IMU is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mounting {
+    link_from_imu: Isometry3<f64>,
+    /// Of the antenna, in the body, m.
+    lever_arm: Vector3<f64>,
+}
+
+impl Mounting {
+    /// As the robot declares them.
+    pub(super) fn of(context: &Context) -> Result<Self, Fault> {
+        let link_from_imu = context.frame_from_driver()?;
+        // Of an input that the robot does not declare, there is none.
+        let antenna = context.frame_from_input("gnss").ok().map(|antenna| antenna.translation.vector);
+        let lever_arm = antenna.map_or_else(Vector3::zeros, |antenna| antenna - link_from_imu.translation.vector);
+        Ok(Self { link_from_imu, lever_arm })
+    }
+}
+
+pub(super) fn attitude(report: &Stamped<AttitudeReport>) -> AttitudeReading {
+    reading(report.monotonic_time, report)
+}
+
+fn reading(time: MonotonicTime, report: &AttitudeReport) -> AttitudeReading {
+    let AttitudeReport { world_from_body, tilt_deviation, heading_deviation } = *report;
+    AttitudeReading { time_ns: time.as_nanos(), world_from_body, tilt_deviation, heading_deviation }
+}
+
+pub(super) fn warm_start(report: &Stamped<WarmStartReport>) -> Option<FlightControllerState> {
+    Some(FlightControllerState {
+        attitude: reading(report.monotonic_time, &report.attitude),
+        position: geodetic(&report.position)?,
+        position_covariance: report.position_covariance,
+        velocity: report.velocity,
+        velocity_covariance: report.velocity_covariance,
+    })
+}
+
+pub(super) fn sample(imu: &Stamped<Imu>, mounting: &Mounting) -> ImuMean {
+    let turn = mounting.link_from_imu.rotation;
     ImuMean {
         time_ns: imu.monotonic_time.as_nanos(),
-        angular_velocity: link_from_imu.rotation * imu.angular_velocity,
-        specific_force: link_from_imu.rotation * imu.linear_acceleration,
+        angular_velocity: turn * imu.angular_velocity,
+        specific_force: turn * imu.linear_acceleration,
     }
 }
 
@@ -104,7 +174,7 @@ pub(super) fn anchor(reading: &Stamped<AnchorReading>) -> Option<PoseAnchor> {
 /// Standard deviation of a fix that says nothing about its own, m; of its height it is twice as much.
 const FIX: f64 = 5.0;
 
-pub(super) fn fix(fix: &Stamped<GnssFix>) -> Option<GnssReading> {
+pub(super) fn fix(fix: &Stamped<GnssFix>, mounting: &Mounting) -> Option<GnssReading> {
     let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
     let usual = Vector3::new(FIX * FIX, FIX * FIX, 4.0 * FIX * FIX);
     Some(GnssReading {
@@ -112,7 +182,7 @@ pub(super) fn fix(fix: &Stamped<GnssFix>) -> Option<GnssReading> {
         position: geodetic(&position)?,
         covariance: fix.position_covariance.unwrap_or_else(|| Matrix3::from_diagonal(&usual)),
         velocity: None,
-        lever_arm: Vector3::zeros(),
+        lever_arm: mounting.lever_arm,
     })
 }
 

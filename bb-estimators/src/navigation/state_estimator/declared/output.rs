@@ -187,7 +187,9 @@ impl Parts {
             EventKind::Gate { from, to } => Self { from: Some(from.name()), to: Some(to.name()), ..none },
             EventKind::Started { from } => Self { from: Some(from.name()), ..none },
             EventKind::Ready { strategy, .. } => Self { to: Some(strategy.name()), ..none },
-            EventKind::CovarianceGrowing { .. }
+            EventKind::ClockSetBack { .. }
+            | EventKind::SamplesDropped { .. }
+            | EventKind::CovarianceGrowing { .. }
             | EventKind::FallbackImminent
             | EventKind::FallbackEngaged
             | EventKind::FallbackRecovered

@@ -50,12 +50,17 @@ impl EskfStrategy {
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filter.start(start)?;
-        self.filter.set_keyframe(id_of(start.time_ns));
-        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (start.time_ns, start.time_ns);
+        self.begin(start.time_ns);
+        Ok(())
+    }
+
+    /// The present is the first keyframe.
+    fn begin(&mut self, time_ns: i64) {
+        self.filter.set_keyframe(id_of(time_ns));
+        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (time_ns, time_ns);
         self.is_next = false;
         self.past.clear();
         self.past.extend(self.pose());
-        Ok(())
     }
 
     pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
@@ -91,19 +96,19 @@ impl EskfStrategy {
     }
 
     pub(super) fn measure<F: ProvidedFactor>(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
-        let Streams { relative, anchors, positions, velocities, provided } = &mut self.streams;
+        let streams = &mut self.streams;
         let fused = match measured {
-            Measured::Relative(pose) => self.filter.update(relative, pose)?,
-            Measured::Anchor(pose) => self.filter.update(anchors, pose)?,
-            Measured::Gnss(position, velocity) => {
-                let fused = self.filter.update(positions, position)?;
+            Measured::Relative(pose) => self.filter.update(&mut streams.relative, pose)?,
+            Measured::Anchor(pose) => self.filter.update(&mut streams.anchors, pose)?,
+            Measured::Gnss(position, velocity, trust) => {
+                let fused = self.filter.update(streams.of_fixes(*trust), position)?;
                 if let Some(velocity) = velocity {
                     // A receiver whose position is good is trusted, whether its velocity is or not.
-                    let _ = self.filter.update(velocities, velocity);
+                    let _ = self.filter.update(&mut streams.velocities, velocity);
                 }
                 fused
             }
-            Measured::Provided(factor) => update(&mut self.filter, provided, *factor)?,
+            Measured::Provided(factor) => update(&mut self.filter, &mut streams.provided, *factor)?,
         };
         let pose = self.pose().filter(Pose::is_finite).ok_or(Failure::Fatal(Refusal::NonFinite))?;
         // What was measured at a keyframe belongs to it.
@@ -152,6 +157,14 @@ impl EskfStrategy {
 
     pub(super) fn keyframes(&self) -> usize {
         self.past.len()
+    }
+
+    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+        let estimate = Estimate { time_ns, ..*self.filter.estimate().ok_or(Refusal::NotStarted)? };
+        let covariance = *self.filter.covariance();
+        self.filter.adopt::<Navigated, NAVIGATED>(&estimate, &covariance)?;
+        self.begin(time_ns);
+        Ok(())
     }
 
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {

@@ -152,14 +152,15 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                 };
                 self.smoother.add(&mut self.streams.anchors, id, Held::Navigation(factor.into()))?
             }
-            Measured::Gnss(position, velocity) => {
+            Measured::Gnss(position, velocity, trust) => {
                 let way = self.way()?;
                 let moved = GnssPosition {
                     position: position.position - way.position,
                     covariance: position.covariance + way.covariance,
                     ..*position
                 };
-                let fused = self.smoother.add(&mut self.streams.positions, id, Held::Navigation(moved.into()))?;
+                let stream = self.streams.of_fixes(*trust);
+                let fused = self.smoother.add(stream, id, Held::Navigation(moved.into()))?;
                 if let Some(velocity) = velocity {
                     let moved = GnssVelocity { velocity: velocity.velocity - way.velocity, ..*velocity };
                     // A receiver whose position is good is trusted, whether its velocity is or not.
@@ -233,6 +234,18 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn keyframes(&self) -> usize {
         self.smoother.keyframes().len()
+    }
+
+    /// The window begins again with the newest keyframe.
+    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+        if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
+            return Err(refusal);
+        }
+        let covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
+        let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
+        self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
+        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (time_ns, time_ns);
+        Ok(())
     }
 
     /// The window begins again with the newest keyframe.

@@ -170,3 +170,55 @@ fn a_receiver_of_which_nothing_is_reported_is_not_used() {
         assert_eq!(refused, Err(EstimatorError::Degraded(Reason::Gate(Rejection::Unhealthy))));
     }
 }
+
+/// Fixes that are moved, or an estimate that is: the outputs from 4 s on, the error of each from the fixes, and whether it is degraded.
+fn moved_fixes(strategy: StrategyKind, with_vio: bool) -> Vec<(f64, f64, bool)> {
+    let flight = Flight::new(20, 3);
+    let mut estimator = started(&flight, strategy);
+    let off = Vector3::new(0.0, 300.0, 0.0);
+    let mut outputs = Vec::new();
+    for sent in &flight.sent(with_vio, false, true) {
+        ignore(match sent {
+            Sent::Fix(fix) if fix.time_ns > 4 * SECOND => {
+                let position = flight.frame.geodetic(&(flight.frame.position(&fix.position) + off));
+                estimator.add_gnss(GnssReading { position, ..*fix }).map(drop)
+            }
+            sent => sent.to(&mut estimator),
+        });
+        if let Some(output) = estimator.tick(sent.time_ns()).filter(|_| sent.time_ns() > 4 * SECOND) {
+            let apart = flight.frame.position(&output.position) - Flight::truth(output.time_ns).position - off;
+            outputs.push((output.time_ns as f64 * 1e-9, apart.norm(), output.degraded));
+        }
+    }
+    outputs
+}
+
+/// Where nothing but the IMU and the receiver tell where it is, a gate that never yields would lose it for ever.
+#[test]
+fn a_receiver_that_is_alone_overrules_the_estimate() {
+    for strategy in StrategyKind::ALL {
+        let outputs = moved_fixes(*strategy, false);
+        for (time_s, error_m, degraded) in &outputs {
+            let is_told = *degraded || *time_s < 4.5;
+            assert!(*error_m < 20.0 || is_told, "{}: {error_m} m at {time_s} s", strategy.name());
+        }
+        let (_, error_m, degraded) = outputs[outputs.len() - 1];
+        assert!(error_m < 10.0 && !degraded, "{}: {error_m} m", strategy.name());
+    }
+}
+
+/// Beside a camera it does not, but nobody is told that all is well.
+#[test]
+fn a_receiver_beside_a_camera_never_overrules_it() {
+    for strategy in StrategyKind::ALL {
+        let outputs = moved_fixes(*strategy, true);
+        let late = outputs.iter().filter(|(time_s, ..)| *time_s > 4.7);
+        for (time_s, error_m, degraded) in late {
+            assert!(
+                (280.0..320.0).contains(error_m) && *degraded,
+                "{}: {error_m} m at {time_s} s",
+                strategy.name()
+            );
+        }
+    }
+}

@@ -94,6 +94,28 @@ fn set_takeoff_origin_starts_levelled_by_the_flight_controller() {
     }
 }
 
+/// The flight controller tells it before the first sample comes.
+#[test]
+fn an_attitude_from_before_the_first_sample_levels_the_start() {
+    let world_from_body = UnitQuaternion::from_euler_angles(0.0, 0.0, 1.0);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = estimator(*strategy);
+        let origin = Geodetic::from_degrees(48.0, 11.0, 500.0);
+        estimator.set_takeoff_origin(TakeoffOrigin::new(origin)).unwrap();
+        let (tilt_deviation, heading_deviation) = (0.01, 0.1);
+        let attitude = AttitudeReading { time_ns: 0, world_from_body, tilt_deviation, heading_deviation };
+        assert_eq!(estimator.add_attitude(attitude), Ok(Added::Waits));
+        assert_eq!(
+            estimator.add_gps_health(GpsHealthReading { time_ns: 0, health: GpsHealth::Spoofed }),
+            Ok(Added::Waits)
+        );
+        (1..=3).for_each(|i| estimator.add_imu(&at_rest(i * STEP)).unwrap());
+        let started = estimator.predicted(3 * STEP).unwrap();
+        assert!(started.world_from_body.angle_to(&world_from_body) < 1e-3, "{}", strategy.name());
+        assert_eq!((count(estimator.sink(), "degraded"), estimator.health().gate), (0, GateState::Blocked));
+    }
+}
+
 #[test]
 fn without_an_attitude_rest_levels_the_start() {
     for strategy in StrategyKind::ALL {

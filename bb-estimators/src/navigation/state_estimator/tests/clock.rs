@@ -1,0 +1,199 @@
+//! Stamps that cannot be believed, clocks that are set back, and more samples than there is room for.
+
+use super::flight::SECOND;
+use super::*;
+use crate::navigation::{ImuMean, Refusal};
+
+/// Something sent, on a clock that is behind by so much.
+fn behind(sent: &Sent, by_ns: i64) -> Sent {
+    match *sent {
+        Sent::Imu(sample) => Sent::Imu(ImuMean { time_ns: sample.time_ns - by_ns, ..sample }),
+        Sent::Vio(vio) => Sent::Vio(VioOutput { from_ns: vio.from_ns - by_ns, to_ns: vio.to_ns - by_ns, ..vio }),
+        Sent::Anchor(anchor) => Sent::Anchor(PoseAnchor { time_ns: anchor.time_ns - by_ns, ..anchor }),
+        Sent::Fix(fix) => Sent::Fix(GnssReading { time_ns: fix.time_ns - by_ns, ..fix }),
+        Sent::Health(health) => Sent::Health(GpsHealthReading { time_ns: health.time_ns - by_ns, ..health }),
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_back_is_followed_and_told() {
+    let flight = Flight::new(24, 3);
+    for strategy in StrategyKind::ALL {
+        for by_ns in [5 * SECOND, 10_000 * SECOND] {
+            let mut estimator = started(&flight, *strategy);
+            let (mut first_ns, mut confirmed_ns) = (None, None);
+            for sent in &flight.sent(true, true, false) {
+                let time_ns = sent.time_ns();
+                let set_back_ns = if time_ns > 12 * SECOND { by_ns } else { 0 };
+                ignore(behind(sent, set_back_ns).to(&mut estimator));
+                let Some(output) = estimator.tick(time_ns - set_back_ns) else { continue };
+                if set_back_ns == 0 {
+                    continue;
+                }
+                first_ns.get_or_insert(time_ns);
+                let on_the_old_clock = EstimatorOutput { time_ns: output.time_ns + by_ns, ..output };
+                let (error_m, _) = flight.error(&on_the_old_clock);
+                assert!(output.degraded || error_m < 5.0, "{}: {error_m} m", strategy.name());
+                assert!(error_m < 40.0, "{}: {error_m} m at {time_ns}", strategy.name());
+                if !output.degraded {
+                    confirmed_ns.get_or_insert(time_ns);
+                }
+            }
+            let (first_ns, confirmed_ns) = (first_ns.unwrap(), confirmed_ns.unwrap());
+            assert!((12 * SECOND..13 * SECOND).contains(&first_ns), "an estimate again after {first_ns}");
+            assert!((16 * SECOND..22 * SECOND).contains(&confirmed_ns), "trusted after {confirmed_ns}");
+            let told: Vec<_> = kinds(estimator.sink(), "clock_set_back").collect();
+            let EventKind::ClockSetBack { seconds } = told[0].kind else { unreachable!() };
+            // Half a second is needed to believe it.
+            assert!((seconds - by_ns as f64 * 1e-9 + 0.5).abs() < 0.02, "{seconds}");
+            assert_eq!((told.len(), told[0].level(), estimator.counts().set_back), (1, Level::Warn, 1));
+            assert!(told[0].status_text().unwrap().as_str().starts_with("NAV IMU clock set back"));
+            assert_eq!(count(estimator.sink(), "fallback_engaged"), 0);
+        }
+    }
+}
+
+#[test]
+fn before_the_start_a_clock_that_is_set_back_starts_on_the_new_one() {
+    let flight = Flight::new(8, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = estimator(*strategy);
+        for sample in &flight.samples[..200] {
+            estimator.add_imu(&ImuMean { time_ns: sample.time_ns + 1000 * SECOND, ..*sample }).unwrap();
+        }
+        for sent in &flight.sent(true, true, false) {
+            ignore(sent.to(&mut estimator));
+        }
+        assert_eq!(estimator.counts().set_back, 1);
+        assert!(flight.error(&estimator.predicted(8 * SECOND).unwrap()).0 < 5.0, "{}", strategy.name());
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_back_does_not_let_a_spoofed_receiver_in() {
+    let flight = Flight::new(8, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        for sent in &flight.sent(true, true, true) {
+            let is_set_back = sent.time_ns() > 4 * SECOND;
+            let sent = match sent {
+                Sent::Health(reading) if !is_set_back => {
+                    Sent::Health(GpsHealthReading { health: GpsHealth::Spoofed, ..*reading })
+                }
+                sent => behind(sent, if is_set_back { 3600 * SECOND } else { 0 }),
+            };
+            ignore(sent.to(&mut estimator));
+        }
+        assert_eq!(estimator.counts().set_back, 1);
+        assert!(!estimator.health().gate.is_open());
+    }
+}
+
+/// A stamp alone, before the first sample, as the first, or among others, and what is sent as if it were not.
+#[test]
+fn one_absurd_stamp_moves_nothing() {
+    let flight = Flight::new(8, 3);
+    for strategy in StrategyKind::ALL {
+        for absurd_ns in [i64::MAX, i64::MIN, 59 * SECOND, -59 * SECOND, 1 << 60] {
+            for at in [0, 1, 800] {
+                let mut estimator = estimator(*strategy);
+                estimator.warm_start(flight.warm_start(0)).unwrap();
+                let mut outputs = 0;
+                for (i, sent) in flight.sent(true, true, false).iter().enumerate() {
+                    if i == at {
+                        let sample = ImuMean { time_ns: absurd_ns, ..flight.samples[0] };
+                        ignore(estimator.add_imu(&sample));
+                    }
+                    sent.to(&mut estimator).unwrap();
+                    if let Some(output) = estimator.tick(sent.time_ns()) {
+                        outputs += 1;
+                        let (error_m, _) = flight.error(&output);
+                        assert!(error_m < 5.0 && !output.degraded, "{}, {absurd_ns}: {error_m}", strategy.name());
+                    }
+                }
+                assert!(outputs >= 39, "{}, {absurd_ns} at {at}: {outputs}", strategy.name());
+                let told = kinds(estimator.sink(), "degraded").count();
+                assert_eq!(told, 1, "{absurd_ns} at {at}: it is refused, and said so");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_first_sample_waits_for_one_that_agrees() {
+    let flight = Flight::new(2, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = estimator(*strategy);
+        estimator.add_imu(&flight.samples[0]).unwrap();
+        let last = estimator.sink().last().unwrap().kind;
+        assert_eq!(last, EventKind::Added { input: InputKind::Imu, nis: None, waits: true });
+        let origin = TakeoffOrigin::new(*flight.frame.origin());
+        assert_eq!(estimator.set_takeoff_origin(origin), Err(OriginError::AfterMeasurement));
+        estimator.add_imu(&flight.samples[1]).unwrap();
+        assert_eq!(estimator.held()[0], 2, "none is lost");
+    }
+}
+
+/// Legal settings: nothing is dropped, and no more is held than is stated.
+#[test]
+fn a_fast_imu_and_a_long_lateness_fit() {
+    let flight = Flight::new(4, 3);
+    for strategy in StrategyKind::ALL {
+        let mut config = config(*strategy);
+        config.params.imu_rate = 4000.0;
+        config.params.lateness = 3.0;
+        config.params.keyframe_interval = 2.0;
+        let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+        // Before the start, too: nothing tells where it is for twenty seconds.
+        let fast = |i: i64, from: &ImuMean| ImuMean { time_ns: i * SECOND / 4000, ..*from };
+        let most = config.params.room()[0];
+        let mut held = 0;
+        for i in 1..=20 * 4000 {
+            estimator.add_imu(&fast(i, &flight.samples[0])).unwrap();
+            held = held.max(estimator.held()[0]);
+            estimator.sink_mut().clear();
+        }
+        estimator.add_pose_anchor(PoseAnchor { time_ns: 20 * SECOND, ..flight.anchors[0] }).unwrap();
+        for i in 20 * 4000 + 1..=32 * 4000 {
+            estimator.add_imu(&fast(i, &flight.samples[0])).unwrap();
+            held = held.max(estimator.held()[0]);
+        }
+        assert!(held <= most && held > 3 * 4000, "{held} of {most}");
+        assert_eq!((estimator.counts().dropped, estimator.counts().overflows), (0, 0));
+        assert_eq!(count(estimator.sink(), "samples_dropped"), 0);
+        assert!(estimator.predicted(32 * SECOND).is_some());
+    }
+}
+
+/// More than was said: the oldest leave, which is counted and told, and the estimate goes on.
+#[test]
+fn an_imu_that_is_too_fast_drops_the_oldest_and_says_so() {
+    let flight = Flight::new(12, 3);
+    for strategy in StrategyKind::ALL {
+        for (imu_rate, keyframe_interval) in [(50.0, 1.0), (1.0, 10.0)] {
+            let mut config = config(*strategy);
+            (config.params.imu_rate, config.params.keyframe_interval) = (imu_rate, keyframe_interval);
+            let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+            estimator.warm_start(flight.warm_start(0)).unwrap();
+            for sent in &flight.sent(true, true, false) {
+                ignore(sent.to(&mut estimator));
+                assert!(estimator.held()[0] <= config.params.room()[0]);
+                if let Some(output) = estimator.tick(sent.time_ns()) {
+                    assert!(flight.error(&output).0 < 5.0, "{}", strategy.name());
+                }
+            }
+            let dropped = estimator.counts().dropped;
+            let told = kinds(estimator.sink(), "samples_dropped").map(|event| match event.kind {
+                EventKind::SamplesDropped { count } => count,
+                _ => 0,
+            });
+            assert!(dropped > 0, "{}: {dropped}", strategy.name());
+            assert_eq!(told.sum::<u64>(), dropped);
+            assert!(count(estimator.sink(), "samples_dropped") < 1000, "not one event a sample");
+            // What can no longer be placed is refused.
+            let late = estimator.add_pose_anchor(PoseAnchor { provider: 3, ..flight.anchors[9] });
+            let too_old = Refusal::TooOld { time_ns: flight.anchors[9].time_ns };
+            assert_eq!(late, Err(EstimatorError::Degraded(Reason::Refused(too_old))), "{}", strategy.name());
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! The state estimator in a robot: where it starts, where its antenna is, and that a keyframe which takes long holds up nothing.
+
+use crate::components::{at, within};
+use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
+use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
+use bb_core::prelude::*;
+use bb_core::run::DropReason;
+use bb_estimators::StateEstimator;
+use bb_estimators::navigation::state_estimator::{
+    AttitudeReport, FlightEstimator, FlightInputs, FlightOptions, FlightOutputs, GpsHealth, GpsReport,
+    RelativePoseReading, WarmStartReport,
+};
+use bb_estimators::navigation::{Geodetic, LocalFrame};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+robot! {
+    robot Surveying;
+
+    link base {
+        joint shelf: fixed {
+            origin: { xyz: [20 cm, 0 m, 10 cm] };
+            link board { sensor imu: External<Imu>(); }
+        }
+        joint mast: fixed {
+            origin: { xyz: [-130 cm, 40 cm, 110 cm] };
+            link antenna { sensor gps: External<GnssFix>(); }
+        }
+        sensor gps_report: External<GpsReport>();
+        sensor attitude: External<AttitudeReport>();
+        sensor state: External<WarmStartReport>();
+        estimator navigation: StateEstimator() {
+            input imu: sensor::base::shelf::board::imu, driver;
+            input gnss: sensor::base::mast::antenna::gps, optional;
+            input gps_health: sensor::base::gps_report, optional;
+            input attitude: sensor::base::attitude, optional;
+            input warm_start: sensor::base::state, optional;
+            output estimate;
+            output health;
+            output events;
+        }
+    }
+}
+
+fn frame() -> LocalFrame {
+    LocalFrame::new(Geodetic::from_degrees(48.0, 11.0, 500.0))
+}
+
+fn geodetic(position: Vector3<f64>) -> GeodeticPosition {
+    let Geodetic { latitude, longitude, height } = frame().geodetic(&position);
+    GeodeticPosition { latitude_rad: latitude, longitude_rad: longitude, altitude: Some(height) }
+}
+
+fn local(position: &GeodeticPosition) -> Vector3<f64> {
+    let height = position.altitude.unwrap_or(f64::NAN);
+    frame().position(&Geodetic { latitude: position.latitude_rad, longitude: position.longitude_rad, height })
+}
+
+fn at_rest() -> Imu {
+    Imu::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 9.80665))
+}
+
+/// The robot looks north.
+fn north() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2)
+}
+
+fn attitude() -> AttitudeReport {
+    AttitudeReport { world_from_body: north(), tilt_deviation: 0.01, heading_deviation: 0.02 }
+}
+
+#[test]
+fn it_starts_from_the_flight_controller_and_knows_where_the_antenna_is() -> Result<(), StartError> {
+    for strategy in ["smoother", "eskf"] {
+        let mut builder = Surveying::builder();
+        builder.options(surveying::estimator::base::navigation).strategy = strategy.to_owned();
+        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
+        let events = builder.subscribe(surveying::estimator::base::navigation::events);
+        let mut simulation = builder.simulate()?;
+        simulation.publish(
+            surveying::sensor::base::state,
+            at(0),
+            WarmStartReport {
+                attitude: attitude(),
+                position: geodetic(Vector3::new(3.0, -2.0, 1.0)),
+                position_covariance: Matrix3::identity() * 4.0,
+                velocity: Vector3::zeros(),
+                velocity_covariance: Matrix3::identity() * 0.01,
+            },
+        );
+        for step in 1..=600 {
+            let time = at(5 * step);
+            if step % 40 == 0 {
+                simulation.publish(
+                    surveying::sensor::base::gps_report,
+                    time,
+                    GpsReport { health: GpsHealth::Stable },
+                );
+                // From the IMU, the antenna is 1.5 m behind, 0.4 m to the left and 1 m above; it looks north.
+                let fix = GnssFix {
+                    status: GnssStatus::Fix,
+                    services: GnssServices::default(),
+                    position: Some(geodetic(Vector3::new(-0.4, -1.5, 1.0))),
+                    position_covariance: Some(Matrix3::identity() * 0.01),
+                };
+                simulation.publish(surveying::sensor::base::mast::antenna::gps, time, fix);
+            }
+            simulation.publish(surveying::sensor::base::shelf::board::imu, time, at_rest());
+        }
+        let started: Vec<_> = events
+            .drain()
+            .flat_map(|events| events.payload.events)
+            .filter(|event| event.kind == "started")
+            .filter_map(|event| event.from)
+            .collect();
+        assert_eq!(started, ["flight_controller"], "{strategy}: once");
+        let all: Vec<_> = estimates.drain().collect();
+        let first = local(&all[0].position);
+        assert!((first - Vector3::new(3.0, -2.0, 1.0)).norm() < 0.1, "{strategy}: {first}");
+        let last = local(&all.last().expect("it runs").position);
+        assert!(last.norm() < 0.15, "{strategy}: {last}, where the IMU is");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_attitude_levels_the_start_at_the_origin() -> Result<(), StartError> {
+    for strategy in ["smoother", "eskf"] {
+        let mut builder = Surveying::builder();
+        let options = builder.options(surveying::estimator::base::navigation);
+        let origin = *frame().origin();
+        options.strategy = strategy.to_owned();
+        (options.origin_latitude, options.origin_longitude) = (origin.latitude, origin.longitude);
+        options.origin_height = origin.height;
+        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
+        let mut simulation = builder.simulate()?;
+        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+        (1..=100).for_each(|step| {
+            simulation.publish(surveying::sensor::base::shelf::board::imu, at(5 * step), at_rest());
+        });
+        // Rest would have to last for a second, and the options say that it looks east. An output comes every 200 ms.
+        let first = estimates.drain().next().expect("it starts at once");
+        assert!(first.time < at(250), "{strategy}: {:?}", first.time);
+        assert!(first.world_from_body.angle_to(&north()) < 1e-3, "{strategy}");
+    }
+    Ok(())
+}
+
+/// The state estimator, held up at each keyframe until it is let go.
+#[derive(Debug)]
+struct Slow(FlightEstimator);
+
+static HOLDS: AtomicBool = AtomicBool::new(true);
+static KEYFRAMES: AtomicUsize = AtomicUsize::new(0);
+
+impl Estimator for Slow {
+    type Options = FlightOptions;
+    type Input = FlightInputs<'static>;
+    type Output = FlightOutputs;
+
+    fn init(options: FlightOptions, context: &Context) -> Result<Self, Fault> {
+        FlightEstimator::init(options, context).map(Self)
+    }
+
+    fn handle_input(&mut self, inputs: FlightInputs<'_>) -> Result<Reply<FlightOutputs>, Fault> {
+        if inputs.vio.is_some_and(|vio| vio.is_new()) {
+            KEYFRAMES.fetch_add(1, Ordering::SeqCst);
+            while HOLDS.load(Ordering::SeqCst) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        self.0.handle_input(inputs)
+    }
+}
+
+robot! {
+    robot Flying;
+
+    link base {
+        sensor imu: External<Imu>();
+        sensor camera: External<RelativePoseReading>();
+        estimator navigation: Slow() {
+            input imu: sensor::base::imu, driver;
+            input vio: sensor::base::camera, optional;
+            output estimate;
+            output health;
+            output events;
+            runs_on: worker;
+        }
+        estimator twin: StateEstimator(strategy = "eskf", output_rate = 200 Hz) {
+            input imu: sensor::base::imu, driver;
+            input vio: sensor::base::camera, optional;
+            output estimate;
+            output health;
+            output events;
+        }
+    }
+}
+
+const NAVIGATION: &str = "estimator/base/navigation";
+const TWIN: &str = "estimator/base/twin";
+
+/// A test that fails must not hang on what it holds up.
+struct LetsGo;
+
+impl Drop for LetsGo {
+    fn drop(&mut self) {
+        HOLDS.store(false, Ordering::SeqCst);
+    }
+}
+
+/// By counting, not by the clock: while the smoother is in a keyframe, its twin takes every sample.
+#[test]
+fn a_keyframe_that_takes_long_delays_no_sample_of_the_imu() {
+    within(60, || {
+        let mut builder = Flying::builder();
+        let origin = *frame().origin();
+        let set = |options: &mut FlightOptions| {
+            (options.origin_latitude, options.origin_longitude) = (origin.latitude, origin.longitude);
+            options.origin_height = origin.height;
+        };
+        set(builder.options(flying::estimator::base::navigation));
+        set(builder.options(flying::estimator::base::twin));
+        let twin = builder.subscribe(flying::estimator::base::twin::estimate);
+        let slow = builder.subscribe(flying::estimator::base::navigation::estimate);
+        let running = builder.start().expect("it starts");
+        let lets_go = LetsGo;
+        // All of it is in the past, whatever the time it takes.
+        let stamp = |i: i64| MonotonicTime::from_nanos((i - 1000) * 5_000_000);
+        let sample = |i: i64| running.publish(flying::sensor::base::imu, stamp(i), at_rest());
+        let dispatched = |name: &str| {
+            let report = running.report();
+            let estimator = report.estimator(name).expect("it is declared");
+            assert!(DropReason::ALL.iter().all(|reason| estimator.inputs[0].dropped(*reason) == 0), "{name}");
+            estimator.dispatched
+        };
+        let until = |name: &str, count: u64| {
+            while dispatched(name) < count {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        };
+        // Both start after a second of rest.
+        (1..=240).for_each(sample);
+        until(TWIN, 240);
+        until(NAVIGATION, 240);
+        assert!(twin.drain().last().is_some_and(|estimate| estimate.time >= stamp(230)), "it has started");
+        let reading = RelativePoseReading {
+            from: stamp(220),
+            translation: Vector3::zeros(),
+            from_to: UnitQuaternion::identity(),
+            covariance: Matrix6::identity() * 1e-4,
+            accelerometer_bias: None,
+            gyroscope_bias: None,
+        };
+        running.publish(flying::sensor::base::camera, stamp(240), reading);
+        sample(241);
+        while KEYFRAMES.load(Ordering::SeqCst) == 0 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        // It is in the keyframe now, and stays there.
+        (242..=641).for_each(sample);
+        until(TWIN, 641);
+        assert_eq!((dispatched(NAVIGATION), KEYFRAMES.load(Ordering::SeqCst)), (241, 1));
+        assert!(twin.drain().last().is_some_and(|estimate| estimate.time >= stamp(630)), "its estimates go on");
+        drop(lets_go);
+        until(NAVIGATION, 641);
+        assert!(slow.drain().last().is_some_and(|estimate| estimate.time >= stamp(600)), "and it has missed none");
+    });
+}
