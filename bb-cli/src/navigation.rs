@@ -12,6 +12,7 @@ mod measured;
 mod picture;
 mod player;
 mod report;
+mod step;
 mod trace;
 
 pub use bag::{
