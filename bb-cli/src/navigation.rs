@@ -13,6 +13,7 @@ mod measured;
 mod picture;
 mod player;
 mod report;
+mod step;
 mod trace;
 mod verdicts;
 

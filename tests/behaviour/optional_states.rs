@@ -90,7 +90,7 @@ fn a_lever_arm_a_delay_and_a_hard_iron_are_found() -> Result<(), StartError> {
     let mut simulation = builder.simulate()?;
     let frame = LocalFrame::new(Geodetic::from_degrees(ORIGIN.0, ORIGIN.1, ORIGIN.2));
     let way = way(120);
-    let mut noise = Noise(5);
+    let mut noise = Noise::new(5);
     let mut first = None;
     for millis in (0..way.len() - 1).step_by(10) {
         let time = MonotonicTime::ZERO + Duration::from_millis(millis as u64);

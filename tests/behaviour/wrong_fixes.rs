@@ -93,7 +93,7 @@ fn drive_as(
     let health = builder.subscribe_with(system::Health, room());
     let mut simulation = builder.simulate().expect("it starts");
     let frame = LocalFrame::new(*start);
-    let mut noise = Noise(3);
+    let mut noise = Noise::new(3);
     for millis in (0..seconds * 1000).step_by(10) {
         let (now, time) = (millis as f64 * 1e-3, MonotonicTime::ZERO + Duration::from_millis(millis));
         let Truth { position, speed, .. } = truth(now);

@@ -1,7 +1,7 @@
 //! How far an estimate is from the truth.
 
 use super::data::Truth;
-use super::player::Known;
+use super::step::Known;
 use bb_core::nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use bb_estimators::navigation::nees;
 

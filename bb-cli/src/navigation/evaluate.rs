@@ -3,7 +3,8 @@
 use super::data::{DataSet, Truth};
 use super::errors::Errors;
 use super::filters::{NavigationFilter, NavigationSetting};
-use super::player::{Known, Player};
+use super::player::Player;
+use super::step::Known;
 use super::trace::Trace;
 use super::verdicts::Verdicts;
 use bb_core::nalgebra::Vector3;

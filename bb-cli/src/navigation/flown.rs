@@ -2,7 +2,7 @@
 
 use super::data::{DataSet, Keyframe, nanoseconds};
 use super::measured::Measured;
-use super::player::{Known, Step};
+use super::step::{Known, Step};
 use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::state_estimator::{
     Added, AttitudeReading, EstimatorError, EstimatorOutput, FlightControllerState, GnssReading, GpsHealth,

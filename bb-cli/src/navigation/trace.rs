@@ -3,7 +3,7 @@
 use super::data::{DataSet, Keyframe, Truth};
 use super::errors::Errors;
 use super::measured::{Answers, Sensor};
-use super::player::Known;
+use super::step::Known;
 use bb_core::nalgebra::Vector3;
 use bb_estimators::navigation::Refusal;
 

@@ -2,7 +2,7 @@
 
 use super::doubt::{distrusted, is_most};
 use super::measured::Sensor;
-use super::player::Step;
+use super::step::Step;
 use bb_estimators::navigation::Refusal;
 
 /// Of one sensor.
