@@ -167,6 +167,8 @@ enum Limit {
     Disarming(u64),
     /// The same of those that run while nobody disarms the robot.
     Apart(Key),
+    /// When to look again whether the handles of a cancelled execution still act.
+    Gone(u64),
 }
 
 /// Names some callbacks that run together.
@@ -199,6 +201,8 @@ struct State {
     disarms: u64,
     /// How often the robot was disarmed.
     generation: u64,
+    /// It has started: a thread keeps time.
+    has_begun: bool,
     is_stopping: bool,
     /// The journal and the last report are made: entries that come later are neither written nor published.
     has_ended: bool,

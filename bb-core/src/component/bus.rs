@@ -196,13 +196,14 @@ struct OwnPath {
 
 impl Gate for OwnPath {
     fn pass(&self, publish: &mut dyn FnMut(Stamp)) {
-        let clock = self.host.clock();
-        let monotonic_time = clock.now();
-        let wall_time = clock.wall_at(monotonic_time);
-        let stamp = Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() };
-        if self.permit.is_valid() {
-            self.host.while_open(&mut || publish(stamp));
-        }
+        self.host.while_open(&mut || {
+            // After what had to be waited for. Until the message is out, the command is not gone.
+            let Some(_acting) = self.permit.act() else { return };
+            let clock = self.host.clock();
+            let monotonic_time = clock.now();
+            let wall_time = clock.wall_at(monotonic_time);
+            publish(Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() });
+        });
     }
 
     fn is_noted(&self) -> bool {

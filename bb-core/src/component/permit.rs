@@ -2,12 +2,19 @@
 
 use super::Fault;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Given to a command with its context and revoked when it ends or is cancelled. What it has obtained through that context
 /// refuses to act from then on, even if the command's code still runs.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Permit(Option<Arc<AtomicBool>>);
+pub(crate) struct Permit(Option<Arc<AtomicUsize>>);
+
+/// Set once the permit is revoked; below it, how many threads act.
+const REVOKED: usize = 1 << (usize::BITS - 1);
+
+/// A handle acts as long as this lives.
+#[derive(Debug)]
+pub(crate) struct Acting<'a>(Option<&'a AtomicUsize>);
 
 impl Permit {
     /// Of a component, whose handles always work.
@@ -15,13 +22,26 @@ impl Permit {
 
     /// Of one execution of a command.
     pub(crate) fn revocable() -> Self {
-        Self(Some(Arc::new(AtomicBool::new(true))))
+        Self(Some(Arc::default()))
     }
 
     pub(crate) fn revoke(&self) {
-        if let Some(is_valid) = &self.0 {
-            is_valid.store(false, Ordering::SeqCst);
+        if let Some(state) = &self.0 {
+            state.fetch_or(REVOKED, Ordering::SeqCst);
         }
+    }
+
+    /// What a handle does while what this returns lives has begun before the permit was revoked; none if it was revoked.
+    pub(crate) fn act(&self) -> Option<Acting<'_>> {
+        let Some(state) = &self.0 else { return Some(Acting(None)) };
+        let acting = Acting(Some(state));
+        let before = state.fetch_add(1, Ordering::SeqCst);
+        (before & REVOKED == 0).then_some(acting)
+    }
+
+    /// Whether a handle still acts that began to before the permit was revoked.
+    pub(crate) fn is_acting(&self) -> bool {
+        self.0.as_ref().is_some_and(|state| state.load(Ordering::SeqCst) & !REVOKED > 0)
     }
 
     /// # Errors
@@ -34,6 +54,14 @@ impl Permit {
     }
 
     pub(crate) fn is_valid(&self) -> bool {
-        self.0.as_ref().is_none_or(|is_valid| is_valid.load(Ordering::SeqCst))
+        self.0.as_ref().is_none_or(|state| state.load(Ordering::SeqCst) & REVOKED == 0)
+    }
+}
+
+impl Drop for Acting<'_> {
+    fn drop(&mut self) {
+        if let Some(state) = self.0 {
+            state.fetch_sub(1, Ordering::SeqCst);
+        }
     }
 }

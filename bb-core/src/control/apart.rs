@@ -69,6 +69,12 @@ impl Control {
             Owner::Execution(id) => step.state.executions.iter().any(|execution| execution.id == id),
             _ => true,
         };
+        let is_callback = inside::is_callback(self.id());
+        if is_callback && (step.state.has_ended || step.state.is_stopped()) {
+            // One that a callback registers is for the next time, and there is none.
+            step.finish();
+            return discard(code);
+        }
         if step.state.has_ended || !is_known {
             let callback = step.state.hooks.make(path, code);
             if !is_known && !step.state.has_ended {
@@ -83,7 +89,7 @@ impl Control {
         let mut key = None;
         if step.state.is_stopped() {
             key = step.run_apart(path, vec![callback], Why::Started);
-        } else if !inside::is_callback(self.id()) {
+        } else if !is_callback {
             // One that a callback registers is for the next time.
             step.join_disarming(vec![callback]);
         }
@@ -113,14 +119,14 @@ impl Control {
         let made = make();
         let mut step = self.step();
         let hooks = &mut step.state.hooks;
-        let (new, old) = match made {
+        let (callbacks, old) = match made {
             Ok(_) if is_made => hooks.made(path, first),
             Ok(_) => hooks.changed(path, first),
             Err(_) => hooks.failed(path, first),
         };
         let key = match made {
-            Ok(_) => step.run_again(path, new, disarmings),
-            Err(_) => step.run_apart(path, new, Why::FailedInit),
+            Ok(_) => step.run_again(path, callbacks, disarmings),
+            Err(_) => step.run_apart(path, callbacks, Why::FailedInit),
         };
         step.finish();
         self.wait_apart(key);
@@ -132,7 +138,9 @@ impl Control {
     /// the caller may be in its way.
     fn wait_apart(&self, key: Option<Key>) {
         let Some(key) = key else { return };
-        if self.0.mode != Mode::Real || cfg!(loom) {
+        // The callback of an actuator waits for the code that this is a part of. A robot that does not start is disarmed next.
+        let is_in_the_way = inside::is_waited_for(self.id()) || !self.lock().has_begun;
+        if self.0.mode != Mode::Real || cfg!(loom) || is_in_the_way {
             return;
         }
         let is_over = |state: &State| state.apart.iter().all(|apart| apart.key != key) || state.disarming.is_some();
@@ -193,8 +201,8 @@ impl Control {
 }
 
 impl Step<'_> {
-    /// If the robot was disarmed while a component was made, what it had registered by then may have run before its hardware
-    /// was started: it runs once more.
+    /// If the robot was disarmed while a component was made or its options changed, its callbacks may have run before its
+    /// hardware was started: they run once more.
     fn run_again(&mut self, path: &'static str, callbacks: Vec<Arc<Callback>>, disarmings: u64) -> Option<Key> {
         let has_begun = self.state.generation != disarmings;
         let was_disarmed = has_begun && self.state.machine.safety != Safety::Armed;

@@ -260,8 +260,8 @@ impl Step<'_> {
         // Those of commands too, which end below.
         let hooks = if self.control.0.mode == Mode::Replay { Vec::new() } else { self.state.hooks.all() };
         for execution in &mut self.state.executions {
-            let is_inside = || execution.task.as_ref().is_some_and(|task| task.is_polled());
-            execution.lingers_on |= matches!(execution.phase, Phase::Lingering) && is_inside();
+            let may_act = || execution.task.as_ref().is_some_and(|task| task.may_act());
+            execution.lingers_on |= matches!(execution.phase, Phase::Lingering) && may_act();
         }
         self.state.machine.safety = Safety::Disarming;
         self.state.generation += 1;

@@ -112,14 +112,14 @@ impl Effects {
             callbacks.into_iter().for_each(discard);
         }
         // Each of these may block for ever, and is a job of its own.
-        wakers.into_wakers().for_each(|waker| control.run_apart(move || wake(waker)));
+        wakers.into_wakers().for_each(|waker| control.run_apart(Lane::Wakers, move || wake(waker)));
         for (slot, result) in results {
             let (waker, late) = slot.set(result);
-            waker.into_iter().for_each(|waker| control.run_apart(move || wake(waker)));
-            late.into_iter().for_each(|late| control.run_apart(move || discard(late)));
+            waker.into_iter().for_each(|waker| control.run_apart(Lane::Wakers, move || wake(waker)));
+            late.into_iter().for_each(|late| control.run_apart(Lane::Dropping, move || discard(late)));
         }
-        dropped.into_iter().for_each(|value| control.run_apart(move || discard(value)));
-        forgotten.into_iter().for_each(|hook| control.run_apart(move || discard(hook)));
+        dropped.into_iter().for_each(|value| control.run_apart(Lane::Dropping, move || discard(value)));
+        forgotten.into_iter().for_each(|hook| control.run_apart(Lane::Dropping, move || discard(hook)));
         drop(wired);
         for task in cancelled {
             task.cancel();
@@ -132,9 +132,9 @@ impl Effects {
 
 impl Control {
     /// Runs user code where it harms nobody.
-    fn run_apart(&self, code: impl FnOnce() + Send + 'static) {
+    fn run_apart(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
         match self.0.mode {
-            Mode::Real => self.0.pool.submit(Lane::Wakers, code),
+            Mode::Real => self.0.pool.submit(lane, code),
             Mode::Virtual | Mode::Replay => code(),
         }
     }

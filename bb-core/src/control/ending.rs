@@ -12,6 +12,10 @@ use crate::event::{CommandPhase, Safety};
 use crate::journal::{End, Event};
 use crate::node::Mode;
 use std::sync::Arc;
+use std::time::Duration;
+
+/// How long until it is looked again whether the handles of a command still act.
+const LOOK_AGAIN: Duration = Duration::from_millis(1);
 
 impl Control {
     /// Cancels an execution for its caller.
@@ -214,8 +218,10 @@ impl Step<'_> {
             && matches!(result, Err(CommandError::Cancelled | CommandError::TimedOut));
         match previous {
             Phase::Running if goes_on => {
-                let is_inside = execution.task.as_ref().is_some_and(|task| task.mark_cancelled());
-                execution.lingers_on |= is_inside && !is_armed;
+                if let Some(task) = &execution.task {
+                    task.mark_cancelled();
+                    execution.lingers_on |= task.may_act() && !is_armed;
+                }
                 self.effects.cancelled.extend(execution.task.clone());
             }
             Phase::Disarming(value, _) | Phase::Arming(value, _) => {
@@ -258,6 +264,11 @@ impl Step<'_> {
 
     /// The code of a cancelled execution has returned. What it may have started since is made safe before it is gone.
     fn returned(&mut self, id: u64) {
+        let acts = |execution: &RunningCommand| execution.id == id && execution.permit.is_acting();
+        if self.control.0.mode == Mode::Real && self.state.executions.iter().any(acts) {
+            // A thread that it has left behind is about to publish, and must not once the robot is armed again.
+            return self.control.0.limits.set(Limit::Gone(id), self.now + LOOK_AGAIN);
+        }
         if !self.makes_safe_after(id) {
             self.gone(id);
         }

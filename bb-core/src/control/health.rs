@@ -111,6 +111,7 @@ impl Control {
 
     /// Watches all estimators from now on.
     pub(crate) fn begin_watch(&self, now: MonotonicTime) {
+        self.lock().has_begun = true;
         for (number, declared) in self.0.declared.estimators.iter().enumerate() {
             if let (Some(after), Some(node)) = (declared.health.lost_after_nanos, self.0.nodes.get(number)) {
                 node.set_last_run(now);

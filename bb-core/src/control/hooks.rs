@@ -59,29 +59,27 @@ impl Hooks {
         own.map(|hook| Arc::clone(&hook.callback)).collect()
     }
 
-    /// The component at `path` was made, and those from `first` on are new. They, and the ones they replace, which are to be
-    /// dropped without a lock.
+    /// The component at `path` was made, and those from `first` on are new. All it has now, and the ones that are replaced,
+    /// which are to be dropped without a lock.
     pub(super) fn made(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
         let old = self.take(|hook| {
             let is_replaced = matches!(hook.owner, Owner::Component | Owner::Options | Owner::FailedInit);
             is_replaced && hook.is_of(path) && hook.callback.number < first
         });
-        (self.since(path, first).map(|hook| Arc::clone(&hook.callback)).collect(), old)
+        (self.of_component(path), old)
     }
 
     /// The same of a component whose options have changed. What it registered when it was made is kept: a callback too many
     /// fails loudly, and one too few does so when something burns.
     pub(super) fn changed(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
-        let new: Vec<_> = self
-            .since(path, first)
-            .map(|hook| {
-                hook.owner = Owner::Options;
-                Arc::clone(&hook.callback)
-            })
-            .collect();
+        let mut has_any = false;
+        for hook in self.since(path, first) {
+            hook.owner = Owner::Options;
+            has_any = true;
+        }
         let is_old = |hook: &Hook| hook.is_of(path) && hook.callback.number < first && hook.owner == Owner::Options;
-        let old = if new.is_empty() { Vec::new() } else { self.take(is_old) };
-        (new, old)
+        let old = if has_any { self.take(is_old) } else { Vec::new() };
+        (self.of_component(path), old)
     }
 
     /// The component at `path` could not be made. What it had registered from `first` on, and the ones of earlier failures,
@@ -104,6 +102,13 @@ impl Hooks {
     pub(super) fn hang(&self, path: &str) -> bool {
         let mut failed = self.all.iter().filter(|hook| hook.is_of(path) && hook.owner == Owner::FailedInit);
         failed.any(|hook| hook.callback.is_running())
+    }
+
+    /// Those of the component at `path`, an actuator's own among them.
+    fn of_component(&self, path: &str) -> Vec<Arc<Callback>> {
+        let is_own = |hook: &&Hook| matches!(hook.owner, Owner::Actuator | Owner::Component | Owner::Options);
+        let own = self.all.iter().filter(|hook| hook.is_of(path)).filter(is_own);
+        own.map(|hook| Arc::clone(&hook.callback)).collect()
     }
 
     fn since(&mut self, path: &str, first: u64) -> impl Iterator<Item = &mut Hook> {

@@ -1,45 +1,59 @@
 //! Whether the calling thread runs code that disarming waits for, and which must not wait for that in turn.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 
 thread_local! {
-    /// Of which robot the calling thread runs a disarm callback; 0 for none.
-    static CALLBACK: Cell<usize> = const { Cell::new(0) };
-    /// Of which robot the calling thread runs an actuator's code, which its disarm callback waits for; 0 for none.
-    static ACTUATOR: Cell<usize> = const { Cell::new(0) };
+    /// What the calling thread is inside of: of one robot, and from there perhaps of another.
+    static INSIDE: RefCell<Vec<(usize, Code)>> = const { RefCell::new(Vec::new()) };
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Code {
+    /// A disarm callback.
+    Callback,
+    /// An actuator's code, which its disarm callback waits for.
+    Actuator,
 }
 
 /// Runs a disarm callback of `robot`.
 pub(super) fn callback<T>(robot: usize, code: impl FnOnce() -> T) -> T {
-    let before = CALLBACK.replace(robot);
-    let result = code();
-    CALLBACK.set(before);
-    result
+    let _inside = Inside::new(robot, Code::Callback);
+    code()
 }
 
 /// Whether the calling thread runs a disarm callback of `robot`.
 pub(super) fn is_callback(robot: usize) -> bool {
-    CALLBACK.get() == robot
+    INSIDE.with_borrow(|inside| inside.contains(&(robot, Code::Callback)))
 }
 
 /// Whether the calling thread runs code of `robot` that disarming waits for.
 pub(super) fn is_waited_for(robot: usize) -> bool {
-    is_callback(robot) || ACTUATOR.get() == robot
+    INSIDE.with_borrow(|inside| inside.iter().any(|(other, _)| *other == robot))
+}
+
+/// The calling thread is inside as long as this lives. They end in the reverse order.
+struct Inside;
+
+impl Inside {
+    fn new(robot: usize, code: Code) -> Self {
+        INSIDE.with_borrow_mut(|inside| inside.push((robot, code)));
+        Self
+    }
+}
+
+impl Drop for Inside {
+    fn drop(&mut self) {
+        INSIDE.with_borrow_mut(|inside| inside.pop());
+    }
 }
 
 /// The calling thread runs an actuator's code as long as this lives.
 pub(crate) struct InActuator {
-    before: usize,
+    _inside: Inside,
 }
 
 impl InActuator {
     pub(super) fn new(robot: usize) -> Self {
-        Self { before: ACTUATOR.replace(robot) }
-    }
-}
-
-impl Drop for InActuator {
-    fn drop(&mut self) {
-        ACTUATOR.set(self.before);
+        Self { _inside: Inside::new(robot, Code::Actuator) }
     }
 }

@@ -63,10 +63,8 @@ impl Control {
 
     fn polled(&self) -> Vec<&'static str> {
         let state = self.lock();
-        let inside = state
-            .executions
-            .iter()
-            .filter(|execution| execution.task.as_ref().is_some_and(|task| task.is_polled()));
+        let inside =
+            state.executions.iter().filter(|execution| execution.task.as_ref().is_some_and(|task| task.may_act()));
         inside
             .filter_map(|execution| self.0.declared.commands.get(execution.command))
             .map(|declared| declared.path)
@@ -82,6 +80,7 @@ impl Control {
             Limit::Arming => self.arm_timeout(),
             Limit::Disarming(generation) => self.disarm_timeout(generation),
             Limit::Apart(key) => self.apart_timeout(key),
+            Limit::Gone(id) => self.gone(id),
         }
         true
     }

@@ -50,6 +50,7 @@ impl Control {
             last_disarm: Ok(()),
             disarms: 0,
             generation: 0,
+            has_begun: false,
             is_stopping: false,
             has_ended: false,
         };

@@ -84,12 +84,14 @@ impl Task {
         }
     }
 
-    /// Its code is not entered any more; whether a thread is inside. Before [`Self::cancel`], which cannot be
-    /// called under a lock.
-    pub(super) fn mark_cancelled(&self) -> bool {
-        let mut state = self.lock();
-        state.is_cancelled = true;
-        matches!(state.code, Code::Polled)
+    /// Its code is not entered any more. Before [`Self::cancel`], which cannot be called under a lock.
+    pub(super) fn mark_cancelled(&self) {
+        self.lock().is_cancelled = true;
+    }
+
+    /// Whether it has code that may do something: a thread is inside, or its future is to be dropped.
+    pub(super) fn may_act(&self) -> bool {
+        matches!(self.lock().code, Code::Polled | Code::Future(_))
     }
 
     /// Its future is dropped as soon as its code gives way.
@@ -197,11 +199,6 @@ impl Task {
         })
     }
 
-    /// Whether a thread is inside its code.
-    pub(super) fn is_polled(&self) -> bool {
-        matches!(self.lock().code, Code::Polled)
-    }
-
     /// When the thread that is inside its code entered it.
     pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
         let state = self.lock();
@@ -210,7 +207,7 @@ impl Task {
 
     /// Which threads of the pool run it, or drop its future.
     pub(super) fn lane(&self) -> Lane {
-        if self.lock().is_cancelled { Lane::Wakers } else { self.lane }
+        if self.lock().is_cancelled { Lane::Dropping } else { self.lane }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

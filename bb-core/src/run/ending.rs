@@ -116,6 +116,12 @@ impl<R: Robot> Machine<R> {
             let message = "what its disarm callback owns was not dropped in time".to_owned();
             report.add_fault(self.fault(path, message));
         }
+        let deadline = Instant::now() + LEAST_TO_CLOSE;
+        for lane in [Lane::Dropping, Lane::Wakers] {
+            if let Some(message) = self.control.pool().left(lane, deadline) {
+                report.add_fault(self.fault("pool", message));
+            }
+        }
         // It is set once.
         let _ = self.last_report.set(report);
         self.wake_all(self.control.topics().journal.close());

@@ -30,12 +30,15 @@ pub(crate) enum Lane {
     Robot,
     /// All other commands.
     Commands,
-    /// Wakers, and values that are dropped.
+    /// Values that are dropped, among them the futures of cancelled commands.
+    Dropping,
+    /// Wakers.
     Wakers,
 }
 
 impl Lane {
-    const ALL: [Self; 5] = [Self::Disarming, Self::Health, Self::Robot, Self::Commands, Self::Wakers];
+    const ALL: [Self; 6] =
+        [Self::Disarming, Self::Health, Self::Robot, Self::Commands, Self::Dropping, Self::Wakers];
 
     /// How many of its jobs may run at once; others wait until one returns.
     const fn most(self) -> usize {
@@ -44,7 +47,7 @@ impl Lane {
             Self::Commands if cfg!(loom) => 1,
             Self::Disarming | Self::Health => 64,
             Self::Robot => usize::MAX,
-            Self::Commands | Self::Wakers => 512,
+            Self::Commands | Self::Dropping | Self::Wakers => 512,
         }
     }
 
@@ -55,6 +58,7 @@ impl Lane {
             Self::Health => "commands that health has started",
             Self::Robot => "turns",
             Self::Commands => "commands",
+            Self::Dropping => "values that were dropped",
             Self::Wakers => "wakers",
         }
     }
@@ -136,6 +140,20 @@ impl Pool {
         let lane = crew.newly_full(Instant::now())?;
         let (most, jobs) = (lane.most(), lane.jobs());
         Some(format!("{most} {jobs} have not returned, as many as there are threads for: others wait"))
+    }
+
+    /// Waits until nothing is left of a lane, until `deadline` at most; else what is left, in words.
+    pub(crate) fn left(&self, lane: Lane, deadline: Instant) -> Option<String> {
+        loop {
+            let left = self.0.lock().left(lane);
+            if left == 0 {
+                return None;
+            }
+            if Instant::now() >= deadline {
+                return Some(format!("{} that have not returned: {left}", lane.jobs()));
+            }
+            std::thread::sleep(Duration::from_micros(100));
+        }
     }
 
     /// Runs what waits, on threads that end once nothing does. Nobody keeps time any more.

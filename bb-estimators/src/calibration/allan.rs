@@ -174,7 +174,13 @@ pub fn sensor_noise(integrals: &[f64], period_s: f64) -> Result<SensorNoise, All
     while m <= samples / SHARE && curve.count < OCTAVES {
         let deviation = allan_deviation(integrals, m).unwrap_or(0.0);
         if deviation <= 0.0 {
-            return Err(AllanError::Constant);
+            // The square of something tiny is 0 as well.
+            let largest = integrals.iter().fold(0.0, |largest: f64, integral| largest.max(integral.abs()));
+            return Err(if largest > 0.0 {
+                AllanError::Unlikely { deviation: largest }
+            } else {
+                AllanError::Constant
+            });
         }
         if !DEVIATIONS.contains(&deviation) {
             return Err(AllanError::Unlikely { deviation });

@@ -101,6 +101,12 @@ impl Crew {
         thread
     }
 
+    /// Jobs of a lane that have not returned.
+    pub(super) fn left(&self, lane: Lane) -> usize {
+        let queue = &self.lanes[lane as usize];
+        queue.running + queue.waiting.len()
+    }
+
     pub(super) fn threads(&self) -> usize {
         self.threads
     }
