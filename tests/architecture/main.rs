@@ -19,8 +19,15 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 6] =
-    ["bb-macros", "bb-core", "bb-estimators", "bb-cli", "integrations/mcap", "integrations/metrics"];
+const CRATES: [&str; 7] = [
+    "bb-macros",
+    "bb-core",
+    "bb-estimators",
+    "bb-cli",
+    "integrations/mavlink",
+    "integrations/mcap",
+    "integrations/metrics",
+];
 
 /// All files of code below a folder, without those of tests.
 fn code_below(folder: &Path, files: &mut Vec<PathBuf>) {

@@ -51,6 +51,10 @@ struct Recording;
 struct Settings;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/mavlink.md")]
+struct Mavlink;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/drivers.md")]
 struct Drivers;
 

@@ -1,0 +1,188 @@
+//! One connection, shared by all who name its address.
+//!
+//! A thread reads it until the last user drops it: reads wait for 50 ms at most, so that the thread ends soon after.
+//! Every user has an inbox of a bounded number of messages of its own; a user who is slow loses the oldest, which is
+//! counted, and holds up nobody.
+
+mod inbox;
+mod reading;
+mod shared;
+
+pub(crate) use inbox::{Inbox, Received};
+pub(crate) use shared::Voice;
+
+use crate::transport;
+use crate::{Address, AddressError};
+use bb_core::{MonotonicTime, Payload};
+use mavlink::MavHeader;
+use mavlink::dialects::common::MavMessage;
+use shared::Shared;
+use std::collections::HashMap;
+use std::io;
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+
+/// Why a link cannot be opened, or cannot be used any more.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The address is malformed.
+    #[error(transparent)]
+    Address(#[from] AddressError),
+    /// It cannot be opened: the port is taken, or the device is not there.
+    #[error("the link `{address}` cannot be opened: {source}")]
+    Open {
+        /// Of the link.
+        address: Address,
+        /// Why.
+        source: Arc<io::Error>,
+    },
+    /// It has worked, and does so no more: the device was unplugged.
+    #[error("the link `{address}` has failed: {source}")]
+    Failed {
+        /// Of the link.
+        address: Address,
+        /// Why.
+        source: Arc<io::Error>,
+    },
+}
+
+/// What has come over a link, and been sent, since it was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub struct LinkStatistics {
+    /// Messages of the dialect `common`.
+    pub messages: u64,
+    /// Frames of other dialects.
+    pub unknown: u64,
+    /// Frames with a good checksum and a content that the dialect does not have.
+    pub invalid: u64,
+    /// Bytes that belong to no frame: noise, and frames with a bad checksum.
+    pub bytes_skipped: u64,
+    /// Messages that drivers lost because they came faster than they were read.
+    pub dropped: u64,
+    /// Frames that senders have numbered and that have not come.
+    pub lost: u64,
+    /// Frames sent.
+    pub sent: u64,
+    /// Frames that could not be sent, or that nobody was known to hear.
+    pub unsent: u64,
+}
+
+/// Whom to listen to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Peer {
+    /// 0 for any.
+    pub(crate) system_id: u8,
+    /// 0 for any.
+    pub(crate) component_id: u8,
+}
+
+impl Peer {
+    fn is(self, header: MavHeader) -> bool {
+        let fits = |wanted: u8, is: u8| wanted == 0 || wanted == is;
+        fits(self.system_id, header.system_id) && fits(self.component_id, header.component_id)
+    }
+}
+
+/// A use of a connection. The last one that is dropped closes it.
+#[derive(Debug)]
+pub(crate) struct Link {
+    shared: Arc<Shared>,
+}
+
+/// A connection with its thread.
+struct Open {
+    shared: Arc<Shared>,
+    thread: JoinHandle<()>,
+    users: usize,
+}
+
+/// All open connections. It is locked while one is opened or closed, so that no address is opened twice.
+static LINKS: LazyLock<Mutex<HashMap<Address, Open>>> = LazyLock::new(Mutex::default);
+
+fn links() -> MutexGuard<'static, HashMap<Address, Open>> {
+    LINKS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Link {
+    /// Opens a connection, or shares the one that is open.
+    ///
+    /// # Errors
+    /// The address is malformed, or it cannot be opened.
+    pub(crate) fn open(address: &str) -> Result<Self, LinkError> {
+        let address: Address = address.parse()?;
+        let mut links = links();
+        // One that has failed is left to those who still hold it.
+        if let Some(open) = links.get_mut(&address).filter(|open| !open.shared.has_failed()) {
+            open.users += 1;
+            return Ok(Self { shared: Arc::clone(&open.shared) });
+        }
+        let failed = |source: io::Error| LinkError::Open { address: address.clone(), source: Arc::new(source) };
+        let (reader, writer) = transport::open(&address).map_err(failed)?;
+        let shared = Arc::new(Shared::new(address.clone(), writer));
+        let of_thread = Arc::clone(&shared);
+        let named = thread::Builder::new().name("mavlink".into());
+        let thread = named.spawn(move || reading::read(&of_thread, reader)).map_err(failed)?;
+        links.insert(address, Open { shared: Arc::clone(&shared), thread, users: 1 });
+        Ok(Self { shared })
+    }
+
+    /// Listens to messages of a peer with these ids.
+    pub(crate) fn listen(&self, peer: Peer, ids: &[u32], capacity: usize) -> Arc<Inbox> {
+        self.shared.listen(peer, ids, capacity)
+    }
+
+    /// Speaks as a component of a system, which sends heartbeats for as long as the voice is kept.
+    pub(crate) fn voice(&self, system_id: u8, component_id: u8) -> Arc<Voice> {
+        self.shared.voice((system_id, component_id))
+    }
+
+    /// Sends a message. Returns `false` if nobody is known who would hear it.
+    ///
+    /// # Errors
+    /// The link has failed.
+    pub(crate) fn send(&self, voice: &Voice, message: &MavMessage) -> Result<bool, LinkError> {
+        self.shared.send(voice, message)
+    }
+
+    /// # Errors
+    /// The link has failed.
+    pub(crate) fn check(&self) -> Result<(), LinkError> {
+        self.shared.check()
+    }
+
+    /// When the last heartbeat of a peer came, on the machine's clock.
+    pub(crate) fn last_heartbeat(&self, peer: Peer) -> Option<MonotonicTime> {
+        self.shared.last_heartbeat(peer)
+    }
+
+    /// The machine's time.
+    pub(crate) fn now(&self) -> MonotonicTime {
+        self.shared.clock().now()
+    }
+
+    pub(crate) fn statistics(&self) -> LinkStatistics {
+        self.shared.statistics()
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        let mut links = links();
+        let address = self.shared.address();
+        // A link that has failed may have a successor at its address; its thread has ended.
+        let Some(open) = links.get_mut(address).filter(|open| Arc::ptr_eq(&open.shared, &self.shared)) else {
+            return;
+        };
+        open.users -= 1;
+        if open.users > 0 {
+            return;
+        }
+        let Some(open) = links.remove(address) else { return };
+        open.shared.stop();
+        // It ends after its current read. Until then, the address stays taken.
+        let _ = open.thread.join();
+    }
+}
+
+#[cfg(test)]
+mod tests;

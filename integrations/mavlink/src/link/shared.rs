@@ -1,0 +1,246 @@
+//! What the users of a link and its thread share.
+
+use super::inbox::Inbox;
+use super::{LinkError, LinkStatistics, Peer};
+use crate::Address;
+use crate::frames::Item;
+use crate::transport::Writer;
+use bb_core::MonotonicTime;
+use bb_core::time::Clock;
+use mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader, Message, MessageData};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+/// Who speaks: system and component, and how many frames they have sent.
+#[derive(Debug)]
+pub(crate) struct Voice {
+    system_id: u8,
+    component_id: u8,
+    sequence: AtomicU8,
+}
+
+/// Who speaks where nobody has chosen: the onboard computer of the first vehicle.
+const DEFAULT_VOICE: (u8, u8) = (1, 191);
+
+#[derive(Debug)]
+pub(crate) struct Shared {
+    address: Address,
+    clock: Clock,
+    is_stopping: AtomicBool,
+    state: Mutex<State>,
+    /// None once the link has failed.
+    writer: Mutex<Option<Writer>>,
+    voices: Mutex<Vec<Weak<Voice>>>,
+    default_voice: Arc<Voice>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    inboxes: Vec<Weak<Inbox>>,
+    statistics: LinkStatistics,
+    /// By system and component.
+    heard: BTreeMap<(u8, u8), Heard>,
+    failure: Option<LinkError>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Heard {
+    sequence: u8,
+    heartbeat: Option<MonotonicTime>,
+}
+
+impl Shared {
+    pub(super) fn new(address: Address, writer: Writer) -> Self {
+        Self {
+            address,
+            clock: Clock::real(),
+            is_stopping: AtomicBool::new(false),
+            state: Mutex::default(),
+            writer: Mutex::new(Some(writer)),
+            voices: Mutex::default(),
+            default_voice: Arc::new(Voice::new(DEFAULT_VOICE)),
+        }
+    }
+
+    pub(super) fn address(&self) -> &Address {
+        &self.address
+    }
+
+    pub(super) fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    pub(super) fn stop(&self) {
+        self.is_stopping.store(true, Ordering::Release);
+    }
+
+    pub(super) fn is_stopping(&self) -> bool {
+        self.is_stopping.load(Ordering::Acquire)
+    }
+
+    pub(super) fn listen(&self, peer: Peer, ids: &[u32], capacity: usize) -> Arc<Inbox> {
+        let inbox = Arc::new(Inbox::new(peer, ids, capacity));
+        let mut state = self.state();
+        state.inboxes.retain(|inbox| inbox.strong_count() > 0);
+        state.inboxes.push(Arc::downgrade(&inbox));
+        if let Some(failure) = &state.failure {
+            inbox.fail(failure.clone());
+        }
+        inbox
+    }
+
+    /// A voice with these ids: that which has them already, if there is one.
+    pub(super) fn voice(&self, ids: (u8, u8)) -> Arc<Voice> {
+        if ids == DEFAULT_VOICE {
+            return self.remember(Arc::clone(&self.default_voice));
+        }
+        let found = self.living().into_iter().find(|voice| voice.ids() == ids);
+        found.unwrap_or_else(|| self.remember(Arc::new(Voice::new(ids))))
+    }
+
+    fn remember(&self, voice: Arc<Voice>) -> Arc<Voice> {
+        let mut voices = self.voices.lock().unwrap_or_else(PoisonError::into_inner);
+        voices.retain(|known| known.upgrade().is_some_and(|known| !Arc::ptr_eq(&known, &voice)));
+        voices.push(Arc::downgrade(&voice));
+        voice
+    }
+
+    fn living(&self) -> Vec<Arc<Voice>> {
+        let voices = self.voices.lock().unwrap_or_else(PoisonError::into_inner);
+        voices.iter().filter_map(Weak::upgrade).collect()
+    }
+
+    /// All voices that send heartbeats: at least one, so that the peer learns of us.
+    pub(super) fn voices(&self) -> Vec<Arc<Voice>> {
+        let living = self.living();
+        if living.is_empty() { vec![Arc::clone(&self.default_voice)] } else { living }
+    }
+
+    /// Sends a message. Returns `false` if nobody is known who would hear it.
+    pub(super) fn send(&self, voice: &Voice, message: &MavMessage) -> Result<bool, LinkError> {
+        let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(open) = writer.as_mut() else { return Err(self.failure()) };
+        let mut frame = MAVLinkV2MessageRaw::new();
+        frame.serialize_message(voice.header(), message);
+        let sent = open.write(frame.raw_bytes());
+        drop(writer);
+        let mut state = self.state();
+        match &sent {
+            Ok(true) => state.statistics.sent += 1,
+            Ok(false) | Err(_) => state.statistics.unsent += 1,
+        }
+        sent.map_err(|error| LinkError::Failed { address: self.address.clone(), source: Arc::new(error) })
+    }
+
+    pub(super) fn deliver(&self, item: Item, arrival: MonotonicTime) {
+        let mut state = self.state();
+        match item {
+            Item::Message(header, message) => {
+                state.statistics.messages += 1;
+                let id = message.message_id();
+                let heard = state.hear(header);
+                if id == HEARTBEAT_DATA::ID {
+                    heard.heartbeat = Some(arrival);
+                }
+                let inboxes = state.inboxes.iter().filter_map(Weak::upgrade);
+                let dropped = inboxes.filter(|inbox| inbox.offer(header, id, &message, arrival)).count();
+                state.statistics.dropped += dropped as u64;
+            }
+            Item::Unknown(header) => {
+                state.statistics.unknown += 1;
+                state.hear(header);
+            }
+            Item::Invalid(header) => {
+                state.statistics.invalid += 1;
+                state.hear(header);
+            }
+        }
+    }
+
+    pub(super) fn count_skipped(&self, bytes: u64) {
+        self.state().statistics.bytes_skipped = bytes;
+    }
+
+    /// When the last heartbeat of a peer came.
+    pub(super) fn last_heartbeat(&self, peer: Peer) -> Option<MonotonicTime> {
+        let state = self.state();
+        let of_peer = state.heard.iter().filter(|((system_id, component_id), _)| {
+            peer.is(MavHeader { system_id: *system_id, component_id: *component_id, sequence: 0 })
+        });
+        of_peer.filter_map(|(_, heard)| heard.heartbeat).max()
+    }
+
+    pub(super) fn statistics(&self) -> LinkStatistics {
+        self.state().statistics
+    }
+
+    pub(super) fn fail(&self, failure: LinkError) {
+        // Both ends are closed before anybody is told, who may then open the device again.
+        *self.writer.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        let mut state = self.state();
+        for inbox in state.inboxes.iter().filter_map(Weak::upgrade) {
+            inbox.fail(failure.clone());
+        }
+        state.failure = Some(failure);
+    }
+
+    pub(super) fn check(&self) -> Result<(), LinkError> {
+        self.state().failure.clone().map_or(Ok(()), Err)
+    }
+
+    pub(super) fn has_failed(&self) -> bool {
+        self.state().failure.is_some()
+    }
+
+    fn failure(&self) -> LinkError {
+        let closed = || LinkError::Failed {
+            address: self.address.clone(),
+            source: Arc::new(std::io::Error::other("it is closed")),
+        };
+        self.state().failure.clone().unwrap_or_else(closed)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    /// Counts what was lost before a frame.
+    fn hear(&mut self, header: MavHeader) -> &mut Heard {
+        let MavHeader { system_id, component_id, sequence } = header;
+        let heard = self
+            .heard
+            .entry((system_id, component_id))
+            .or_insert(Heard { sequence: sequence.wrapping_sub(1), heartbeat: None });
+        let lost = sequence.wrapping_sub(heard.sequence).wrapping_sub(1);
+        // More than half a round back is more likely a frame that was overtaken, sent twice, or a sender that has
+        // started again.
+        if lost < 128 {
+            self.statistics.lost += u64::from(lost);
+        }
+        heard.sequence = sequence;
+        heard
+    }
+}
+
+impl Voice {
+    fn new((system_id, component_id): (u8, u8)) -> Self {
+        Self { system_id, component_id, sequence: AtomicU8::new(0) }
+    }
+
+    fn ids(&self) -> (u8, u8) {
+        (self.system_id, self.component_id)
+    }
+
+    fn header(&self) -> MavHeader {
+        let Self { system_id, component_id, sequence } = self;
+        MavHeader {
+            system_id: *system_id,
+            component_id: *component_id,
+            sequence: sequence.fetch_add(1, Ordering::Relaxed),
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! `ODOMETRY`: the estimate in a local frame with axes to north, east and down.
+
+use crate::axes::{body_matrix, ned_from_frd, swap_body, swap_world, turned, world_matrix};
+use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use bb_core::payload::Odometry;
+use bb_core::time::WallTime;
+use bb_estimators::navigation::state_estimator::FlightEstimate;
+use bb_estimators::navigation::{Geodetic, LocalFrame};
+use mavlink::dialects::common::{MavEstimatorType, MavFrame, ODOMETRY_DATA};
+
+/// The frame of flight estimates.
+#[derive(Clone, Debug)]
+pub(super) struct OdometryFrame {
+    /// None before the first estimate, where none was given.
+    origin: Option<LocalFrame>,
+}
+
+impl OdometryFrame {
+    pub(super) fn new(origin: Option<LocalFrame>) -> Self {
+        Self { origin }
+    }
+
+    /// None if a value is not finite.
+    pub(super) fn of_flight(&mut self, estimate: &FlightEstimate, wall: WallTime) -> Option<ODOMETRY_DATA> {
+        let position = &estimate.position;
+        let here = Geodetic {
+            latitude: position.latitude_rad,
+            longitude: position.longitude_rad,
+            height: position.altitude?,
+        };
+        let is_on_earth = [here.latitude, here.longitude, here.height].iter().all(|value| value.is_finite());
+        is_on_earth.then_some(())?;
+        let origin = *self.origin.get_or_insert(LocalFrame::new(here));
+        // Level there is not level here.
+        let origin_from_here = LocalFrame::new(here).other_from_self(&origin).rotation;
+        let world_from_body = origin_from_here * estimate.world_from_body;
+        let body_from_here = estimate.world_from_body.inverse();
+        // Of the position in the world, of the orientation as a small rotation of the body.
+        let covariance = turned(
+            &estimate.covariance,
+            origin_from_here.to_rotation_matrix().matrix(),
+            body_from_here.to_rotation_matrix().matrix(),
+        );
+        Motion {
+            position: origin.position(&here),
+            world_from_body,
+            covariance: Some(covariance),
+            velocity: body_from_here * estimate.velocity,
+            angular_velocity: None,
+            velocity_covariance: None,
+        }
+        .message(wall, MavEstimatorType::MAV_ESTIMATOR_TYPE_VIO)
+    }
+
+    /// None if a value is not finite.
+    pub(super) fn of_odometry(estimate: &Odometry, wall: WallTime) -> Option<ODOMETRY_DATA> {
+        let Odometry { pose, twist } = estimate;
+        Motion {
+            position: pose.position,
+            world_from_body: pose.world_from_body,
+            covariance: pose.covariance,
+            velocity: twist.linear,
+            angular_velocity: Some(twist.angular),
+            velocity_covariance: twist.covariance,
+        }
+        .message(wall, MavEstimatorType::MAV_ESTIMATOR_TYPE_UNKNOWN)
+    }
+}
+
+/// In the axes of the framework: the world's for position, the body's for the rest.
+struct Motion {
+    position: Vector3<f64>,
+    world_from_body: UnitQuaternion<f64>,
+    covariance: Option<Matrix6<f64>>,
+    velocity: Vector3<f64>,
+    angular_velocity: Option<Vector3<f64>>,
+    velocity_covariance: Option<Matrix6<f64>>,
+}
+
+impl Motion {
+    fn message(&self, wall: WallTime, estimator_type: MavEstimatorType) -> Option<ODOMETRY_DATA> {
+        let position = swap_world(&self.position).cast::<f32>();
+        let rotation = ned_from_frd(&self.world_from_body);
+        let velocity = swap_body(&self.velocity).cast::<f32>();
+        let unknown = Vector3::repeat(f32::NAN);
+        let rates = self.angular_velocity.map_or(unknown, |rates| swap_body(&rates).cast());
+        let body = body_matrix();
+        let pose_covariance = self.covariance.map(|covariance| turned(&covariance, &world_matrix(), &body));
+        let velocity_covariance = self.velocity_covariance.map(|covariance| turned(&covariance, &body, &body));
+        let mut sent =
+            position.iter().chain(velocity.iter()).copied().map(f64::from).chain(rotation.coords.iter().copied());
+        let is_finite = sent.all(f64::is_finite)
+            && pose_covariance.is_none_or(|covariance| covariance.iter().all(|value| value.is_finite()));
+        is_finite.then(|| ODOMETRY_DATA {
+            time_usec: u64::try_from(wall.as_unix_nanos() / 1_000).unwrap_or(0),
+            x: position.x,
+            y: position.y,
+            z: position.z,
+            q: [rotation.w, rotation.i, rotation.j, rotation.k].map(|value| value as f32),
+            vx: velocity.x,
+            vy: velocity.y,
+            vz: velocity.z,
+            rollspeed: rates.x,
+            pitchspeed: rates.y,
+            yawspeed: rates.z,
+            pose_covariance: upper_triangle(pose_covariance),
+            velocity_covariance: upper_triangle(velocity_covariance),
+            frame_id: MavFrame::MAV_FRAME_LOCAL_NED,
+            child_frame_id: MavFrame::MAV_FRAME_BODY_FRD,
+            reset_counter: 0,
+            estimator_type,
+            // Unknown: the covariance tells.
+            quality: 0,
+        })
+    }
+}
+
+/// Row by row. What is unknown begins with what is not a number.
+fn upper_triangle(covariance: Option<Matrix6<f64>>) -> [f32; 21] {
+    let mut entries = [0.0; 21];
+    let Some(covariance) = covariance else {
+        entries[0] = f32::NAN;
+        return entries;
+    };
+    let upper = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));
+    for (entry, at) in entries.iter_mut().zip(upper) {
+        *entry = covariance[at] as f32;
+    }
+    entries
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gps_input::tests::estimate;
+    use super::*;
+    use bb_core::payload::{Pose, Twist};
+    use bb_core::time::WallTime;
+
+    const NOW: WallTime = WallTime::from_unix_nanos(1_795_305_600_000_000_000);
+
+    #[test]
+    fn a_flight_estimate_is_relative_to_the_origin() {
+        let origin =
+            Geodetic { latitude: 48.099_f64.to_radians(), longitude: 11.5_f64.to_radians(), height: 500.0 };
+        let mut frame = OdometryFrame::new(Some(LocalFrame::new(origin)));
+        let message = frame.of_flight(&estimate(), NOW).expect("it can be sent");
+        assert!((message.x - 111.2).abs() < 0.1 && message.y.abs() < 1e-3, "{} {}", message.x, message.y);
+        assert!((message.z + 47.5).abs() < 0.01, "{}", message.z);
+        // To the north-west: forward is by a right angle and a half to the left of east, half a one to the left of north.
+        let yaw = 2.0 * message.q[3].atan2(message.q[0]).to_degrees();
+        assert!((yaw.rem_euclid(360.0) - 315.0).abs() < 0.01, "{yaw}");
+        // 2 m/s to the north and 1 m/s to the west are 3/√2 m/s forward and 1/√2 m/s to the right.
+        let half = std::f32::consts::FRAC_1_SQRT_2;
+        assert!(
+            (message.vx - 3.0 * half).abs() < 1e-3 && (message.vy - half).abs() < 1e-3,
+            "{} {}",
+            message.vx,
+            message.vy
+        );
+        assert!((message.vz + 0.5).abs() < 1e-3);
+        assert_eq!(
+            (message.frame_id, message.child_frame_id),
+            (MavFrame::MAV_FRAME_LOCAL_NED, MavFrame::MAV_FRAME_BODY_FRD)
+        );
+        // North, east, down; then the mean of both about the forward and the right axis, since they are at 45 degrees
+        // to the world's.
+        let diagonal = [0, 6, 11, 15, 18, 20].map(|at| message.pose_covariance[at]);
+        for (entry, expected) in diagonal.iter().zip([4.0, 25.0, 9.0, 2.5e-4, 2.5e-4, 9e-4]) {
+            assert!((entry - expected).abs() < 1e-4 * expected, "{diagonal:?}");
+        }
+        assert!(message.velocity_covariance[0].is_nan() && message.rollspeed.is_nan());
+        assert_eq!(message.time_usec, 1_795_305_600_000_000);
+    }
+
+    /// Ten degrees to the east on the equator, what is up there leans to the east by ten degrees.
+    #[test]
+    fn level_far_away_is_not_level_at_the_origin() {
+        let origin = Geodetic { latitude: 0.0, longitude: 0.0, height: 0.0 };
+        let mut far = estimate();
+        (far.position.latitude_rad, far.position.longitude_rad) = (0.0, 10_f64.to_radians());
+        let message =
+            OdometryFrame::new(Some(LocalFrame::new(origin))).of_flight(&far, NOW).expect("it can be sent");
+        let [w, i, j, k] = message.q.map(f64::from);
+        let ned_from_frd = UnitQuaternion::from_quaternion(bb_core::nalgebra::Quaternion::new(w, i, j, k));
+        let up = ned_from_frd * Vector3::new(0.0, 0.0, -1.0);
+        let (sin, cos) = 10_f64.to_radians().sin_cos();
+        assert!((up - Vector3::new(0.0, sin, -cos)).norm() < 1e-6, "{up}");
+    }
+
+    #[test]
+    fn without_an_origin_the_first_estimate_is_it() {
+        let mut frame = OdometryFrame::new(None);
+        let first = frame.of_flight(&estimate(), NOW).expect("it can be sent");
+        assert!([first.x, first.y, first.z].iter().all(|coordinate| coordinate.abs() < 1e-6));
+        let mut higher = estimate();
+        higher.position.altitude = Some(557.5);
+        let second = frame.of_flight(&higher, NOW).expect("it can be sent");
+        assert!((second.z + 10.0).abs() < 1e-4, "{}", second.z);
+    }
+
+    #[test]
+    fn odometry_of_any_estimator_keeps_its_covariances() {
+        let pose = Pose {
+            position: Vector3::new(1.0, 2.0, 3.0),
+            world_from_body: UnitQuaternion::identity(),
+            covariance: None,
+        };
+        let covariance = Some(Matrix6::from_fn(|row, column| (row.min(column) * 10 + row.max(column)) as f64));
+        let twist = Twist { linear: Vector3::new(1.0, 2.0, 3.0), angular: Vector3::new(0.1, 0.2, 0.3), covariance };
+        let message = OdometryFrame::of_odometry(&Odometry { pose, twist }, NOW).expect("it can be sent");
+        assert_eq!([message.x, message.y, message.z], [2.0, 1.0, -3.0]);
+        assert_eq!([message.vx, message.vy, message.vz], [1.0, -2.0, -3.0]);
+        assert_eq!([message.rollspeed, message.pitchspeed, message.yawspeed], [0.1, -0.2, -0.3]);
+        assert!(message.pose_covariance[0].is_nan());
+        // A sign for each of the two axes that is turned round.
+        let signs = [1.0, -1.0, -1.0, 1.0, -1.0, -1.0];
+        let mut at = 0;
+        for row in 0..6 {
+            for column in row..6 {
+                let expected = signs[row] * signs[column] * (row * 10 + column) as f32;
+                assert_eq!(message.velocity_covariance[at], expected, "{row} {column}");
+                at += 1;
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_not_sent() {
+        let mut wrong = estimate();
+        wrong.velocity.x = f64::NAN;
+        assert_eq!(OdometryFrame::new(None).of_flight(&wrong, NOW), None);
+        wrong = estimate();
+        wrong.position.latitude_rad = f64::NAN;
+        let mut frame = OdometryFrame::new(None);
+        assert_eq!(frame.of_flight(&wrong, NOW), None);
+        assert!(frame.origin.is_none(), "it is no origin either");
+    }
+}

@@ -1,0 +1,137 @@
+//! How the flight controller's receiver is, from `GPS_RAW_INT` and `STATUSTEXT`.
+
+use super::stream::Stream;
+use crate::link::Peer;
+use bb_core::{Fault, MonotonicTime, Options, Reading, Sensor, SensorContext};
+use bb_estimators::navigation::state_estimator::{GpsHealth, GpsReport};
+use mavlink::MessageData;
+use mavlink::dialects::common::{GPS_RAW_INT_DATA, GpsFixType, MavMessage, STATUSTEXT_DATA};
+use std::time::Duration;
+
+/// Options of [`MavlinkGpsHealth`].
+#[derive(Clone, Debug, Options)]
+pub struct MavlinkGpsHealthOptions {
+    /// Where the flight controller is reached: see [`Address`](crate::Address).
+    #[option(required)]
+    pub link: String,
+    /// With fewer satellites it is unstable. A receiver that does not say how many it sees is not judged by it.
+    #[option(default = 6)]
+    pub least_satellites: u8,
+    /// With a larger dilution of precision it is unstable.
+    #[option(default = 2.5, range = 0.1..=100.0)]
+    pub largest_hdop: f64,
+    /// With a larger horizontal accuracy, where the receiver says one, it is unstable.
+    #[option(default = 10.0, range = 0.01..=10000.0, unit = "m")]
+    pub largest_accuracy: f64,
+    /// For how long it is spoofed after a text that says so.
+    #[option(default = Duration::from_secs(10))]
+    pub spoofed_for: Duration,
+    /// System that sends; 0 for any.
+    #[option(default = 1)]
+    pub system_id: u8,
+    /// Component that sends; 0 for any.
+    #[option(default = 1)]
+    pub component_id: u8,
+    /// How long it may send nothing that can be used.
+    #[option(default = Duration::from_secs(2))]
+    pub timeout: Duration,
+}
+
+/// The health of the flight controller's receiver, with each `GPS_RAW_INT`, as the state estimator takes it.
+///
+/// The dialect `common` has no message about spoofing, so the receiver is taken for spoofed for a while after a
+/// `STATUSTEXT` that contains "spoof", which PX4 and ArduPilot send.
+#[derive(Debug)]
+pub struct MavlinkGpsHealth {
+    stream: Stream,
+    options: MavlinkGpsHealthOptions,
+    spoofed: Option<MonotonicTime>,
+}
+
+impl Sensor for MavlinkGpsHealth {
+    type Options = MavlinkGpsHealthOptions;
+    type Output = GpsReport;
+
+    fn init(options: MavlinkGpsHealthOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let messages =
+            [(GPS_RAW_INT_DATA::NAME, GPS_RAW_INT_DATA::ID), (STATUSTEXT_DATA::NAME, STATUSTEXT_DATA::ID)];
+        let peer = Peer { system_id: options.system_id, component_id: options.component_id };
+        let stream = Stream::open(&options.link, peer, &messages, options.timeout, context)?;
+        Ok(Self { stream, options, spoofed: None })
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<GpsReport>, Fault> {
+        let Some(received) = self.stream.next()? else { return Ok(Reading::nothing()) };
+        let arrival = received.arrival;
+        let health = match &received.message {
+            MavMessage::STATUSTEXT(text) if says_spoofed(text) => {
+                self.spoofed = Some(arrival);
+                GpsHealth::Spoofed
+            }
+            MavMessage::GPS_RAW_INT(data) => {
+                self.stream.has_value();
+                let is_recent =
+                    |at: MonotonicTime| arrival.seconds_since(at) <= self.options.spoofed_for.as_secs_f64();
+                if self.spoofed.is_some_and(is_recent) { GpsHealth::Spoofed } else { health(data, &self.options) }
+            }
+            // A flood of texts must not hide that nothing else comes.
+            _ => return self.stream.check_silence().map(|()| Reading::nothing()),
+        };
+        Ok(Reading::at(arrival, GpsReport { health }))
+    }
+}
+
+fn says_spoofed(text: &STATUSTEXT_DATA) -> bool {
+    text.text.to_str().is_ok_and(|text| text.to_ascii_lowercase().contains("spoof"))
+}
+
+fn health(data: &GPS_RAW_INT_DATA, options: &MavlinkGpsHealthOptions) -> GpsHealth {
+    match data.fix_type {
+        GpsFixType::GPS_FIX_TYPE_NO_GPS | GpsFixType::GPS_FIX_TYPE_NO_FIX => return GpsHealth::NoFix,
+        GpsFixType::GPS_FIX_TYPE_2D_FIX => return GpsHealth::Unstable,
+        _ => {}
+    }
+    let has_few = data.satellites_visible != u8::MAX && data.satellites_visible < options.least_satellites;
+    let is_diluted = data.eph != u16::MAX && f64::from(data.eph) * 1e-2 > options.largest_hdop;
+    // Zero where it is unknown.
+    let is_inaccurate = f64::from(data.h_acc) * 1e-3 > options.largest_accuracy;
+    if has_few || is_diluted || is_inaccurate { GpsHealth::Unstable } else { GpsHealth::Stable }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_sign_of_trouble_is_unstable() {
+        let options = MavlinkGpsHealthOptions::defaults();
+        let good = GPS_RAW_INT_DATA {
+            fix_type: GpsFixType::GPS_FIX_TYPE_3D_FIX,
+            satellites_visible: 6,
+            eph: 250,
+            h_acc: 10_000,
+            ..Default::default()
+        };
+        let unknown = GPS_RAW_INT_DATA { satellites_visible: u8::MAX, eph: u16::MAX, h_acc: 0, ..good.clone() };
+        let rows = [
+            (good.clone(), GpsHealth::Stable),
+            (unknown, GpsHealth::Stable),
+            (GPS_RAW_INT_DATA { satellites_visible: 5, ..good.clone() }, GpsHealth::Unstable),
+            (GPS_RAW_INT_DATA { eph: 251, ..good.clone() }, GpsHealth::Unstable),
+            (GPS_RAW_INT_DATA { h_acc: 10_001, ..good.clone() }, GpsHealth::Unstable),
+            (GPS_RAW_INT_DATA { fix_type: GpsFixType::GPS_FIX_TYPE_2D_FIX, ..good.clone() }, GpsHealth::Unstable),
+            (GPS_RAW_INT_DATA { fix_type: GpsFixType::GPS_FIX_TYPE_NO_FIX, ..good.clone() }, GpsHealth::NoFix),
+            (GPS_RAW_INT_DATA { fix_type: GpsFixType::GPS_FIX_TYPE_NO_GPS, ..good }, GpsHealth::NoFix),
+        ];
+        for (data, expected) in rows {
+            assert_eq!(health(&data, &options), expected, "{data:?}");
+        }
+    }
+
+    #[test]
+    fn texts_about_spoofing_are_found() {
+        let text = |text: &str| STATUSTEXT_DATA { text: text.into(), ..Default::default() };
+        assert!(says_spoofed(&text("GPS1: Spoofing indicated")));
+        assert!(!says_spoofed(&text("GPS1: detected u-blox")));
+    }
+}

@@ -1,0 +1,141 @@
+//! A socket or a serial port, split into the end that the link's thread reads and the end that everybody writes.
+
+use crate::Address;
+use std::io;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// How long a read waits at most: after so long, a link that is dropped has stopped.
+pub(crate) const READ_TIMEOUT: Duration = Duration::from_millis(50);
+
+/// How long a write to a serial port may take.
+#[cfg(feature = "serial")]
+const WRITE_TIMEOUT: Duration = Duration::from_millis(250);
+
+/// The largest datagram.
+pub(crate) const LONGEST_READ: usize = 65_536;
+
+#[derive(Debug)]
+pub(crate) enum Reader {
+    Udp {
+        socket: UdpSocket,
+        /// Where the last datagram came from.
+        from: Option<SocketAddr>,
+        /// Where to answer, if that is whoever sends.
+        peer: Option<Arc<Mutex<Option<SocketAddr>>>>,
+    },
+    #[cfg(feature = "serial")]
+    Serial(Box<dyn serialport::SerialPort>),
+}
+
+#[derive(Debug)]
+pub(crate) enum Writer {
+    Udp(UdpSocket, Peer),
+    #[cfg(feature = "serial")]
+    Serial(Box<dyn serialport::SerialPort>),
+}
+
+#[derive(Debug)]
+pub(crate) enum Peer {
+    /// The socket is connected.
+    Known,
+    /// Whoever sent the newest frame.
+    Newest(Arc<Mutex<Option<SocketAddr>>>),
+}
+
+pub(crate) fn open(address: &Address) -> io::Result<(Reader, Writer)> {
+    match address {
+        Address::UdpIn { local } => {
+            let socket = UdpSocket::bind(local.as_str())?;
+            let peer = Arc::new(Mutex::new(None));
+            udp(socket, Some(Arc::clone(&peer)), Peer::Newest(peer))
+        }
+        Address::UdpOut { remote } => {
+            let remote =
+                remote.to_socket_addrs()?.next().ok_or_else(|| io::Error::other("the host has no address"))?;
+            let any: SocketAddr = match remote {
+                SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+                SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+            };
+            let socket = UdpSocket::bind(any)?;
+            socket.connect(remote)?;
+            udp(socket, None, Peer::Known)
+        }
+        #[cfg(feature = "serial")]
+        Address::Serial { port, baud } => {
+            let reader = serialport::new(port, *baud).timeout(READ_TIMEOUT).open()?;
+            let mut writer = reader.try_clone()?;
+            writer.set_timeout(WRITE_TIMEOUT)?;
+            Ok((Reader::Serial(reader), Writer::Serial(writer)))
+        }
+        #[cfg(not(feature = "serial"))]
+        Address::Serial { .. } => {
+            Err(io::Error::other("serial ports need the feature `serial` of the crate `bb-mavlink`"))
+        }
+    }
+}
+
+fn udp(socket: UdpSocket, peer: Option<Arc<Mutex<Option<SocketAddr>>>>, to: Peer) -> io::Result<(Reader, Writer)> {
+    socket.set_read_timeout(Some(READ_TIMEOUT))?;
+    let writer = Writer::Udp(socket.try_clone()?, to);
+    Ok((Reader::Udp { socket, from: None, peer }, writer))
+}
+
+impl Reader {
+    /// Waits for bytes; 0 if none have come in time. Of UDP, it gives one datagram.
+    pub(crate) fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = match self {
+            Self::Udp { socket, from, .. } => socket.recv_from(buffer).map(|(length, address)| {
+                *from = Some(address);
+                length
+            }),
+            #[cfg(feature = "serial")]
+            Self::Serial(port) => match port.read(buffer) {
+                Ok(0) => return Err(io::Error::other("the port was closed")),
+                read => read,
+            },
+        };
+        match read {
+            Err(error) if is_passing(&error) => Ok(0),
+            read => read,
+        }
+    }
+
+    pub(crate) fn is_datagrams(&self) -> bool {
+        matches!(self, Self::Udp { .. })
+    }
+
+    /// What was read last held a frame: its sender is to be answered.
+    pub(crate) fn accept_peer(&self) {
+        if let Self::Udp { from: Some(from), peer: Some(peer), .. } = self {
+            *peer.lock().unwrap_or_else(PoisonError::into_inner) = Some(*from);
+        }
+    }
+}
+
+/// Nothing has come; or, of a connected socket, nobody listens at the other side yet.
+fn is_passing(error: &io::Error) -> bool {
+    use io::ErrorKind::{ConnectionRefused, ConnectionReset, Interrupted, TimedOut, WouldBlock};
+    matches!(error.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused | ConnectionReset)
+}
+
+impl Writer {
+    /// Writes a frame. Returns `false` if nobody is known who would hear it.
+    pub(crate) fn write(&mut self, frame: &[u8]) -> io::Result<bool> {
+        let written = match self {
+            Self::Udp(socket, Peer::Known) => socket.send(frame).map(|_| true),
+            Self::Udp(socket, Peer::Newest(peer)) => {
+                let peer = *peer.lock().unwrap_or_else(PoisonError::into_inner);
+                let Some(peer) = peer else { return Ok(false) };
+                socket.send_to(frame, peer).map(|_| true)
+            }
+            #[cfg(feature = "serial")]
+            Self::Serial(port) => port.write_all(frame).map(|()| true),
+        };
+        match written {
+            Err(error) if is_passing(&error) => Ok(false),
+            written => written,
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! What the bridge sends.
+
+use super::{LONG, drone};
+use crate::other::Other;
+use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use bb_core::payload::{GeodeticPosition, Pose, Twist};
+use bb_core::prelude::*;
+use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvent, FlightEvents, Level, SourceLabel};
+use mavlink::MavHeader;
+use mavlink::dialects::common::{MavFrame, MavMessage, MavSeverity};
+
+fn estimate(time: MonotonicTime, longitude_deg: f64) -> FlightEstimate {
+    FlightEstimate {
+        frame_id: [0; 16],
+        emitted: time,
+        time,
+        position: GeodeticPosition {
+            latitude_rad: 48_f64.to_radians(),
+            longitude_rad: longitude_deg.to_radians(),
+            altitude: Some(500.0),
+        },
+        world_from_body: UnitQuaternion::identity(),
+        velocity: Vector3::new(1.0, 2.0, 3.0),
+        covariance: Matrix6::identity() * 4.0,
+        label: SourceLabel::SatelliteAnchored,
+        anchor_age_ms: None,
+        smoothed: false,
+        degraded: false,
+        covariance_norm: 1.0,
+        nis: None,
+        is_anchor_degraded: false,
+    }
+}
+
+fn text(level: Level, text: &str) -> FlightEvent {
+    FlightEvent {
+        time: MonotonicTime::ZERO,
+        level,
+        kind: "label".into(),
+        input: None,
+        reason: None,
+        from: None,
+        to: None,
+        status_text: Some(text.into()),
+        keyframe: None,
+    }
+}
+
+#[test]
+fn an_estimate_arrives_and_a_stale_one_does_not() {
+    let other = Other::new();
+    let builder = drone(&other.address);
+    let sent = builder.subscribe(drone::bridge::position);
+    let running = builder.start().expect("the link can be opened");
+    let live = running.live();
+    let clock = Clock::real();
+    // As if it had been measured before the system was started.
+    let stale = clock.now() - Duration::from_secs(3_600);
+    live.publish(drone::sensor::base::estimate, stale, estimate(stale, 10.0));
+    let counts = std::iter::from_fn(|| sent.recv_timeout(LONG)).find(|sent| sent.stale > 0).expect("it is counted");
+    assert_eq!(counts.estimates, 0);
+
+    let now = clock.now();
+    live.publish(drone::sensor::base::estimate, now, estimate(now, 11.0));
+    let position = other.hears(|header, message| match message {
+        MavMessage::GPS_INPUT(data) => Some((header.component_id, data)),
+        _ => None,
+    });
+    let (component_id, data) = position.expect("it is sent");
+    assert_eq!((component_id, data.lat, data.lon), (220, 480_000_000, 110_000_000), "not the stale one");
+    assert_eq!([data.vn, data.ve, data.vd], [2.0, 1.0, -3.0]);
+    assert_eq!((data.horiz_accuracy, data.vert_accuracy), (2.0, 2.0));
+    let wall = clock.wall_at(now).as_unix_nanos() / 1_000;
+    assert!((data.time_usec as i64 - wall).abs() < 1_000_000, "{} {wall}", data.time_usec);
+}
+
+#[test]
+fn texts_arrive_with_their_severities() {
+    let other = Other::new();
+    let running = drone(&other.address).start().expect("the link can be opened");
+    let now = Clock::real().now();
+    let long = "x".repeat(60);
+    let events = vec![text(Level::Warn, "visual blackout"), text(Level::Info, &long)];
+    running.live().publish(drone::sensor::base::events, now, FlightEvents { events, lost: 0 });
+    let heard = |_| {
+        other.hears(|_, message| match message {
+            MavMessage::STATUSTEXT(data) => Some(data),
+            _ => None,
+        })
+    };
+    let texts: Vec<_> = (0..3).map_while(heard).collect();
+    let read: Vec<_> = texts
+        .iter()
+        .map(|data| (data.severity, data.text.to_str().map(str::len), data.id, data.chunk_seq))
+        .collect();
+    assert_eq!(
+        read,
+        [
+            (MavSeverity::MAV_SEVERITY_WARNING, Ok(15), 0, 0),
+            (MavSeverity::MAV_SEVERITY_INFO, Ok(50), 1, 0),
+            (MavSeverity::MAV_SEVERITY_INFO, Ok(10), 1, 1),
+        ]
+    );
+}
+
+#[test]
+fn odometry_of_any_estimator_arrives_and_both_bridges_say_that_they_are_there() {
+    let other = Other::new();
+    let running = drone(&other.address).start().expect("the link can be opened");
+    let pose = Pose {
+        position: Vector3::new(1.0, 2.0, 3.0),
+        world_from_body: UnitQuaternion::identity(),
+        covariance: Some(Matrix6::identity()),
+    };
+    let twist = Twist { linear: Vector3::new(4.0, 5.0, 6.0), angular: Vector3::zeros(), covariance: None };
+    running.live().publish(drone::sensor::base::odometry, Clock::real().now(), Odometry { pose, twist });
+    let odometry = other.hears(|header, message| match message {
+        MavMessage::ODOMETRY(data) => Some((header, data)),
+        _ => None,
+    });
+    let (header, data) = odometry.expect("it is sent");
+    assert_eq!((header.system_id, header.component_id), (1, 197));
+    assert_eq!([data.x, data.y, data.z], [2.0, 1.0, -3.0]);
+    assert_eq!([data.vx, data.vy, data.vz], [4.0, -5.0, -6.0]);
+    assert_eq!(data.frame_id, MavFrame::MAV_FRAME_LOCAL_NED);
+    assert!(data.pose_covariance[0] == 1.0 && data.velocity_covariance[0].is_nan());
+    for component_id in [197, 220] {
+        let hello = |header: MavHeader, message| {
+            (header.component_id == component_id && matches!(message, MavMessage::HEARTBEAT(_))).then_some(())
+        };
+        other.hears(hello).expect("it says so once a second");
+    }
+}
