@@ -25,6 +25,8 @@ const AFTER: u32 = 1;
 const REGISTERS_AFTER: u32 = 2;
 /// That is done by a thread that the command leaves behind.
 const LEAVES_A_THREAD: u32 = 3;
+/// The motor is started when its future is dropped.
+const DROPS: u32 = 4;
 
 fn alone(way: u32) -> MutexGuard<'static, ()> {
     let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -44,6 +46,15 @@ fn stop() -> Result<(), Fault> {
     Ok(())
 }
 
+/// Starts the motor when it is dropped.
+struct Starts;
+
+impl Drop for Starts {
+    fn drop(&mut self) {
+        TURNS.store(true, Ordering::SeqCst);
+    }
+}
+
 /// Turns a motor with a library that blocks and knows nothing of robots.
 #[derive(Debug)]
 pub(crate) struct Turn;
@@ -55,8 +66,12 @@ impl Command for Turn {
 
     async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
         let way = WAY.load(Ordering::SeqCst);
-        if matches!(way, BEFORE | AFTER) {
+        if matches!(way, BEFORE | AFTER | DROPS) {
             context.on_disarm(stop);
+        }
+        if way == DROPS {
+            let _starts = Starts;
+            std::future::pending::<()>().await;
         }
         TURNS.store(way == BEFORE, Ordering::SeqCst);
         let rest = move || {
@@ -113,6 +128,101 @@ fn what_the_code_of_a_command_starts_after_the_robot_was_disarmed_is_stopped_bef
             assert!(report.faults.is_empty(), "{:?}", report.faults);
         });
     }
+}
+
+#[test]
+fn what_the_future_of_a_command_starts_when_it_is_dropped_is_stopped() {
+    let _alone = alone(DROPS);
+    within(60, || {
+        for stops in [false, true] {
+            STOPPED.store(0, Ordering::SeqCst);
+            let robot = Turning::builder().start().expect("it starts");
+            assert_eq!(robot.arm(), Ok(()));
+            let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
+            // It waits, outside of its code.
+            while robot.report().commands.iter().all(|command| command.started == 0) {}
+            std::thread::sleep(Duration::from_millis(20));
+            if stops {
+                assert_eq!(robot.stop().safety, Safety::Disarmed);
+            } else {
+                assert_eq!(robot.disarm(), Ok(()));
+                assert_eq!(robot.arm(), Ok(()), "that waits until it was dropped");
+            }
+            assert_eq!(turn.wait(), Err(CommandError::Cancelled));
+            while STOPPED.load(Ordering::SeqCst) < 2 {
+                std::thread::yield_now();
+            }
+            assert!(!stopped().0, "{stops}");
+        }
+        let mut simulation = Turning::builder().simulate().expect("it starts");
+        assert_eq!(simulation.arm(), Ok(()));
+        let _turn = simulation.command(turning::command::turn, NoArguments).expect("it starts");
+        simulation.run_for(Duration::from_millis(1));
+        assert_eq!(simulation.disarm(), Ok(()));
+        simulation.run_for(Duration::from_millis(1));
+        assert!(!stopped().0, "on virtual time");
+    });
+}
+
+/// Has a thread publish at a path of its own, and waits.
+#[derive(Debug)]
+pub(crate) struct Tell;
+
+static PUBLISHED: AtomicBool = AtomicBool::new(false);
+
+impl Command for Tell {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        let publisher = context.bus().publisher::<Number>("own/drive")?;
+        std::thread::spawn(move || {
+            // The journal has no room.
+            publisher.publish(Number(1.0));
+            PUBLISHED.store(true, Ordering::SeqCst);
+        });
+        std::future::pending().await
+    }
+}
+
+robot! {
+    robot Telling;
+    commands { tell: Tell; }
+    link base { sensor number: External<Number>(); }
+}
+
+/// Fills the journal.
+#[derive(Clone, Debug, Payload)]
+struct Filling {
+    bytes: Vec<u8>,
+}
+
+#[test]
+fn a_publisher_that_waits_for_the_journal_publishes_nothing_once_its_command_was_cancelled() {
+    let _alone = alone(BEFORE);
+    within(60, || {
+        PUBLISHED.store(false, Ordering::SeqCst);
+        GATE.close("here");
+        let mut builder = Telling::builder();
+        builder.journal(|_| GATE.pass("here"));
+        let robot = builder.start().expect("it starts");
+        assert_eq!(robot.arm(), Ok(()));
+        let filler = robot.bus().publisher::<Filling>("own/filling").expect("it may publish");
+        (0..64).for_each(|_| filler.publish(Filling { bytes: vec![0; 1 << 20] }));
+        let told = robot.bus().publisher::<Number>("own/drive").expect("it may publish");
+        let told = robot.bus().subscribe::<Number>(told.path(), Overflow::default()).expect("it is there");
+        let tell = robot.command(telling::command::tell, NoArguments).expect("it starts");
+        std::thread::sleep(Duration::from_millis(50));
+        assert_eq!((robot.disarm(), robot.arm()), (Ok(()), Ok(())));
+        assert_eq!(tell.wait(), Err(CommandError::Cancelled));
+        assert!(!PUBLISHED.load(Ordering::SeqCst), "it waits still");
+        GATE.open();
+        while !PUBLISHED.load(Ordering::SeqCst) {
+            std::thread::yield_now();
+        }
+        assert!(told.drain().next().is_none());
+    });
 }
 
 #[test]

@@ -158,6 +158,7 @@ fn a_robot_of_which_everything_hangs_as_it_closes_is_back_and_says_what_it_left(
             "actuator/base/tilt/heavy failed: did not return when the robot stopped; its code was entered ",
             "journal failed: its sink did not take the last lines in time: it ends before the run",
             "sensor/base/owner failed: what its disarm callback owns was not dropped in time",
+            "pool failed: wakers that have not returned: 1",
         ];
         assert_eq!(faults.len(), starts.len(), "{faults:?}");
         for (fault, start) in faults.iter().zip(starts) {

@@ -45,6 +45,7 @@ mod parameters;
 mod planar;
 mod real_time;
 mod replay;
+mod restarted_motors;
 mod restarts;
 mod safety;
 mod sensor_failures;
