@@ -210,11 +210,14 @@ fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() -> Result<(
     simulation.publish(LIFT, at(4), joint(1.0));
     // Older than what is known.
     simulation.publish(CAMERA, at(3), Pixel(1.0));
-    assert_eq!(gap(&simulation), (3, "the history of the joint `lift` begins 1ms later".into()));
+    assert_eq!(gap(&simulation), (3, "the history of the joint `lift` begins 1ms after the time asked for".into()));
     simulation.publish(CAMERA, at(102), Pixel(1.0));
     assert_eq!(gap(&simulation).0, 3, "100 ms are not too old");
     simulation.publish(CAMERA, at(103), Pixel(1.0));
-    assert_eq!(gap(&simulation), (4, "the newest state of the joint `shoulder` is 101ms older".into()));
+    assert_eq!(
+        gap(&simulation),
+        (4, "the newest state of the joint `shoulder` is 101ms older than the time asked for".into())
+    );
     let changes: Vec<String> = health.drain().map(|change| change.payload.to_string()).collect();
     let shown =
         "estimator/base/spot healthy -> degraded (no transform; sensor/base/shoulder/arm/lift/carriage/camera)";
@@ -251,7 +254,7 @@ fn an_optional_input_is_told_why_it_has_no_transform() -> Result<(), StartError>
     assert_eq!(next(&mut simulation, 24), some("0.500", Some(0.5)));
     // Its own tolerance, 20 ms, not that of the robot.
     simulation.publish(CAMERA, at(26), Pixel(0.0));
-    let old = "the input `camera` has no transform: the newest state of the joint `shoulder` is 22ms older";
+    let old = "the input `camera` has no transform: the newest state of the joint `shoulder` is 22ms older than the time asked for";
     assert_eq!(next(&mut simulation, 26), some(old, None));
     // An input that depends on no frame spans joints as it likes.
     assert_eq!(simulation.report().estimator("estimator/base/watch").map(|watch| watch.emitted), Some(1));

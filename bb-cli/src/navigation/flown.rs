@@ -92,7 +92,9 @@ impl Flown {
             now_ns = nanoseconds(time_s);
             let (angular_velocity, specific_force) = (sample.angular_velocity, sample.specific_force);
             let sample = ImuMean { time_ns: now_ns, angular_velocity, specific_force };
-            step.refused += u64::from(self.estimator.add_imu(&sample).is_err());
+            let is_refused = u64::from(self.estimator.add_imu(&sample).is_err());
+            step.refused += is_refused;
+            step.samples.0 += is_refused;
         }
         step.propagation_s = began.elapsed().as_secs_f64();
         self.stamps_ns.push(now_ns);

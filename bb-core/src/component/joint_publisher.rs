@@ -29,9 +29,10 @@ impl Service for JointPublisher {
 
     fn update(&mut self, _: MonotonicTime) -> Result<Reading<JointSnapshot>, Fault> {
         let Some((time, snapshot)) = self.joints.snapshot() else { return Ok(Reading::nothing()) };
-        if self.last.replace(time).is_some_and(|last| last >= time) {
+        if self.last.is_some_and(|last| last >= time) {
             return Ok(Reading::nothing());
         }
+        self.last = Some(time);
         Ok(Reading::at(time, snapshot))
     }
 }

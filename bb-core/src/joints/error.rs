@@ -106,10 +106,10 @@ impl fmt::Display for LookupError {
         match self {
             Self::UnknownJoint { joint } => write!(f, "nothing is known yet of the joint `{joint}`"),
             Self::TooOld { joint, by } => {
-                write!(f, "the history of the joint `{joint}` begins {by:?} later")
+                write!(f, "the history of the joint `{joint}` begins {by:?} after the time asked for")
             }
             Self::InFuture { joint, by } => {
-                write!(f, "the newest state of the joint `{joint}` is {by:?} older")
+                write!(f, "the newest state of the joint `{joint}` is {by:?} older than the time asked for")
             }
             Self::NotConnected { name, nearest } => {
                 write!(f, "the robot has no frame `{name}`")?;

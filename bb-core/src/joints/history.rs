@@ -32,6 +32,9 @@ pub(super) struct State<'a> {
     pub(super) effort: &'a [f64],
 }
 
+/// How many turns a continuous joint may be from where it was told last, before its turns are counted anew.
+const MOST_TURNS: f64 = 1e5;
+
 impl History {
     pub(super) fn new(kind: JointKind, capacity: usize, span_nanos: i64) -> Self {
         let (positions, velocities) = match kind {
@@ -108,7 +111,8 @@ impl History {
 
     /// The quaternion of a floating joint must have a direction.
     fn is_rotation(&self, position: &[f64]) -> bool {
-        self.kind != JointKind::Floating || position.iter().skip(3).map(|part| part * part).sum::<f64>() > 1e-12
+        let norm_squared = || position.iter().skip(3).map(|part| part * part).sum::<f64>();
+        self.kind != JointKind::Floating || (1e-12..1e12).contains(&norm_squared())
     }
 
     /// The angle of a continuous joint, in the turn that is nearest to where the last state leads.
@@ -126,9 +130,11 @@ impl History {
             None => 0.0,
         };
         let expected = before + velocity * state.time.seconds_since(MonotonicTime::from_nanos(self.time(last)));
-        let unwound = told + TAU * ((expected - told) / TAU).round();
-        // Beyond what fits into a number, a turn more or less does not matter.
-        Some(if unwound.is_finite() { unwound } else { told })
+        if (expected - told).abs() > MOST_TURNS * TAU || expected.is_nan() {
+            // An absurd velocity or stamp: turns are counted anew, or the angle would lose its digits for ever.
+            return Some(told);
+        }
+        Some(told + TAU * ((expected - told) / TAU).round())
     }
 
     const fn stride(&self) -> usize {
@@ -237,7 +243,7 @@ fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: 
     }
     match (kind, position, velocity) {
         (JointKind::Planar, [x, y, angle], [forward, left, rate]) => {
-            // Along the circle, in the axes at its middle: exact to the third order.
+            // Along the circle, in the axes at its middle: the error is of third order.
             let (sin, cos) = (*angle + 0.5 * rate * duration_s).sin_cos();
             *x += (cos * forward - sin * left) * duration_s;
             *y += (sin * forward + cos * left) * duration_s;

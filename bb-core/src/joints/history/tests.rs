@@ -49,6 +49,20 @@ fn the_extremes_of_time_are_no_panic() {
 }
 
 #[test]
+fn an_absurd_velocity_does_no_lasting_harm_to_a_continuous_joint() {
+    for velocity in [1e18, 1e20, 1e300, -1e20] {
+        let mut history = History::new(JointKind::Continuous, 16, i64::MAX);
+        history.add(state(0, &[0.1], &[])).expect("it is the first");
+        history.add(state(1, &[0.1], &[velocity])).expect("it is a number");
+        for (millis, angle) in [(2, 0.11), (3, 0.12)] {
+            history.add(state(millis, &[angle], &[0.0])).expect("it is newer");
+        }
+        let known = sampled(&history, 3, 0).expect("it is known");
+        assert!((known - 0.12).abs() < 1e-6, "{velocity}: {known}");
+    }
+}
+
+#[test]
 fn coordinates_of_another_joint_are_refused() {
     let mut history = History::new(JointKind::Planar, 4, i64::MAX);
     assert_eq!(history.add(state(0, &[1.0], &[])), Err(JointRefusal::OtherCoordinates));
@@ -56,6 +70,8 @@ fn coordinates_of_another_joint_are_refused() {
     assert_eq!(history.add(state(0, &[1.0; 3], &[f64::NAN; 3])), Err(JointRefusal::NonFinite));
     let mut history = History::new(JointKind::Floating, 4, i64::MAX);
     assert_eq!(history.add(state(0, &[0.0; 7], &[])), Err(JointRefusal::NonFinite), "no rotation");
+    let huge = [0.0, 0.0, 0.0, 1e200, 0.0, 0.0, 0.0];
+    assert_eq!(history.add(state(0, &huge, &[])), Err(JointRefusal::NonFinite), "its norm is no number");
     assert_eq!(history.add(state(0, &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0], &[])), Ok(()));
 }
 

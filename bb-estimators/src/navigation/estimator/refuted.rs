@@ -47,6 +47,11 @@ impl Refuted {
         *self = Self { track: Track::default(), fused: counts.fused };
     }
 
+    /// Whether the filter rests on so many positions that what began the world cannot have been wrong.
+    pub(in crate::navigation) fn confirms(&self, counts: &Counts, patience: u32) -> bool {
+        counts.fused.saturating_sub(self.fused) >= u64::from(patience)
+    }
+
     /// Where the robot is, if the filter is wrong: the last positions were refused, agree among each other, and are more than those
     /// that the filter rests on, or as many as `patience` if that is less. 0: never.
     pub(in crate::navigation) fn verdict(&self, counts: &Counts, patience: u32) -> Option<Found> {

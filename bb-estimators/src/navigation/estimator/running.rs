@@ -140,9 +140,12 @@ impl<S: States, const N: usize> Running<S, N> {
         let (found, lever_arm, orientation, world) =
             if let Some(found) = self.fixes.verdict(of_fixes, options.patience) {
                 let jump = now.position().map_or(0.0, |position| (found.point.position - position).norm());
-                let world = self.world.corrected(&found.point.position, jump);
+                let is_confirmed = self.fixes.confirms(of_fixes, options.patience);
+                let world = self.world.corrected(&found.point.position, jump, is_confirmed);
                 let position = self.world.position_in(&world, &found.point.position);
-                let found = Found { point: TrackPoint { position, ..found.point }, ..found };
+                let turn = self.world.rotation_to(&world);
+                let velocity = found.velocity.map(|(velocity, deviation)| (turn * velocity, deviation));
+                let found = Found { point: TrackPoint { position, ..found.point }, velocity };
                 (found, mounting.antenna(), None, world)
             } else if let Some(found) = self.poses.verdict(of_poses, options.patience) {
                 (found, Vector3::zeros(), self.orientation, self.world)

@@ -7,7 +7,7 @@ use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::{AbsolutePose, GnssPosition};
 use crate::navigation::track::TrackPoint;
 use bb_core::payload::{GnssFix, Pose};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 /// How far from the origin of its world a filter works, m: there down differs by 0.8 mrad, as much as a good accelerometer's
 /// bias.
@@ -25,11 +25,13 @@ pub(super) struct World {
     /// Where it was at the start.
     first: Option<LocalFrame>,
     first_from_frame: Isometry3<f64>,
+    /// So many fixes agreed with it that it did not begin at wrong ones.
+    is_confirmed: bool,
 }
 
 impl World {
     pub(super) fn new(frame: Option<LocalFrame>) -> Self {
-        Self { frame, first: frame, first_from_frame: Isometry3::identity() }
+        Self { frame, first: frame, first_from_frame: Isometry3::identity(), is_confirmed: false }
     }
 
     /// The frame that outputs are in.
@@ -65,16 +67,19 @@ impl World {
     }
 
     /// The world of a filter that was wrong by `jump` (m) and is at `position`. Far from the origin of its frame the filter works
-    /// in one that begins there; and if no robot could have gone so far, neither did the world begin where it was taken to.
-    pub(super) fn corrected(&self, position: &Vector3<f64>, jump: f64) -> Self {
-        let Some(frame) = self.frame.filter(|_| position.norm() > FARTHEST) else { return *self };
+    /// in one that begins there; and if no robot could have gone so far, neither did the world begin where it was taken to, unless
+    /// many fixes have confirmed it.
+    pub(super) fn corrected(&self, position: &Vector3<f64>, jump: f64, is_confirmed: bool) -> Self {
+        let is_confirmed = self.is_confirmed || is_confirmed;
+        let kept = Self { is_confirmed, ..*self };
+        let Some(frame) = self.frame.filter(|_| position.norm() > FARTHEST) else { return kept };
         let place = frame.geodetic(position);
-        if jump > FARTHEST_JUMP {
+        if jump > FARTHEST_JUMP && !is_confirmed {
             return Self::new(Some(LocalFrame::new(place)));
         }
         let next = LocalFrame::new(Geodetic { height: frame.origin().height, ..place });
         let first_from_frame = self.first_from_frame * next.other_from_self(&frame);
-        Self { frame: Some(next), first_from_frame, ..*self }
+        Self { frame: Some(next), first_from_frame, ..kept }
     }
 
     /// Coordinates of this world in that of `other`, which is elsewhere on the same Earth.
@@ -82,6 +87,14 @@ impl World {
         match (self.frame, other.frame) {
             (Some(own), Some(others)) => own.other_from_self(&others).transform_point(&(*position).into()).coords,
             _ => *position,
+        }
+    }
+
+    /// Takes vectors of this world to those of `other`.
+    pub(super) fn rotation_to(&self, other: &Self) -> Matrix3<f64> {
+        match (self.frame, other.frame) {
+            (Some(own), Some(others)) => own.other_from_self(&others).rotation.to_rotation_matrix().into_inner(),
+            _ => Matrix3::identity(),
         }
     }
 

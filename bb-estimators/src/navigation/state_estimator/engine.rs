@@ -476,6 +476,8 @@ impl<F: ProvidedFactor> Engine<F> {
             self.start_at(now_ns, anchor, config)?;
             // One alone may be an outlier.
             self.unconfirmed = self.unconfirmed.max(1);
+            // It stands beside the receiver from here on.
+            self.independent_ns = Some(now_ns);
             self.sources.anchored(anchor.time_ns, &config.params);
             self.is_anchor_degraded = anchor.is_covariance_degraded;
             return Ok(None);

@@ -26,10 +26,14 @@ impl GpsInput {
         let height = position.altitude?;
         let (horizontal, vertical) = accuracies(estimate)?;
         let velocity = swap_world(&estimate.velocity);
-        let is_finite = height.is_finite() && velocity.iter().all(|value| value.is_finite());
+        let velocity = velocity.cast::<f32>();
+        let altitude = self.geoid_height.map_or(0.0, |geoid| height - geoid) as f32;
+        let sent = [altitude, height as f32, horizontal as f32, vertical as f32];
+        let is_finite = sent.iter().chain(velocity.iter()).all(|value| value.is_finite());
         // The covariance has none of the velocity.
         let mut ignore_flags = Flags::GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY | Flags::GPS_INPUT_IGNORE_FLAG_VDOP;
         ignore_flags.set(Flags::GPS_INPUT_IGNORE_FLAG_ALT, self.geoid_height.is_none());
+        ignore_flags.set(Flags::GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, self.geoid_height.is_none());
         ignore_flags.set(Flags::GPS_INPUT_IGNORE_FLAG_HDOP, self.hdop.is_none());
         let (time_week, time_week_ms) = self.gps_time(wall);
         let has_fix = horizontal <= self.no_fix_beyond;
@@ -39,19 +43,24 @@ impl GpsInput {
             time_week_ms,
             lat: degrees(position.latitude_rad, 90.0)?,
             lon: degrees(position.longitude_rad, 180.0)?,
-            alt: self.geoid_height.map_or(0.0, |geoid| height - geoid) as f32,
+            alt: altitude,
             hdop: self.hdop.unwrap_or(0.0) as f32,
             vdop: 0.0,
-            vn: velocity.x as f32,
-            ve: velocity.y as f32,
-            vd: velocity.z as f32,
+            vn: velocity.x,
+            ve: velocity.y,
+            vd: velocity.z,
             speed_accuracy: 0.0,
             horiz_accuracy: horizontal as f32,
             vert_accuracy: vertical as f32,
             ignore_flags,
             time_week,
             gps_id: self.gps_id,
-            fix_type: if has_fix { GpsFixType::GPS_FIX_TYPE_3D_FIX } else { GpsFixType::GPS_FIX_TYPE_NO_FIX },
+            fix_type: match self.geoid_height {
+                _ if !has_fix => GpsFixType::GPS_FIX_TYPE_NO_FIX,
+                // Without a height above the sea.
+                None => GpsFixType::GPS_FIX_TYPE_2D_FIX,
+                Some(_) => GpsFixType::GPS_FIX_TYPE_3D_FIX,
+            },
             satellites_visible: self.satellites,
             yaw: if self.sends_yaw { yaw(estimate) } else { 0 },
         })

@@ -1,7 +1,7 @@
 //! `ODOMETRY`: the estimate in a local frame with axes to north, east and down.
 
 use crate::axes::{body_matrix, ned_from_frd, swap_body, swap_world, turned, world_matrix};
-use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use bb_core::payload::Odometry;
 use bb_core::time::WallTime;
 use bb_estimators::navigation::state_estimator::FlightEstimate;
@@ -55,10 +55,13 @@ impl OdometryFrame {
     /// None if a value is not finite.
     pub(super) fn of_odometry(estimate: &Odometry, wall: WallTime) -> Option<ODOMETRY_DATA> {
         let Odometry { pose, twist } = estimate;
+        // Of the orientation, about the axes of the world; MAVLink has those of the body.
+        let body_from_world = pose.world_from_body.inverse().to_rotation_matrix();
+        let in_body = |covariance| turned(&covariance, &Matrix3::identity(), body_from_world.matrix());
         Motion {
             position: pose.position,
             world_from_body: pose.world_from_body,
-            covariance: pose.covariance,
+            covariance: pose.covariance.map(in_body),
             velocity: twist.linear,
             angular_velocity: Some(twist.angular),
             velocity_covariance: twist.covariance,
@@ -89,8 +92,11 @@ impl Motion {
         let velocity_covariance = self.velocity_covariance.map(|covariance| turned(&covariance, &body, &body));
         let mut sent =
             position.iter().chain(velocity.iter()).copied().map(f64::from).chain(rotation.coords.iter().copied());
-        let is_finite = sent.all(f64::is_finite)
-            && pose_covariance.is_none_or(|covariance| covariance.iter().all(|value| value.is_finite()));
+        let fits = |covariance: Option<Matrix6<f64>>| {
+            covariance.is_none_or(|covariance| covariance.iter().all(|value| (*value as f32).is_finite()))
+        };
+        let has_rates = self.angular_velocity.is_none() || rates.iter().all(|rate| rate.is_finite());
+        let is_finite = sent.all(f64::is_finite) && has_rates && fits(pose_covariance) && fits(velocity_covariance);
         is_finite.then(|| ODOMETRY_DATA {
             time_usec: u64::try_from(wall.as_unix_nanos() / 1_000).unwrap_or(0),
             x: position.x,
@@ -224,10 +230,33 @@ mod tests {
         }
     }
 
+    /// Facing north, the forward axis of the body is the north of the world.
+    #[test]
+    fn the_rotation_covariance_of_any_estimator_is_sent_in_the_bodys_axes() {
+        let diagonal = bb_core::nalgebra::Vector6::new(1.0, 2.0, 3.0, 1e-4, 4e-4, 9e-4);
+        let pose = Pose {
+            position: Vector3::zeros(),
+            world_from_body: UnitQuaternion::from_euler_angles(0.0, 0.0, core::f64::consts::FRAC_PI_2),
+            covariance: Some(Matrix6::from_diagonal(&diagonal)),
+        };
+        let twist = Twist { linear: Vector3::zeros(), angular: Vector3::zeros(), covariance: None };
+        let message = OdometryFrame::of_odometry(&Odometry { pose, twist }, NOW).expect("it can be sent");
+        // North, east, down; forward, right, down.
+        let expected = [2.0, 1.0, 3.0, 4e-4, 1e-4, 9e-4];
+        for (index, (at, expected)) in [0, 6, 11, 15, 18, 20].into_iter().zip(expected).enumerate() {
+            let sent = f64::from(message.pose_covariance[at]);
+            assert!((sent - expected).abs() < 1e-6 * expected, "{index}: {sent}");
+        }
+    }
+
     #[test]
     fn what_is_not_finite_is_not_sent() {
         let mut wrong = estimate();
         wrong.velocity.x = f64::NAN;
+        assert_eq!(OdometryFrame::new(None).of_flight(&wrong, NOW), None);
+        // It is finite, but not in single precision.
+        wrong = estimate();
+        wrong.velocity.x = 1e39;
         assert_eq!(OdometryFrame::new(None).of_flight(&wrong, NOW), None);
         wrong = estimate();
         wrong.position.latitude_rad = f64::NAN;

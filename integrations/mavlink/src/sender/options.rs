@@ -44,8 +44,9 @@ pub struct MavlinkSenderOptions {
     /// `GPS_INPUT`: how many satellites it claims; flight controllers refuse a receiver with few.
     #[option(default = 10)]
     pub satellites: u8,
-    /// `GPS_INPUT`: the dilution of precision that it claims; not a number to have it ignored.
-    #[option(default = f64::NAN)]
+    /// `GPS_INPUT`: the dilution of precision that it claims; not a number to have it ignored. ArduPilot does not use a receiver
+    /// whose dilution is unknown or above 2.5.
+    #[option(default = 1.0)]
     pub hdop: f64,
     /// `GPS_INPUT`: whether the heading is sent, too.
     #[option(default = false)]

@@ -31,6 +31,8 @@ pub(super) struct Running {
     past: Past,
     /// The world on the Earth; none without satellites.
     frame: Option<LocalFrame>,
+    /// So many fixes agreed with it that it did not begin at wrong ones.
+    is_confirmed: bool,
     watch: Watch,
     /// Fixes, and poses.
     fixes: Refuted,
@@ -50,7 +52,8 @@ impl Running {
         let filter = Filter::new(options, start)?;
         let past = Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let (fixes, poses) = (Refuted::default(), Refuted::default());
-        Ok(Box::new(Self { past, frame, watch: Watch::new(limits), fixes, poses, heading: None }))
+        let watch = Watch::new(limits);
+        Ok(Box::new(Self { past, frame, is_confirmed: false, watch, fixes, poses, heading: None }))
     }
 
     /// The world on the Earth; none without satellites.
@@ -115,7 +118,8 @@ impl Running {
         let mut frame = self.frame;
         let (found, lever_arm, heading) = if let Some(mut found) = self.fixes.verdict(of_fixes, options.patience) {
             let here = now.ekf().estimate().map_or_else(Vector2::zeros, |estimate| estimate.position);
-            if (found.point.position.xy() - here).norm() > FARTHEST_JUMP {
+            self.is_confirmed |= self.fixes.confirms(of_fixes, options.patience);
+            if (found.point.position.xy() - here).norm() > FARTHEST_JUMP && !self.is_confirmed {
                 // No robot has gone so far: neither did the world begin where it was taken to.
                 frame = frame.map(|frame| LocalFrame::new(frame.geodetic(&found.point.position)));
                 found.point.position = Vector3::zeros();
