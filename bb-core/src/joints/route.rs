@@ -190,7 +190,7 @@ impl Routes {
         let route = |of: &RouteOf| -> Option<InputRoute> {
             let (target, source) = (place_of(topology, of.target.name())?, place_of(topology, of.source.name())?);
             let route = Route::new(topology, kinematics, &target, &source)?;
-            let tolerance_nanos = of.tolerance_nanos.unwrap_or(stale_nanos);
+            let tolerance_nanos = of.tolerance_nanos.map_or(stale_nanos, |tolerance| tolerance.min(stale_nanos));
             Some(InputRoute { input: of.input, tolerance_nanos, route })
         };
         Self(estimators.iter().map(|inputs| inputs.iter().filter_map(route).collect()).collect())

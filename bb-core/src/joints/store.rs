@@ -23,7 +23,8 @@ pub struct JointSettings {
     pub history: Duration,
     /// So many states of a joint are kept at most: 1024, which is 10 s at 100 Hz.
     pub states: usize,
-    /// A joint whose newest state is older than that is stale: 100 ms. An estimator with a `sync_tolerance` takes that instead.
+    /// A joint whose newest state is older than that is stale: 100 ms. An estimator with a shorter
+    /// `sync_tolerance` takes that instead.
     pub stale_after: Duration,
 }
 
