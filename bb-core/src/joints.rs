@@ -25,7 +25,7 @@
 //! # What is refused
 //!
 //! A state that is not newer than the last of its joint, holds a NaN or an infinity, is more than a second ahead of the clock,
-//! has another number of coordinates than the joint, or names a joint that there is not. Each is counted, by joint and reason,
+//! has another number of coordinates than the joint, or names an unknown joint. Each is counted, by joint and reason,
 //! in [`Report::joints`](crate::Report); the first of each is logged.
 //!
 //! # Replays

@@ -30,7 +30,7 @@ pub enum LookupError {
     },
     /// No joints connect the two: the robot has no frame of that name.
     NotConnected {
-        /// The frame or the path that there is not.
+        /// The unknown frame or path.
         name: String,
         /// The nearest that there is.
         nearest: Option<String>,

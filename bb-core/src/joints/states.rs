@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// How far ahead of the clock a stamp may be.
 const MAX_SKEW_NANOS: i64 = 1_000_000_000;
 
-/// Names of joints that there are not, of which it is counted how often they came.
+/// Unknown names of joints that are counted one by one.
 const MOST_UNKNOWN: usize = 64;
 
 /// [`States`] that any thread may read and add to. The lock is held for as long as some numbers are copied, and no code of

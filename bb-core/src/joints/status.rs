@@ -48,7 +48,7 @@ pub struct JointStatistics {
     pub is_declared: bool,
     /// States that were kept.
     pub states: u64,
-    /// States of a joint that there is not.
+    /// States of an unknown joint.
     pub unknown: u64,
     pub(super) refused: [u64; REFUSALS],
 }

@@ -206,7 +206,7 @@ impl Joints {
         Some(status)
     }
 
-    /// What was counted: each moving joint of the robot, and names that messages gave of joints that there are not.
+    /// What was counted: each moving joint of the robot, and unknown names in messages.
     pub fn statistics(&self) -> Vec<JointStatistics> {
         let states = self.0.states.lock();
         let joints = self.0.topology.joints.iter().zip(states.known());
