@@ -47,7 +47,7 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
-    Step { name: "planar/sample", on: None, stored: 1120.0, run: |steps| planar(steps, |_, _, _| Ok(())) },
+    Step { name: "planar/sample", on: None, stored: 1084.0, run: |steps| planar(steps, |_, _, _| Ok(())) },
     Step {
         name: "planar/position_with_gate",
         on: Some("planar/sample"),
