@@ -9,6 +9,8 @@
 
 mod apart;
 mod arming;
+#[cfg(test)]
+mod bare;
 mod budgets;
 mod callback;
 mod command;

@@ -76,12 +76,13 @@ impl Callback {
         }
         runs.waiting.push(reason);
         if runs.waiting.len() > 1 {
-            // It hangs: those that nobody waits for any more are not to pile up.
-            let waiting = std::mem::take(&mut runs.waiting);
+            // It hangs: reasons that nobody waits for any more must not pile up. They stay in the list while the control
+            // state is asked, since the run may end meanwhile.
+            let waiting = runs.waiting.clone();
             drop(runs);
-            let wanted = waiting.into_iter().filter(|reason| control.is_wanted(*reason, self.number));
-            let wanted: Vec<_> = wanted.collect();
-            self.runs().waiting.extend(wanted);
+            let is_over = |reason: &Reason| !control.is_wanted(*reason, self.number);
+            let over: Vec<Reason> = waiting.into_iter().filter(is_over).collect();
+            self.runs().waiting.retain(|reason| !over.contains(reason));
         }
         false
     }
@@ -141,5 +142,62 @@ fn spawn(_: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> 
 impl fmt::Debug for Callback {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Callback").field("number", &self.number).field("path", &self.path).finish_non_exhaustive()
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::control::{Disarming, bare};
+    use crate::node::Mode;
+    use std::sync::mpsc;
+    use std::time::{Duration, Instant};
+
+    #[test]
+    fn a_run_that_ends_while_others_ask_for_it_answers_them_all() {
+        let control = bare::control(Mode::Virtual, &[], []);
+        let (enter, entered) = mpsc::channel();
+        let (release, released) = mpsc::channel::<()>();
+        let released = Mutex::new(released);
+        let code = move || {
+            let _ = enter.send(());
+            // The first run hangs; the sender is gone in later ones.
+            let _ = released.lock().map(|released| released.recv());
+            Ok(())
+        };
+        let callback = Arc::new(Callback::new(0, "motor", Arc::new(code)));
+        let reason = Reason::Disarming(7);
+        control.lock().disarming = Some(Disarming {
+            generation: 7,
+            force: false,
+            to_error: false,
+            by: None,
+            left: vec![(0, "motor"); 3],
+            outcome: Arc::default(),
+            errors: Vec::new(),
+        });
+        let ask = || {
+            let (callback, control) = (Arc::clone(&callback), control.clone());
+            std::thread::spawn(move || callback.run(&control, reason))
+        };
+        let runs = ask();
+        entered.recv().expect("it is entered");
+        ask().join().expect("it does not panic");
+        // The third one asks the control state while the run ends.
+        let state = control.lock();
+        let asks = ask();
+        while callback.runs().waiting.len() == 1 {
+            std::thread::yield_now();
+        }
+        std::thread::sleep(Duration::from_millis(20));
+        drop(release);
+        std::thread::sleep(Duration::from_millis(20));
+        drop(state);
+        [runs, asks].into_iter().for_each(|thread| thread.join().expect("it does not panic"));
+        let start = Instant::now();
+        while control.is_disarming() && start.elapsed() < Duration::from_secs(5) {
+            std::thread::yield_now();
+        }
+        assert!(!control.is_disarming(), "three have asked, and some wait for ever");
     }
 }

@@ -259,42 +259,16 @@ impl Step<'_> {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::control::topics::SystemTopics;
-    use crate::control::{Declared, Parts};
+    use crate::control::bare;
     use crate::declaration::EstimatorDeclaration;
-    use crate::lifecycle::Supervision;
-    use crate::message::Origin;
     use crate::node::SharedNode;
-    use crate::time::Clock;
-    use crate::topology::Topology;
 
-    static NOTHING: Topology = Topology { links: &[], joints: &[] };
     static ESTIMATORS: [EstimatorDeclaration; 1] = [EstimatorDeclaration::NONE];
 
     #[test]
     fn what_an_island_reports_after_the_end_counts_no_more() {
-        let declared = Declared {
-            topology: &NOTHING,
-            states: &[],
-            categories: &[],
-            commands: &[],
-            parameters: &[],
-            estimators: &ESTIMATORS,
-        };
         let node = SharedNode::new(0, &ESTIMATORS[0]);
-        let control = Control::new(Parts {
-            declared,
-            mode: Mode::Virtual,
-            topics: Arc::new(SystemTopics::new(declared)),
-            clock: Clock::virtual_at(MonotonicTime::ZERO),
-            origin: Origin::default(),
-            commands: Vec::new(),
-            parameters: ParameterValues::new(vec![]),
-            supervision: Supervision::default(),
-            nodes: Box::new([node.clone()]),
-            journal: None,
-            telemetry: None,
-        });
+        let control = bare::control(Mode::Virtual, &ESTIMATORS, [node.clone()]);
         let report = |to| {
             let transition = HealthTransition {
                 estimator: "estimator/base/pose",

@@ -3,45 +3,17 @@
 //! In each, a robot that was told to stop stays disarmed, what could not be made safe ends in `error`, and an actuator does not
 //! move once it was made safe.
 
-use super::topics::SystemTopics;
-use super::{Control, Declared, Parts};
+use super::{Control, bare};
 use crate::component::{Guardian, Permit};
-use crate::declaration::ParameterValues;
 use crate::event::Safety;
 use crate::fault::Fault;
-use crate::lifecycle::Supervision;
-use crate::message::Origin;
 use crate::node::Mode;
-use crate::time::{Clock, MonotonicTime};
-use crate::topology::Topology;
 use loom::sync::{Arc, Mutex};
 use loom::thread;
 
-static NOTHING: Topology = Topology { links: &[], joints: &[] };
-
 /// A robot without components.
 fn control() -> Control {
-    let declared = Declared {
-        topology: &NOTHING,
-        states: &[],
-        categories: &[],
-        commands: &[],
-        parameters: &[],
-        estimators: &[],
-    };
-    Control::new(Parts {
-        declared,
-        mode: Mode::Real,
-        topics: std::sync::Arc::new(SystemTopics::new(declared)),
-        clock: Clock::virtual_at(MonotonicTime::ZERO),
-        origin: Origin::default(),
-        commands: Vec::new(),
-        parameters: ParameterValues::new(vec![]),
-        supervision: Supervision::default(),
-        nodes: Box::default(),
-        journal: None,
-        telemetry: None,
-    })
+    bare::control(Mode::Real, &[], [])
 }
 
 /// What moves, as the runtime drives it: under one lock it asks whether the robot is armed and moves, or is made safe.
