@@ -15,6 +15,7 @@ mod requests;
 mod running;
 mod shared;
 mod timers;
+mod timing;
 mod turn;
 
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};

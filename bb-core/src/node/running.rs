@@ -11,6 +11,7 @@ use super::environment::{BindTarget, Environment, Mode};
 use super::health::{Event, Health};
 use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
+use super::timing::{Begun, Measured};
 use super::turn::Turn;
 use super::{DropReason, HealthReport, Report};
 use crate::component::{Binding, Context, Estimator, Guardian, Inputs, Reply, Request, SyncMiss, TakenAt};
@@ -190,7 +191,7 @@ impl<E: Estimator> Node<E> {
         let mut taken = Taken::new(emitted, &mut self.timers);
         let counters = self.shared.counters();
         let budget = self.declaration.health.latency_budget_nanos;
-        let mut start = None;
+        let mut begun = None;
         turn.enter(self.shared.number() as u32);
         // All user code in one call: the payload's, the cache's clone and the estimator. After a panic the estimator is
         // dropped, so that nothing sees a half-finished state.
@@ -202,7 +203,11 @@ impl<E: Estimator> Node<E> {
                 if let Some(slot) = F::slot(cache) {
                     slot.store(message);
                 }
+                turn.timing().interrupt();
                 return Ok(Handled::Stored);
+            }
+            if E::HANDLES_MOVING_JOINTS {
+                turn.timing().interrupt();
             }
             if E::HANDLES_MOVING_JOINTS
                 && let Err(unplaced) = placing.place(message.monotonic_time, admission, turn)
@@ -215,7 +220,9 @@ impl<E: Estimator> Node<E> {
             };
             let dispatched = counters.dispatched.increment();
             if budget.is_some() || dispatched.is_multiple_of(SAMPLED) {
-                start = Some(turn.begin_measure());
+                begun = Some(turn.timing().begin(turn.environment()));
+            } else {
+                turn.timing().interrupt();
             }
             if E::HANDLES_MOVING_JOINTS {
                 running.handle_transforms(&placing.transforms())?;
@@ -230,7 +237,7 @@ impl<E: Estimator> Node<E> {
                     self.shared.set_last_run(turn.now());
                 }
                 let mut bad =
-                    start.and_then(|start| self.measure(start, Some((input, message.monotonic_time)), turn));
+                    begun.and_then(|begun| self.measure(begun, Some((input, message.monotonic_time)), turn));
                 if let Some(limit) = declared.stale_after_nanos
                     && turn.now().nanos_since(message.monotonic_time) > limit
                 {
@@ -270,6 +277,7 @@ impl<E: Estimator> Node<E> {
 
     /// Does one thing that is due, if any is.
     pub fn turn(&mut self, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
+        turn.timing().interrupt();
         // An estimator that is woken says when to be woken next.
         self.scheduled = None;
         if self.slot.restart_at().is_some_and(|at| at <= turn.now()) {
@@ -317,7 +325,7 @@ impl<E: Estimator> Node<E> {
         let Some(AsEstimator(running)) = self.slot.running() else { return Next::Quiet };
         turn.enter(self.shared.number() as u32);
         let is_measured = self.declaration.health.latency_budget_nanos.is_some();
-        let start = is_measured.then(|| turn.begin_measure());
+        let begun = is_measured.then(|| turn.timing().begin(turn.environment()));
         let mut taken = Taken::new(emitted, &mut self.timers);
         let called = caught(|| {
             taken.take(callback(running)?, turn.now());
@@ -326,7 +334,7 @@ impl<E: Estimator> Node<E> {
         let Taken { diverged, has_asked, .. } = taken;
         match called {
             Ok(()) => {
-                let bad = start.and_then(|start| self.measure(start, None, turn));
+                let bad = begun.and_then(|begun| self.measure(begun, None, turn));
                 let now = turn.now();
                 let stamp = Stamp { monotonic_time: now, wall_time: turn.wall_at(now), ..self.template };
                 self.complete(diverged, has_asked, bad, None, emitted.is_some(), turn);
@@ -392,23 +400,19 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Measures a callback that began at `start`; returns a reason if it took longer than its budget. `driver` is the input that
+    /// Measures a callback that has begun; returns a reason if it took longer than its budget. `driver` is the input that
     /// it was called with, and the message's stamp.
     fn measure(
         &mut self,
-        start: MonotonicTime,
+        begun: Begun,
         driver: Option<(usize, MonotonicTime)>,
         turn: &Turn<'_>,
     ) -> Option<HealthReason> {
         let budget = self.declaration.health.latency_budget_nanos;
-        let (end, nanos) = if self.environment.mode() == Mode::Real {
-            let end = turn.read_clock();
-            (end, end.nanos_since(start))
-        } else {
-            let is_replayed = self.environment.mode() == Mode::Replay && budget.is_some();
-            let nanos = self.shared.virtual_latency_nanos(is_replayed);
-            (start.plus_nanos(nanos), nanos)
-        };
+        let Measured { end, nanos } = turn.timing().end(begun, turn.environment(), || {
+            let is_replayed = turn.environment().mode() == Mode::Replay && budget.is_some();
+            self.shared.virtual_latency_nanos(is_replayed)
+        });
         let counters = self.shared.counters();
         counters.latency.add(nanos.max(0) as u64);
         if let Some((input, stamp)) = driver

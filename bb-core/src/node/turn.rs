@@ -2,6 +2,7 @@
 
 use super::emission::handed_on;
 use super::environment::{Environment, Mode};
+use super::timing::Timing;
 use crate::declaration::EstimatorDeclaration;
 use crate::joints::PlacedInput;
 use crate::journal::{Callback, Event, Recorded, checksum};
@@ -21,8 +22,7 @@ pub struct Turn<'a> {
     is_observed: bool,
     /// The estimator whose callback runs or ran last, for the report of one that hangs.
     running: &'a AtomicU32,
-    /// When the clock was read last: the end of one measured callback is the beginning of the next.
-    read_at: Cell<Option<MonotonicTime>>,
+    timing: Timing,
     /// How long measured callbacks took, if there is a journal.
     measured: RefCell<Vec<Callback>>,
     /// Where inputs across moving joints were, if there is a journal.
@@ -50,7 +50,7 @@ impl<'a> Turn<'a> {
             island,
             is_observed: environment.is_observed(),
             running,
-            read_at: Cell::new(None),
+            timing: Timing::default(),
             measured: RefCell::default(),
             placed: RefCell::default(),
             answering: Cell::new(None),
@@ -85,20 +85,9 @@ impl<'a> Turn<'a> {
         self.running.store(estimator, Ordering::Relaxed);
     }
 
-    /// When a measured callback begins: when the one before ended, or now.
     #[inline]
-    pub(super) fn begin_measure(&self) -> MonotonicTime {
-        match self.read_at.get() {
-            Some(read_at) => read_at,
-            None => self.read_clock(),
-        }
-    }
-
-    #[inline]
-    pub(super) fn read_clock(&self) -> MonotonicTime {
-        let read_at = self.environment.clock().now();
-        self.read_at.set(Some(read_at));
-        read_at
+    pub(super) fn timing(&self) -> &Timing {
+        &self.timing
     }
 
     /// Keeps how long a callback took, for the journal.
@@ -152,6 +141,8 @@ impl<'a> Turn<'a> {
     #[inline]
     pub fn emit<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
         if T::TELLS_JOINT_POSITION || self.is_observed || topic.is_listened_to() {
+            // Copies for others may take longer than the callback after them.
+            self.timing.interrupt();
             handed_on(self.environment, topic.path(), || {
                 self.environment.joints().hear(message, self.now);
                 if self.is_observed {

@@ -20,7 +20,8 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 // the wait for it cannot drift apart. The crates that read the processor's counter (quanta, minstant, fastant) need
 // 8.5 ns a read where `Instant` needs 22, but fail the tests below: without a fence, the counter may be read before an
 // earlier load, and a calibration done once drifts. With that fence and a sequence lock for new calibrations, a read
-// takes 17 ns, which is not worth the `unsafe` that the fence needs.
+// takes 17 ns, which is not worth the `unsafe` that the fence needs. How long a callback takes is another matter, since it
+// begins and ends on one thread: see `Stopwatch`.
 #[derive(Clone, Debug)]
 pub struct Clock {
     kind: Kind,

@@ -1,0 +1,78 @@
+//! How long the callbacks of a turn take.
+
+use super::environment::{Environment, Mode};
+use crate::time::{MonotonicTime, Reading, Stopwatch};
+use std::cell::Cell;
+
+/// The reads of the clock and of the counter in one turn: the clock is read once, the counter once a callback, since the end of a
+/// callback is the beginning of the next unless something came between them.
+#[derive(Debug, Default)]
+pub(super) struct Timing {
+    first: Cell<Option<First>>,
+    /// When the last measured callback ended, as long as nothing came after it.
+    ended: Cell<Option<Begun>>,
+}
+
+/// The beginning of the first measured callback of the turn.
+#[derive(Clone, Copy, Debug)]
+struct First {
+    time: MonotonicTime,
+    stopwatch: Stopwatch,
+    reading: Reading,
+}
+
+/// When a callback began that is to be measured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Begun(Reading);
+
+/// When a measured callback ended, and how long it took.
+pub(super) struct Measured {
+    pub(super) end: MonotonicTime,
+    pub(super) nanos: i64,
+}
+
+impl Timing {
+    #[inline]
+    pub(super) fn begin(&self, environment: &Environment) -> Begun {
+        if let Some(ended) = self.ended.take() {
+            return ended;
+        }
+        let clock = environment.clock();
+        if let Some(first) = self.first.get() {
+            return Begun(first.stopwatch.read(clock));
+        }
+        let stopwatch = Stopwatch::start();
+        let first = First { time: clock.now(), stopwatch, reading: stopwatch.read(clock) };
+        self.first.set(Some(first));
+        Begun(first.reading)
+    }
+
+    /// Something happened that no callback is to be charged with.
+    #[inline]
+    pub(super) fn interrupt(&self) {
+        self.ended.set(None);
+    }
+
+    /// A callback ended. On virtual time it took `virtual_nanos`.
+    #[inline]
+    pub(super) fn end(
+        &self,
+        Begun(begun): Begun,
+        environment: &Environment,
+        virtual_nanos: impl FnOnce() -> i64,
+    ) -> Measured {
+        let clock = environment.clock();
+        match self.first.get() {
+            Some(first) if environment.mode() == Mode::Real => {
+                let ended = first.stopwatch.read(clock);
+                self.ended.set(Some(Begun(ended)));
+                let nanos = first.stopwatch.nanos_between(begun, ended);
+                Measured { end: first.time.plus_nanos(first.stopwatch.nanos_between(first.reading, ended)), nanos }
+            }
+            _ => {
+                let nanos = virtual_nanos();
+                Measured { end: clock.now().plus_nanos(nanos), nanos }
+            }
+        }
+    }
+}

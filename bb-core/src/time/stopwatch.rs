@@ -1,0 +1,96 @@
+//! Durations by the processor's counter.
+
+use super::{Clock, MonotonicTime};
+use std::sync::{Once, OnceLock};
+
+/// Measures how long code takes on one thread. A read of the processor's counter costs less than half of one of the [`Clock`].
+///
+/// It is no clock: readings of two threads cannot be compared, and the scale is exact to some parts in a million (a percent, if the
+/// machine was busy while it was found). Where a processor has no counter that runs at a constant rate, the crate `quanta`
+/// reads the system's clock.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stopwatch(Option<&'static quanta::Clock>);
+
+/// What a stopwatch said.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Reading {
+    Counter(u64),
+    Clock(MonotonicTime),
+}
+
+static COUNTER: OnceLock<quanta::Clock> = OnceLock::new();
+
+impl Stopwatch {
+    /// Has the scale of the counter found, if nobody has yet: up to 200 ms of a busy machine, on a thread of its own.
+    pub(crate) fn prepare() {
+        static ONCE: Once = Once::new();
+        ONCE.call_once(|| {
+            let find = || {
+                COUNTER.get_or_init(quanta::Clock::new);
+            };
+            // Without a thread, the clock is read.
+            let _ = std::thread::Builder::new().name("bb-counter".into()).spawn(find);
+        });
+    }
+
+    /// By the counter, or by the clock as long as its scale is not known.
+    #[inline]
+    pub(crate) fn start() -> Self {
+        Self(COUNTER.get())
+    }
+
+    #[inline]
+    pub(crate) fn read(self, clock: &Clock) -> Reading {
+        match self.0 {
+            Some(counter) => Reading::Counter(counter.raw()),
+            None => Reading::Clock(clock.now()),
+        }
+    }
+
+    /// The nanoseconds from `start` to `end`, both of this stopwatch; zero if the counter went back, as it may when a machine is
+    /// suspended.
+    #[inline]
+    pub(crate) fn nanos_between(self, start: Reading, end: Reading) -> i64 {
+        match (self.0, start, end) {
+            (Some(counter), Reading::Counter(start), Reading::Counter(end)) => {
+                i64::try_from(counter.delta_as_nanos(start, end)).unwrap_or(i64::MAX)
+            }
+            (_, Reading::Clock(start), Reading::Clock(end)) => end.nanos_since(start),
+            _ => 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::{Duration, Instant};
+
+    #[test]
+    fn a_duration_is_the_systems() {
+        let clock = Clock::real();
+        for stopwatch in [Stopwatch(None), Stopwatch(Some(COUNTER.get_or_init(quanta::Clock::new)))] {
+            for millis in [0, 1, 30, 300] {
+                let outer = Instant::now();
+                let start = stopwatch.read(&clock);
+                let inner = Instant::now();
+                std::thread::sleep(Duration::from_millis(millis));
+                let shortest = inner.elapsed().as_nanos() as i64;
+                let measured = stopwatch.nanos_between(start, stopwatch.read(&clock));
+                let longest = outer.elapsed().as_nanos() as i64;
+                // A busy machine spoils the scale by a percent or two.
+                let tolerance = 100 + longest / 20;
+                let is_right = shortest - tolerance <= measured && measured <= longest + tolerance;
+                assert!(is_right, "{measured} ns in {shortest} to {longest}: {stopwatch:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_counter_that_goes_back_gives_zero() {
+        let stopwatch = Stopwatch(Some(COUNTER.get_or_init(quanta::Clock::new)));
+        for (start, end) in [(u64::MAX, 0), (1, 0)] {
+            assert_eq!(stopwatch.nanos_between(Reading::Counter(start), Reading::Counter(end)), 0);
+        }
+    }
+}

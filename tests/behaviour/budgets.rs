@@ -1,0 +1,69 @@
+//! What a latency budget charges an estimator with in real time.
+
+use bb_core::prelude::*;
+
+/// How long a copy for a subscriber takes.
+const COPYING: Duration = Duration::from_millis(60);
+
+/// A payload whose copies take long.
+#[derive(Debug, Payload)]
+pub(crate) struct Large {
+    /// A number.
+    x: f64,
+}
+
+impl Clone for Large {
+    fn clone(&self) -> Self {
+        std::thread::sleep(COPYING);
+        Self { x: self.x }
+    }
+}
+
+/// Emits a message of its own for each.
+#[derive(Debug)]
+pub(crate) struct Forward;
+
+impl Estimator for Forward {
+    type Options = NoOptions;
+    type Input = Large;
+    type Output = Large;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, large: &Stamped<Large>) -> Result<Reply<Large>, Fault> {
+        Ok(Reply::emit(Large { x: large.x }))
+    }
+}
+
+robot! {
+    robot Copying;
+    link base {
+        sensor camera: External<Large>() {
+            estimator first: Forward() { latency_budget: 1 s; }
+        }
+        estimator second: Forward() { input message: sensor::base::camera::first; latency_budget: 1 s; }
+    }
+}
+
+#[test]
+fn copies_for_subscribers_are_charged_to_no_estimator() -> Result<(), Box<dyn std::error::Error>> {
+    let builder = Copying::builder();
+    let copies = builder.subscribe(copying::sensor::base::camera::first);
+    let running = builder.start()?;
+    // The first at the scale of the system's clock perhaps, the last by the processor's counter.
+    for x in 0..5 {
+        running.publish(copying::sensor::base::camera, running.clock().now(), Large { x: f64::from(x) });
+        assert!(copies.recv_timeout(Duration::from_secs(10)).is_some());
+        std::thread::sleep(Duration::from_millis(60));
+    }
+    let report = running.stop();
+    for path in ["sensor/base/camera/first", "estimator/base/second"] {
+        let latency = report.estimator(path).ok_or("it is declared")?.latency;
+        assert_eq!(latency.count, 5, "{path}");
+        // The median, since the machine may give the thread no core now and then.
+        assert!(latency.median < COPYING / 2, "{path}: {latency:?}");
+    }
+    Ok(())
+}
