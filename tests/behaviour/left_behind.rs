@@ -1,7 +1,7 @@
 //! What hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
 
 use crate::components::{Number, within};
-use crate::disarm_first::Gate;
+use crate::gate::Gate;
 use bb_core::journal::Event;
 use bb_core::prelude::*;
 use std::future::Future;

@@ -23,6 +23,7 @@ mod faults;
 mod flight_logs;
 mod flights;
 mod frames;
+mod gate;
 mod good_runs;
 mod guards;
 mod hanging_code;
