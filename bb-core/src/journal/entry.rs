@@ -255,6 +255,13 @@ pub enum Event {
         /// Each, in order.
         inputs: Vec<PlacedInput>,
     },
+    /// A command, a service or other code may publish at a path of its own.
+    OwnPublisher {
+        /// The path.
+        path: &'static str,
+        /// The name of the payload's type.
+        payload: &'static str,
+    },
 }
 
 /// How long a callback took.

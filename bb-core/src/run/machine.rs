@@ -205,8 +205,7 @@ impl<R: Robot> Machine<R> {
     pub(super) fn report_of(&self, control: Summary) -> Report {
         let topics = self.topics();
         let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
-        let made = self.control.topics().registry.topics();
-        let made = made.iter().map(|topic| topic.statistics());
+        let made = self.control.topics().registry.statistics();
         let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
         let Summary { commands, state, safety, faults, all_faults } = control;
         Report {

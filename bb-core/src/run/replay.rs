@@ -210,6 +210,7 @@ impl<R: Robot> Replay<R> {
                 }
             }
             Event::Own { path, message } => self.publish_own(path, message)?,
+            Event::OwnPublisher { path, payload } => control.topics().registry.expect(path, payload),
             Event::Actuated { actuator, message } => self.actuated(actuator, message)?,
             Event::Deliver { island, entry, message } => {
                 self.island(island, time, Replayed::Deliver(Key { entry, line: message }))?;
