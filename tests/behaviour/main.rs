@@ -22,6 +22,7 @@ mod fan_in;
 mod faults;
 mod flight_logs;
 mod flights;
+mod fragile_messages;
 mod frames;
 mod gate;
 mod good_runs;

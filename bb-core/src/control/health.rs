@@ -30,6 +30,13 @@ impl Overseer for Control {
         }
     }
 
+    fn message_failed(&self, path: &'static str, message: String) {
+        // A replay's journal has it.
+        if self.0.mode != Mode::Replay {
+            self.note_fault(path, message);
+        }
+    }
+
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget) {
         self.bind_to(path, parameters, Arc::new(check), target);
     }

@@ -7,7 +7,8 @@ mod requests;
 use super::admission::Admission;
 use super::backlog::Backlog;
 use super::counters::SAMPLED;
-use super::environment::{BindTarget, Environment, Mode};
+use super::emission::{copied_of, copy_failed};
+use super::environment::{BindTarget, Environment, Missing, Mode};
 use super::health::{Event, Health};
 use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
@@ -199,8 +200,10 @@ impl<E: Estimator> Node<E> {
                 return Ok(Handled::Refused(reason));
             }
             if !declared.driver {
-                if let Some(slot) = F::slot(cache) {
-                    slot.store(message);
+                if let Some(slot) = F::slot(cache)
+                    && let Err(panic) = slot.store(message)
+                {
+                    copy_failed(turn.environment(), declared.source, panic);
                 }
                 return Ok(Handled::Stored);
             }
@@ -405,8 +408,12 @@ impl<E: Estimator> Node<E> {
             let end = turn.read_clock();
             (end, end.nanos_since(start))
         } else {
-            let is_replayed = self.environment.mode() == Mode::Replay && budget.is_some();
-            let nanos = self.shared.virtual_latency_nanos(is_replayed);
+            let nanos = if self.environment.mode() == Mode::Replay && budget.is_some() {
+                let nanos = self.shared.replayed_latency_nanos();
+                nanos.unwrap_or_else(|| self.miss_in_journal("how long its callback took".to_owned()))
+            } else {
+                self.shared.pretended_latency_nanos()
+            };
             (start.plus_nanos(nanos), nanos)
         };
         let counters = self.shared.counters();
@@ -424,6 +431,13 @@ impl<E: Estimator> Node<E> {
         let budget = budget?;
         turn.keep(self.shared.number(), nanos);
         (nanos > budget).then_some(HealthReason::LatencyOverrun)
+    }
+
+    /// In a replay: the journal does not have what the estimator asks for.
+    #[cold]
+    fn miss_in_journal<D: Default>(&self, what: String) -> D {
+        self.environment.replayed().miss(Missing { estimator: self.declaration.path, what });
+        D::default()
     }
 
     #[cold]
@@ -480,17 +494,18 @@ impl<E: Estimator> Node<E> {
             self.shared.counters().drop(input, DropReason::Stopped);
             return;
         }
-        // User code runs here: the `clone` of this payload, and the `drop` of the oldest that makes room.
-        let kept = caught(|| {
-            let message = message.clone();
-            let deliver: Deliver<E> =
-                Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
-            Ok(self.backlog.push(input, deliver))
-        });
-        match kept {
+        let declared = self.declaration.inputs.get(input);
+        let copy = declared.and_then(|declared| copied_of(&self.environment, declared.source, message));
+        let Some(message) = copy else {
+            self.shared.counters().drop(input, DropReason::Stopped);
+            return;
+        };
+        let deliver: Deliver<E> =
+            Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
+        // The `drop` of the oldest, which makes room, is user code.
+        match caught(|| Ok(self.backlog.push(input, deliver))) {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
             Ok(None) => {}
-            // The payload's `clone` panicked: it cannot be stored.
             Err(failed) => {
                 self.shared.counters().drop(input, DropReason::Stopped);
                 self.report_failure(&failed);

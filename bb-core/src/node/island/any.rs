@@ -187,9 +187,10 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         self.process_line(wiring, now, None, |turn| {
             match entry {
                 Replayed::Deliver(_) => {
-                    if let Some(keyed) = &message {
-                        state.deliver(wiring, &keyed.message, turn);
-                    }
+                    let Some(message) = message.as_ref().and_then(|keyed| keyed.message.as_ref()) else {
+                        return false;
+                    };
+                    state.deliver(wiring, message, turn);
                 }
                 Replayed::Drop(key) => S::dropped(wiring, key),
                 Replayed::Wake => state.wake(wiring, turn),

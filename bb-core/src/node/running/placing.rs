@@ -7,7 +7,7 @@ use crate::event::HealthReason;
 use crate::joints::{Gap, InputRoute, LookupError, PlacedInput, Placement};
 use crate::node::DropReason;
 use crate::node::admission::Admission;
-use crate::node::environment::{Environment, Mode};
+use crate::node::environment::{Environment, Missing, Mode};
 use crate::node::health::Event;
 use crate::node::shared::SharedNode;
 use crate::node::turn::Turn;
@@ -23,11 +23,18 @@ pub(super) struct Placing {
     inputs: Box<[InputTransform]>,
 }
 
-/// An input without which a dispatch is dropped, and why nothing is known of where it is.
+/// Why there is no dispatch.
 #[derive(Debug)]
-pub(super) struct Unplaced {
-    input: usize,
-    error: LookupError,
+pub(super) enum Unplaced {
+    /// Nothing is known of where a required input is.
+    Gap {
+        /// The number of the input.
+        input: usize,
+        /// Why.
+        error: LookupError,
+    },
+    /// The journal that is replayed does not have where an input was.
+    Missing,
 }
 
 impl Placing {
@@ -67,10 +74,14 @@ impl Placing {
                 input.set_absent();
                 continue;
             };
-            let found = find(&self.shared, route, time, turn);
+            let Some(found) = find(&self.shared, route, time, turn) else {
+                let what = format!("where its input `{}` was", declared.name);
+                turn.environment().replayed().miss(Missing { estimator: self.declaration.path, what });
+                return Err(Unplaced::Missing);
+            };
             let found = found.map_err(|gap| turn.environment().joints().error(gap));
             if let (Err(error), false) = (&found, declared.optional) {
-                return Err(Unplaced { input: route.input, error: error.clone() });
+                return Err(Unplaced::Gap { input: route.input, error: error.clone() });
             }
             input.set(found);
         }
@@ -82,18 +93,16 @@ impl Placing {
     }
 }
 
-/// Looks it up; in a replay, takes what the journal has.
+/// Looks it up; in a replay, takes what the journal has, and never asks the store: its history may be another one.
 fn find(
     shared: &SharedNode,
     route: &InputRoute,
     time: MonotonicTime,
     turn: &Turn<'_>,
-) -> Result<Isometry3<f64>, Gap> {
+) -> Option<Result<Isometry3<f64>, Gap>> {
     let environment = turn.environment();
-    if environment.mode() == Mode::Replay
-        && let Some(placement) = shared.replayed_placement(route.input)
-    {
-        return placement.found();
+    if environment.mode() == Mode::Replay {
+        return shared.replayed_placement(route.input).map(|placement| placement.found());
     }
     let found = environment.joints().placed(route, time);
     turn.keep_placed(PlacedInput {
@@ -101,15 +110,16 @@ fn find(
         input: route.input,
         placement: Placement::of(&found),
     });
-    found
+    Some(found)
 }
 
 impl<E: Estimator> Node<E> {
     #[cold]
     pub(super) fn note_unplaced(&mut self, unplaced: &Unplaced, turn: &Turn<'_>) {
-        self.shared.counters().drop(unplaced.input, DropReason::NoTransform);
-        let Some(input) = self.declaration.inputs.get(unplaced.input) else { return };
-        let (estimator, name, error) = (self.declaration.path, input.name, &unplaced.error);
+        let Unplaced::Gap { input, error } = unplaced else { return };
+        self.shared.counters().drop(*input, DropReason::NoTransform);
+        let Some(input) = self.declaration.inputs.get(*input) else { return };
+        let (estimator, name) = (self.declaration.path, input.name);
         tracing::debug!(estimator, input = name, %error, "dispatch dropped for want of a transform");
         self.shared.set_last_gap(error.clone());
         self.tell_drop(name, DropReason::NoTransform.name());
