@@ -51,19 +51,14 @@ impl State {
 }
 
 impl Control {
-    /// Remembers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
-    /// for the last time, it is run at once.
-    fn remember(&self, path: &'static str, execution: Option<u64>, code: DisarmHook) {
-        let owner = execution.map_or(Owner::Component, Owner::Execution);
-        self.remember_as(path, owner, code);
-    }
-
-    /// The same for an actuator's own `disarm`, which restarts do not replace.
+    /// Registers an actuator's own `disarm`, which restarts do not replace.
     pub(crate) fn on_disarm_always(&self, path: &'static str, code: DisarmHook) {
-        self.remember_as(path, Owner::Actuator, code);
+        self.register(path, Owner::Actuator, code);
     }
 
-    fn remember_as(&self, path: &'static str, owner: Owner, code: DisarmHook) {
+    /// Registers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
+    /// for the last time, it is run at once.
+    fn register(&self, path: &'static str, owner: Owner, code: DisarmHook) {
         let mut step = self.step();
         let is_known = match owner {
             Owner::Execution(id) => step.state.executions.iter().any(|execution| execution.id == id),
@@ -138,11 +133,12 @@ impl Control {
     /// the caller may be in its way.
     fn wait_apart(&self, key: Option<Key>) {
         let Some(key) = key else { return };
-        // The callback of an actuator waits for the code that this is a part of. A robot that does not start is disarmed next.
-        let is_in_the_way = inside::is_waited_for(self.id()) || !self.lock().has_begun;
-        if self.0.mode != Mode::Real || cfg!(loom) || is_in_the_way {
+        // A robot that does not start is disarmed next.
+        if self.0.mode != Mode::Real || cfg!(loom) || !self.lock().has_begun {
             return;
         }
+        // The callback of an actuator waits for the code that this is a part of.
+        let Some(_waits) = inside::waits_for(self.id()) else { return };
         let is_over = |state: &State| state.apart.iter().all(|apart| apart.key != key) || state.disarming.is_some();
         if !self.wait_until(DISARM_WITHIN + Duration::from_millis(500), is_over) {
             // Even the thread that keeps time is gone.
@@ -287,7 +283,9 @@ impl Guardian for Control {
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
         match self.0.mode {
             Mode::Replay => discard(hook),
-            Mode::Real | Mode::Virtual => self.remember(path, execution, hook),
+            Mode::Real | Mode::Virtual => {
+                self.register(path, execution.map_or(Owner::Component, Owner::Execution), hook);
+            }
         }
     }
 

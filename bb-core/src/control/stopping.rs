@@ -1,6 +1,7 @@
 //! How the robot stops: it is disarmed first, whatever hangs.
 
 use super::arming::DISARM_WITHIN;
+use super::inside;
 use super::{Control, Limit};
 use crate::event::Safety;
 use crate::journal::Event;
@@ -43,6 +44,8 @@ impl Control {
     pub(crate) fn wait_until_disarmed(&self) {
         if self.0.mode == Mode::Real {
             let generation = self.lock().generation;
+            // If another robot's callback stops this one, those of this robot do not wait for that one.
+            let _waits = inside::waits_for(self.id());
             self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| !state.is_disarming(generation));
             // If even the thread that keeps time is gone.
             self.disarm_timeout(generation);
