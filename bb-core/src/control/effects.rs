@@ -112,14 +112,14 @@ impl Effects {
             callbacks.into_iter().for_each(discard);
         }
         // Each of these may block for ever, and is a job of its own.
-        wakers.into_wakers().for_each(|waker| control.run_apart(Lane::Wakers, move || wake(waker)));
+        wakers.into_wakers().for_each(|waker| control.run_on_pool(Lane::Wakers, move || wake(waker)));
         for (slot, result) in results {
             let (waker, late) = slot.set(result);
-            waker.into_iter().for_each(|waker| control.run_apart(Lane::Wakers, move || wake(waker)));
-            late.into_iter().for_each(|late| control.run_apart(Lane::Dropping, move || discard(late)));
+            waker.into_iter().for_each(|waker| control.run_on_pool(Lane::Wakers, move || wake(waker)));
+            late.into_iter().for_each(|late| control.run_on_pool(Lane::Dropping, move || discard(late)));
         }
-        dropped.into_iter().for_each(|value| control.run_apart(Lane::Dropping, move || discard(value)));
-        forgotten.into_iter().for_each(|hook| control.run_apart(Lane::Dropping, move || discard(hook)));
+        dropped.into_iter().for_each(|value| control.run_on_pool(Lane::Dropping, move || discard(value)));
+        forgotten.into_iter().for_each(|hook| control.run_on_pool(Lane::Dropping, move || discard(hook)));
         drop(wired);
         for task in cancelled {
             task.cancel();
@@ -131,8 +131,8 @@ impl Effects {
 }
 
 impl Control {
-    /// Runs user code where it harms nobody.
-    fn run_apart(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
+    /// Runs user code on a thread of the pool, where it harms nobody; on virtual time on the caller's.
+    fn run_on_pool(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
         match self.0.mode {
             Mode::Real => self.0.pool.submit(lane, code),
             Mode::Virtual | Mode::Replay => code(),

@@ -2,7 +2,7 @@
 //! what components own is closed. Nothing here waits for user code without a limit.
 
 use super::Robot;
-use super::apart::Apart;
+use super::closing::Closing;
 use super::machine::Machine;
 use super::threads::since;
 use crate::fault::wake;
@@ -54,7 +54,7 @@ impl<R: Robot> Machine<R> {
     /// behind and reported.
     pub(super) fn terminate_actuators(self: &Arc<Self>, deadline: Instant) {
         let deadline = deadline.max(Instant::now() + LEAST_TO_STOP);
-        let mut closing = Apart::default();
+        let mut closing = Closing::default();
         for (number, actuator) in R::all_actuators(&self.wiring).into_iter().enumerate() {
             let machine = Arc::clone(self);
             closing.run(&self.control, actuator.path(), move || {
@@ -104,7 +104,7 @@ impl<R: Robot> Machine<R> {
             }
         }
         let deadline = deadline.max(Instant::now() + LEAST_TO_CLOSE);
-        let mut dropping = Apart::default();
+        let mut dropping = Closing::default();
         for (path, hook) in self.control.take_all_hooks() {
             dropping.discard(&self.control, path, hook);
         }

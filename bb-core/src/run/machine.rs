@@ -1,6 +1,7 @@
 //! What all runs share: the wiring, and what can be asked of it.
 
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
+use super::remains::Remains;
 use super::source::SharedSource;
 use super::visit::{Visit, Visitable};
 use super::{ActuatorError, Report, Robot, SensorHandle};
@@ -28,6 +29,8 @@ pub(super) struct Machine<R: Robot> {
     pub(super) has_ended: AtomicBool,
     /// What it had done when it ended.
     pub(super) last_report: OnceLock<Report>,
+    /// Set when it is dropped. It is dropped last.
+    pub(super) remains: Option<Remains>,
 }
 
 /// One-way requests that may wait for an estimator; one more is refused.
@@ -225,5 +228,15 @@ impl<R: Robot> Machine<R> {
     pub(super) fn fault(&self, path: &'static str, message: String) -> ComponentFault {
         self.control.note_fault(path, message.clone());
         ComponentFault { path, message }
+    }
+}
+
+impl<R: Robot> Drop for Machine<R> {
+    /// On virtual time all user code runs on the caller's thread.
+    fn drop(&mut self) {
+        if !self.control.is_virtual() {
+            let shared = (Arc::clone(&self.wiring), self.environment.clone(), self.control.clone());
+            self.remains = Remains::of((shared, Arc::clone(&self.host)));
+        }
     }
 }

@@ -23,7 +23,7 @@ pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 const GRACE: Duration = Duration::from_millis(400);
 
 /// Within this time after the call, whatever hangs, the robot has stopped: all above, and the last lines of the journal.
-const BACK_WITHIN: Duration = Duration::from_millis(5800);
+const BACK_WITHIN: Duration = Duration::from_millis(5600);
 
 /// How long loggers may take for the last lines: a program that ends after `stop` does not say otherwise what was not safe.
 const LINES_WITHIN: Duration = Duration::from_millis(150);

@@ -6,9 +6,9 @@ use crate::schedule::Lane;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// What runs apart: each piece on a thread of the pool, on virtual time on the caller's.
+/// What runs there: each piece on a thread of the pool, on virtual time on the caller's.
 #[derive(Default)]
-pub(super) struct Apart(Arc<Shared>);
+pub(super) struct Closing(Arc<Shared>);
 
 #[derive(Default)]
 struct Shared {
@@ -17,7 +17,7 @@ struct Shared {
     changed: Condvar,
 }
 
-impl Apart {
+impl Closing {
     /// Runs code of the component at `path`; `run` says whether it is done.
     pub(super) fn run(
         &mut self,
