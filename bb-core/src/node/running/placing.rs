@@ -15,11 +15,17 @@ use crate::time::MonotonicTime;
 use nalgebra::Isometry3;
 use std::sync::Arc;
 
+/// When an input was measured, and where it was then.
+type PlacedAt = (MonotonicTime, Isometry3<f64>);
+
 /// The transforms of an estimator's inputs.
 pub(super) struct Placing {
     declaration: &'static EstimatorDeclaration,
     shared: SharedNode,
     routes: Arc<[InputRoute]>,
+    /// The last lookup of each route that succeeded: the message of an input without a tolerance may be older than the history
+    /// of the joints.
+    placed: Box<[Option<PlacedAt>]>,
     inputs: Box<[InputTransform]>,
 }
 
@@ -47,12 +53,9 @@ impl Placing {
             let fixed = input.frame_from_input.map(|transform| transform.isometry());
             InputTransform::declared(input.name, input.driver, fixed)
         });
-        Self {
-            declaration,
-            shared: environment.node(number),
-            routes: environment.joints().routes().of(number),
-            inputs: inputs.collect(),
-        }
+        let routes = environment.joints().routes().of(number);
+        let placed = vec![None; routes.len()].into();
+        Self { declaration, shared: environment.node(number), routes, placed, inputs: inputs.collect() }
     }
 
     /// Finds where the inputs are at a dispatch by a message of the driver. `admission` knows when the others were measured.
@@ -62,19 +65,19 @@ impl Placing {
         admission: &Admission,
         turn: &Turn<'_>,
     ) -> Result<(), Unplaced> {
-        for route in self.routes.iter() {
+        for (route, placed) in self.routes.iter().zip(&mut self.placed) {
             let (Some(declared), Some(input)) =
                 (self.declaration.inputs.get(route.input), self.inputs.get_mut(route.input))
             else {
                 continue;
             };
             let time = if declared.driver { Some(driver_time) } else { admission.last(route.input) };
-            // What is missing or too old takes no part; if it is needed, that is what the dispatch is dropped for.
+            // An input that is missing or too old is not placed. If it is required, the dispatch is dropped for that reason.
             let Some(time) = time.filter(|time| !declared.is_too_old(driver_time.nanos_since(*time))) else {
                 input.set_absent();
                 continue;
             };
-            let Some(found) = find(&self.shared, route, time, turn) else {
+            let Some(found) = find(&self.shared, route, placed, time, turn) else {
                 let what = format!("where its input `{}` was", declared.name);
                 turn.environment().replayed().miss(Missing { estimator: self.declaration.path, what });
                 return Err(Unplaced::Missing);
@@ -97,6 +100,7 @@ impl Placing {
 fn find(
     shared: &SharedNode,
     route: &InputRoute,
+    placed: &mut Option<PlacedAt>,
     time: MonotonicTime,
     turn: &Turn<'_>,
 ) -> Option<Result<Isometry3<f64>, Gap>> {
@@ -104,7 +108,13 @@ fn find(
     if environment.mode() == Mode::Replay {
         return shared.replayed_placement(route.input).map(|placement| placement.found());
     }
-    let found = environment.joints().placed(route, time);
+    let found = match (environment.joints().placed(route, time), *placed) {
+        (Err(Gap::TooOld { .. }), Some((then, transform))) if then == time => Ok(transform),
+        (found, _) => found,
+    };
+    if let Ok(transform) = found {
+        *placed = Some((time, transform));
+    }
     turn.keep_placed(PlacedInput {
         estimator: shared.number(),
         input: route.input,
