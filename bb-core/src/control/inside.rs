@@ -1,10 +1,10 @@
-//! Whether the calling thread runs code that disarming waits for, and which must not wait for that in turn.
+//! Whether the calling thread runs code that disarming waits for: such code must not wait for the disarming in turn.
 
 use std::cell::RefCell;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Which robots wait for which to be disarmed, of all robots of the process: code that the disarming of the first waits for
-/// waits for the second. One robot alone needs no entry.
+/// Pairs of robots of this process: code that the disarming of the first one waits for, waits for the second one to be
+/// disarmed.
 static WAITS: Mutex<Vec<(usize, usize)>> = Mutex::new(Vec::new());
 
 thread_local! {

@@ -177,7 +177,7 @@ pub enum Event {
         /// Whether it panicked.
         panicked: bool,
     },
-    /// A component hangs or did not stop well, or something that is no component failed; nothing followed from it.
+    /// A component hangs or did not stop well, or something other than a component failed. It had no other consequence.
     Noted {
         /// Its path.
         path: &'static str,

@@ -69,7 +69,7 @@ pub(crate) fn blame(environment: &Environment, failed: Failed) -> Result<(), Fai
     }
 }
 
-/// Hands on what an estimator has emitted at `path`, to those outside its island: a panic in there keeps nobody else from
+/// Passes a message that an estimator has emitted at `path` to those outside its island. A panic there does not prevent others from
 /// getting it.
 #[cold]
 pub(super) fn handed_on(environment: &Environment, path: &'static str, hand_on: impl FnOnce()) {

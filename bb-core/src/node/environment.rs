@@ -96,7 +96,7 @@ struct Inner {
     joints: Joints,
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
-    /// By which a thread knows which robots' islands it is inside.
+    /// Identifies the robot to threads that are inside its islands.
     mark: RobotMark,
     /// Drains an island, once the robot is wired.
     drain: OnceLock<Drain>,
@@ -235,7 +235,7 @@ impl Environment {
         lock(&self.0.refusal).get_or_insert(Refusal { path, fault });
     }
 
-    /// What kept the robot from starting, if anything did.
+    /// What prevented the robot from starting, if anything.
     pub(crate) fn take_refusal(&self) -> Option<Refusal> {
         lock(&self.0.refusal).take()
     }

@@ -10,7 +10,7 @@
 //! inbox, for the thread that holds the island to process before it leaves. So there is a single writer, and every entry has
 //! its place in one order.
 //!
-//! No thread blocks on the island's own lock: it is only ever tried. Threads that need an island which is held (a caller that
+//! No thread blocks on the island's own lock; it is only ever tried. Threads that need an island that is held (a caller that
 //! waits for an answer, a publisher that waits for room) wait on a condition variable with a timeout, so that an estimator that
 //! hangs blocks no other thread forever.
 
@@ -171,7 +171,7 @@ pub(crate) enum CallError {
     Busy,
 }
 
-/// What a thread saw that looked at an island.
+/// What a thread found when it looked at an island.
 struct Looked {
     is_held: bool,
     /// An entry waits that another thread may have left because of the look.
@@ -524,7 +524,7 @@ impl<S: IslandState> Island<S> {
         Some(Within::new(state, wiring.environment().mark()))
     }
 
-    /// Whether a thread holds it, for one that only wants to know.
+    /// Whether a thread holds it. The caller does not want to enter.
     fn is_held(&self, wiring: &S::Wiring) -> bool {
         let Looked { is_held, has_kept } = self.look();
         if has_kept {
@@ -538,7 +538,7 @@ impl<S: IslandState> Island<S> {
     fn look(&self) -> Looked {
         let tried = self.state.try_lock();
         let is_held = matches!(tried, Err(TryLockError::WouldBlock));
-        // Releasing a lock is no step of a model: this is one at which others find it taken.
+        // Releasing a lock is not a step of the model. This is one, at which other threads find the lock taken.
         #[cfg(loom)]
         self.pending.load(Ordering::Relaxed);
         drop(tried);

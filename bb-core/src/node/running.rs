@@ -112,8 +112,9 @@ pub enum Next {
 }
 
 impl<E: Estimator> Node<E> {
-    /// Makes the estimator; what keeps it from starting is kept in `environment`. `make_cache` makes the slots of its inputs,
-    /// and `binding` puts parameters into its options. In a replay it is made when the journal begins.
+    /// Creates the estimator; an error that prevents it from starting is stored in `environment`. `make_cache` creates the
+    /// slots of its inputs, and `binding` puts parameters into its options. In a replay it is created when the journal
+    /// begins.
     pub fn new(
         number: usize,
         options: &E::Options,
@@ -271,9 +272,9 @@ impl<E: Estimator> Node<E> {
         self.timers.continue_with.is_some()
     }
 
-    /// Does one thing that is due, if any is.
+    /// Does one thing that is due, if there is any.
     pub fn turn(&mut self, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
-        // An estimator that is woken says when to be woken next.
+        // An estimator that is woken schedules its next wake-up.
         self.scheduled = None;
         if self.slot.restart_at().is_some_and(|at| at <= turn.now()) {
             self.restart(turn);
@@ -502,7 +503,7 @@ impl<E: Estimator> Node<E> {
         };
         let deliver: Deliver<E> =
             Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
-        // The `drop` of the oldest, which makes room, is user code.
+        // Dropping the oldest to make room is user code.
         match caught(|| Ok(self.backlog.push(input, deliver))) {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
             Ok(None) => {}

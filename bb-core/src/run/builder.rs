@@ -187,7 +187,7 @@ impl<R: Robot> Builder<R> {
         Ok(Replay::new(machine))
     }
 
-    /// Dropping what has started stops it in order.
+    /// Dropping the result stops in order what has started.
     fn assemble(self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
         // Of a robot that does not start: dropped after all that is declared below.
         let mut _remains = None;
@@ -246,7 +246,7 @@ impl<R: Robot> Builder<R> {
             let wiring: Option<Arc<R::Wiring>> = drained.get().and_then(std::sync::Weak::upgrade);
             if let (Some(wiring), Some(find)) = (wiring, R::ISLANDS.get(island)) {
                 let island = find(&wiring);
-                // Nobody's that is known: that of a payload in an inbox, say.
+                // The component is unknown: the code of a payload in an inbox, say.
                 if let Err(failed) = contained(environment, || island.drain(&wiring)) {
                     tracing::error!(fault = %failed.fault, "an island was left");
                 }
@@ -268,7 +268,7 @@ impl<R: Robot> Builder<R> {
                 dropping.discard(&control, path, hook);
             }
             control.pool().close();
-            // What hangs is left behind: there is no report, and the error says what keeps the robot from starting.
+            // Callbacks that hang are left running. There is no report, and the error says what prevents the robot from starting.
             dropping.wait(Instant::now() + STOP_WITHIN);
             StartError::component(path, fault)
         };
@@ -288,7 +288,7 @@ impl<R: Robot> Builder<R> {
             }
             return Err(error);
         }
-        // Each component's code is guarded on its own, with its path; this is for what no one has thought of.
+        // Each component's code is guarded separately, with its path. This is for anything else.
         let (wiring, sources) = wired.map_err(|failed| abandon(R::NAME, failed.fault))?;
         if let Some(journal) = &journal {
             let declaration = facts.iter().cloned().chain(environment.facts()).collect();

@@ -1,4 +1,4 @@
-//! What all runs share: the wiring, and what can be asked of it.
+//! What all kinds of run share: the wiring and the operations on it.
 
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::remains::Remains;
@@ -29,7 +29,7 @@ pub(super) struct Machine<R: Robot> {
     pub(super) has_ended: AtomicBool,
     /// What it had done when it ended.
     pub(super) last_report: OnceLock<Report>,
-    /// Set when it is dropped. It is dropped last.
+    /// Set in `drop`. The last field, since it is dropped last.
     pub(super) remains: Option<Remains>,
 }
 
@@ -224,7 +224,7 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Keeps what is wrong with a component that did not come back.
+    /// Records a fault of a component that did not return.
     pub(super) fn fault(&self, path: &'static str, message: String) -> ComponentFault {
         self.control.note_fault(path, message.clone());
         ComponentFault { path, message }

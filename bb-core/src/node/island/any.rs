@@ -47,7 +47,7 @@ pub trait AnyIsland<W> {
     fn is_inside(&self, wiring: &W) -> bool;
     /// Whether its estimators have stopped.
     fn has_retired(&self) -> bool;
-    /// Whether nothing waits for it and no thread holds it.
+    /// Whether its inbox is empty and no thread holds it.
     fn is_idle(&self, wiring: &W) -> bool;
     /// Sets that entries are processed only by [`Self::replay`].
     fn begin_replay(&self, wiring: &W);
