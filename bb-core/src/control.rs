@@ -2,9 +2,9 @@
 //! they are seen.
 //!
 //! This state has a single writer of the same kind as an island: a thread with an entry takes the lock for some
-//! microseconds, writes the entry's line into the journal, changes the state and publishes what has changed. No user code runs in there.
+//! microseconds, writes the entry's line into the journal, changes the state and publishes the changes. No user code runs meanwhile.
 //! What follows from an entry and is user code (disarm callbacks, futures of commands, wakers, handlers, loggers) is collected
-//! as `Effects` and run without the lock, on threads of its own or of the pool: each may block for ever,
+//! as `Effects` and run without the lock, on threads of its own or of the pool: each may block forever,
 //! and harms only itself.
 
 mod apart;
@@ -110,7 +110,7 @@ struct Inner {
     journal: Option<Journal>,
     telemetry: Option<Telemetry>,
     state: StateMutex<State>,
-    /// Told of every entry: for those who wait for the robot to be disarmed, or for commands to be gone.
+    /// Notified of every entry, for threads that wait for the robot to be disarmed or for commands to be gone.
     changed: Condvar,
     /// The safety state, for actuators, which ask before every command.
     safety: AtomicU8,
@@ -167,7 +167,7 @@ enum Limit {
     Arming,
     /// How long disarm callbacks may take.
     Disarming(u64),
-    /// The same of those that run while nobody disarms the robot.
+    /// The same for those that run outside of a disarming.
     Apart(Key),
     /// When to look again whether the handles of a cancelled execution still act.
     Gone(u64),
@@ -194,12 +194,12 @@ struct State {
     health: Vec<Health>,
     components: Vec<Supervised>,
     disarming: Option<Disarming>,
-    /// Disarm callbacks that run while nobody disarms the robot.
+    /// Disarm callbacks that run outside of a disarming.
     apart: Vec<Apart>,
     next_apart: u64,
-    /// What became of the last disarming.
+    /// The outcome of the last disarming.
     last_disarm: Result<(), DisarmError>,
-    /// How often somebody asked for the robot to be disarmed: who waits to arm it since before does not.
+    /// How often a disarming was requested. A caller that has been waiting to arm the robot since before gives up.
     disarms: u64,
     /// How often the robot was disarmed.
     generation: u64,
@@ -258,7 +258,7 @@ struct Supervised {
     order: Box<dyn Fn(ComponentOrder) + Send + Sync>,
 }
 
-/// What a supervisor tells a component.
+/// An order from a supervisor to a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ComponentOrder {
     /// Restart.
@@ -277,7 +277,7 @@ struct Disarming {
     by: Option<u64>,
     /// The numbers and paths of callbacks that have not returned, as often as they are to run.
     left: Vec<(u64, &'static str)>,
-    /// Where those who wait for it find what became of it.
+    /// Its outcome, for those who wait for it.
     outcome: Arc<OnceLock<Result<(), DisarmError>>>,
     errors: Vec<SafetyError>,
 }
@@ -289,7 +289,7 @@ struct Faults {
     count: u64,
 }
 
-/// Faults that are kept; of earlier ones only the number is.
+/// The number of faults that are kept. Earlier ones are only counted.
 const KEPT_FAULTS: usize = 256;
 
 /// Does not keep the robot alive.

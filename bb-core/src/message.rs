@@ -1,12 +1,14 @@
 //! Messages: a payload with its time, its frame and its origin.
 
 pub mod codec;
+mod copy;
 mod finite;
 mod joint;
 pub(crate) mod nearest;
 mod stamped;
 
 pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};
+pub(crate) use copy::{Panic, copied, copy_to};
 pub use finite::Finite;
 pub use joint::{JointPositions, JointReading, JointSide};
 pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};

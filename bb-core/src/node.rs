@@ -22,7 +22,7 @@ pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
 pub(crate) use emission::{Emitting, blame, contained, contained_outside};
 pub(crate) use entry::{HealthReport, NodeEntry, Report};
 pub use environment::Environment;
-pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Mode, Overseer};
+pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Missing, Mode, Overseer};
 pub use island::{
     Act, Island, IslandOf, IslandState, IslandWiring, Key, Member, act, alone, enter, feed, island as island_of,
     receive, start,

@@ -2,9 +2,9 @@
 //! caller ([`Simulation`]), or from a journal ([`Replay`]).
 
 pub(crate) mod actuator;
-mod apart;
 mod bound;
 mod builder;
+mod closing;
 mod describe;
 mod ending;
 mod error;
@@ -14,6 +14,7 @@ mod joints;
 mod live;
 mod machine;
 mod occupied;
+mod remains;
 mod replay;
 mod report;
 mod running;

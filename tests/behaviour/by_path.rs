@@ -1,7 +1,7 @@
 //! A robot as tools see it: by path, with arguments as JSON; and what they are told of it.
 
 use crate::components::{Counter, Number, at, within};
-use crate::disarm_first::Gate;
+use crate::gate::Gate;
 use bb_core::prelude::*;
 use bb_core::telemetry::TelemetryEvent;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,24 +1,28 @@
 //! Many commands that hang keep none from running that makes the robot safe.
 
 use crate::components::{Number, within};
-use crate::disarm_first::Gate;
+use crate::gate::{Gate, Place, Stuck};
 use bb_core::event::RefusalReason;
 use bb_core::prelude::*;
 
 static HERE: Gate = Gate::new();
 
-/// Hangs, until all are let go.
-pub(crate) struct Stuck;
+static CANCELLED: Gate = Gate::new();
 
-impl Command for Stuck {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
+/// Where commands that health starts hang.
+pub(crate) struct OfHealth;
 
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        HERE.pass("here");
-        Ok(Outcome::done(()))
-    }
+impl Place for OfHealth {
+    const GATE: &'static Gate = &HERE;
+    const NAME: &'static str = "here";
+}
+
+/// Where those hang that are cancelled.
+pub(crate) struct InVain;
+
+impl Place for InVain {
+    const GATE: &'static Gate = &CANCELLED;
+    const NAME: &'static str = "here";
 }
 
 /// Diverges at a 1.
@@ -45,7 +49,7 @@ robot! {
     commands {
         category many { concurrency: 1000; }
         disarm: Disarm;
-        stuck: Stuck { category: many; allowed_states: [idle, executing]; }
+        stuck: Stuck<OfHealth> { category: many; allowed_states: [idle, executing]; }
     }
     link base {
         sensor number: External<Number>() { estimator fickle: Fickle() { recover_after: 1; on_degraded: stuck; } }
@@ -101,27 +105,11 @@ fn a_command_that_hangs_is_not_started_for_ever_however_often_it_is_cancelled() 
     });
 }
 
-static CANCELLED: Gate = Gate::new();
-
-/// Hangs as well.
-pub(crate) struct Errand;
-
-impl Command for Errand {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        CANCELLED.pass("here");
-        Ok(Outcome::done(()))
-    }
-}
-
 robot! {
     robot Crowded;
     commands {
         disarm: Disarm;
-        errand: Errand { allowed_states: [idle, executing]; }
+        errand: Stuck<InVain> { allowed_states: [idle, executing]; }
     }
     link base { sensor number: External<Number>(); }
 }

@@ -1,6 +1,7 @@
 //! Whatever hangs, hardware is made safe first; and what is not safe, or was cancelled, moves nothing any more.
 
 use crate::components::{Number, at, within};
+use crate::gate::{Gate, PATIENCE, Place, Stuck};
 use bb_core::event::CommandPhase;
 use bb_core::prelude::*;
 use bb_core::run::ActuatorError;
@@ -12,56 +13,8 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
 use std::task::{Context as Polled, Wake, Waker};
 
-/// Longer than anything takes that does not hang, however busy the machine.
-const PATIENCE: Duration = Duration::from_secs(20);
-
 /// Within it a motor is told to stop, whatever hangs: shorter than any time that the robot gives code that hangs.
 const AT_ONCE: Duration = Duration::from_secs(2);
-
-/// A place at which code waits until the test lets it go on.
-pub(crate) struct Gate {
-    /// The place that is closed, and how many have come there.
-    state: Mutex<(Option<&'static str>, u32)>,
-    changed: Condvar,
-}
-
-impl Gate {
-    pub(crate) const fn new() -> Self {
-        Self { state: Mutex::new((None, 0)), changed: Condvar::new() }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, (Option<&'static str>, u32)> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(crate) fn close(&self, place: &'static str) {
-        *self.lock() = (Some(place), 0);
-    }
-
-    pub(crate) fn open(&self) {
-        self.lock().0 = None;
-        self.changed.notify_all();
-    }
-
-    pub(crate) fn pass(&self, place: &'static str) {
-        let mut state = self.lock();
-        if state.0 == Some(place) {
-            state.1 += 1;
-            self.changed.notify_all();
-        }
-        while state.0 == Some(place) {
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
-    }
-
-    /// Waits until so many wait there.
-    pub(crate) fn wait_for(&self, many: u32) {
-        let state = self.lock();
-        let waited = self.changed.wait_timeout_while(state, PATIENCE, |state| state.1 < many);
-        let (state, timeout) = waited.unwrap_or_else(PoisonError::into_inner);
-        assert!(!timeout.timed_out(), "nobody came to {:?}", state.0);
-    }
-}
 
 static HERE: Gate = Gate::new();
 
@@ -122,19 +75,13 @@ impl Estimator for Thinker {
     }
 }
 
-/// Blocks the thread that runs it.
+/// Where commands hang.
 #[derive(Debug)]
-pub(crate) struct Errand;
+pub(crate) struct InCommands;
 
-impl Command for Errand {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        HERE.pass("a command");
-        Ok(Outcome::done(()))
-    }
+impl Place for InCommands {
+    const GATE: &'static Gate = &HERE;
+    const NAME: &'static str = "a command";
 }
 
 /// Is done at once.
@@ -220,8 +167,8 @@ robot! {
 
     commands {
         category many { concurrency: 8; }
-        errand: Errand { category: many; allowed_states: [idle, executing]; }
-        hurried: Errand { category: many; timeout: 20 ms; allowed_states: [idle, executing]; }
+        errand: Stuck<InCommands> { category: many; allowed_states: [idle, executing]; }
+        hurried: Stuck<InCommands> { category: many; timeout: 20 ms; allowed_states: [idle, executing]; }
         alarm: Alarm { allowed_states: [disarmed, idle, executing]; }
     }
 

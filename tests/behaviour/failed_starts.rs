@@ -1,7 +1,7 @@
 //! What an `init` has started that fails then: how it is made safe, and what becomes of callbacks that fail or hang.
 
 use crate::components::{Number, within};
-use crate::disarm_first::Gate;
+use crate::gate::Gate;
 use bb_core::prelude::*;
 use bb_core::{DisarmError, Running};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};

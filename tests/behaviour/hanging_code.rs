@@ -1,7 +1,7 @@
 //! Code that hangs, or calls back where it would wait for itself, harms itself alone, and is reported while the robot runs.
 
 use crate::components::Number;
-use crate::disarm_first::Gate;
+use crate::gate::{Gate, Place, Stuck};
 use bb_core::prelude::*;
 use bb_core::run::ActuatorError;
 use bb_core::{ComponentFault, DisarmError, Live, TelemetryEvent};
@@ -228,18 +228,12 @@ mod pools {
 
     static HANG: Hangs = Hangs::new();
 
-    /// Hangs, until all are let go.
-    pub(crate) struct Stuck;
+    /// Where commands hang until all are let go.
+    pub(crate) struct InPool;
 
-    impl Command for Stuck {
-        type Options = NoOptions;
-        type Arguments = NoArguments;
-        type Output = ();
-
-        async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-            HANG.0.pass("here");
-            Ok(Outcome::done(()))
-        }
+    impl Place for InPool {
+        const GATE: &'static Gate = &HANG.0;
+        const NAME: &'static str = "here";
     }
 
     /// Does what is to be done when an estimator is degraded.
@@ -283,7 +277,7 @@ mod pools {
         robot Crowded;
         commands {
             category many { concurrency: 1000; }
-            stuck: Stuck { category: many; allowed_states: [idle, executing]; }
+            stuck: Stuck<InPool> { category: many; allowed_states: [idle, executing]; }
             halt: Halt { allowed_states: [idle, executing]; }
         }
         link base {

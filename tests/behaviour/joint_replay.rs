@@ -4,7 +4,9 @@ use crate::components::at;
 use crate::joints::{Fusion, Pixel, Spotter};
 use crate::replay::{Heard, Lines, counts, hear, overflow, same};
 use bb_core::Report;
+use bb_core::journal::{Entry, Event};
 use bb_core::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::PoisonError;
 
 /// Xorshift.
@@ -142,13 +144,17 @@ fn builder(seed: u64, reads: u32) -> (bb_core::Builder<Swing>, Lines) {
 
 /// Plays the journal in parts of random length.
 fn replayed(lines: &Lines, random: &mut Random) -> Result<(Heard, Report), Box<dyn std::error::Error>> {
+    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    lines.sort_by_key(|line| line.number);
+    played(lines, random)
+}
+
+fn played(mut lines: Vec<Entry>, random: &mut Random) -> Result<(Heard, Report), Box<dyn std::error::Error>> {
     let mut builder = Swing::builder();
     // What the store would answer is another matter: the journal has what it did answer.
     builder.joints().states = 2;
     let all = builder.subscribe_any(Select::All, None, overflow());
     let mut replay = builder.replay()?;
-    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
-    lines.sort_by_key(|line| line.number);
     let mut heard = Heard::new();
     while !lines.is_empty() {
         let rest = lines.split_off((1 + random.below(200) as usize).min(lines.len()));
@@ -205,5 +211,52 @@ fn random_days_on_many_threads_are_the_same_again() -> Result<(), Box<dyn std::e
         same(&first, &again);
         assert_eq!(counts(&report), counts(&report_again));
     }
+    Ok(())
+}
+
+/// The lines of turns that have not ended there.
+fn turns_without_an_end(lines: &[Entry]) -> BTreeSet<u64> {
+    let mut open = BTreeSet::new();
+    for line in lines {
+        match &line.event {
+            Event::Deliver { .. } | Event::Wake { .. } | Event::Start { .. } => drop(open.insert(line.number)),
+            Event::Placed { cause, .. } => drop(open.remove(cause)),
+            _ => {}
+        }
+    }
+    open
+}
+
+#[test]
+fn a_journal_that_is_cut_is_replayed_up_to_there_and_the_line_is_named() -> Result<(), Box<dyn std::error::Error>> {
+    let (builder, lines) = builder(70, 60);
+    let all = builder.subscribe_any(Select::All, None, overflow());
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(200));
+    simulation.stop();
+    let mut first = Heard::new();
+    hear(&all, &mut first);
+    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    lines.sort_by_key(|line| line.number);
+    let mut random = Random::new(7);
+    let mut cuts = 0;
+    for _ in 0..400 {
+        let cut = 1 + random.below(lines.len() as u64 - 1) as usize;
+        let (again, report) = played(lines[..cut].to_vec(), &mut random)?;
+        // What the store of joint states would answer is not the same, so what is said to be known must come from the journal.
+        for (path, again) in again.iter().filter(|(path, _)| path.starts_with("estimator/")) {
+            assert!(first[path].starts_with(again), "{path} up to line {cut}: {again:?}");
+        }
+        let open = turns_without_an_end(&lines[..cut]);
+        for fault in report.faults.iter().filter(|fault| fault.path == "journal") {
+            let line = fault.message.strip_prefix("line ").and_then(|rest| rest.split(' ').next()?.parse().ok());
+            assert!(line.is_some_and(|line| open.contains(&line)), "{fault} of {open:?}");
+            let says =
+                ": the journal is cut here: it does not say where its input `camera` was for `estimator/base/";
+            assert!(fault.message.contains(says), "{fault}");
+            cuts += 1;
+        }
+    }
+    assert!(cuts > 20, "{cuts}");
     Ok(())
 }

@@ -441,3 +441,86 @@ fn a_thread_waits_for_a_state_that_comes() -> Result<(), Box<dyn std::error::Err
     running.stop();
     Ok(())
 }
+
+/// The newest of both, however old.
+#[derive(Clone, Copy, Debug, Inputs)]
+pub(crate) struct Kept<'a> {
+    #[allow(dead_code, reason = "it only drives")]
+    pub(crate) imu: Input<'a, Pixel>,
+    #[allow(dead_code, reason = "it is placed, and not looked at")]
+    pub(crate) camera: Input<'a, Pixel>,
+}
+
+/// Says where its camera was when that saw something last.
+#[derive(Debug, Default)]
+struct Keeper {
+    camera_x: f64,
+}
+
+impl Estimator for Keeper {
+    type Options = NoOptions;
+    type Input = Kept<'static>;
+    type Output = Pixel;
+    const HANDLES_MOVING_JOINTS: bool = true;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self::default())
+    }
+
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        self.camera_x = transforms.frame_from_input("camera")?.translation.vector.x;
+        Ok(())
+    }
+
+    fn handle_input(&mut self, _: Kept<'_>) -> Result<Reply<Pixel>, Fault> {
+        Ok(Reply::emit(Pixel(self.camera_x)))
+    }
+}
+
+robot! {
+    robot Lookout;
+
+    link base {
+        sensor imu: External<Pixel>();
+        estimator keeper: Keeper() {
+            input imu: sensor::base::imu, driver;
+            input camera: sensor::base::lift::carriage::camera;
+        }
+        joint lift: prismatic {
+            axis: x;
+            limit: { lower: 0 m, upper: 2 m, velocity: 1 m/s, effort: 10 N };
+            sensor encoder: External<JointState>();
+            link carriage { sensor camera: External<Pixel>(); }
+        }
+    }
+}
+
+#[test]
+fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen() -> Result<(), StartError> {
+    let mut builder = Lookout::builder();
+    builder.joints().history = Duration::from_millis(100);
+    let keeper = builder.subscribe(lookout::estimator::base::keeper);
+    let mut simulation = builder.simulate()?;
+    for millis in 1..=1000 {
+        let position = 0.3 + millis as f64 * 1e-3;
+        let state = JointState { position, velocity: None, effort: None };
+        simulation.publish(lookout::sensor::base::lift::encoder, at(millis), state);
+        if millis == 1 {
+            simulation.publish(lookout::sensor::base::lift::carriage::camera, at(1), Pixel(1.0));
+        }
+        if millis % 50 == 2 {
+            simulation.publish(lookout::sensor::base::imu, at(millis), Pixel(0.0));
+        }
+    }
+    let heard: Vec<_> = keeper.drain().map(|pixel| pixel.0).collect();
+    assert_eq!(heard, [0.301; 20]);
+    // One that was never placed while the joints were known is not placed later.
+    let camera = lookout::sensor::base::lift::carriage::camera;
+    simulation.publish(camera, at(800), Pixel(1.0));
+    simulation.publish(lookout::sensor::base::imu, at(1001), Pixel(0.0));
+    assert_eq!(keeper.drain().count(), 0);
+    let report = simulation.report();
+    let drops = report.estimators[0].inputs[1].dropped(bb_core::run::DropReason::NoTransform);
+    assert_eq!(drops, 1);
+    Ok(())
+}

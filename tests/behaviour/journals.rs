@@ -1,7 +1,7 @@
 //! What may happen to a robot once, and happens again from its journal.
 
 use crate::components::{Number, at, within};
-use crate::disarm_first::Gate;
+use crate::gate::Gate;
 use crate::replay::{Heard, Lines, counts, hear, overflow, same};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;

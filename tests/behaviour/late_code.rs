@@ -1,7 +1,7 @@
 //! Commands whose code goes on after they were cancelled: what it starts is made safe.
 
 use crate::components::{Number, within};
-use crate::disarm_first::Gate;
+use crate::gate::Gate;
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use bb_core::{ArmError, Running};

@@ -1,12 +1,12 @@
 //! What hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
 
 use crate::components::{Number, within};
-use crate::disarm_first::Gate;
+use crate::gate::Gate;
 use bb_core::journal::Event;
 use bb_core::prelude::*;
 use std::future::Future;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, mpsc};
+use std::sync::{Arc, Mutex, mpsc};
 use std::task::{Context as Polled, Wake, Waker};
 
 /// Where all of it hangs.
@@ -121,6 +121,117 @@ robot! {
         joint pan: continuous { axis: z; actuator clinging: Clinging(); sensor a: External<Number>(); link head {} }
         joint tilt: continuous { axis: y; actuator heavy: Heavy(); sensor b: External<Number>(); link eye {} }
     }
+}
+
+/// Where options, and what a handler of telemetry owns, hang when they are dropped.
+static GONE: Gate = Gate::new();
+
+struct Slow(mpsc::Sender<Option<String>>);
+
+impl Drop for Slow {
+    fn drop(&mut self) {
+        let _ = self.0.send(std::thread::current().name().map(str::to_owned));
+        GONE.pass("gone");
+    }
+}
+
+/// Where the options of an estimator were dropped while [`GONE`] was closed.
+static TUNINGS: Mutex<Vec<Option<String>>> = Mutex::new(Vec::new());
+
+/// Options that hang when they are dropped.
+#[derive(Clone, Debug, Options)]
+pub(crate) struct Tuning {
+    #[option(default = 1.0)]
+    gain: f64,
+}
+
+impl Drop for Tuning {
+    fn drop(&mut self) {
+        if GONE.is_closed() {
+            let thread = std::thread::current().name().map(str::to_owned);
+            TUNINGS.lock().expect("it does not panic").push(thread);
+        }
+        GONE.pass("gone");
+    }
+}
+
+/// Has these options.
+#[derive(Debug)]
+pub(crate) struct Tuned {
+    gain: f64,
+}
+
+impl Estimator for Tuned {
+    type Options = Tuning;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: Tuning, _: &bb_core::Context) -> Result<Self, Fault> {
+        Ok(Self { gain: options.gain })
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(self.gain * number.0)))
+    }
+}
+
+robot! {
+    robot Heavily;
+    link base { sensor number: External<Number>() { estimator tuned: Tuned(); } }
+}
+
+robot! {
+    robot Told;
+    link base { sensor number: External<Number>(); }
+}
+
+/// What hangs there is one for all.
+static ALONE: Mutex<()> = Mutex::new(());
+
+#[test]
+fn a_robot_whose_options_hang_when_they_are_dropped_is_back() {
+    within(60, || {
+        let _alone = ALONE.lock();
+        let running = Heavily::builder().start().expect("it starts");
+        TUNINGS.lock().expect("it does not panic").clear();
+        GONE.close("gone");
+        let start = std::time::Instant::now();
+        running.stop().ok().expect("nothing is wrong");
+        assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
+        GONE.wait_for(1);
+        GONE.open();
+        assert_eq!(
+            *TUNINGS.lock().expect("it does not panic"),
+            [Some("drop".to_owned())],
+            "on a thread of its own"
+        );
+    });
+}
+
+#[test]
+fn a_robot_whose_handler_of_telemetry_hangs_when_it_is_dropped_is_back() {
+    within(60, || {
+        let _alone = ALONE.lock();
+        for is_kept in [false, true] {
+            let (tell, told) = mpsc::channel();
+            let slow = Slow(tell);
+            let mut builder = Told::builder();
+            builder.telemetry(move |_, _| {
+                let _ = &slow;
+            });
+            let running = builder.start().expect("it starts");
+            // Another handle may be the last.
+            let live = is_kept.then(|| running.live());
+            GONE.close("gone");
+            let start = std::time::Instant::now();
+            running.stop().ok().expect("nothing is wrong");
+            drop(live);
+            assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
+            let dropped = told.recv_timeout(Duration::from_secs(20)).expect("it is dropped");
+            assert_eq!(dropped.as_deref(), Some("drop"), "on a thread of its own");
+            GONE.open();
+        }
+    });
 }
 
 #[test]

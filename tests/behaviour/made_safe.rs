@@ -1,6 +1,7 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
 use crate::components::{Number, within};
+use crate::gate::{Brake, Brakes};
 use bb_core::prelude::*;
 use bb_core::{ArmError, DisarmError, Live};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
@@ -91,24 +92,14 @@ impl Sensor for Lidar {
     }
 }
 
-/// Takes 300 ms to be made safe.
+/// Takes 300 ms.
 #[derive(Debug)]
-pub(crate) struct Brake;
+pub(crate) struct Slowly;
 
-impl Sensor for Brake {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        context.on_disarm(|| {
-            std::thread::sleep(Duration::from_millis(300));
-            if HOLDS.load(Ordering::SeqCst) { Ok(()) } else { Err(Fault::new("it slips")) }
-        });
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
+impl Brakes for Slowly {
+    fn brake() -> Result<(), Fault> {
+        std::thread::sleep(Duration::from_millis(300));
+        if HOLDS.load(Ordering::SeqCst) { Ok(()) } else { Err(Fault::new("it slips")) }
     }
 }
 
@@ -116,7 +107,7 @@ robot! {
     robot Scanner;
     link base {
         sensor lidar: Lidar() { rate: 100 Hz; }
-        sensor brake: Brake() { rate: 10 Hz; }
+        sensor brake: Brake<Slowly>() { rate: 10 Hz; }
     }
 }
 
@@ -274,7 +265,7 @@ robot! {
         go: Go { allowed_states: [idle, executing]; category: other; }
         mission: Mission { allowed_states: [idle]; category: other; }
     }
-    link base { sensor brake: Brake() { rate: 10 Hz; } }
+    link base { sensor brake: Brake<Slowly>() { rate: 10 Hz; } }
 }
 
 #[test]

@@ -188,3 +188,40 @@ fn a_publisher_at_a_path_of_its_own_waits_for_a_journal_whose_sink_is_slow()
     );
     Ok(())
 }
+
+/// Topics of a report, and how much was published there.
+fn rows(report: &bb_core::Report) -> Vec<(&'static str, &'static str, u64)> {
+    report.topics.iter().map(|topic| (topic.path, topic.payload, topic.published)).collect()
+}
+
+#[test]
+fn a_replay_reports_paths_at_which_nothing_was_published_too() -> Result<(), Box<dyn std::error::Error>> {
+    let lines = Arc::new(std::sync::Mutex::new(Vec::new()));
+    let sink = Arc::clone(&lines);
+    let mut builder = Missionary::builder();
+    builder.journal(move |line| sink.lock().expect("it does not panic").push(line));
+    let mut simulation = builder.simulate()?;
+    let bus = simulation.bus();
+    let _silent = bus.publisher::<Progress>("radio/silent")?;
+    let loud = bus.publisher::<Number>("radio/loud")?;
+    let _again = bus.publisher::<Progress>("radio/silent")?;
+    simulation.run_for(Duration::from_millis(5));
+    loud.publish(Number(1.0));
+    simulation.run_for(Duration::from_millis(5));
+    let report = simulation.stop();
+    let first = rows(&report);
+    for row in
+        [("radio/silent", "Progress", 0), ("radio/loud", "Number", 1), ("mission/plan/progress", "Progress", 1)]
+    {
+        assert!(first.contains(&row), "{first:?}");
+    }
+    let lines = std::mem::take(&mut *lines.lock().expect("it does not panic"));
+    let silent = |line: &&bb_core::journal::Entry| {
+        matches!(line.event, Event::OwnPublisher { path: "radio/silent", payload: "Progress" })
+    };
+    assert_eq!(lines.iter().filter(silent).count(), 1, "once");
+    let mut replay = Missionary::builder().replay()?;
+    replay.play(lines)?;
+    assert_eq!(rows(&replay.stop()), first);
+    Ok(())
+}

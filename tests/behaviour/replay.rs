@@ -198,9 +198,8 @@ pub(crate) fn counts(report: &Report) -> String {
             format!("{estimator:?}")
         })
         .collect();
-    // A path of one's own at which nothing was published is not in the journal.
-    let topics = report.topics.iter().filter(|topic| topic.published > 0);
-    let published: Vec<_> = topics.map(|topic| (topic.path, topic.published)).collect();
+    let published: Vec<_> =
+        report.topics.iter().map(|topic| (topic.path, topic.payload, topic.published)).collect();
     format!("{estimators:#?} {published:?} {:#?} {} {}", report.commands, report.state, report.safety)
 }
 

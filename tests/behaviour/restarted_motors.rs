@@ -1,7 +1,7 @@
 //! Hardware that a restart, or a change of options, starts while the robot is being disarmed.
 
 use crate::components::{Number, within};
-use crate::disarm_first::Gate;
+use crate::gate::{Brake, Brakes, Gate};
 use bb_core::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -81,31 +81,21 @@ impl Sensor for Fan {
     }
 }
 
-/// Takes as long to be made safe as the gate is closed.
+/// Takes as long as the gate is closed.
 #[derive(Debug)]
-pub(crate) struct Brake;
+pub(crate) struct AtGate;
 
-impl Sensor for Brake {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        context.on_disarm(|| {
-            GATE.pass("brake");
-            Ok(())
-        });
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
+impl Brakes for AtGate {
+    fn brake() -> Result<(), Fault> {
+        GATE.pass("brake");
+        Ok(())
     }
 }
 
 robot! {
     robot Stiff;
     link base {
-        sensor brake: Brake() { rate: 10 Hz; }
+        sensor brake: Brake<AtGate>() { rate: 10 Hz; }
         joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
     }
 }
@@ -114,7 +104,7 @@ robot! {
     robot Windy;
     parameters { speed: f64 = 1.0, range: 0.0..=10.0; }
     link base {
-        sensor brake: Brake() { rate: 10 Hz; }
+        sensor brake: Brake<AtGate>() { rate: 10 Hz; }
         sensor fan: Fan(speed = param::speed) { rate: 100 Hz; }
     }
 }

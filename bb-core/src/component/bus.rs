@@ -70,7 +70,12 @@ impl Bus {
     /// malformed, too many are in use, the robot has stopped, or the command that this bus belongs to has ended.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
         self.check_permit()?;
-        let topic = self.host.registry().topic(path)?;
+        // Two threads may both find it new, which does no harm.
+        let is_new = self.host.is_journaled() && !self.host.registry().has(path);
+        let topic = self.host.registry().topic::<T>(path)?;
+        if is_new {
+            self.host.note_publisher(topic.path(), T::NAME);
+        }
         Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), permit: self.permit.clone() })))
     }
 

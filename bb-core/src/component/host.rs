@@ -31,6 +31,8 @@ pub(crate) trait Host: Guardian {
     fn is_journaled(&self) -> bool;
     /// Has something published, unless the robot has stopped; waits first while too much waits for the journal's sink.
     fn while_open(&self, publish: &mut dyn FnMut());
+    /// There is a publisher at a path of one's own.
+    fn note_publisher(&self, path: &'static str, payload: &'static str);
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage);
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.

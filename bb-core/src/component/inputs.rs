@@ -6,7 +6,7 @@
 
 use crate::Payload;
 use crate::declaration::{EstimatorDeclaration, InputDeclaration};
-use crate::message::Stamped;
+use crate::message::{Panic, Stamped, copy_to};
 use crate::time::MonotonicTime;
 use std::cell::Cell;
 use std::ops::Deref;
@@ -215,13 +215,11 @@ impl<T: Payload> Slot<T> {
         self.declaration = Some(declaration);
     }
 
-    /// Keeps `message` as the last known.
-    pub fn store(&mut self, message: &Stamped<T>) {
-        match &mut self.message {
-            Some(kept) => kept.clone_from(message),
-            none => *none = Some(message.clone()),
-        }
+    /// Keeps `message` as the last known. A panic of the payload's `Clone` is returned; the message is kept all the same.
+    #[inline]
+    pub(crate) fn store(&mut self, message: &Stamped<T>) -> Result<(), Panic> {
         self.is_new.set(true);
+        copy_to(&mut self.message, message)
     }
 
     /// The miss of a required input that has not arrived, or is too old for a driver of `time`; none if all is well.

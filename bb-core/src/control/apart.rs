@@ -1,7 +1,7 @@
-//! Disarm callbacks that run while nobody disarms the robot: those of an `init` that failed, and those of code that may have
-//! started something after the robot was disarmed.
+//! Disarm callbacks that run outside of a disarming: those of an `init` that failed, and those of code that may have started
+//! something after the robot was disarmed.
 //!
-//! They stay registered while they run, so that a disarming in that time runs them too and waits for them.
+//! They stay registered while they run, so a disarming that begins meanwhile also runs them and waits for them.
 
 use super::arming::{DISARM_WITHIN, late_at};
 use super::callback::{Callback, Reason};
@@ -26,7 +26,7 @@ pub(super) struct Apart {
     left: Vec<u64>,
 }
 
-/// Why callbacks run, which decides what follows.
+/// Why callbacks run, which determines the consequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Why {
     /// An `init` has failed: a device that is unplugged is no danger. Each that succeeds is forgotten; one that fails is a
@@ -39,7 +39,7 @@ enum Why {
 }
 
 impl State {
-    /// Whether a callback is to run for `key`.
+    /// Whether a callback still has to run for `key`.
     pub(super) fn is_apart(&self, key: Key, number: u64) -> bool {
         self.apart.iter().any(|apart| apart.key == key && apart.left.contains(&number))
     }
@@ -51,19 +51,14 @@ impl State {
 }
 
 impl Control {
-    /// Remembers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
-    /// for the last time, it is run at once.
-    fn remember(&self, path: &'static str, execution: Option<u64>, code: DisarmHook) {
-        let owner = execution.map_or(Owner::Component, Owner::Execution);
-        self.remember_as(path, owner, code);
-    }
-
-    /// The same for an actuator's own `disarm`, which restarts do not replace.
+    /// Registers an actuator's own `disarm`, which restarts do not replace.
     pub(crate) fn on_disarm_always(&self, path: &'static str, code: DisarmHook) {
-        self.remember_as(path, Owner::Actuator, code);
+        self.register(path, Owner::Actuator, code);
     }
 
-    fn remember_as(&self, path: &'static str, owner: Owner, code: DisarmHook) {
+    /// Registers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
+    /// for the last time, it is run at once.
+    fn register(&self, path: &'static str, owner: Owner, code: DisarmHook) {
         let mut step = self.step();
         let is_known = match owner {
             Owner::Execution(id) => step.state.executions.iter().any(|execution| execution.id == id),
@@ -71,7 +66,7 @@ impl Control {
         };
         let is_callback = inside::is_callback(self.id());
         if is_callback && (step.state.has_ended || step.state.is_stopped()) {
-            // One that a callback registers is for the next time, and there is none.
+            // A callback that is registered by a callback runs at the next disarming, and there is no further one.
             step.finish();
             return discard(code);
         }
@@ -90,7 +85,7 @@ impl Control {
         if step.state.is_stopped() {
             key = step.run_apart(path, vec![callback], Why::Started);
         } else if !is_callback {
-            // One that a callback registers is for the next time.
+            // A callback that is registered by a callback runs at the next disarming.
             step.join_disarming(vec![callback]);
         }
         step.lingers_on(owner);
@@ -98,11 +93,10 @@ impl Control {
         self.wait_apart(key);
     }
 
-    /// Runs `make`, which makes the component at `path`, or changes its options. What it registers replaces what was
-    /// registered before, once it has succeeded. There is no time between in which its hardware would not be made safe.
+    /// Runs `make`, which creates the component at `path` or changes its options. The callbacks that it registers replace earlier
+    /// ones once it has succeeded. At no time is there no callback for the hardware.
     ///
-    /// As long as callbacks of an earlier attempt have not returned, there is no further one: the device is still held by
-    /// them.
+    /// There is no further attempt before the callbacks of an earlier one have returned, since they still hold the device.
     pub(crate) fn replacing_hooks<T>(
         &self,
         path: &'static str,
@@ -134,29 +128,31 @@ impl Control {
         made
     }
 
-    /// Waits until the callbacks have returned, or their time is over. A disarming that begins meanwhile runs them too, and
-    /// the caller may be in its way.
+    /// Waits until the callbacks have returned or have timed out, or until a disarming begins, which runs them too and may have
+    /// to wait for the caller.
     fn wait_apart(&self, key: Option<Key>) {
         let Some(key) = key else { return };
-        // The callback of an actuator waits for the code that this is a part of. A robot that does not start is disarmed next.
-        let is_in_the_way = inside::is_waited_for(self.id()) || !self.lock().has_begun;
-        if self.0.mode != Mode::Real || cfg!(loom) || is_in_the_way {
+        // A robot that does not start is disarmed next.
+        if self.0.mode != Mode::Real || cfg!(loom) || !self.lock().has_begun {
             return;
         }
+        // The callback of an actuator waits for the code that this is a part of.
+        let Some(_waits) = inside::waits_for(self.id()) else { return };
         let is_over = |state: &State| state.apart.iter().all(|apart| apart.key != key) || state.disarming.is_some();
         if !self.wait_until(DISARM_WITHIN + Duration::from_millis(500), is_over) {
-            // Even the thread that keeps time is gone.
+            // The timekeeper's thread is gone.
             self.apart_timeout(key);
         }
     }
 
-    /// Whether callbacks run though nobody disarms the robot.
+    /// Whether callbacks run outside of a disarming.
     #[cfg(loom)]
     pub(super) fn makes_safe(&self) -> bool {
         !self.lock().apart.is_empty()
     }
 
-    /// Runs callbacks, each on a thread of its own; those for which there is none. On virtual time they run here.
+    /// Runs each callback on a thread of its own, and returns those for which no thread could be started. On virtual time it
+    /// returns all of them, and the caller runs them.
     pub(super) fn start_apart(&self, key: Key, callbacks: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
         if self.0.mode != Mode::Real || cfg!(loom) {
             return callbacks;
@@ -164,7 +160,7 @@ impl Control {
         callbacks.into_iter().filter(|callback| !callback.start(self, Reason::Apart(key))).collect()
     }
 
-    /// A callback has returned that ran apart.
+    /// A callback that ran outside of a disarming has returned.
     pub(super) fn apart_returned(&self, key: Key, number: u64, error: Option<SafetyError>) {
         let mut step = self.step();
         let Some(apart) = step.state.apart.iter_mut().find(|apart| apart.key == key) else { return };
@@ -187,7 +183,7 @@ impl Control {
         safe.into_iter().for_each(discard);
     }
 
-    /// The time of callbacks that run apart is over.
+    /// Callbacks that run outside of a disarming have timed out.
     pub(super) fn apart_timeout(&self, key: Key) {
         let mut step = self.step();
         let Some(apart) = step.state.apart.iter_mut().find(|apart| apart.key == key) else { return };
@@ -201,8 +197,8 @@ impl Control {
 }
 
 impl Step<'_> {
-    /// If the robot was disarmed while a component was made or its options changed, its callbacks may have run before its
-    /// hardware was started: they run once more.
+    /// If the robot was disarmed while a component was created or its options changed, its callbacks may have run before its
+    /// hardware was started, so they run once more.
     fn run_again(&mut self, path: &'static str, callbacks: Vec<Arc<Callback>>, disarmings: u64) -> Option<Key> {
         let has_begun = self.state.generation != disarmings;
         let was_disarmed = has_begun && self.state.machine.safety != Safety::Armed;
@@ -213,8 +209,8 @@ impl Step<'_> {
         self.run_apart(path, left, Why::Started)
     }
 
-    /// The code of a cancelled command has returned. It may have started something after its callbacks had run: they run once
-    /// more, and only then it is gone. True if there are any.
+    /// The code of a cancelled command has returned. It may have started something after its callbacks had run, so they run once
+    /// more before it is gone. Returns true if there are any.
     pub(super) fn makes_safe_after(&mut self, id: u64) -> bool {
         let lingers_on = |execution: &RunningCommand| execution.id == id && execution.lingers_on;
         if self.state.machine.safety == Safety::Armed || !self.state.executions.iter().any(lingers_on) {
@@ -225,7 +221,7 @@ impl Step<'_> {
         self.run_apart(path, callbacks, Why::Lingered(id)).is_some()
     }
 
-    /// A command registers a callback: if the robot is not armed, its code goes on after the robot was disarmed.
+    /// A command registers a callback. If the robot is not armed, the command's code has continued after the disarming.
     fn lingers_on(&mut self, owner: Owner) {
         let Owner::Execution(id) = owner else { return };
         if self.state.machine.safety == Safety::Armed {
@@ -236,7 +232,7 @@ impl Step<'_> {
         }
     }
 
-    /// Has callbacks run as a part of the disarming; they are returned if there is none.
+    /// Adds callbacks to the disarming in progress; returns them if there is no disarming.
     fn join_disarming(&mut self, callbacks: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
         let Some(disarming) = &mut self.state.disarming else { return callbacks };
         disarming.left.extend(callbacks.iter().map(|callback| (callback.number, callback.path)));
@@ -287,7 +283,9 @@ impl Guardian for Control {
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
         match self.0.mode {
             Mode::Replay => discard(hook),
-            Mode::Real | Mode::Virtual => self.remember(path, execution, hook),
+            Mode::Real | Mode::Virtual => {
+                self.register(path, execution.map_or(Owner::Component, Owner::Execution), hook);
+            }
         }
     }
 

@@ -102,11 +102,14 @@ impl Control {
         step.disarm(force);
         let disarming = step.state.disarming.as_ref();
         let waits_for = disarming.map(|disarming| (disarming.generation, Arc::clone(&disarming.outcome)));
+        let Some((generation, outcome)) = waits_for else {
+            step.finish();
+            return Ok(());
+        };
+        // Before the callbacks begin: of robots that disarm each other, the one that closes the circle is told.
+        let waits = inside::waits_for(self.id());
         step.finish();
-        let Some((generation, outcome)) = waits_for else { return Ok(()) };
-        if inside::is_waited_for(self.id()) {
-            return Err(DisarmError::Callback);
-        }
+        let Some(_waits) = waits else { return Err(DisarmError::Callback) };
         if self.0.mode == Mode::Real {
             self.wait_until(DISARM_WITHIN + MARGIN, |state| !state.is_disarming(generation));
         } else {

@@ -1,5 +1,5 @@
-//! What becomes of a component that panics too often: everything that its supervisor looks after is restarted, and at last
-//! the robot is disarmed.
+//! Budgets of panics. When a component exceeds its supervisor's budget, everything below that supervisor is restarted, and
+//! eventually the robot is disarmed.
 //!
 //! Supervisors mirror the topology: one for the robot, one for each link, one for each joint. The parent of a link's is
 //! that of the joint that carries it, the parent of a joint's is that of the link it is mounted on.
@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 pub(super) enum Verdict {
     /// That component alone.
     Restart,
-    /// All that this supervisor and those below it look after.
+    /// All components of this supervisor and of those below it.
     RestartAll(Supervisor),
     /// The robot has used up its budget.
     GiveUp,
@@ -26,7 +26,7 @@ pub(super) enum Verdict {
 pub(super) struct Budgets {
     settings: Supervision,
     parents: Box<[Option<Supervisor>]>,
-    /// The last panics that each has allowed.
+    /// The most recent panics that each has allowed.
     panics: Vec<VecDeque<MonotonicTime>>,
 }
 
@@ -41,7 +41,7 @@ impl Budgets {
         Self { settings, parents, panics }
     }
 
-    /// A component that `supervisor` looks after has panicked.
+    /// A component of `supervisor` has panicked.
     pub(super) fn panicked(&mut self, supervisor: Supervisor, now: MonotonicTime) -> Verdict {
         let mut current = supervisor;
         let mut verdict = Verdict::Restart;
@@ -52,7 +52,7 @@ impl Budgets {
                 past.push_back(now);
                 return verdict;
             }
-            // Until some of these are long enough ago, a panic below goes up at once.
+            // Until some of these have expired, further panics escalate at once.
             let Some(Some(parent)) = self.parents.get(current).copied() else { return Verdict::GiveUp };
             verdict = Verdict::RestartAll(current);
             current = parent;

@@ -28,7 +28,7 @@ pub struct CommandStatistics {
     pub cancelled: u64,
     /// How often it was refused.
     pub refused: u64,
-    /// Why, the last time.
+    /// The reason of the last refusal.
     pub last_refusal: Option<Refusal>,
 }
 
@@ -40,7 +40,7 @@ pub(super) trait AnyCommand: Send + Sync {
     fn role(&self) -> Role;
     /// The parameters that its options are bound to.
     fn bound_to(&self) -> &'static [usize];
-    /// `arguments` are its own, or none: the default. User code runs here.
+    /// `arguments` are of its own type; `None` stands for the default. User code runs here.
     fn start(
         &self,
         arguments: Option<Arguments>,
@@ -49,7 +49,7 @@ pub(super) trait AnyCommand: Send + Sync {
     ) -> Result<RunningFuture, Fault>;
     /// Whether its options would be valid with these parameters. User code runs here.
     fn check(&self, parameters: &ParameterValues) -> Result<(), String>;
-    /// What its arguments and its result are made of.
+    /// The schemas of its arguments and its result.
     fn shapes(&self) -> (Shape, Shape);
     /// Its arguments from JSON; the default ones from an empty text.
     fn arguments(&self, json: &str) -> Result<Arguments, Fault>;

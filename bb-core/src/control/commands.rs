@@ -1,4 +1,4 @@
-//! Commands, as callers see them: which there are, and how one is asked for.
+//! Commands as callers see them: listing and starting them.
 
 use super::command::Arguments;
 use super::execution::{Execution, Slot, UntypedExecution};
@@ -14,7 +14,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 impl Control {
-    /// That all commands could start with their options as they are; else the path of one, and why not.
+    /// Checks that all commands can start with their current options. The error names the path of one that cannot, and why.
     pub(crate) fn check_commands(&self) -> Result<(), (&'static str, String)> {
         let parameters = self.parameters();
         self.0.commands.iter().zip(self.0.declared.commands).try_for_each(|(command, declared)| {
@@ -27,7 +27,7 @@ impl Control {
         self.request(self.step(), number, Some(arguments)).map(Execution::new)
     }
 
-    /// Starts the command at `path` with arguments from JSON, for one whose permit that is.
+    /// Starts the command at `path` with arguments from JSON, on behalf of the holder of the permit.
     pub(crate) fn execute_untyped(
         &self,
         path: &str,
@@ -53,9 +53,9 @@ impl Control {
         Ok(DynamicExecution::new(UntypedExecution(slot)))
     }
 
-    /// In a replay: a command was asked for.
+    /// In a replay: a command was requested.
     pub(crate) fn replay_command(&self, number: usize) {
-        // One that was refused is refused again.
+        // A command that was refused is refused again.
         let _ = self.request(self.step(), number, None);
     }
 
@@ -109,7 +109,7 @@ impl Control {
         lingering.into_iter().for_each(|task| task.run());
     }
 
-    /// On virtual time: polls each command once that can go on.
+    /// On virtual time: polls each command that can make progress once.
     pub(crate) fn poll_ready(&self) {
         let ready = std::mem::take(&mut *self.0.ready.lock().unwrap_or_else(PoisonError::into_inner));
         ready.into_iter().for_each(|task| task.run());
@@ -141,7 +141,7 @@ impl Step<'_> {
         self.declared(execution.command).map(|declared| declared.name)
     }
 
-    /// The numbers of executions that have not ended and fit.
+    /// The numbers of executions that have not ended and match.
     pub(super) fn not_ended(&self, fits: impl Fn(&Self, &RunningCommand) -> bool) -> Vec<u64> {
         let executions = self.state.executions.iter();
         let executions = executions.filter(|execution| !matches!(execution.phase, Phase::Lingering));

@@ -1,4 +1,5 @@
-//! What follows from an entry of the control state and is user code: it runs without the lock, and where it harms nobody.
+//! The effects of an entry of the control state that are user code. They run without the lock, on threads that nothing else
+//! waits for.
 
 use super::callback::{Callback, Reason};
 use super::execution::CommandError;
@@ -39,7 +40,7 @@ pub(super) struct Effects {
     pub(super) wired: Vec<Wired>,
 }
 
-/// What loggers and handlers of telemetry are told.
+/// What loggers and handlers of telemetry receive.
 #[derive(Clone, Debug)]
 pub(super) enum Log {
     Health(HealthTransition),
@@ -50,7 +51,7 @@ pub(super) enum Log {
     Refused(Refusal),
 }
 
-/// Lines for loggers, in order. Loggers are user code, and may block: one thread of the pool at a time is in them.
+/// Lines for loggers, in order. Loggers are user code and may block, so at most one thread of the pool runs them at a time.
 #[derive(Default)]
 pub(super) struct Reporter(Mutex<Reports>);
 
@@ -61,11 +62,11 @@ struct Reports {
     skipped: u64,
 }
 
-/// Lines that wait for a logger that blocks; beyond, new ones are counted and dropped.
+/// The number of lines that may wait for a logger that blocks. Further lines are counted and dropped.
 const MOST_LOGS: usize = 4096;
 
 impl Reporter {
-    /// True if nobody is writing lines: the caller has them written.
+    /// Returns true if no thread is writing lines, so that the caller has to start one.
     fn queue(&self, logs: impl IntoIterator<Item = Log>) -> bool {
         let mut reports = lock(&self.0);
         for log in logs {
@@ -84,9 +85,9 @@ impl Effects {
         self.logs.push(log);
     }
 
-    /// Queues the lines for loggers. Called under the lock of the control state, so that they keep the order of the entries.
+    /// Queues the lines for loggers. Called under the lock of the control state, to keep the order of the entries.
     pub(super) fn queue_lines(&mut self, control: &Control) {
-        // The pool's threads are no part of a model.
+        // The model does not include the pool's threads.
         if !self.logs.is_empty() && !cfg!(loom) {
             self.has_lines = control.0.reporter.queue(self.logs.drain(..));
         }
@@ -95,7 +96,7 @@ impl Effects {
     pub(super) fn run(self, control: &Control) {
         let Self { wakers, logs: _, has_lines, begun, cancelled, results, hooks, apart, dropped, forgotten, wired } =
             self;
-        // First of all: hardware.
+        // Hardware comes first.
         let hooks = hooks.into_iter().map(|(generation, callbacks)| {
             (Reason::Disarming(generation), control.start_hooks(generation, callbacks))
         });
@@ -107,19 +108,19 @@ impl Effects {
             control.start_writing_logs();
         }
         for (reason, callbacks) in without_thread {
-            // Hardware that is made safe late is better than never.
+            // Better late than never.
             callbacks.iter().for_each(|callback| callback.run(control, reason));
             callbacks.into_iter().for_each(discard);
         }
-        // Each of these may block for ever, and is a job of its own.
-        wakers.into_wakers().for_each(|waker| control.run_apart(Lane::Wakers, move || wake(waker)));
+        // Each of these may block forever, so each is a separate job.
+        wakers.into_wakers().for_each(|waker| control.run_on_pool(Lane::Wakers, move || wake(waker)));
         for (slot, result) in results {
             let (waker, late) = slot.set(result);
-            waker.into_iter().for_each(|waker| control.run_apart(Lane::Wakers, move || wake(waker)));
-            late.into_iter().for_each(|late| control.run_apart(Lane::Dropping, move || discard(late)));
+            waker.into_iter().for_each(|waker| control.run_on_pool(Lane::Wakers, move || wake(waker)));
+            late.into_iter().for_each(|late| control.run_on_pool(Lane::Dropping, move || discard(late)));
         }
-        dropped.into_iter().for_each(|value| control.run_apart(Lane::Dropping, move || discard(value)));
-        forgotten.into_iter().for_each(|hook| control.run_apart(Lane::Dropping, move || discard(hook)));
+        dropped.into_iter().for_each(|value| control.run_on_pool(Lane::Dropping, move || discard(value)));
+        forgotten.into_iter().for_each(|hook| control.run_on_pool(Lane::Dropping, move || discard(hook)));
         drop(wired);
         for task in cancelled {
             task.cancel();
@@ -131,15 +132,15 @@ impl Effects {
 }
 
 impl Control {
-    /// Runs user code where it harms nobody.
-    fn run_apart(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
+    /// Runs user code on a thread of the pool, where it harms nobody; on virtual time on the caller's.
+    fn run_on_pool(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
         match self.0.mode {
             Mode::Real => self.0.pool.submit(lane, code),
             Mode::Virtual | Mode::Replay => code(),
         }
     }
 
-    /// Has a command polled.
+    /// Schedules a command to be polled.
     pub(super) fn run_task(&self, task: Arc<Task>) {
         match self.0.mode {
             Mode::Real => self.0.pool.submit(task.lane(), move || task.run()),
@@ -147,8 +148,8 @@ impl Control {
         }
     }
 
-    /// Runs disarm callbacks, each on a thread of its own, and returns those for which there is none; on virtual time all wait
-    /// for [`Self::run_pending_hooks`].
+    /// Runs each disarm callback on a thread of its own, and returns those for which no thread could be started. On virtual time
+    /// all of them wait for [`Self::run_pending_hooks`].
     fn start_hooks(&self, generation: u64, all: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
         if self.0.mode != Mode::Real {
             lock(&self.0.pending_hooks).push_back((generation, all));
@@ -160,13 +161,13 @@ impl Control {
         all.into_iter().filter(|callback| !callback.start(self, Reason::Disarming(generation))).collect()
     }
 
-    /// The calling thread runs an actuator's code, which disarming waits for, as long as what this returns lives.
+    /// Marks the calling thread as running an actuator's code, which disarming waits for, until the returned guard is dropped.
     pub(crate) fn enter_actuator(&self) -> inside::InActuator {
         inside::InActuator::new(self.id())
     }
 
-    /// On virtual time: runs the disarm callbacks that wait, in order, on the calling thread; true if there were any. None runs
-    /// inside code that they would wait for.
+    /// On virtual time: runs the waiting disarm callbacks in order on the calling thread, and returns true if there were any. None
+    /// of them runs inside code that it would wait for.
     pub(crate) fn run_pending_hooks(&self) -> bool {
         if inside::is_waited_for(self.id()) {
             return false;
@@ -216,7 +217,7 @@ impl Control {
             };
             let skipped = std::mem::take(&mut reports.skipped);
             drop(reports);
-            // A logger that panics cannot be told so.
+            // There is nobody to report a logger's panic to.
             let _ = crate::fault::guarded(|| {
                 if skipped > 0 {
                     tracing::warn!(skipped, "lines of this log were dropped: the logger blocked");
@@ -236,7 +237,7 @@ impl Control {
 }
 
 fn write_log(log: &Log) {
-    // A robot whose program installs no subscriber says on the terminal what has failed.
+    // If the program has installed no subscriber, failures are printed to the terminal.
     let is_plain = !tracing::dispatcher::has_been_set();
     match log {
         Log::Health(HealthTransition { estimator, source, from, to, reason, time }) => {

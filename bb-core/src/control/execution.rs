@@ -118,7 +118,7 @@ impl<T: 'static> Execution<T> {
     /// [`Self::try_result`].
     ///
     /// # Errors
-    /// Why there is none.
+    /// Why there is no result.
     pub fn wait(self) -> Result<T, CommandError> {
         loop {
             if let Some(result) = self.slot.wait_timeout(Duration::MAX) {
@@ -127,13 +127,13 @@ impl<T: 'static> Execution<T> {
         }
     }
 
-    /// Waits for the result, `timeout` at most; none after that.
+    /// Waits for the result, `timeout` at most; returns `None` after that.
     pub fn wait_timeout(&self, timeout: Duration) -> Option<Result<T, CommandError>> {
         self.slot.wait_timeout(timeout).map(typed)
     }
 
     /// Cancels it. Its result is [`CommandError::Cancelled`] at once, and from now on its handles refuse to act; its future is
-    /// dropped as soon as its code gives way.
+    /// dropped as soon as its code yields.
     pub fn cancel(&self) {
         self.slot.cancel();
     }

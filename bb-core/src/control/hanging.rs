@@ -1,4 +1,4 @@
-//! Commands that do not come back, and those that keep virtual time from going on.
+//! Commands that do not return, and commands that keep virtual time from advancing.
 
 use super::step::Step;
 use super::task::MOST_AT_ONCE;
@@ -11,19 +11,19 @@ use crate::time::MonotonicTime;
 use std::sync::PoisonError;
 use std::time::Duration;
 
-/// Executions that have not come back from their code.
+/// Executions whose code has not returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Hanging {
     /// The path of the command.
     pub(crate) path: &'static str,
     /// The number of the first of these executions.
     pub(crate) first: u64,
-    /// How long it is inside its code.
+    /// How long its code has been running.
     pub(crate) duration: Duration,
 }
 
 impl Control {
-    /// Of each command, the first execution that is inside its code for `longest` or longer.
+    /// For each command, the first execution whose code has been running for `longest` or longer.
     pub(crate) fn hanging(&self, now: MonotonicTime, longest: Duration) -> Vec<Hanging> {
         let state = self.lock();
         let mut hanging: Vec<Hanging> = Vec::new();
@@ -38,7 +38,7 @@ impl Control {
         hanging
     }
 
-    /// Counts a command that begins; whether too many have begun at this instant of virtual time.
+    /// Counts a command that begins; returns whether too many have begun at this instant of virtual time.
     pub(super) fn begins_too_often(&self) -> bool {
         if self.0.mode != Mode::Virtual {
             return false;
@@ -50,15 +50,15 @@ impl Control {
     }
 }
 
-/// Executions that were cancelled and whose code has not returned: while there are so many, which is as many as there may be
-/// threads for commands, no command starts. The others are bounded by the concurrency of their categories.
+/// The number of cancelled executions whose code has not returned at which no further command starts. The pool has as many
+/// threads for commands. Other executions are bounded by the concurrency of their categories.
 const MOST_LINGERING: usize = 512;
 
-/// How many more there may be before a command that disarms the robot, or that health has started, is refused.
+/// How many more are accepted of commands that disarm the robot or were started by health.
 const MORE_FOR_SAFETY: usize = 512;
 
 impl Step<'_> {
-    /// Whether another command may start. One that hangs leaves an execution each time that it is started and cancelled.
+    /// Whether another command may start. A command that hangs leaves an execution behind each time it is started and cancelled.
     pub(super) fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
         let is_for_safety = of_health || role == Role::Disarming;
         let most = if is_for_safety { MOST_LINGERING + MORE_FOR_SAFETY } else { MOST_LINGERING };

@@ -30,6 +30,13 @@ impl Overseer for Control {
         }
     }
 
+    fn message_failed(&self, path: &'static str, message: String) {
+        // A replay's journal has it.
+        if self.0.mode != Mode::Replay {
+            self.note_fault(path, message);
+        }
+    }
+
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget) {
         self.bind_to(path, parameters, Arc::new(check), target);
     }
@@ -58,7 +65,7 @@ impl Control {
         self.0.reports.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// In a replay: takes note of the first report of an estimator that waits; false if none does.
+    /// In a replay: processes the first waiting report of an estimator; returns false if there is none.
     pub(crate) fn replay_report(&self, estimator: usize) -> bool {
         let report = self.reports().get_mut(&estimator).and_then(std::collections::VecDeque::pop_front);
         match report {
@@ -73,7 +80,7 @@ impl Control {
     fn process_report(&self, estimator: usize, report: Report) {
         let mut step = self.step();
         if step.state.has_ended {
-            // An island that was still busy. The last report is being made, or has been.
+            // From an island that was still busy: the last report is being made or has been made.
             return;
         }
         step.line(Event::Report { estimator });
@@ -102,7 +109,8 @@ impl Control {
         step.finish();
     }
 
-    /// Something that no component did, or one that hangs: it is kept, published and logged, and nothing follows from it.
+    /// Notes a fault that is not a component's failure, or a component that hangs. It is kept, published and logged, and has no
+    /// other consequence.
     pub(crate) fn note_fault(&self, path: &'static str, message: String) {
         let mut step = self.step();
         step.note_fault(path, message);
@@ -120,7 +128,7 @@ impl Control {
         }
     }
 
-    /// Looks at the estimators whose time has come; true if there was any.
+    /// Checks an estimator whose deadline has passed; returns true if there was one.
     pub(crate) fn check_watch(&self, now: MonotonicTime) -> bool {
         let Some((_, estimator)) = self.0.watch.take(now) else { return false };
         let Some(due) = self.lost_at(estimator) else { return true };
@@ -158,7 +166,7 @@ impl Step<'_> {
         let HealthReport { transition, epoch } = report;
         let Some(health) = self.state.health.get_mut(estimator) else { return };
         if health.epoch != epoch {
-            // It was lost meanwhile, and does not know yet: what follows is told again once it does.
+            // It was lost meanwhile and does not know yet: it reports again once it does.
             return;
         }
         let was_lost = health.state == HealthState::Lost;

@@ -1,7 +1,7 @@
 //! Every order in which threads can enter the control state, by a model checker: `RUSTFLAGS="--cfg loom"`.
 //!
-//! In each, a robot that was told to stop stays disarmed, what could not be made safe ends in `error`, and an actuator does not
-//! move once it was made safe.
+//! In each of them, a robot that was told to stop stays disarmed, hardware that could not be made safe leads to `error`, and an
+//! actuator does not move after it was made safe.
 
 use super::{Control, bare};
 use crate::component::{Guardian, Permit};

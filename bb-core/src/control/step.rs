@@ -26,7 +26,7 @@ impl Control {
     /// Enters the control state.
     pub(super) fn step(&self) -> Step<'_> {
         let state = self.lock();
-        // Under the lock, so that the times of lines are in their order.
+        // Read under the lock, so that lines are in the order of their times.
         let now = self.0.clock.now();
         let wall_offset_nanos = self.0.clock.wall_offset_nanos();
         let before = state.machine;
@@ -84,7 +84,7 @@ impl Step<'_> {
         self.publish_fault(path, message);
     }
 
-    /// Keeps and publishes that a component has failed.
+    /// Records and publishes a component's failure.
     pub(super) fn publish_fault(&mut self, path: &'static str, message: String) {
         let fault = ComponentFault { path, message };
         self.control.keep_fault(fault.clone());
@@ -101,7 +101,7 @@ impl Step<'_> {
         }
     }
 
-    /// Releases the lock and has done what follows.
+    /// Releases the lock and runs the effects.
     pub(super) fn finish(mut self) {
         self.publish_machine(None);
         let Self { control, state, mut effects, .. } = self;

@@ -1,6 +1,7 @@
 //! How the robot stops: it is disarmed first, whatever hangs.
 
 use super::arming::DISARM_WITHIN;
+use super::inside;
 use super::{Control, Limit};
 use crate::event::Safety;
 use crate::journal::Event;
@@ -9,8 +10,8 @@ use crate::time::MonotonicTime;
 use std::time::{Duration, Instant};
 
 impl Control {
-    /// Disarms the robot and cancels its commands, at once and without waiting; nothing is started any more. Sensors and
-    /// services are told to stop when the robot is safe, or the time for that is over.
+    /// Disarms the robot and cancels its commands, without waiting. Nothing is started from now on. Sensors and services are
+    /// told to stop once the robot is safe or the time limit has passed.
     pub(crate) fn begin_stop(&self) {
         let mut step = self.step();
         if step.state.is_stopping {
@@ -39,12 +40,14 @@ impl Control {
         self.lock().is_stopping
     }
 
-    /// Waits until the disarm callbacks have returned, or their time is over.
+    /// Waits until the disarm callbacks have returned or have timed out.
     pub(crate) fn wait_until_disarmed(&self) {
         if self.0.mode == Mode::Real {
             let generation = self.lock().generation;
+            // If another robot's callback stops this one, those of this robot do not wait for that one.
+            let _waits = inside::waits_for(self.id());
             self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| !state.is_disarming(generation));
-            // If even the thread that keeps time is gone.
+            // In case the timekeeper's thread is gone.
             self.disarm_timeout(generation);
             self.0.stop.set();
         }
@@ -72,7 +75,7 @@ impl Control {
             .collect()
     }
 
-    /// Does what is due of the time limits; true if anything was.
+    /// Enforces the time limits that have passed; returns true if there were any.
     pub(crate) fn check_limits(&self, now: MonotonicTime) -> bool {
         let Some((_, limit)) = self.0.limits.take(now) else { return false };
         match limit {
@@ -85,7 +88,7 @@ impl Control {
         true
     }
 
-    /// Wakes what sleeps until now: on the pool, or on virtual time here; true if anything did.
+    /// Wakes a sleeper that is due: on the pool, or on virtual time on this thread. Returns true if there was one.
     pub(crate) fn wake_sleepers(&self, now: MonotonicTime) -> bool {
         let Some((lane, waker)) = self.0.sleeper.take(now) else { return false };
         match self.0.mode {
@@ -95,7 +98,7 @@ impl Control {
         true
     }
 
-    /// Has `waker` woken then.
+    /// Wakes `waker` at that time.
     pub(crate) fn wake_at(&self, time: MonotonicTime, waker: std::task::Waker) {
         self.0.sleeper.wake_at(time, None, waker);
     }
@@ -117,7 +120,7 @@ impl Control {
 }
 
 impl super::step::Step<'_> {
-    /// Whatever its safety state is: what was started while the robot was disarmed may move as well.
+    /// Disarms whatever the safety state: hardware that was started while the robot was disarmed may move as well.
     fn begin_stop(&mut self) {
         let was_in_error = self.state.machine.safety == Safety::Error;
         if self.state.disarming.is_none() {

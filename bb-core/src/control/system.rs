@@ -1,4 +1,4 @@
-//! How the control state is made and looked at.
+//! Creating and inspecting the control state.
 
 use super::budgets::Budgets;
 use super::command::CommandStatistics;
@@ -101,7 +101,7 @@ impl Control {
         let _ = self.0.host.set(Arc::downgrade(host));
     }
 
-    /// What it differs from other robots by.
+    /// Distinguishes it from other robots.
     pub(super) fn id(&self) -> usize {
         Arc::as_ptr(&self.0).addr()
     }
@@ -115,7 +115,7 @@ impl Control {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until `holds`, `longest` at most; whether it does.
+    /// Waits until `holds`, `longest` at most; returns whether it holds.
     #[cfg(not(loom))]
     pub(super) fn wait_until(&self, longest: Duration, holds: impl Fn(&State) -> bool) -> bool {
         let deadline = std::time::Instant::now() + longest;
@@ -130,14 +130,14 @@ impl Control {
         true
     }
 
-    /// A model has no time: others go on once.
+    /// A model has no time: other threads get one turn.
     #[cfg(loom)]
     pub(super) fn wait_until(&self, _: Duration, holds: impl Fn(&State) -> bool) -> bool {
         loom::thread::yield_now();
         holds(&self.lock())
     }
 
-    /// Has a supervisor look after a sensor, a service or an actuator.
+    /// Adds a sensor, a service or an actuator to its supervisor.
     pub(crate) fn look_after(
         &self,
         path: &'static str,

@@ -94,12 +94,12 @@ impl Task {
         matches!(self.lock().code, Code::Polled | Code::Future(_))
     }
 
-    /// Its future is dropped as soon as its code gives way.
+    /// Its future is dropped as soon as its code yields.
     pub(super) fn cancel(self: &Arc<Self>) {
         let Some(control) = self.control.upgrade() else { return };
         let mut state = self.lock();
         state.is_cancelled = true;
-        // It may wait for a thread of its lane, which may all hang. On virtual time nothing waits for long.
+        // It may be waiting for a thread of its lane, and all of these may hang. On virtual time nothing waits for long.
         state.is_scheduled &= control.is_virtual();
         drop(state);
         self.schedule();
@@ -122,7 +122,7 @@ impl Task {
             return control.ended(self.id, Err(too_often(control.clock().now())));
         }
         let ended = match code {
-            // Another thread polls it, or it has ended: a wake that came late.
+            // A late wake: another thread is polling it, or it has ended.
             Code::Polled | Code::Done => {
                 let mut state = self.lock();
                 if matches!(code, Code::Done) {

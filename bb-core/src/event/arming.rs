@@ -30,7 +30,7 @@ pub enum DisarmError {
     /// The safety state is `error`, and this disarm was not forced, or hardware reported an error meanwhile.
     Error,
     /// A disarm callback or an actuator's own code called: the robot is being disarmed, and the caller must not wait for
-    /// itself.
+    /// itself. The same holds for a disarm callback of another robot if disarming this one waits for that robot.
     Callback,
     /// The robot is still being disarmed: its time limit has not been enforced yet, or another thread of a simulation runs the
     /// callbacks.

@@ -28,8 +28,8 @@ pub enum LookupError {
         /// How much older.
         by: Duration,
     },
-    /// No joints connect the two: the robot has no frame of that name.
-    NotConnected {
+    /// The robot has no frame of that name, and all frames that it has are connected. What tf2 calls a `LookupException`.
+    UnknownFrame {
         /// The unknown frame or path.
         name: String,
         /// The nearest that there is.
@@ -111,7 +111,7 @@ impl fmt::Display for LookupError {
             Self::InFuture { joint, by } => {
                 write!(f, "the newest state of the joint `{joint}` is {by:?} older than the time asked for")
             }
-            Self::NotConnected { name, nearest } => {
+            Self::UnknownFrame { name, nearest } => {
                 write!(f, "the robot has no frame `{name}`")?;
                 match nearest {
                     Some(near) => write!(f, "; did you mean `{near}`?"),

@@ -20,12 +20,12 @@ impl Joints {
     /// paths of sensors, estimators and actuators, whose frames are meant then.
     ///
     /// # Errors
-    /// [`LookupError::NotConnected`]: the robot has no frame of that name, with the nearest that it has.
+    /// [`LookupError::UnknownFrame`]: the robot has no frame of that name, with the nearest that it has.
     pub fn between(&self, target: &str, source: &str) -> Result<TransformHandle, LookupError> {
-        let find = |name: &str| self.place(name).ok_or_else(|| self.not_connected(name));
+        let find = |name: &str| self.place(name).ok_or_else(|| self.unknown_frame(name));
         let (target, source) = (find(target)?, find(source)?);
         let route = Route::new(self.topology(), self.kinematics(), &target, &source);
-        let route = route.ok_or_else(|| self.not_connected(""))?;
+        let route = route.ok_or_else(|| self.unknown_frame(""))?;
         Ok(TransformHandle { joints: self.clone(), route })
     }
 
@@ -47,12 +47,12 @@ impl Joints {
         place_of(self.topology(), frame.map_or(name, |frame| frame.name()))
     }
 
-    fn not_connected(&self, name: &str) -> LookupError {
+    fn unknown_frame(&self, name: &str) -> LookupError {
         let topology = self.topology();
         let frames =
             topology.links.iter().map(|link| link.name).chain(topology.joints.iter().map(|joint| joint.name));
         let nearest = nearest(name, frames.chain(self.components()));
-        LookupError::NotConnected { name: name.to_owned(), nearest: nearest.map(str::to_owned) }
+        LookupError::UnknownFrame { name: name.to_owned(), nearest: nearest.map(str::to_owned) }
     }
 }
 
@@ -84,7 +84,7 @@ impl TransformHandle {
     /// # Errors
     /// A joint between is unknown, or its history begins after the newest state of another.
     pub fn latest(&self) -> Result<Latest, LookupError> {
-        let found = self.route.latest(&self.joints.states().lock());
+        let found = self.route.latest(self.joints.states());
         found.map_err(|gap| self.joints.error(gap))
     }
 
@@ -96,7 +96,7 @@ impl TransformHandle {
     /// As for [`Self::at`].
     pub fn wait_until(&self, time: MonotonicTime, timeout: Duration) -> Result<Isometry3<f64>, LookupError> {
         let timeout = if self.joints.clock().is_virtual() { Duration::ZERO } else { timeout };
-        let found = self.joints.states().wait(timeout, |states| self.route.sampled(states, time, 0));
+        let found = self.route.waited_for(self.joints.states(), time, timeout);
         found.map_err(|gap| self.joints.error(gap))
     }
 

@@ -32,7 +32,7 @@ pub(super) struct State<'a> {
     pub(super) effort: &'a [f64],
 }
 
-/// How many turns a continuous joint may be from where it was told last, before its turns are counted anew.
+/// How many turns a continuous joint may be from where it was told last, before its turns are counted from there.
 const MOST_TURNS: f64 = 1e5;
 
 impl History {
@@ -131,7 +131,7 @@ impl History {
         };
         let expected = before + velocity * state.time.seconds_since(MonotonicTime::from_nanos(self.time(last)));
         if (expected - told).abs() > MOST_TURNS * TAU || expected.is_nan() {
-            // An absurd velocity or stamp: turns are counted anew, or the angle would lose its digits for ever.
+            // An absurd velocity or stamp: turns are counted from here, or the angle would lose its digits for good.
             return Some(told);
         }
         Some(told + TAU * ((expected - told) / TAU).round())
@@ -258,7 +258,13 @@ fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: 
             let turned = (rotation * UnitQuaternion::from_scaled_axis(turn)).into_inner();
             [*rw, *rx, *ry, *rz] = [turned.w, turned.i, turned.j, turned.k];
         }
-        (_, [position], [velocity]) => *position += velocity * duration_s,
+        (_, [position], [velocity]) => {
+            // Held where an absurd velocity leads beyond all numbers.
+            let moved = *position + velocity * duration_s;
+            if moved.is_finite() {
+                *position = moved;
+            }
+        }
         _ => {}
     }
 }
@@ -266,7 +272,11 @@ fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: 
 /// From one position to the next.
 #[inline]
 fn interpolate(kind: JointKind, from: &[f64], to: &[f64], share: f64, position: &mut [f64]) {
-    let lerp = |from: f64, to: f64| from + (to - from) * share;
+    // The difference of two finite numbers may be infinite.
+    let lerp = |from: f64, to: f64| match to - from {
+        way if way.is_finite() => from + way * share,
+        _ => from * (1.0 - share) + to * share,
+    };
     match (kind, position) {
         (JointKind::Planar, [x, y, angle]) => {
             let (&[x0, y0, from, ..], &[x1, y1, to, ..]) = (from, to) else { return };

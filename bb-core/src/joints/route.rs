@@ -10,6 +10,7 @@ use crate::topology::{JointKind, Topology};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Coordinates of a route up to which asking allocates nothing.
 const FEW: usize = 32;
@@ -99,23 +100,26 @@ impl Route {
         self.with_positions(|positions| self.read(&states.lock(), time, tolerance_nanos, positions))
     }
 
-    pub(super) fn sampled(
+    /// The same, after waiting for states that have not come yet.
+    pub(super) fn waited_for(
         &self,
-        states: &States,
+        states: &SharedStates,
         time: MonotonicTime,
-        tolerance_nanos: i64,
+        timeout: Duration,
     ) -> Result<Isometry3<f64>, Gap> {
-        self.with_positions(|positions| self.read(states, time, tolerance_nanos, positions))
+        self.with_positions(|positions| states.wait(timeout, |states| self.read(states, time, 0, positions)))
     }
 
-    pub(super) fn latest(&self, states: &States) -> Result<Latest, Gap> {
+    pub(super) fn latest(&self, states: &SharedStates) -> Result<Latest, Gap> {
         let mut time = None;
-        for (joint, _) in &self.joints {
-            let newest = states.newest(*joint)?;
-            time = Some(time.map_or(newest, |time: i64| time.min(newest)));
-        }
-        let time = time.map(MonotonicTime::from_nanos);
-        let transform = self.sampled(states, time.unwrap_or(MonotonicTime::ZERO), 0)?;
+        let transform = self.with_positions(|positions| {
+            let states = states.lock();
+            for (joint, _) in &self.joints {
+                let newest = MonotonicTime::from_nanos(states.newest(*joint)?);
+                time = Some(time.map_or(newest, |time: MonotonicTime| time.min(newest)));
+            }
+            self.read(&states, time.unwrap_or(MonotonicTime::ZERO), 0, positions)
+        })?;
         Ok(Latest { transform, time })
     }
 

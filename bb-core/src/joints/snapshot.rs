@@ -7,43 +7,28 @@ use crate::payload::JointSnapshot;
 use crate::time::MonotonicTime;
 use crate::topology::JointKind;
 
-/// A joint whose state is known and not stale.
+/// A joint whose state is known and not stale. Quantities that are not measured are NaN.
 struct Listed {
     name: &'static str,
-    /// The joint that it follows, itself if it mimics none, and what it makes of that one's position.
-    owner: usize,
-    multiplier: f64,
-    offset: f64,
-    /// Whether it mimics none: the effort is its own then.
-    is_own: bool,
-    newest: MonotonicTime,
+    position: f64,
+    velocity: f64,
+    effort: f64,
 }
 
 impl Joints {
     /// All joints with one degree of freedom whose state is known and not stale, at the newest time that is known of all of
     /// them; none if there is no such joint. Velocities and efforts are those of the newest states.
     pub fn snapshot(&self) -> Option<(MonotonicTime, JointSnapshot)> {
-        let states = self.states().lock();
-        let listed = self.listed(&states);
-        let time = listed.iter().map(|joint| joint.newest).min()?;
+        // Room is made before the lock is taken.
+        let mut listed = Vec::with_capacity(self.topology().joints.len());
+        let time = self.list(&self.states().lock(), &mut listed)?;
         let mut snapshot = JointSnapshot::default();
-        let mut names = Vec::new();
+        let mut names = Vec::with_capacity(listed.len());
         for joint in listed {
-            let mut position = [0.0];
-            let Some(history) = states.history(joint.owner) else { continue };
-            // The history of one that has only begun does not reach back to the others.
-            if history.sample(time, 0, &mut position).is_err() {
-                continue;
-            }
-            let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
-            let newest = history.newest_state();
-            let (velocity, effort) = newest.map_or((f64::NAN, f64::NAN), |State { velocity, effort, .. }| {
-                (joint.multiplier * first(velocity), if joint.is_own { first(effort) } else { f64::NAN })
-            });
             names.push(joint.name.to_owned());
-            snapshot.positions.push(joint.multiplier * position[0] + joint.offset);
-            snapshot.velocities.push(velocity);
-            snapshot.efforts.push(effort);
+            snapshot.positions.push(joint.position);
+            snapshot.velocities.push(joint.velocity);
+            snapshot.efforts.push(joint.effort);
         }
         for list in [&mut snapshot.velocities, &mut snapshot.efforts] {
             if list.iter().any(|value| value.is_nan()) {
@@ -54,19 +39,35 @@ impl Joints {
         Some((time, snapshot))
     }
 
-    fn listed(&self, states: &States) -> Vec<Listed> {
+    /// Lists the joints whose state at the newest time that is known of all of them is known; that time.
+    fn list(&self, states: &States, listed: &mut Vec<Listed>) -> Option<MonotonicTime> {
         let now = self.clock().now();
         let topology = self.topology();
         let joints = topology.joints.iter().enumerate().filter(|(_, joint)| {
             matches!(joint.kind, JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic)
         });
-        let listed = joints.filter_map(|(number, joint)| {
-            let (owner, multiplier, offset) = topology.followed(number);
-            let newest = MonotonicTime::from_nanos(states.history(owner)?.newest()?);
+        let fresh = joints.filter_map(|(number, joint)| {
+            let followed = topology.followed(number);
+            let history = states.history(followed.0)?;
+            let newest = MonotonicTime::from_nanos(history.newest()?);
             let is_fresh = now.nanos_since(newest) <= self.stale_nanos();
-            let is_own = owner == number;
-            is_fresh.then_some(Listed { name: joint.name, owner, multiplier, offset, is_own, newest })
+            is_fresh.then_some((number, joint.name, followed, history, newest))
         });
-        listed.collect()
+        let time = fresh.clone().map(|(.., newest)| newest).min()?;
+        for (number, name, (owner, multiplier, offset), history, _) in fresh {
+            let mut position = [0.0];
+            // The history of one that has only begun does not reach back to the others.
+            if history.sample(time, 0, &mut position).is_err() {
+                continue;
+            }
+            let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
+            let newest = history.newest_state();
+            let (velocity, effort) = newest.map_or((f64::NAN, f64::NAN), |State { velocity, effort, .. }| {
+                // The effort is its own if it mimics none.
+                (multiplier * first(velocity), if owner == number { first(effort) } else { f64::NAN })
+            });
+            listed.push(Listed { name, position: multiplier * position[0] + offset, velocity, effort });
+        }
+        Some(time)
     }
 }

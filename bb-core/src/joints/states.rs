@@ -1,4 +1,4 @@
-//! The histories of all joints behind one lock.
+//! The histories of all joints, under one lock.
 
 use super::error::{Gap, Missing};
 use super::history::{History, State};

@@ -233,7 +233,7 @@ impl Joints {
 fn joint_path(topology: &Topology, joint: &Joint) -> String {
     let mut names = vec![joint.name];
     let mut link = topology.links.get(joint.parent);
-    // A declared robot is a tree; this ends also where it is none.
+    // A declared robot is a tree. The loop ends even if it is not.
     for _ in 0..=topology.links.len() {
         let Some(at) = link else { break };
         names.push(at.name);

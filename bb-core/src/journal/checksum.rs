@@ -1,4 +1,4 @@
-//! A checksum of a message, to compare an output with what it was.
+//! A checksum of a message, to compare an output with that of the run.
 
 use crate::message::codec::Writer;
 use crate::message::{Payload, Stamped};

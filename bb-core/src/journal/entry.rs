@@ -177,7 +177,7 @@ pub enum Event {
         /// Whether it panicked.
         panicked: bool,
     },
-    /// A component hangs or did not stop well, or something that is no component failed; nothing followed from it.
+    /// A component hangs or did not stop well, or something other than a component failed. It had no other consequence.
     Noted {
         /// Its path.
         path: &'static str,
@@ -254,6 +254,13 @@ pub enum Event {
         cause: u64,
         /// Each, in order.
         inputs: Vec<PlacedInput>,
+    },
+    /// A command, a service or other code may publish at a path of its own.
+    OwnPublisher {
+        /// The path.
+        path: &'static str,
+        /// The name of the payload's type.
+        payload: &'static str,
     },
 }
 

@@ -6,14 +6,14 @@ use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// What may wait for the sink before outside producers have to wait for it.
+/// The load at which outside producers start to wait for the sink.
 pub(super) const CAPACITY: Load = Load { lines: 1 << 16, bytes: 64 << 20 };
 
-/// What may wait from any writer: estimators and the control state do not wait for the sink. One line more is taken, however
-/// large it is.
+/// The load at which the journal ends. Estimators and the control state do not wait for the sink. One line beyond it is taken,
+/// however large.
 pub(super) const MOST: Load = Load { lines: 4 * CAPACITY.lines, bytes: 4 * CAPACITY.bytes };
 
-/// What is handed to the sink at a time.
+/// The load of one batch for the sink.
 pub(super) const BATCH: Load = Load { lines: 1 << 10, bytes: 1 << 20 };
 
 /// How long outside producers wait for a sink that is too slow. One that takes no line for so long while [`CAPACITY`] waits

@@ -32,9 +32,9 @@ struct Inner {
 
 struct State {
     queue: Queue,
-    /// None once it has got the last line.
+    /// `None` once it has taken the last line.
     sink: Option<Sink>,
-    /// A thread of its own hands lines to the sink; else whoever flushes it does.
+    /// A dedicated thread hands lines to the sink; otherwise the thread that flushes does.
     has_thread: bool,
     /// A thread hands lines to the sink.
     is_draining: bool,
@@ -102,7 +102,7 @@ impl Journal {
         number
     }
 
-    /// Outside producers call this before they begin: it waits while the sink is too far behind.
+    /// Outside producers call this first. It waits while too many lines wait for the sink.
     #[inline]
     pub(crate) fn wait_for_room(&self) {
         if self.0.is_full.load(Ordering::Relaxed) {
@@ -135,7 +135,7 @@ impl Journal {
         self.0.lock().queue.ended.is_some()
     }
 
-    /// Looks whether the sink hangs while nobody writes. What is wrong, once; then the journal has ended.
+    /// Checks whether the sink hangs while nobody writes. Returns the error once; the journal has then ended.
     pub(crate) fn look(&self) -> Option<String> {
         let mut state = self.0.lock();
         self.0.judge(&mut state);
@@ -183,7 +183,7 @@ impl Inner {
         self.finish();
     }
 
-    /// Hands out what waits. The sink is user code: nothing but its own thread waits for it.
+    /// Hands out waiting lines. The sink is user code; only its own thread waits for it.
     fn flush(&self) {
         let mut state = self.lock();
         if state.is_draining || !state.has_begun {
@@ -366,7 +366,7 @@ mod tests {
     fn large_lines_are_bounded_by_their_bytes() {
         const LARGE: usize = 4 << 20;
         let (journal, release) = hanging();
-        // Nobody here waits for room. The text is not copied.
+        // None of these writes waits for room. The text is not copied.
         let written = (0..1000).filter(|_| journal.write(MonotonicTime::ZERO, 0, large(LARGE)) > 0).count();
         assert_eq!(written, MOST.bytes / LARGE, "the line beyond is refused");
         assert!(journal.look().is_some_and(|message| message.starts_with("its sink is too slow")));
@@ -381,7 +381,7 @@ mod tests {
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 std::thread::sleep(Duration::from_millis(300));
-                // It takes no more than what waits, and then hangs no more.
+                // The sink takes what is waiting and stops hanging.
                 drop(release);
             });
             journal.wait_for_room();

@@ -195,7 +195,7 @@ pub struct EstimatorStatistics {
     pub last_drop: Option<(&'static str, DropReason)>,
     /// Why it does not run, if it does not.
     pub stopped: Option<String>,
-    /// Why a dispatch was dropped for want of a transform the last time: which joint, and how old.
+    /// Why the last dispatch that lacked a transform was dropped: which joint, and how old its state was.
     pub last_gap: Option<LookupError>,
 }
 

@@ -4,6 +4,7 @@
 use super::Environment;
 use super::shared::SharedNode;
 use crate::fault::{Failed, Fault, caught, guarded, of_panic};
+use crate::message::{Panic, Payload, Stamped, copied};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
@@ -68,15 +69,46 @@ pub(crate) fn blame(environment: &Environment, failed: Failed) -> Result<(), Fai
     }
 }
 
-/// Hands on what an estimator has emitted at `path`, to those outside its island: a panic in there keeps nobody else from
+/// Passes a message that an estimator has emitted at `path` to those outside its island. A panic there does not prevent others from
 /// getting it.
 #[cold]
 pub(super) fn handed_on(environment: &Environment, path: &'static str, hand_on: impl FnOnce()) {
-    if let Err(failed) = guarded(hand_on) {
-        let emits = |node: &&SharedNode| node.declaration().outputs.contains(&path);
-        if let Some(node) = environment.nodes().iter().find(emits) {
-            report(environment, node.number(), &failed);
-        }
+    if let Err(fault) = guarded(hand_on) {
+        charge(environment, path, &fault);
+    }
+}
+
+/// Copies a message that was published at `path`, and charges its publisher if the payload's `Clone` panics.
+pub(super) fn copied_of<T: Payload>(
+    environment: &Environment,
+    path: &'static str,
+    message: &Stamped<T>,
+) -> Option<Stamped<T>> {
+    let mut panic = None;
+    let copy = copied(message, &mut panic);
+    if let Some(panic) = panic {
+        copy_failed(environment, path, panic);
+    }
+    copy
+}
+
+/// A message that was published at `path` was copied, and the payload's `Clone` panicked.
+#[cold]
+pub(super) fn copy_failed(environment: &Environment, path: &'static str, panic: Panic) {
+    charge(environment, path, &of_panic(panic));
+}
+
+/// Whether an estimator publishes at `path`.
+pub(super) fn emitter(environment: &Environment, path: &'static str) -> Option<usize> {
+    let emits = |node: &&SharedNode| node.declaration().outputs.contains(&path);
+    environment.nodes().iter().find(emits).map(SharedNode::number)
+}
+
+/// The publisher at `path` is charged with a panic in its payload's code: an estimator is restarted.
+fn charge(environment: &Environment, path: &'static str, fault: &Fault) {
+    match emitter(environment, path) {
+        Some(estimator) => report(environment, estimator, fault),
+        None => environment.overseer().message_failed(path, format!("its message {fault}")),
     }
 }
 

@@ -5,7 +5,7 @@ use super::mark::{Mark, RobotMark};
 use super::shared::SharedNode;
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
-use crate::fault::{Failed, Fault};
+use crate::fault::{Failed, Fault, guarded};
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
@@ -25,6 +25,8 @@ pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
     /// Code of an output of that estimator has panicked while the output was passed on: the estimator gets an entry.
     fn output_failed(&self, estimator: usize, message: String);
+    /// Code of a message of a sensor or a service has panicked in an island.
+    fn message_failed(&self, path: &'static str, message: String);
     /// Registers that the options of the component at `path` are bound to these parameters. An estimator gets new values as
     /// entries, other components through their inbox.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
@@ -94,7 +96,7 @@ struct Inner {
     joints: Joints,
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
-    /// By which a thread knows which robots' islands it is inside.
+    /// Identifies the robot to threads that are inside its islands.
     mark: RobotMark,
     /// Drains an island, once the robot is wired.
     drain: OnceLock<Drain>,
@@ -107,24 +109,45 @@ struct Inner {
     declared_facts: Mutex<Vec<String>>,
     /// The line of the journal that is being replayed.
     replayed_line: AtomicU64,
-    /// Outputs of the islands in a replay, to be compared with the journal.
-    replayed: ReplayedOutputs,
+    replayed: Comparison,
     /// Islands whose estimators have stopped.
     retired: (Mutex<usize>, Condvar),
 }
 
-/// Outputs of islands in a replay: publisher and checksum, in order.
+/// What a replay compares with the journal.
 #[derive(Debug, Default)]
-pub(crate) struct ReplayedOutputs(Mutex<HashMap<usize, VecDeque<(usize, u64)>>>);
+pub(crate) struct Comparison {
+    /// Outputs of islands: publisher and checksum, in order.
+    outputs: Mutex<HashMap<usize, VecDeque<(usize, u64)>>>,
+    missing: Mutex<Option<Missing>>,
+}
 
-impl ReplayedOutputs {
+/// What an estimator asked for in a replay, and the journal does not have.
+#[derive(Clone, Debug)]
+pub(crate) struct Missing {
+    /// Its path.
+    pub(crate) estimator: &'static str,
+    /// Such as `how long its callback took`.
+    pub(crate) what: String,
+}
+
+impl Comparison {
     pub(crate) fn add(&self, island: usize, publisher: usize, checksum: u64) {
-        lock(&self.0).entry(island).or_default().push_back((publisher, checksum));
+        lock(&self.outputs).entry(island).or_default().push_back((publisher, checksum));
     }
 
     /// Takes the first output of an island that has not been compared yet.
     pub(crate) fn take(&self, island: usize) -> Option<(usize, u64)> {
-        lock(&self.0).get_mut(&island)?.pop_front()
+        lock(&self.outputs).get_mut(&island)?.pop_front()
+    }
+
+    /// Keeps the first thing of a turn that is missing.
+    pub(super) fn miss(&self, missing: Missing) {
+        lock(&self.missing).get_or_insert(missing);
+    }
+
+    pub(crate) fn take_missing(&self) -> Option<Missing> {
+        lock(&self.missing).take()
     }
 }
 
@@ -182,7 +205,7 @@ impl Environment {
             facts: Mutex::default(),
             declared_facts: Mutex::default(),
             replayed_line: AtomicU64::new(0),
-            replayed: ReplayedOutputs::default(),
+            replayed: Comparison::default(),
             retired: Default::default(),
         }))
     }
@@ -215,7 +238,7 @@ impl Environment {
         lock(&self.0.refusal).get_or_insert(Refusal { path, fault });
     }
 
-    /// What kept the robot from starting, if anything did.
+    /// What prevented the robot from starting, if anything.
     pub(crate) fn take_refusal(&self) -> Option<Refusal> {
         lock(&self.0.refusal).take()
     }
@@ -388,7 +411,7 @@ impl Environment {
         self.0.journal.is_some() || self.0.telemetry.is_some() || self.0.mode == Mode::Replay
     }
 
-    pub(crate) fn replayed(&self) -> &ReplayedOutputs {
+    pub(crate) fn replayed(&self) -> &Comparison {
         &self.0.replayed
     }
 
@@ -408,6 +431,13 @@ impl Environment {
     ) -> u64 {
         self.0.joints.hear(message, now);
         match &self.0.journal {
+            None if self.0.mode == Mode::Replay => {
+                // Islands get it whatever happens to the copies for those who listen now.
+                if let Err(fault) = guarded(|| topic.publish(message)) {
+                    tracing::error!(%fault, "a recorded message failed where it was copied");
+                }
+                self.0.replayed_line.load(Ordering::Relaxed)
+            }
             None => {
                 topic.publish(message);
                 self.0.replayed_line.load(Ordering::Relaxed)

@@ -10,7 +10,7 @@
 //! inbox, for the thread that holds the island to process before it leaves. So there is a single writer, and every entry has
 //! its place in one order.
 //!
-//! No thread blocks on the island's own lock: it is only ever tried. Threads that need an island which is held (a caller that
+//! No thread blocks on the island's own lock; it is only ever tried. Threads that need an island that is held (a caller that
 //! waits for an answer, a publisher that waits for room) wait on a condition variable with a timeout, so that an estimator that
 //! hangs blocks no other thread forever.
 
@@ -34,6 +34,7 @@ use crate::journal::Event;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::fmt;
+use std::marker::PhantomData;
 use std::time::Duration;
 
 #[cfg(loom)]
@@ -157,7 +158,8 @@ pub struct Key {
 /// A message that waits.
 struct Keyed<M> {
     key: Key,
-    message: M,
+    /// None if it could not be copied: it keeps its place in the order, and is dropped when its turn comes.
+    message: Option<M>,
 }
 
 /// Why a call was not made.
@@ -169,11 +171,30 @@ pub(crate) enum CallError {
     Busy,
 }
 
-/// What a thread saw that looked at an island.
+/// What a thread found when it looked at an island.
 struct Looked {
     is_held: bool,
     /// An entry waits that another thread may have left because of the look.
     has_kept: bool,
+}
+
+/// Writes what a turn found out when it ends, also if it ends because the code of a message panicked.
+struct Ending<'a, 'b, S: IslandState> {
+    turn: &'a Turn<'b>,
+    /// The number of its line.
+    cause: u64,
+    island: PhantomData<S>,
+}
+
+impl<S: IslandState> Drop for Ending<'_, '_, S> {
+    fn drop(&mut self) {
+        if S::DECLARATION.is_measured {
+            self.turn.write(|turn| Event::Measured { cause: self.cause, callbacks: turn.take_measured() });
+        }
+        if self.turn.environment().joints().routes().has_any(S::DECLARATION.estimators) {
+            self.turn.write(|turn| Event::Placed { cause: self.cause, inputs: turn.take_placed() });
+        }
+    }
 }
 
 type Held<'a, S> = Within<MutexGuard<'a, S>>;
@@ -206,7 +227,7 @@ impl<S: IslandState> Island<S> {
         now: MonotonicTime,
         key: Key,
         direct: impl FnOnce(&mut S, &Turn<'_>),
-        message: impl FnOnce() -> S::Message,
+        message: impl FnOnce() -> Option<S::Message>,
     ) {
         if self.pending.load(Ordering::Relaxed) == 0
             && !self.served.load(Ordering::Relaxed)
@@ -249,23 +270,11 @@ impl<S: IslandState> Island<S> {
             None => environment.clock().wall_offset_nanos(),
         };
         let turn = Turn::new(environment, S::DECLARATION.number, now, wall_offset_nanos, &self.running);
+        let _ending = line.map(|(cause, _)| Ending::<S> { turn: &turn, cause, island: PhantomData });
         // One writer at a time: plain stores instead of atomic additions. These are for the report of a turn that hangs.
         self.entered_nanos.store(now.as_nanos(), RELAXED);
         self.turns.store(self.turns.load(RELAXED).wrapping_add(1), RELAXED);
-        let result = run(&turn);
-        if S::DECLARATION.is_measured
-            && let Some((cause, _)) = line
-            && let Some(journal) = environment.journal()
-        {
-            journal.write(now, wall_offset_nanos, Event::Measured { cause, callbacks: turn.take_measured() });
-        }
-        if let Some((cause, _)) = line
-            && let Some(journal) = environment.journal()
-            && environment.joints().routes().has_any(S::DECLARATION.estimators)
-        {
-            journal.write(now, wall_offset_nanos, Event::Placed { cause, inputs: turn.take_placed() });
-        }
-        result
+        run(&turn)
     }
 
     /// Puts a message into the inbox and makes sure that a thread processes it.
@@ -291,9 +300,7 @@ impl<S: IslandState> Island<S> {
         if let Some(dropped) = &dropped
             && let Some(journal) = wiring.environment().journal()
         {
-            let Key { entry, line } = dropped.key;
-            let event = Event::Drop { island: S::DECLARATION.number, entry, message: line };
-            journal.write(now, wiring.environment().clock().wall_offset_nanos(), event);
+            journal.write(now, wiring.environment().clock().wall_offset_nanos(), self::dropped::<S>(dropped.key));
         }
         inbox.push(now, message);
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
@@ -443,10 +450,11 @@ impl<S: IslandState> Island<S> {
         let retires = matches!(taken, Taken::Retire(_));
         self.process_line(wiring, now, line, |turn| match taken {
             Taken::Retire(_) => for_all(state, wiring, turn, || NodeEntry::Retire),
-            Taken::Entry(_, Entry::Message(Keyed { message, .. })) => {
+            Taken::Entry(_, Entry::Message(Keyed { message: Some(message), .. })) => {
                 state.deliver(wiring, &message, turn);
                 crate::fault::discard(message);
             }
+            Taken::Entry(_, Entry::Message(Keyed { key, message: None })) => S::dropped(wiring, key),
             Taken::Entry(_, Entry::Wake) => state.wake(wiring, turn),
             Taken::Entry(_, Entry::Start) => for_all(state, wiring, turn, || NodeEntry::Start),
             Taken::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
@@ -516,7 +524,7 @@ impl<S: IslandState> Island<S> {
         Some(Within::new(state, wiring.environment().mark()))
     }
 
-    /// Whether a thread holds it, for one that only wants to know.
+    /// Whether a thread holds it. The caller does not want to enter.
     fn is_held(&self, wiring: &S::Wiring) -> bool {
         let Looked { is_held, has_kept } = self.look();
         if has_kept {
@@ -530,7 +538,7 @@ impl<S: IslandState> Island<S> {
     fn look(&self) -> Looked {
         let tried = self.state.try_lock();
         let is_held = matches!(tried, Err(TryLockError::WouldBlock));
-        // Releasing a lock is no step of a model: this is one at which others find it taken.
+        // Releasing a lock is not a step of the model. This is one, at which other threads find the lock taken.
         #[cfg(loom)]
         self.pending.load(Ordering::Relaxed);
         drop(tried);
@@ -555,9 +563,14 @@ fn deliver<S: IslandState>(key: Key) -> Event {
     Event::Deliver { island: S::DECLARATION.number, entry: key.entry, message: key.line }
 }
 
+fn dropped<S: IslandState>(key: Key) -> Event {
+    Event::Drop { island: S::DECLARATION.number, entry: key.entry, message: key.line }
+}
+
 fn line_of<S: IslandState>(entry: &Entry<Keyed<S::Message>>) -> Event {
     match entry {
-        Entry::Message(message) => deliver::<S>(message.key),
+        Entry::Message(Keyed { key, message: Some(_) }) => deliver::<S>(*key),
+        Entry::Message(Keyed { key, message: None }) => dropped::<S>(*key),
         Entry::Wake => Event::Wake { island: S::DECLARATION.number },
         Entry::Start => Event::Start { island: S::DECLARATION.number },
         Entry::Node(estimator, entry) => entry.line(*estimator, S::DECLARATION.number),

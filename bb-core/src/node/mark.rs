@@ -1,4 +1,4 @@
-//! What a robot is known by to the threads that are inside its islands.
+//! Identifies a robot to the threads that are inside its islands.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -18,11 +18,11 @@ impl Mark {
     }
 }
 
-/// A robot has its mark as long as this lives.
+/// A robot owns its mark until this is dropped.
 #[derive(Debug)]
 pub(super) struct RobotMark(Mark);
 
-/// The bits that robots have, and always the one that is shared.
+/// The bits that are taken. The shared one always is.
 static TAKEN: AtomicU64 = AtomicU64::new(SHARED_BIT);
 const SHARED_BIT: u64 = 1 << 63;
 

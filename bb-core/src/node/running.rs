@@ -7,7 +7,8 @@ mod requests;
 use super::admission::Admission;
 use super::backlog::Backlog;
 use super::counters::SAMPLED;
-use super::environment::{BindTarget, Environment, Mode};
+use super::emission::{copied_of, copy_failed};
+use super::environment::{BindTarget, Environment, Missing, Mode};
 use super::health::{Event, Health};
 use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
@@ -112,8 +113,9 @@ pub enum Next {
 }
 
 impl<E: Estimator> Node<E> {
-    /// Makes the estimator; what keeps it from starting is kept in `environment`. `make_cache` makes the slots of its inputs,
-    /// and `binding` puts parameters into its options. In a replay it is made when the journal begins.
+    /// Creates the estimator; an error that prevents it from starting is stored in `environment`. `make_cache` creates the
+    /// slots of its inputs, and `binding` puts parameters into its options. In a replay it is created when the journal
+    /// begins.
     pub fn new(
         number: usize,
         options: &E::Options,
@@ -200,8 +202,10 @@ impl<E: Estimator> Node<E> {
                 return Ok(Handled::Refused(reason));
             }
             if !declared.driver {
-                if let Some(slot) = F::slot(cache) {
-                    slot.store(message);
+                if let Some(slot) = F::slot(cache)
+                    && let Err(panic) = slot.store(message)
+                {
+                    copy_failed(turn.environment(), declared.source, panic);
                 }
                 turn.timing().interrupt();
                 return Ok(Handled::Stored);
@@ -275,10 +279,10 @@ impl<E: Estimator> Node<E> {
         self.timers.continue_with.is_some()
     }
 
-    /// Does one thing that is due, if any is.
+    /// Does one thing that is due, if there is any.
     pub fn turn(&mut self, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
         turn.timing().interrupt();
-        // An estimator that is woken says when to be woken next.
+        // An estimator that is woken schedules its next wake-up.
         self.scheduled = None;
         if self.slot.restart_at().is_some_and(|at| at <= turn.now()) {
             self.restart(turn);
@@ -410,8 +414,12 @@ impl<E: Estimator> Node<E> {
     ) -> Option<HealthReason> {
         let budget = self.declaration.health.latency_budget_nanos;
         let Measured { end, nanos } = turn.timing().end(begun, turn.environment(), || {
-            let is_replayed = turn.environment().mode() == Mode::Replay && budget.is_some();
-            self.shared.virtual_latency_nanos(is_replayed)
+            if turn.environment().mode() == Mode::Replay && budget.is_some() {
+                let nanos = self.shared.replayed_latency_nanos();
+                nanos.unwrap_or_else(|| self.miss_in_journal("how long its callback took".to_owned()))
+            } else {
+                self.shared.pretended_latency_nanos()
+            }
         });
         let counters = self.shared.counters();
         counters.latency.add(nanos.max(0) as u64);
@@ -428,6 +436,13 @@ impl<E: Estimator> Node<E> {
         let budget = budget?;
         turn.keep(self.shared.number(), nanos);
         (nanos > budget).then_some(HealthReason::LatencyOverrun)
+    }
+
+    /// In a replay: the journal does not have what the estimator asks for.
+    #[cold]
+    fn miss_in_journal<D: Default>(&self, what: String) -> D {
+        self.environment.replayed().miss(Missing { estimator: self.declaration.path, what });
+        D::default()
     }
 
     #[cold]
@@ -484,17 +499,18 @@ impl<E: Estimator> Node<E> {
             self.shared.counters().drop(input, DropReason::Stopped);
             return;
         }
-        // User code runs here: the `clone` of this payload, and the `drop` of the oldest that makes room.
-        let kept = caught(|| {
-            let message = message.clone();
-            let deliver: Deliver<E> =
-                Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
-            Ok(self.backlog.push(input, deliver))
-        });
-        match kept {
+        let declared = self.declaration.inputs.get(input);
+        let copy = declared.and_then(|declared| copied_of(&self.environment, declared.source, message));
+        let Some(message) = copy else {
+            self.shared.counters().drop(input, DropReason::Stopped);
+            return;
+        };
+        let deliver: Deliver<E> =
+            Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
+        // Dropping the oldest to make room is user code.
+        match caught(|| Ok(self.backlog.push(input, deliver))) {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
             Ok(None) => {}
-            // The payload's `clone` panicked: it cannot be stored.
             Err(failed) => {
                 self.shared.counters().drop(input, DropReason::Stopped);
                 self.report_failure(&failed);

@@ -138,6 +138,12 @@ impl SharedNode {
         self.0.pretended_latency_nanos.store(nanos, Ordering::Relaxed);
     }
 
+    /// A turn begins in a replay: what was known of earlier ones is over.
+    pub(crate) fn begin_replayed_turn(&self) {
+        lock(&self.0.replayed_latencies).clear();
+        lock(&self.0.replayed_placements).clear();
+    }
+
     /// Sets how long the next measured callback takes in a replay.
     pub(crate) fn replay_latency(&self, nanos: i64) {
         lock(&self.0.replayed_latencies).push_back(nanos);
@@ -155,11 +161,13 @@ impl SharedNode {
         placements.pop_front().map(|placed| placed.placement)
     }
 
-    /// How long a callback took on virtual time.
-    pub(super) fn virtual_latency_nanos(&self, is_replay: bool) -> i64 {
-        if is_replay {
-            return lock(&self.0.replayed_latencies).pop_front().unwrap_or(0);
-        }
+    /// How long the next measured callback took, as the journal has it.
+    pub(super) fn replayed_latency_nanos(&self) -> Option<i64> {
+        lock(&self.0.replayed_latencies).pop_front()
+    }
+
+    /// How long callbacks are made to take on virtual time.
+    pub(super) fn pretended_latency_nanos(&self) -> i64 {
         self.0.pretended_latency_nanos.load(Ordering::Relaxed)
     }
 }

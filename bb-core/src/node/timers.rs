@@ -49,7 +49,7 @@ impl Timers {
     pub(super) fn next(&self) -> Option<MonotonicTime> {
         let timers = self.timers.iter().map(|(_, time)| *time);
         let all = timers.chain(self.timeout).chain(self.tick.map(|(_, time)| time));
-        // The last instant is one that never comes.
+        // The last instant never comes.
         all.min().filter(|time| *time < MonotonicTime::MAX)
     }
 

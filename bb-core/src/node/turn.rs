@@ -1,6 +1,6 @@
 //! One entry that an island processes.
 
-use super::emission::handed_on;
+use super::emission::{copied_of, handed_on};
 use super::environment::{Environment, Mode};
 use super::timing::Timing;
 use crate::declaration::EstimatorDeclaration;
@@ -112,6 +112,13 @@ impl<'a> Turn<'a> {
         self.placed.take()
     }
 
+    /// Writes a line of this turn, if there is a journal.
+    pub(super) fn write(&self, line: impl FnOnce(&Self) -> Event) {
+        if let Some(journal) = self.environment.journal() {
+            journal.write(self.now, self.wall_offset_nanos, line(self));
+        }
+    }
+
     /// The journal does not contain the request that `estimator` is about to answer, so its outputs are recorded instead. What
     /// other estimators emit follows from these.
     pub(super) fn set_unrecorded(&self, estimator: &'static EstimatorDeclaration) {
@@ -143,10 +150,13 @@ impl<'a> Turn<'a> {
         if T::TELLS_JOINT_POSITION || self.is_observed || topic.is_listened_to() {
             // Copies for others may take longer than the callback after them.
             self.timing.interrupt();
-            handed_on(self.environment, topic.path(), || {
-                self.environment.joints().hear(message, self.now);
+            let path = topic.path();
+            if T::TELLS_JOINT_POSITION {
+                handed_on(self.environment, path, || self.environment.joints().hear(message, self.now));
+            }
+            handed_on(self.environment, path, || {
                 if self.is_observed {
-                    self.follow(publisher, topic.path(), message);
+                    self.follow(publisher, path, message);
                 }
                 topic.publish_alone(message);
             });
@@ -157,16 +167,17 @@ impl<'a> Turn<'a> {
 
     #[cold]
     fn follow<T: Payload>(&self, publisher: usize, path: &'static str, message: &Stamped<T>) {
-        if let Some(journal) = self.environment.journal() {
+        if self.environment.journal().is_some() {
             let is_answer = self.unrecorded.get().is_some_and(|estimator| estimator.outputs.contains(&path));
             let event = if is_answer {
                 let is_first = !self.has_emitted.replace(true);
-                let message = Recorded::Message(DynamicMessage::new(path, message));
+                let Some(message) = copied_of(self.environment, path, message) else { return };
+                let message = Recorded::Message(DynamicMessage::of(path, message));
                 Event::Emission { publisher, is_first, message }
             } else {
                 Event::Output { island: self.island, publisher, checksum: checksum(message) }
             };
-            journal.write(self.now, self.wall_offset_nanos, event);
+            self.write(|_| event);
         }
         if self.environment.mode() == Mode::Replay {
             self.environment.replayed().add(self.island, publisher, checksum(message));

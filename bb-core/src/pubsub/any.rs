@@ -43,9 +43,13 @@ pub(super) trait AnyMessage: Send + Sync {
 
 impl DynamicMessage {
     pub(crate) fn new<T: Payload>(path: &'static str, message: &Stamped<T>) -> Self {
+        Self::of(path, message.clone())
+    }
+
+    pub(crate) fn of<T: Payload>(path: &'static str, message: Stamped<T>) -> Self {
         let heap = if T::IS_INLINE { 0 } else { message.payload.heap_bytes() };
         let bytes = size_of::<Stamped<T>>().saturating_add(heap);
-        Self { path, message: Arc::new(message.clone()), bytes }
+        Self { path, message: Arc::new(message), bytes }
     }
 
     pub(crate) fn bytes(&self) -> usize {

@@ -2,6 +2,7 @@
 
 use super::any::{AnyTopic, DynamicMessage, Tap};
 use super::queue::Queue;
+use super::statistics::TopicStatistics;
 use super::{DynamicSubscription, Overflow, Payloads, Select, Topic};
 use crate::message::Payload;
 use crate::message::codec::intern;
@@ -25,6 +26,8 @@ pub(crate) struct Registry {
 #[derive(Default)]
 struct State {
     topics: BTreeMap<&'static str, Made>,
+    /// In a replay: paths that had a publisher, with the name of its payload, whose type is not known before the first message.
+    expected: BTreeMap<&'static str, &'static str>,
     /// Topics that were made so far.
     made: u64,
     selections: Selections,
@@ -129,6 +132,27 @@ impl Registry {
         drop(state);
         drop(evicted);
         Ok(topic)
+    }
+
+    /// Whether a topic was made at `path`.
+    pub(crate) fn has(&self, path: &str) -> bool {
+        self.lock().topics.contains_key(path)
+    }
+
+    /// In a replay: somebody could publish at `path`.
+    pub(crate) fn expect(&self, path: &'static str, payload: &'static str) {
+        self.lock().expected.insert(path, payload);
+    }
+
+    /// What all topics made here have counted, by path.
+    pub(crate) fn statistics(&self) -> Vec<TopicStatistics> {
+        let expected = self.lock().expected.clone();
+        let silent =
+            |(path, payload)| (path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
+        let mut all: BTreeMap<_, _> = expected.into_iter().map(silent).collect();
+        // Subscriptions are asked for what they have counted without the lock.
+        all.extend(self.topics().iter().map(|topic| (topic.path(), topic.statistics())));
+        all.into_values().collect()
     }
 
     /// All topics made here, by path.

@@ -6,8 +6,9 @@ use super::subscribers::{Subscribers, lock};
 use super::subscription::Subscription;
 use super::wakers::{Wakers, wake};
 use crate::Payload;
-use crate::message::Stamped;
+use crate::message::{Panic, Stamped, copied};
 use std::fmt;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::Waker;
@@ -127,8 +128,10 @@ impl<T: Payload> Topic<T> {
     #[inline]
     pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         self.published.fetch_add(1, Ordering::Relaxed);
-        if self.listening.load(Ordering::Acquire) > 0 {
-            self.deliver(message, wakers);
+        if self.listening.load(Ordering::Acquire) > 0
+            && let Some(panic) = self.deliver(message, wakers)
+        {
+            resume_unwind(panic);
         }
     }
 
@@ -142,20 +145,29 @@ impl<T: Payload> Topic<T> {
     #[cold]
     fn deliver_and_wake(&self, message: &Stamped<T>) {
         let mut wakers = Wakers::dropping_at_once();
-        self.deliver(message, &mut wakers);
+        let panic = self.deliver(message, &mut wakers);
         wakers.run();
+        if let Some(panic) = panic {
+            resume_unwind(panic);
+        }
     }
 
+    /// Returns a panic of the payload's `Clone`; the message is handed to everybody all the same.
     #[cold]
-    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) {
+    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) -> Option<Panic> {
         let Listeners { queues, taps } = self.listeners();
         let bytes = counted_bytes(message);
-        let typed: u64 = queues.iter().map(|queue| queue.push(message.clone(), bytes, wakers)).sum();
-        let untyped = match &*taps {
-            [] => 0,
-            taps => tap_all(taps, DynamicMessage::new(self.path, message), bytes, wakers),
-        };
-        self.count_lost(typed + untyped);
+        let mut panic = None;
+        let mut lost: u64 = queues
+            .iter()
+            .map(|queue| copied(message, &mut panic).map_or(1, |copy| queue.push(copy, bytes, wakers)))
+            .sum();
+        if !taps.is_empty() {
+            let copy = copied(message, &mut panic).map(|copy| DynamicMessage::of(self.path, copy));
+            lost += copy.map_or(taps.len() as u64, |copy| tap_all(&taps, copy, bytes, wakers));
+        }
+        self.count_lost(lost);
+        panic
     }
 
     /// Those who listen now.

@@ -1,4 +1,4 @@
-//! A running actuator: whether it may move, and what becomes of it when it fails.
+//! A running actuator: when it may move, and what happens when it fails.
 
 mod held;
 
@@ -34,7 +34,7 @@ struct Inner<A: Actuator> {
     environment: Environment,
     control: Control,
     topic: Topic<A::Command>,
-    /// What its supervisor and parameters tell it.
+    /// Orders of its supervisor and changes of parameters.
     orders: Mutex<Vec<Order>>,
     /// When its code was entered.
     occupied: Occupied,
@@ -65,7 +65,7 @@ enum Order {
 }
 
 impl<A: Actuator> ActuatorNode<A> {
-    /// Makes the actuator; what keeps the robot from starting is kept in `assembly`.
+    /// Creates the actuator; an error that prevents the robot from starting is stored in `assembly`.
     pub fn new(
         number: usize,
         declaration: &'static ActuatorDeclaration,
@@ -258,7 +258,7 @@ impl<A: Actuator> Inner<A> {
         }
     }
 
-    /// Makes it safe, and makes it again.
+    /// Makes it safe, then creates it again.
     fn remake(&self, state: &mut State<A>, now: MonotonicTime) {
         self.make_safe(state);
         self.make(state, now);

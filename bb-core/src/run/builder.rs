@@ -1,12 +1,13 @@
 //! A robot before it starts.
 
-use super::apart::Apart;
 use super::bound::refused_by_bound;
+use super::closing::Closing;
 use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
 use super::joints::known_joints;
 use super::machine::Machine;
+use super::remains::Remains;
 use super::running::STOP_WITHIN;
 use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
@@ -186,8 +187,10 @@ impl<R: Robot> Builder<R> {
         Ok(Replay::new(machine))
     }
 
-    /// Dropping what has started stops it in order.
+    /// Dropping the result stops in order what has started.
     fn assemble(self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
+        // Of a robot that does not start: dropped after all that is declared below.
+        let mut _remains = None;
         let origin = Origin { robot: R::NAME, node: self.node };
         let journal = self.journal.filter(|_| mode != Mode::Replay);
         let wall_offset_nanos = clock.wall_offset_nanos();
@@ -243,7 +246,7 @@ impl<R: Robot> Builder<R> {
             let wiring: Option<Arc<R::Wiring>> = drained.get().and_then(std::sync::Weak::upgrade);
             if let (Some(wiring), Some(find)) = (wiring, R::ISLANDS.get(island)) {
                 let island = find(&wiring);
-                // Nobody's that is known: that of a payload in an inbox, say.
+                // The component is unknown: the code of a payload in an inbox, say.
                 if let Err(failed) = contained(environment, || island.drain(&wiring)) {
                     tracing::error!(fault = %failed.fault, "an island was left");
                 }
@@ -260,12 +263,12 @@ impl<R: Robot> Builder<R> {
         let abandon = |path, fault| {
             control.begin_stop();
             control.wait_until_disarmed();
-            let mut dropping = Apart::default();
+            let mut dropping = Closing::default();
             for (path, hook) in control.take_all_hooks() {
                 dropping.discard(&control, path, hook);
             }
             control.pool().close();
-            // What hangs is left behind: there is no report, and the error says what keeps the robot from starting.
+            // Callbacks that hang are left running. There is no report, and the error says what prevents the robot from starting.
             dropping.wait(Instant::now() + STOP_WITHIN);
             StartError::component(path, fault)
         };
@@ -279,9 +282,13 @@ impl<R: Robot> Builder<R> {
             Ok((wiring, sources))
         });
         if let Some(refusal) = environment.take_refusal() {
-            return Err(abandon(refusal.path, refusal.fault));
+            let error = abandon(refusal.path, refusal.fault);
+            if mode == Mode::Real {
+                _remains = Remains::of((wired.map(|(wiring, _)| wiring).ok(), environment, control.clone()));
+            }
+            return Err(error);
         }
-        // Each component's code is guarded on its own, with its path; this is for what no one has thought of.
+        // Each component's code is guarded separately, with its path. This is for anything else.
         let (wiring, sources) = wired.map_err(|failed| abandon(R::NAME, failed.fault))?;
         if let Some(journal) = &journal {
             let declaration = facts.iter().cloned().chain(environment.facts()).collect();
@@ -303,6 +310,7 @@ impl<R: Robot> Builder<R> {
             sources: Mutex::new(shared),
             has_ended: AtomicBool::new(false),
             last_report: OnceLock::new(),
+            remains: None,
         };
         Ok((machine, sources))
     }

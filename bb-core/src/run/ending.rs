@@ -1,8 +1,8 @@
-//! How a robot ends once it was disarmed: its estimators and actuators stop, the journal and the last report are made, and
-//! what components own is closed. Nothing here waits for user code without a limit.
+//! The end of a robot after its disarming: estimators and actuators stop, the journal and the last report are completed, and
+//! components are closed. Every wait for user code here has a time limit.
 
 use super::Robot;
-use super::apart::Apart;
+use super::closing::Closing;
 use super::machine::Machine;
 use super::threads::since;
 use crate::fault::wake;
@@ -24,7 +24,7 @@ const LEAST_TO_STOP: Duration = Duration::from_millis(100);
 const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
 
 impl<R: Robot> Machine<R> {
-    /// Has all estimators stop; those that are busy until `deadline` are left behind, and reported.
+    /// Stops all estimators. Those that are busy until `deadline` are left running and reported.
     pub(super) fn retire_islands(&self, deadline: Instant) {
         let now = self.environment.clock().now();
         for island in self.islands() {
@@ -42,7 +42,7 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// On virtual time: has all estimators stop, in order. The journal's line of the stop implies it.
+    /// On virtual time: stops all estimators in order. The journal's line of the stop implies it.
     pub(super) fn retire_quietly(&self) {
         let now = self.environment.clock().now();
         for island in self.islands() {
@@ -50,11 +50,11 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Closes all actuators at the same time; those that are busy, or whose code has not returned, at `deadline` are left
-    /// behind and reported.
+    /// Closes all actuators at the same time. Those that are busy at `deadline`, or whose code has not returned, are left running and
+    /// reported.
     pub(super) fn terminate_actuators(self: &Arc<Self>, deadline: Instant) {
         let deadline = deadline.max(Instant::now() + LEAST_TO_STOP);
-        let mut closing = Apart::default();
+        let mut closing = Closing::default();
         for (number, actuator) in R::all_actuators(&self.wiring).into_iter().enumerate() {
             let machine = Arc::clone(self);
             closing.run(&self.control, actuator.path(), move || {
@@ -104,7 +104,7 @@ impl<R: Robot> Machine<R> {
             }
         }
         let deadline = deadline.max(Instant::now() + LEAST_TO_CLOSE);
-        let mut dropping = Apart::default();
+        let mut dropping = Closing::default();
         for (path, hook) in self.control.take_all_hooks() {
             dropping.discard(&self.control, path, hook);
         }
@@ -131,7 +131,7 @@ impl<R: Robot> Machine<R> {
         self.control.pool().close();
     }
 
-    /// Each waker may block for ever, and is a job of its own.
+    /// Each waker may block forever, so each is a separate job.
     fn wake_all(&self, wakers: Vec<Waker>) {
         for waker in wakers {
             if self.control.is_virtual() {

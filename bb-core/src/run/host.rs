@@ -30,6 +30,14 @@ impl<R: Robot> RobotHost<R> {
     fn wiring(&self) -> Option<Arc<R::Wiring>> {
         self.wiring.get()?.upgrade()
     }
+
+    /// Writes a line, if there is a journal.
+    fn note(&self, line: impl FnOnce() -> Event) {
+        if let Some(journal) = &self.journal {
+            let clock = self.control.clock();
+            journal.write(clock.now(), clock.wall_offset_nanos(), line());
+        }
+    }
 }
 
 impl<R: Robot> Guardian for RobotHost<R> {
@@ -110,12 +118,12 @@ impl<R: Robot> Host for RobotHost<R> {
         }
     }
 
+    fn note_publisher(&self, path: &'static str, payload: &'static str) {
+        self.note(|| Event::OwnPublisher { path, payload });
+    }
+
     fn note_own(&self, message: DynamicMessage) {
-        if let Some(journal) = &self.journal {
-            let clock = self.control.clock();
-            let event = Event::Own { path: message.path(), message: Recorded::Message(message) };
-            journal.write(clock.now(), clock.wall_offset_nanos(), event);
-        }
+        self.note(|| Event::Own { path: message.path(), message: Recorded::Message(message) });
     }
 
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {

@@ -1,6 +1,7 @@
-//! What all runs share: the wiring, and what can be asked of it.
+//! What all kinds of run share: the wiring and the operations on it.
 
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
+use super::remains::Remains;
 use super::source::SharedSource;
 use super::visit::{Visit, Visitable};
 use super::{ActuatorError, Report, Robot, SensorHandle};
@@ -28,6 +29,8 @@ pub(super) struct Machine<R: Robot> {
     pub(super) has_ended: AtomicBool,
     /// What it had done when it ended.
     pub(super) last_report: OnceLock<Report>,
+    /// Set in `drop`. The last field, since it is dropped last.
+    pub(super) remains: Option<Remains>,
 }
 
 /// One-way requests that may wait for an estimator; one more is refused.
@@ -205,8 +208,7 @@ impl<R: Robot> Machine<R> {
     pub(super) fn report_of(&self, control: Summary) -> Report {
         let topics = self.topics();
         let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
-        let made = self.control.topics().registry.topics();
-        let made = made.iter().map(|topic| topic.statistics());
+        let made = self.control.topics().registry.statistics();
         let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
         let Summary { commands, state, safety, faults, all_faults } = control;
         Report {
@@ -222,9 +224,19 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Keeps what is wrong with a component that did not come back.
+    /// Records a fault of a component that did not return.
     pub(super) fn fault(&self, path: &'static str, message: String) -> ComponentFault {
         self.control.note_fault(path, message.clone());
         ComponentFault { path, message }
+    }
+}
+
+impl<R: Robot> Drop for Machine<R> {
+    /// On virtual time all user code runs on the caller's thread.
+    fn drop(&mut self) {
+        if !self.control.is_virtual() {
+            let shared = (Arc::clone(&self.wiring), self.environment.clone(), self.control.clone());
+            self.remains = Remains::of((shared, Arc::clone(&self.host)));
+        }
     }
 }

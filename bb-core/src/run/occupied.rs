@@ -1,4 +1,4 @@
-//! Whose code a thread is inside, and since when.
+//! When a thread entered a component's code.
 
 use crate::time::{Clock, MonotonicTime};
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -27,7 +27,7 @@ impl Occupied {
     }
 }
 
-/// The code of a component runs as long as this lives.
+/// The code of a component runs until this is dropped.
 pub(super) struct Entered<'a>(&'a Occupied);
 
 impl Drop for Entered<'_> {

@@ -6,9 +6,10 @@ use super::visit::Visitable;
 use super::{Live, Report, Robot};
 use crate::component::{HandleCall, HandleCast};
 use crate::declaration::ParameterValues;
+use crate::fault::guarded;
 use crate::joints::PlacedInput;
 use crate::journal::{Callback, Entry, Event, Publishers, Recorded, Request, decoded};
-use crate::node::{Key, NodeEntry, Replayed, know_calls, know_casts};
+use crate::node::{Key, Missing, NodeEntry, Replayed, contained, know_calls, know_casts};
 use crate::pubsub::{AnyTopic, DynamicMessage};
 use crate::time::MonotonicTime;
 use std::collections::{HashMap, VecDeque};
@@ -29,6 +30,8 @@ pub struct Replay<R: Robot> {
     is_virtual: bool,
     /// The last request of each island that the journal does not hold, by line and type.
     unrecorded: HashMap<usize, (u64, String)>,
+    /// Turns that had not ended when the journal did.
+    cut: Vec<ReplayError>,
 }
 
 /// Why a journal cannot be replayed.
@@ -51,6 +54,7 @@ impl<R: Robot> Replay<R> {
             has_begun: false,
             is_virtual: false,
             unrecorded: HashMap::new(),
+            cut: Vec::new(),
         }
     }
 
@@ -99,9 +103,11 @@ impl<R: Robot> Replay<R> {
         know_casts::<V::Estimator, Q>();
     }
 
-    /// Plays what waits, stops the robot, and gives the last report. What does not fit is among its faults.
+    /// Plays what waits, stops the robot, and gives the last report. What does not fit is among its faults, and so is a line at
+    /// which the journal is cut: the turn that it begins had not ended, and is replayed as far as the journal tells.
     pub fn stop(mut self) -> Report {
-        if let Err(error) = self.advance(true) {
+        let played = self.advance(true).err();
+        for error in self.cut.drain(..).chain(played) {
             self.live.0.fault("journal", error.to_string());
         }
         let machine = &self.live.0;
@@ -130,7 +136,14 @@ impl<R: Robot> Replay<R> {
             }
             let Some(entry) = self.waiting.pop_front() else { return Ok(()) };
             let line = entry.number;
-            self.line(entry).map_err(|message| ReplayError { line, message })?;
+            if let Err(message) = self.line(entry) {
+                // What followed from a turn that the journal cuts is in it, and does not follow now.
+                if !self.cut.is_empty() {
+                    self.waiting.clear();
+                    return Ok(());
+                }
+                return Err(ReplayError { line, message });
+            }
         }
         Ok(())
     }
@@ -143,12 +156,32 @@ impl<R: Robot> Replay<R> {
         {
             return true;
         }
-        let island = self.live.0.island(number);
+        self.has_not_ended(number, entry.number)
+    }
+
+    /// Whether the lines are missing that an island writes when the turn of that line has ended.
+    fn has_not_ended(&self, island: usize, line: u64) -> bool {
+        let island = self.live.0.island(island);
         let is_measured = island.is_some_and(|island| island.declaration().is_measured);
         let routes = self.live.0.environment.joints().routes();
         let is_placed = island.is_some_and(|island| routes.has_any(island.estimators()));
-        (is_measured && !self.measured.contains_key(&entry.number))
-            || (is_placed && !self.placed.contains_key(&entry.number))
+        (is_measured && !self.measured.contains_key(&line)) || (is_placed && !self.placed.contains_key(&line))
+    }
+
+    /// Prepares what the turn of a line is told by the journal; returns false if the journal ends before that turn does.
+    fn prepare(&mut self, island: usize, line: u64) -> bool {
+        let is_whole = !self.has_not_ended(island, line);
+        let environment = &self.live.0.environment;
+        for estimator in self.live.0.island(island).map_or(&[][..], |island| island.estimators()) {
+            environment.node(*estimator).begin_replayed_turn();
+        }
+        for Callback { estimator, nanos } in self.measured.remove(&line).unwrap_or_default() {
+            environment.node(estimator).replay_latency(nanos);
+        }
+        for placed in self.placed.remove(&line).unwrap_or_default() {
+            environment.node(placed.estimator).replay_placement(placed);
+        }
+        is_whole
     }
 
     /// The next line, of those that wait from `first` on, that an island processed or wrote while it did.
@@ -185,31 +218,47 @@ impl<R: Robot> Replay<R> {
         }
     }
 
+    /// Plays a line. Where the journal is cut in the turn of that line, it does not have all that the estimators ask for.
     fn line(&mut self, entry: Entry) -> Result<(), String> {
         let Entry { number, time, event } = entry;
         if !self.has_begun {
             return self.begin(time, event);
         }
+        let island = self.island_of(&event);
+        let is_whole = island.is_none_or(|island| self.prepare(island, number));
+        self.play_event(number, time, event)?;
+        match self.live.0.environment.replayed().take_missing() {
+            None => Ok(()),
+            Some(Missing { estimator, what }) if is_whole => Err(format!(
+                "`{estimator}` asks {what}, and did not then: the algorithm is not deterministic{}",
+                island.map_or_else(String::new, |island| self.hint(island))
+            )),
+            Some(Missing { estimator, what }) => {
+                let message = format!("the journal is cut here: it does not say {what} for `{estimator}`");
+                self.cut.push(ReplayError { line: number, message });
+                Ok(())
+            }
+        }
+    }
+
+    fn play_event(&mut self, number: u64, time: MonotonicTime, event: Event) -> Result<(), String> {
         let machine = Arc::clone(&self.live.0);
         let control = &machine.control;
         machine.environment.clock().set_to(time);
-        for Callback { estimator, nanos } in self.measured.remove(&number).unwrap_or_default() {
-            machine.environment.node(estimator).replay_latency(nanos);
-        }
-        for placed in self.placed.remove(&number).unwrap_or_default() {
-            machine.environment.node(placed.estimator).replay_placement(placed);
-        }
         match event {
             Event::Begin { .. } => return Err("the journal begins again".to_owned()),
             Event::WallClock { offset_nanos } => machine.environment.clock().set_wall_offset_nanos(offset_nanos),
             Event::Message { publisher, message } => {
                 let message = self.message(publisher, message)?;
                 machine.environment.set_replayed_line(number);
-                if !R::feed(&machine.wiring, publisher, &message, time) {
+                let mut is_fed = true;
+                handed_out(|| is_fed = R::feed(&machine.wiring, publisher, &message, time));
+                if !is_fed {
                     return Err("the robot has no such sensor, or one of another payload".to_owned());
                 }
             }
             Event::Own { path, message } => self.publish_own(path, message)?,
+            Event::OwnPublisher { path, payload } => control.topics().registry.expect(path, payload),
             Event::Actuated { actuator, message } => self.actuated(actuator, message)?,
             Event::Deliver { island, entry, message } => {
                 self.island(island, time, Replayed::Deliver(Key { entry, line: message }))?;
@@ -310,7 +359,11 @@ impl<R: Robot> Replay<R> {
     fn go_on(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
         let machine = &self.live.0;
         let island = machine.island(number).ok_or("the robot has no such island")?;
-        if island.replay(&machine.wiring, time, entry) {
+        // A panic in the code of an estimator's output, which ends the turn, has a line of its own.
+        let mut is_known = true;
+        contained(&machine.environment, || is_known = island.replay(&machine.wiring, time, entry))
+            .map_err(|failed| failed.fault.to_string())?;
+        if is_known {
             return Ok(());
         }
         Err("no such message waits: it is of another robot, or lines are missing".to_owned())
@@ -392,7 +445,9 @@ impl<R: Robot> Replay<R> {
         let actuators = R::all_actuators(&self.live.0.wiring);
         let actuator = actuators.get(number).ok_or("the robot has no such actuator")?;
         let message = decoded(actuator.any_topic(), message).map_err(|error| error.to_string())?;
-        if actuator.replay(&message) { Ok(()) } else { Err("the actuator takes other commands".to_owned()) }
+        let mut is_known = true;
+        handed_out(|| is_known = actuator.replay(&message));
+        if is_known { Ok(()) } else { Err("the actuator takes other commands".to_owned()) }
     }
 
     fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
@@ -409,7 +464,9 @@ impl<R: Robot> Replay<R> {
             }
         };
         let message = decoded(&*topic, message).map_err(|error| error.to_string())?;
-        if topic.publish_dynamic(&message) { Ok(()) } else { Err(format!("`{path}` has another payload")) }
+        let mut is_known = true;
+        handed_out(|| is_known = topic.publish_dynamic(&message));
+        if is_known { Ok(()) } else { Err(format!("`{path}` has another payload")) }
     }
 
     fn message(&self, publisher: usize, message: Recorded) -> Result<DynamicMessage, String> {
@@ -421,6 +478,14 @@ impl<R: Robot> Replay<R> {
     fn path_of(&self, publisher: usize) -> &'static str {
         let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
         topics.get(publisher).map_or("?", |topic| topic.path())
+    }
+}
+
+/// Hands a recorded message to those who listen now. If its code panics for one of them, the message is what it was, and so is
+/// what followed from it.
+fn handed_out(hand_out: impl FnOnce()) {
+    if let Err(fault) = guarded(hand_out) {
+        tracing::error!(%fault, "a recorded message failed where it was copied");
     }
 }
 

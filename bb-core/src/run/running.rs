@@ -22,10 +22,12 @@ pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 /// How long it may take at least, once disarm callbacks have used up their time.
 const GRACE: Duration = Duration::from_millis(400);
 
-/// Within this time after the call, whatever hangs, the robot has stopped: all above, and the last lines of the journal.
+/// Within this time after the call, whatever hangs, the robot has stopped: all of the above, and the last lines of the
+/// journal.
 const BACK_WITHIN: Duration = Duration::from_millis(5800);
 
-/// How long loggers may take for the last lines: a program that ends after `stop` does not say otherwise what was not safe.
+/// How long loggers may take for the last lines. Otherwise a program that ends after `stop` would not log what could not be
+/// made safe.
 const LINES_WITHIN: Duration = Duration::from_millis(150);
 
 impl<R: Robot> Running<R> {
@@ -33,11 +35,11 @@ impl<R: Robot> Running<R> {
         let mut running = Self { live: Live(Arc::new(machine)), sources: Vec::new() };
         let machine = Arc::clone(&running.live.0);
         machine.control.pool().start();
-        // What goes wrong here drops what runs already, which stops it in order.
+        // On an error here, `running` is dropped, which stops in order what runs already.
         threads::serve(&machine)?;
         let now = machine.environment.clock().now();
         machine.control.begin_watch(now);
-        // Before any message can come: what `init` asked for comes first.
+        // Before any message can arrive, since requests of `init` come first.
         machine.start_islands(now);
         for source in sources {
             running.sources.push(threads::source(source, &machine)?);

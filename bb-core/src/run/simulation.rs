@@ -177,7 +177,7 @@ impl<R: Robot> Simulation<R> {
         self.live.0.settle();
     }
 
-    /// Has sensors carry out what they were told, at once.
+    /// Lets sensors carry out their orders at once.
     fn obey(&mut self) {
         for source in &mut self.sources {
             source.obey();

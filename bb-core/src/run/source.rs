@@ -1,5 +1,5 @@
-//! What is called at a rate, or whenever it wants to be: sensors, controllers, bridges. When each is called, what becomes
-//! of what it gives, and of itself when it fails.
+//! Sensors, controllers and bridges, which are called at a rate or when they ask to be: when each is called, where its readings
+//! go, and how it is restarted.
 
 use super::Robot;
 use super::occupied::{Entered, Occupied};
@@ -37,11 +37,11 @@ pub trait Source: Send {
     fn path(&self) -> &'static str;
     /// When it wants to be read first, if it says so.
     fn starts_at(&mut self) -> Option<MonotonicTime>;
-    /// Lets it begin: it is due at once, or when it wants to be.
+    /// Starts it: it is due at once, or at the time it asks for.
     fn begin(&mut self);
-    /// When it is to be read next, or restarted; none before it has begun and once it has finished.
+    /// When it is read or restarted next; `None` before it has begun and after it has finished.
     fn due(&self) -> Option<MonotonicTime>;
-    /// Carries out what it was told by its supervisor or by a parameter.
+    /// Carries out orders of its supervisor and changes of parameters.
     fn obey(&mut self);
     /// Reads it and publishes the reading; all estimators downstream run before this returns.
     fn fire(&mut self);
@@ -59,7 +59,7 @@ pub struct SharedSource(Arc<Shared>);
 #[derive(Debug)]
 struct Shared {
     path: &'static str,
-    /// Whether it is read at a rate; else it may wait for its device.
+    /// Whether it is read at a rate; otherwise it may wait for its device.
     has_rate: bool,
     inbox: Mutex<Inbox>,
     readings: AtomicU64,
@@ -266,7 +266,7 @@ where
                 origin: self.environment.origin(),
             };
             *next = reading.next;
-            // One that was left behind may come back after the robot has stopped.
+            // A source that was left running may return after the robot has stopped.
             if let Some(_inside) = self.environment.door().enter() {
                 (self.publish)(&self.wiring, &stamp.message(payload), now);
             }
@@ -326,7 +326,7 @@ where
         self.control.component_failed(path, supervisor, message, failed.panicked);
     }
 
-    /// Makes it again; its first reading is due at once.
+    /// Creates it again; its first reading is due at once.
     fn restart(&mut self) {
         let path = self.declaration.path;
         let parameters = self.control.parameters();

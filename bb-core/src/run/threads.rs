@@ -63,7 +63,7 @@ pub(super) fn source<R: Robot>(
                 if due <= environment.clock().now() {
                     source.fire();
                 } else {
-                    // It was woken before its time: it is told something.
+                    // It was woken early, for an order.
                     source.obey();
                 }
             }
@@ -75,7 +75,7 @@ pub(super) fn source<R: Robot>(
     })
 }
 
-/// Waits for the thread until `deadline`; what went wrong.
+/// Waits for the thread until `deadline`; the error says what went wrong.
 pub(super) fn join(thread: JoinHandle<()>, deadline: Option<Instant>) -> Result<(), &'static str> {
     if thread.thread().id() == std::thread::current().id() {
         return Err("has stopped the robot itself, and cannot be waited for");
@@ -91,7 +91,7 @@ pub(super) fn join(thread: JoinHandle<()>, deadline: Option<Instant>) -> Result<
     thread.join().map_err(|_| "its thread panicked")
 }
 
-/// What is known of a source that did not come back.
+/// When a source that did not return was entered, in words.
 pub(super) fn since(entered_at: Option<MonotonicTime>, now: MonotonicTime) -> String {
     let entered = entered_at.map(|at| format!("; its code was entered {:.1?} ago", now.duration_since(at)));
     entered.unwrap_or_default()

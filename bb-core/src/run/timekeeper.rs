@@ -1,4 +1,4 @@
-//! The thread that keeps time in a real run: it wakes what is due and watches what is overdue, and runs no user code.
+//! The timekeeper's thread of a real run: it wakes what is due, watches what is overdue, and runs no user code.
 
 use super::Robot;
 use super::machine::Machine;

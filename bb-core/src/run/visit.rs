@@ -10,7 +10,7 @@ use crate::time::MonotonicTime;
 /// What is called with an estimator, and the slot for what it emits.
 type Call<'a, E> = dyn FnMut(&mut Node<E>, &Turn<'_>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + 'a;
 
-/// What is called with an estimator once that is free. A type of its own, which rustc checks once, not in every function
+/// What is called with an estimator once it is free. A separate type, which rustc checks once, not in every function
 /// that it is given to.
 #[allow(missing_debug_implementations)]
 pub struct Visit<'a, E: Estimator> {

@@ -176,3 +176,23 @@ proptest! {
         }
     }
 }
+
+proptest! {
+    #[test]
+    fn finite_states_never_lead_to_infinite_positions(
+        states in proptest::collection::vec((proptest::num::f64::NORMAL, proptest::num::f64::NORMAL), 2..6),
+        millis in 0..700_i64,
+    ) {
+        for kind in [JointKind::Prismatic, JointKind::Revolute] {
+            let mut history = History::new(kind, 8, i64::MAX);
+            for (time, (position, velocity)) in (0..).step_by(100).zip(&states) {
+                history.add(state(time, &[*position], &[*velocity])).expect("it is newer");
+            }
+            let position = sampled(&history, millis, i64::MAX / 1_000_000).expect("all times are within the tolerance");
+            prop_assert!(position.is_finite(), "{position}");
+            let bound = states.iter().fold(0.0_f64, |bound, (position, _)| bound.max(position.abs()));
+            // Between two states it is between their positions.
+            prop_assert!(millis >= 100 * (states.len() as i64 - 1) || position.abs() <= bound * (1.0 + 1e-12));
+        }
+    }
+}

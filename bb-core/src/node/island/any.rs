@@ -47,7 +47,7 @@ pub trait AnyIsland<W> {
     fn is_inside(&self, wiring: &W) -> bool;
     /// Whether its estimators have stopped.
     fn has_retired(&self) -> bool;
-    /// Whether nothing waits for it and no thread holds it.
+    /// Whether its inbox is empty and no thread holds it.
     fn is_idle(&self, wiring: &W) -> bool;
     /// Sets that entries are processed only by [`Self::replay`].
     fn begin_replay(&self, wiring: &W);
@@ -187,9 +187,10 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         self.process_line(wiring, now, None, |turn| {
             match entry {
                 Replayed::Deliver(_) => {
-                    if let Some(keyed) = &message {
-                        state.deliver(wiring, &keyed.message, turn);
-                    }
+                    let Some(message) = message.as_ref().and_then(|keyed| keyed.message.as_ref()) else {
+                        return false;
+                    };
+                    state.deliver(wiring, message, turn);
                 }
                 Replayed::Drop(key) => S::dropped(wiring, key),
                 Replayed::Wake => state.wake(wiring, turn),

@@ -29,12 +29,12 @@ pub(super) struct Inbox<M> {
     entries: VecDeque<Dated<M>>,
     messages: usize,
     wakes: u8,
-    /// The estimators are to stop before anything else that waits.
+    /// The estimators stop before anything else that waits.
     retires: Option<MonotonicTime>,
 }
 
-/// Wakes that wait: the first keeps its place, so that a flood of messages does not hold up what is due; one behind it is for
-/// what becomes due meanwhile. What a wake finds later still, the island's agenda asks for again.
+/// The number of wakes that may wait. The first keeps its place, so that a flood of messages does not delay what is due. The second
+/// covers what becomes due meanwhile. For anything later, the island's agenda asks again.
 const MOST_WAKES: u8 = 2;
 
 /// Changes of options that wait for one estimator; the next one replaces the last of these.

@@ -1,4 +1,4 @@
-//! Which robots' islands a thread is inside: code that they call must not wait for an island of the same robot.
+//! The robots whose islands a thread is inside. Code that runs there must not wait for an island of the same robot.
 
 use crate::node::mark::Mark;
 use std::cell::{Cell, RefCell};

@@ -1,12 +1,14 @@
 //! An estimator in its island. The expansion of `robot!` says where it is and where its outputs go; the code that uses it is
 //! here, once for all estimators.
 
-use super::{Island, IslandState, Key};
+use super::{Island, IslandState, IslandWiring as _, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, Outputs, TakenAt};
-use crate::message::{Payload, Stamp, Stamped};
-use crate::node::{AnyIsland, Emitting, Next, Node, NodeEntry, Turn};
+use crate::message::{Payload, Stamp, Stamped, copied};
+use crate::node::emission::{copy_failed, emitter};
+use crate::node::{AnyIsland, Emitting, Mode, Next, Node, NodeEntry, Turn};
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
+use std::panic::resume_unwind;
 
 type WiringOf<M> = <<M as Member>::State as IslandState>::Wiring;
 type InputOf<M> = <<M as Member>::Estimator as Estimator>::Input;
@@ -153,7 +155,32 @@ pub fn enter<S: IslandState, T: Payload>(
     keep: impl FnOnce(Stamped<T>) -> S::Message,
 ) {
     let direct = |state: &mut S, turn: &Turn<'_>| deliver(state, wiring, message, turn);
-    S::find(wiring).enter(wiring, now, key, direct, || keep(message.clone()));
+    S::find(wiring).enter(wiring, now, key, direct, || copy_for::<S, T>(wiring, key.entry, message).map(keep));
+}
+
+/// A copy of a message for an island that another thread holds. An estimator whose payload's `Clone` panics is charged with it,
+/// and the turn that emitted the message goes on; a panic in the code of a sensor's or a service's message is resumed.
+#[cold]
+fn copy_for<S: IslandState, T: Payload>(
+    wiring: &S::Wiring,
+    entry: usize,
+    message: &Stamped<T>,
+) -> Option<Stamped<T>> {
+    let mut panic = None;
+    let copy = copied(message, &mut panic);
+    if let Some(panic) = panic {
+        let environment = wiring.environment();
+        let mut inlets = S::DECLARATION.inlets.iter().filter(|inlet| inlet.entry == entry);
+        let input = inlets.find_map(|inlet| inlet.inputs.first());
+        let source = input.and_then(|(estimator, input)| {
+            environment.node(*estimator).declaration().inputs.get(*input).map(|input| input.source)
+        });
+        match source.filter(|path| environment.mode() == Mode::Replay || emitter(environment, path).is_some()) {
+            Some(path) => copy_failed(environment, path, panic),
+            None => resume_unwind(panic),
+        }
+    }
+    copy
 }
 
 /// An island of a wiring, with its estimators erased.

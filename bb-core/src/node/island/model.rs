@@ -80,6 +80,8 @@ impl Overseer for Nobody {
 
     fn output_failed(&self, _: usize, _: String) {}
 
+    fn message_failed(&self, _: &'static str, _: String) {}
+
     fn bind(&self, _: &'static str, _: &'static [usize], _: Check, _: BindTarget) {}
 
     fn parameters(&self) -> ParameterValues {
@@ -147,7 +149,7 @@ const KEY: Key = Key { entry: 0, line: 0 };
 type Thread<const CAPACITY: usize> = fn(&Island<Seen<CAPACITY>>, &Wiring);
 
 fn publish<const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring, message: Message) {
-    island.enter(wiring, NOW, KEY, |seen, _| seen.see(message), || message);
+    island.enter(wiring, NOW, KEY, |seen, _| seen.see(message), || Some(message));
 }
 
 fn publish_twice<const PUBLISHER: usize, const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring) {

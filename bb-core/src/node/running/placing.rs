@@ -7,7 +7,7 @@ use crate::event::HealthReason;
 use crate::joints::{Gap, InputRoute, LookupError, PlacedInput, Placement};
 use crate::node::DropReason;
 use crate::node::admission::Admission;
-use crate::node::environment::{Environment, Mode};
+use crate::node::environment::{Environment, Missing, Mode};
 use crate::node::health::Event;
 use crate::node::shared::SharedNode;
 use crate::node::turn::Turn;
@@ -15,19 +15,32 @@ use crate::time::MonotonicTime;
 use nalgebra::Isometry3;
 use std::sync::Arc;
 
+/// When an input was measured, and where it was then.
+type PlacedAt = (MonotonicTime, Isometry3<f64>);
+
 /// The transforms of an estimator's inputs.
 pub(super) struct Placing {
     declaration: &'static EstimatorDeclaration,
     shared: SharedNode,
     routes: Arc<[InputRoute]>,
+    /// The last lookup of each route that succeeded: the message of an input without a tolerance may be older than the history
+    /// of the joints.
+    placed: Box<[Option<PlacedAt>]>,
     inputs: Box<[InputTransform]>,
 }
 
-/// An input without which a dispatch is dropped, and why nothing is known of where it is.
+/// Why there is no dispatch.
 #[derive(Debug)]
-pub(super) struct Unplaced {
-    input: usize,
-    error: LookupError,
+pub(super) enum Unplaced {
+    /// Nothing is known of where a required input is.
+    Gap {
+        /// The number of the input.
+        input: usize,
+        /// Why.
+        error: LookupError,
+    },
+    /// The journal that is replayed does not have where an input was.
+    Missing,
 }
 
 impl Placing {
@@ -40,12 +53,9 @@ impl Placing {
             let fixed = input.frame_from_input.map(|transform| transform.isometry());
             InputTransform::declared(input.name, input.driver, fixed)
         });
-        Self {
-            declaration,
-            shared: environment.node(number),
-            routes: environment.joints().routes().of(number),
-            inputs: inputs.collect(),
-        }
+        let routes = environment.joints().routes().of(number);
+        let placed = vec![None; routes.len()].into();
+        Self { declaration, shared: environment.node(number), routes, placed, inputs: inputs.collect() }
     }
 
     /// Finds where the inputs are at a dispatch by a message of the driver. `admission` knows when the others were measured.
@@ -55,22 +65,26 @@ impl Placing {
         admission: &Admission,
         turn: &Turn<'_>,
     ) -> Result<(), Unplaced> {
-        for route in self.routes.iter() {
+        for (route, placed) in self.routes.iter().zip(&mut self.placed) {
             let (Some(declared), Some(input)) =
                 (self.declaration.inputs.get(route.input), self.inputs.get_mut(route.input))
             else {
                 continue;
             };
             let time = if declared.driver { Some(driver_time) } else { admission.last(route.input) };
-            // What is missing or too old takes no part; if it is needed, that is what the dispatch is dropped for.
+            // An input that is missing or too old is not placed. If it is required, the dispatch is dropped for that reason.
             let Some(time) = time.filter(|time| !declared.is_too_old(driver_time.nanos_since(*time))) else {
                 input.set_absent();
                 continue;
             };
-            let found = find(&self.shared, route, time, turn);
+            let Some(found) = find(&self.shared, route, placed, time, turn) else {
+                let what = format!("where its input `{}` was", declared.name);
+                turn.environment().replayed().miss(Missing { estimator: self.declaration.path, what });
+                return Err(Unplaced::Missing);
+            };
             let found = found.map_err(|gap| turn.environment().joints().error(gap));
             if let (Err(error), false) = (&found, declared.optional) {
-                return Err(Unplaced { input: route.input, error: error.clone() });
+                return Err(Unplaced::Gap { input: route.input, error: error.clone() });
             }
             input.set(found);
         }
@@ -82,34 +96,40 @@ impl Placing {
     }
 }
 
-/// Looks it up; in a replay, takes what the journal has.
+/// Looks it up; in a replay, takes what the journal has, and never asks the store: its history may be another one.
 fn find(
     shared: &SharedNode,
     route: &InputRoute,
+    placed: &mut Option<PlacedAt>,
     time: MonotonicTime,
     turn: &Turn<'_>,
-) -> Result<Isometry3<f64>, Gap> {
+) -> Option<Result<Isometry3<f64>, Gap>> {
     let environment = turn.environment();
-    if environment.mode() == Mode::Replay
-        && let Some(placement) = shared.replayed_placement(route.input)
-    {
-        return placement.found();
+    if environment.mode() == Mode::Replay {
+        return shared.replayed_placement(route.input).map(|placement| placement.found());
     }
-    let found = environment.joints().placed(route, time);
+    let found = match (environment.joints().placed(route, time), *placed) {
+        (Err(Gap::TooOld { .. }), Some((then, transform))) if then == time => Ok(transform),
+        (found, _) => found,
+    };
+    if let Ok(transform) = found {
+        *placed = Some((time, transform));
+    }
     turn.keep_placed(PlacedInput {
         estimator: shared.number(),
         input: route.input,
         placement: Placement::of(&found),
     });
-    found
+    Some(found)
 }
 
 impl<E: Estimator> Node<E> {
     #[cold]
     pub(super) fn note_unplaced(&mut self, unplaced: &Unplaced, turn: &Turn<'_>) {
-        self.shared.counters().drop(unplaced.input, DropReason::NoTransform);
-        let Some(input) = self.declaration.inputs.get(unplaced.input) else { return };
-        let (estimator, name, error) = (self.declaration.path, input.name, &unplaced.error);
+        let Unplaced::Gap { input, error } = unplaced else { return };
+        self.shared.counters().drop(*input, DropReason::NoTransform);
+        let Some(input) = self.declaration.inputs.get(*input) else { return };
+        let (estimator, name) = (self.declaration.path, input.name);
         tracing::debug!(estimator, input = name, %error, "dispatch dropped for want of a transform");
         self.shared.set_last_gap(error.clone());
         self.tell_drop(name, DropReason::NoTransform.name());

@@ -1,4 +1,4 @@
-//! How an estimator is made, how it fails, and how it is restarted.
+//! Creation, failure and restart of an estimator.
 
 use super::{Context, Node};
 use crate::component::Estimator;
@@ -14,7 +14,7 @@ use crate::node::{DropReason, Report};
 use crate::time::MonotonicTime;
 
 impl<E: Estimator> Node<E> {
-    /// Makes it for the first time. A failure that prevents the robot from starting is stored in the environment.
+    /// Creates it for the first time. A failure that prevents the robot from starting is stored in the environment.
     pub(super) fn make_first(&mut self, now: MonotonicTime) {
         let context = self.context(now);
         self.shared.set_last_run(now);

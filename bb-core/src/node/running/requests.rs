@@ -94,7 +94,7 @@ impl<E: Estimator> Node<E> {
         self.declaration.outputs.iter().position(|output| *output == path)
     }
 
-    /// In a replay: makes it, as the journal begins.
+    /// In a replay: creates it when the journal begins.
     pub fn begin_replay(&mut self) {
         self.make_first(self.environment.clock().now());
     }

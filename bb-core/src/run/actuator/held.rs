@@ -4,7 +4,7 @@
 //! A thread that finds an actuator taken while it is inside another one says what it waits for, under one lock, and looks
 //! whether the thread inside that one waits for an actuator whose thread waits for … an actuator that it is inside itself. Each
 //! thread of such a circle has entered its actuator before it says what it waits for; so the last one sees the whole circle,
-//! and gets an error instead of waiting. Where there is none, nobody gets an error.
+//! and gets an error instead of waiting. Without a circle nobody gets an error.
 
 use std::cell::RefCell;
 use std::collections::HashMap;

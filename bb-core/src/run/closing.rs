@@ -1,4 +1,4 @@
-//! Code of components that is run as the robot stops, where nobody has to wait for it.
+//! Runs code of components while the robot stops, on threads that nothing else waits for.
 
 use crate::control::Control;
 use crate::fault::discard;
@@ -6,9 +6,9 @@ use crate::schedule::Lane;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// What runs apart: each piece on a thread of the pool, on virtual time on the caller's.
+/// Calls in progress, each on a thread of the pool; on virtual time on the caller's thread.
 #[derive(Default)]
-pub(super) struct Apart(Arc<Shared>);
+pub(super) struct Closing(Arc<Shared>);
 
 #[derive(Default)]
 struct Shared {
@@ -17,8 +17,8 @@ struct Shared {
     changed: Condvar,
 }
 
-impl Apart {
-    /// Runs code of the component at `path`; `run` says whether it is done.
+impl Closing {
+    /// Runs code of the component at `path`; `run` returns whether it is done.
     pub(super) fn run(
         &mut self,
         control: &Control,
@@ -41,7 +41,7 @@ impl Apart {
         });
     }
 
-    /// Waits until all have returned; the paths of those that have not at `deadline`.
+    /// Waits until all have returned; returns the paths of those that have not at `deadline`.
     pub(super) fn wait(self, deadline: Instant) -> Vec<&'static str> {
         let mut left = self.0.lock();
         while !left.is_empty() {

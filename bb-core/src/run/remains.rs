@@ -1,0 +1,45 @@
+//! What a robot owns until the last handle of it is dropped: options, handlers of telemetry, what its estimators have kept. Their
+//! `Drop` is user code, and may block.
+
+use crate::fault::discard;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+/// How long the thread that drops the last handle waits.
+const DROPPED_WITHIN: Duration = Duration::from_millis(200);
+
+/// Drops a value on a thread of its own once this is dropped, which waits for that, but not forever.
+#[derive(Debug)]
+pub(super) struct Remains {
+    begin: Option<Sender<()>>,
+    /// A lock that nobody contends: a receiver alone cannot be shared.
+    dropped: Mutex<Receiver<()>>,
+}
+
+impl Remains {
+    /// `value` is dropped no later than here if there is no thread to be had.
+    pub(super) fn of(value: impl Send + 'static) -> Option<Self> {
+        let (begin, begun) = channel();
+        let (done, dropped) = channel::<()>();
+        let drop_it = move || {
+            // It ends when the other end is dropped.
+            let _ = begun.recv();
+            discard(value);
+            drop(done);
+        };
+        std::thread::Builder::new().name("drop".into()).spawn(drop_it).ok()?;
+        Some(Self { begin: Some(begin), dropped: Mutex::new(dropped) })
+    }
+}
+
+impl Drop for Remains {
+    fn drop(&mut self) {
+        self.begin = None;
+        let dropped = self.dropped.get_mut().unwrap_or_else(PoisonError::into_inner);
+        // Nothing is sent: the other end is dropped.
+        if dropped.recv_timeout(DROPPED_WITHIN) == Err(RecvTimeoutError::Timeout) {
+            tracing::warn!("what the robot owned was not dropped in time");
+        }
+    }
+}
