@@ -48,9 +48,6 @@ const FAR: f64 = 1000.0;
 /// less.
 const ALONE_NS: i64 = 60_000_000_000;
 
-/// So much time is taken to have passed while the clock was set back, ns: twice of what it takes to believe it.
-const SET_BACK_GAP_NS: i64 = 1_000_000_000;
-
 /// See the module.
 #[derive(Clone, Debug)]
 pub(super) struct Engine<F: ProvidedFactor> {
@@ -198,8 +195,8 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     /// The clock of the IMU was set back: all that is known stays, but not when it was measured. A receiver that was not let
-    /// in stays out.
-    pub(super) fn set_clock_back(&mut self, sample_ns: i64, config: &StateEstimatorConfig) {
+    /// in stays out. The new clock has been seen `for_ns`; as much again may have passed before.
+    pub(super) fn set_clock_back(&mut self, sample_ns: i64, for_ns: i64, config: &StateEstimatorConfig) {
         (self.key, self.now_ns) = (Key::FIRST, None);
         self.sources = Sources::default();
         self.gate.forget_times();
@@ -211,7 +208,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Starting(_) => self.phase = Phase::Starting(Starter::new(config)),
             Phase::Lost => {}
             Phase::Running => {
-                let resumed_ns = sample_ns.saturating_sub(SET_BACK_GAP_NS);
+                let resumed_ns = sample_ns.saturating_sub(for_ns.saturating_mul(2));
                 if self.strategy.set_clock(resumed_ns).is_ok() {
                     self.now_ns = Some(resumed_ns);
                     self.unconfirmed = CONFIRMATIONS;

@@ -206,8 +206,8 @@ impl<F: ProvidedFactor> Queue<F> {
             Stamped::Late => return self.place_late_sample(sample, config),
             Stamped::Ahead => return Err(Refusal::InTheFuture { time_ns }.into()),
             Stamped::TooOld => return Err(Refusal::TooOld { time_ns }.into()),
-            Stamped::SetBack => {
-                self.set_back(sample, newest.time_ns, config);
+            Stamped::SetBack { for_ns } => {
+                self.set_back(sample, for_ns, newest.time_ns, config);
                 return Ok(Sampled::Bridged);
             }
         }
@@ -229,11 +229,13 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
     }
 
-    /// The first sample sets the time, once another stamp agrees with its own.
+    /// The first sample sets the time, once another stamp agrees with its own. What was told before is not given up for two
+    /// stamps: that takes as many as a jump of the clock does.
     fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
         let time_ns = sample.time_ns;
         let before = self.first.take();
-        if let Some(first) = before.filter(|first| follows(time_ns, first.time_ns)) {
+        let is_believed = self.clock.doubt(time_ns).is_some() || self.inputs.is_empty();
+        if let Some(first) = before.filter(|first| is_believed && follows(time_ns, first.time_ns)) {
             self.begin(&first, config);
             return self.place_sample(sample, config);
         }
@@ -259,7 +261,7 @@ impl<F: ProvidedFactor> Queue<F> {
     }
 
     /// The clock of the IMU was set back: the engine goes on by the new one, without the past.
-    fn set_back(&mut self, sample: &ImuMean, newest_ns: i64, config: &StateEstimatorConfig) {
+    fn set_back(&mut self, sample: &ImuMean, for_ns: i64, newest_ns: i64, config: &StateEstimatorConfig) {
         self.settle(newest_ns, config);
         for entry in self.inputs.drain(..) {
             if let (None, Some(kind)) = (entry.outcome, entry.payload.kind()) {
@@ -268,7 +270,7 @@ impl<F: ProvidedFactor> Queue<F> {
                 self.told.push(Told::Taken(entry.key, kind, Outcome::Degraded(reason)));
             }
         }
-        self.engine.set_clock_back(sample.time_ns, config);
+        self.engine.set_clock_back(sample.time_ns, for_ns, config);
         self.samples.clear();
         self.copies.clear();
         self.copies.push_back(self.engine.clone());
