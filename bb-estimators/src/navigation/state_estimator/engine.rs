@@ -3,23 +3,24 @@
 
 use alloc::collections::VecDeque;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
+use super::agreement::Agreement;
 use super::entry::{Entry, Key, Outcome, Payload};
 use super::error::Reason;
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
 use super::gate::{Rejection, SpoofGate};
-use super::input::{GnssReading, ImuBias, PoseAnchor, TakeoffOrigin, VioOutput, blocks};
+use super::input::{GnssReading, HEIGHTS, ImuBias, MOST_VELOCITY, PoseAnchor, TakeoffOrigin, VioOutput, blocks};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, at_anchor, warm};
-use super::strategy::{Failure, Measured, Pose, Predictor, Strategy, Trust, id_of};
+use super::strategy::{Failure, Measured, PATIENCE, Place, Pose, Predictor, Strategy, Trust, id_of};
 use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::fused::Fused;
-use crate::navigation::measurement::RelativePose;
+use crate::navigation::measurement::{GnssPosition, RelativePose};
 use crate::navigation::refusal::Refusal;
 
 /// For how long an estimate is distrusted after something that does not fit, s.
@@ -60,6 +61,8 @@ pub(super) struct Engine<F: ProvidedFactor> {
     phase: Phase,
     strategy: Strategy<F>,
     started: Option<(i64, StartedFrom)>,
+    /// How often it has jumped since it started first.
+    resets: u32,
     gate: SpoofGate,
     sources: Sources,
     /// What the estimate of each keyframe rests on.
@@ -75,6 +78,11 @@ pub(super) struct Engine<F: ProvidedFactor> {
     unconfirmed: u32,
     /// How often positions have overruled it since they last did.
     overruled: u32,
+    /// What the receiver and the anchors have said: one that does not fit overrules the estimate only if those before agree with it.
+    fixes: Agreement,
+    anchors: Agreement,
+    /// Normalised innovation squared of the last fix that was refused, over its dimension.
+    refused_fix: f64,
     left: Option<(Pose, Sources)>,
 }
 
@@ -105,6 +113,7 @@ impl<F: ProvidedFactor> Engine<F> {
             phase: Phase::Starting(Starter::new(config)),
             strategy: Strategy::new(config)?,
             started: None,
+            resets: 0,
             gate: SpoofGate::default(),
             sources: Sources::default(),
             marks: VecDeque::with_capacity(config.params.window as usize + 2),
@@ -115,6 +124,9 @@ impl<F: ProvidedFactor> Engine<F> {
             independent_ns: None,
             unconfirmed: 0,
             overruled: 0,
+            fixes: Agreement::default(),
+            anchors: Agreement::default(),
+            refused_fix: 0.0,
             left: None,
         })
     }
@@ -142,6 +154,10 @@ impl<F: ProvidedFactor> Engine<F> {
 
     pub(super) fn started(&self) -> Option<(i64, StartedFrom)> {
         self.started
+    }
+
+    pub(super) fn resets(&self) -> u32 {
+        self.resets
     }
 
     pub(super) fn world(&self) -> Option<&World> {
@@ -200,6 +216,7 @@ impl<F: ProvidedFactor> Engine<F> {
         (self.key, self.now_ns) = (Key::FIRST, None);
         self.sources = Sources::default();
         self.gate.forget_times();
+        (self.fixes, self.anchors) = (Agreement::default(), Agreement::default());
         self.marks.clear();
         (self.degraded_ns, self.left) = (None, None);
         // As if it were now: a receiver must not gain by it.
@@ -212,6 +229,7 @@ impl<F: ProvidedFactor> Engine<F> {
                 if self.strategy.set_clock(resumed_ns).is_ok() {
                     self.now_ns = Some(resumed_ns);
                     self.unconfirmed = CONFIRMATIONS;
+                    self.resets = self.resets.wrapping_add(1);
                 } else {
                     self.phase = Phase::Lost;
                 }
@@ -232,11 +250,12 @@ impl<F: ProvidedFactor> Engine<F> {
         mark.map_or(self.sources, |(_, sources)| *sources)
     }
 
-    /// Moves on by one sample of the IMU, or a part of one.
+    /// Moves on by one sample of the IMU, or a part of one, which may follow a gap.
     pub(super) fn advance(
         &mut self,
         key: Key,
         sample: &ImuMean,
+        is_gap: bool,
         config: &StateEstimatorConfig,
     ) -> Result<(), Reason> {
         self.key = key;
@@ -257,10 +276,14 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => {
                 let gaps = self.strategy.gaps();
                 let result = self.strategy.propagate(sample);
-                if self.strategy.gaps() != gaps || self.unconfirmed > 0 {
+                if is_gap || self.strategy.gaps() != gaps || self.unconfirmed > 0 {
                     self.distrust(sample.time_ns);
                 }
                 match result {
+                    Ok(()) if !self.is_plausible() => {
+                        self.phase = Phase::Lost;
+                        return Err(Refusal::OutOfRange.into());
+                    }
                     Ok(()) => self.after(config),
                     Err(Failure::Refused(Refusal::Gap { seconds })) => {
                         self.phase = Phase::Lost;
@@ -346,6 +369,7 @@ impl<F: ProvidedFactor> Engine<F> {
     fn start(&mut self, start: &Start, from: StartedFrom) -> Result<(), Reason> {
         self.strategy.start(start)?;
         self.phase = Phase::Running;
+        self.resets = self.resets.wrapping_add(u32::from(self.started.is_some()));
         self.started = Some((start.time_ns, from));
         self.marks.clear();
         Ok(())
@@ -375,7 +399,7 @@ impl<F: ProvidedFactor> Engine<F> {
                 self.marks.push_back((keyframe_ns, self.sources));
             }
         }
-        if let (Some(world), Some(position)) = (&mut self.world, self.strategy.position()) {
+        if let (Some(world), Some((position, _))) = (&mut self.world, self.strategy.motion()) {
             let mut moved = *world;
             // What cannot be moved stays where it is, and is tried again.
             if let Some(new_from_old) = moved.moves_on(&position)
@@ -397,7 +421,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Ok(fused) if is_relative && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
             result if !is_relative => {
                 let refused = match measured {
-                    Measured::Gnss(.., trust) => self.strategy.refused_fixes(*trust),
+                    Measured::Gnss(..) => self.strategy.refused_fixes(),
                     _ => self.strategy.refused_positions(),
                 };
                 self.weigh_position(result, refused >= DOUBT);
@@ -409,14 +433,22 @@ impl<F: ProvidedFactor> Engine<F> {
             self.distrust(now_ns);
         }
         let fused = result?;
+        self.resets = self.resets.wrapping_add(u32::from(fused.raised > 1.0));
         if !matches!(measured, Measured::Gnss(..)) {
             self.independent_ns = self.now_ns;
         }
-        // Finite, but nowhere on the Earth.
-        if !self.strategy.position().is_some_and(|position| position.norm() < FARTHEST) {
+        if !self.is_plausible() {
             return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
         }
         Ok(fused)
+    }
+
+    /// Whether an aircraft may be there. What was led away by broken samples is finite, but nowhere on the Earth, or too fast for
+    /// anything to correct it.
+    fn is_plausible(&self) -> bool {
+        let Some((position, velocity)) = self.strategy.motion() else { return false };
+        let origin_m = self.world.map_or(0.0, |world| world.frame().origin().height);
+        position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY && HEIGHTS.contains(&(origin_m + position.z))
     }
 
     /// What a position says of the estimate itself.
@@ -481,14 +513,15 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         let world = self.world.ok_or(Refusal::NotStarted)?;
         let measured = world.anchor(anchor);
-        let fused = self.measure(&Measured::Anchor(measured))?;
+        let trust = self.anchors.add(anchor.time_ns, &anchor.position, &blocks(&anchor.covariance)[0]);
+        let fused = self.measure(&Measured::Anchor(measured, trust))?;
         if fused.raised > FAR || (fused.raised > 1.0 && self.overruled > 1) {
             // Far off, or not helped by the last correction: then nothing of it can be relied on.
             self.start_at(now_ns, anchor, config)?;
         }
         self.sources.anchored(anchor.time_ns, &config.params);
         self.is_anchor_degraded = anchor.is_covariance_degraded;
-        if let Some(position) = self.strategy.position() {
+        if let Some((position, _)) = self.strategy.motion() {
             let offset = measured.position - position;
             *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
         }
@@ -506,8 +539,8 @@ impl<F: ProvidedFactor> Engine<F> {
         config: &StateEstimatorConfig,
         rejection: &mut Option<Rejection>,
     ) -> Result<Option<Fused>, Trouble> {
-        let position = self.strategy.position().filter(|_| matches!(self.phase, Phase::Running));
-        let (Some(world), Some(position)) = (self.world, position) else {
+        let motion = self.strategy.motion().filter(|_| matches!(self.phase, Phase::Running));
+        let (Some(world), Some((position, _))) = (self.world, motion) else {
             return Err(Refusal::NotStarted.into());
         };
         let (measured, velocity) = world.fix(fix);
@@ -516,11 +549,44 @@ impl<F: ProvidedFactor> Engine<F> {
             *rejection = Some(rejected);
             return Err(Trouble::Degraded(Reason::Gate(rejected)));
         }
-        let is_alone = |at_ns: i64| fix.time_ns.saturating_sub(at_ns) > ALONE_NS;
-        let trust = if self.independent_ns.is_none_or(is_alone) { Trust::Alone } else { Trust::Beside };
-        let fused = self.measure(&Measured::Gnss(measured, velocity, trust))?;
+        let trust = self.fixes.add(fix.time_ns, &fix.position, &fix.covariance);
+        // Where a camera or anchors tell where it is, it overrules nothing: one that is spoofed is patient.
+        let is_alone = self.independent_ns.is_none_or(|at_ns| fix.time_ns.saturating_sub(at_ns) > ALONE_NS);
+        let trust = if is_alone { trust } else { Trust::Doubted };
+        let is_repeated = self.strategy.refused_fixes() >= u64::from(PATIENCE);
+        if trust == Trust::Believed && is_repeated && self.refused_fix > FAR {
+            let told = velocity.map(|velocity| (velocity.velocity, velocity.covariance));
+            self.relocate(&measured, told.or_else(|| self.fixes.velocity(&world)))?;
+            self.sources.anchored(fix.time_ns, &config.params);
+            return Err(Reason::Raised { factor: self.refused_fix }.into());
+        }
+        let result = self.measure(&Measured::Gnss(measured, velocity, trust));
+        if let Err(Trouble::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) = &result {
+            self.refused_fix = nis / 3.0;
+        }
+        let fused = result?;
         self.sources.anchored(fix.time_ns, &config.params);
         Ok(Some(fused))
+    }
+
+    /// Moves to where fixes have shown it to be: far from the estimate. A correction would take the difference for errors of attitude
+    /// and biases too.
+    fn relocate(
+        &mut self,
+        fix: &GnssPosition,
+        velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
+    ) -> Result<(), Reason> {
+        let place = Place { position: (fix.position, fix.covariance), lever_arm: fix.lever_arm, velocity };
+        self.strategy.relocate(&place)?;
+        self.marks.clear();
+        self.unconfirmed = CONFIRMATIONS;
+        self.overruled += 1;
+        self.resets = self.resets.wrapping_add(1);
+        if let Some(now_ns) = self.now_ns {
+            self.distrust(now_ns);
+            self.started = Some((now_ns, StartedFrom::Receiver));
+        }
+        Ok(())
     }
 }
 

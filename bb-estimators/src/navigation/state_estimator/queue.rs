@@ -478,9 +478,10 @@ impl<F: ProvidedFactor> Queue<F> {
             if next > until {
                 break;
             }
+            let is_gap = self.follows_gap(sample_index, config);
             if !is_input {
                 if let Some(sample) = sample {
-                    self.advance(next, &sample, config);
+                    self.advance(next, &sample, is_gap, config);
                 }
                 sample_index += 1;
                 continue;
@@ -490,7 +491,7 @@ impl<F: ProvidedFactor> Queue<F> {
             {
                 // The sample is a mean: each part of it is the same.
                 let part = ImuMean { time_ns: next.time_ns, ..sample };
-                self.advance(Key::of_sample(next.time_ns), &part, config);
+                self.advance(Key::of_sample(next.time_ns), &part, is_gap, config);
             }
             self.apply(input_index, config)?;
             input_index += 1;
@@ -498,9 +499,16 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(())
     }
 
-    fn advance(&mut self, key: Key, sample: &ImuMean, config: &StateEstimatorConfig) {
+    /// Whether a sample is the first after a gap, however short the parts are that inputs part it into.
+    fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
+        let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
+        let (Some(before), Some(sample)) = (before, self.samples.get(index)) else { return false };
+        sample.time_ns.saturating_sub(before.time_ns) > ns(config.sensors.longest_sample)
+    }
+
+    fn advance(&mut self, key: Key, sample: &ImuMean, is_gap: bool, config: &StateEstimatorConfig) {
         let was = self.engine.condition();
-        if let Err(reason) = self.engine.advance(key, sample, config)
+        if let Err(reason) = self.engine.advance(key, sample, is_gap, config)
             && self.engine.condition() != was
         {
             self.told.push(Told::Broken(sample.time_ns, reason));
@@ -572,7 +580,8 @@ impl<F: ProvidedFactor> Queue<F> {
         let Some(oldest) = self.copies.front() else { return };
         let key = oldest.key();
         let kept_ns = oldest.needed_ns().min(self.engine.needed_ns());
-        while self.samples.front().is_some_and(|sample| sample.time_ns <= kept_ns) {
+        // The one before the first that is needed shows whether that follows a gap.
+        while self.samples.get(1).is_some_and(|sample| sample.time_ns <= kept_ns) {
             self.samples.pop_front();
         }
         while self.inputs.front().is_some_and(|entry| entry.key <= key) {

@@ -192,7 +192,7 @@ proptest! {
     /// longer than any that is bridged, and it is right once anchors confirm it.
     #[test]
     fn a_clock_that_jumps_is_followed(
-        off_ns in prop_oneof![2100 * SECOND / 1000..59 * SECOND, 61 * SECOND..8000 * SECOND],
+        off_ns in prop_oneof![2100 * SECOND / 1000..61 * SECOND, 61 * SECOND..8000 * SECOND],
         is_ahead in any::<bool>(),
         silence_ns in 0..2 * SECOND,
         seed in 0..1000_u64,
@@ -221,11 +221,15 @@ proptest! {
                 }
             }
             let again_ns = again_ns.unwrap() - jump_ns - silence_ns;
-            let is_lost = is_ahead && off_ns + silence_ns > 60 * SECOND;
+            // A gap of a minute, with what it takes to believe it.
+            let is_lost = is_ahead && off_ns + silence_ns + SECOND / 2 + 2 * STEP > 60 * SECOND;
             let bound_ns = if is_lost { 3 * SECOND / 2 + 5 * STEP } else { SECOND / 2 + 2 * STEP };
             prop_assert!(again_ns <= bound_ns, "{}: again after {again_ns} ns", strategy.name());
             let (error_m, degraded) = last.unwrap();
-            prop_assert!(error_m < 6.0 && !degraded, "{}: {error_m} m, degraded {degraded}", strategy.name());
+            // After a long gap its attitude is unknown, and it may take longer to confirm it.
+            let is_long = is_ahead && !is_lost && off_ns + silence_ns > 10 * SECOND;
+            let is_told = error_m < 6.0 && (!degraded || is_long);
+            prop_assert!(is_told, "{}: {error_m} m, degraded {degraded}", strategy.name());
         }
     }
 }
