@@ -32,8 +32,8 @@ const CONFIRMATIONS: u32 = 5;
 /// Normalised innovation squared over the dimension up to which a position fits.
 const FITS: f64 = 3.0;
 
-/// Farther from the origin nothing is, m.
-const FARTHEST: f64 = 1e7;
+/// Farther from the origin nothing is, m: that is on the other side of the Earth.
+const FARTHEST: f64 = 1.4e7;
 
 /// Refused relative poses in a row that are more than outliers.
 const STORM: u64 = 3;
@@ -81,8 +81,9 @@ pub(super) struct Engine<F: ProvidedFactor> {
     /// What the receiver and the anchors have said: one that does not fit overrules the estimate only if those before agree with it.
     fixes: Agreement,
     anchors: Agreement,
-    /// Normalised innovation squared of the last fix that was refused, over its dimension.
+    /// Normalised innovations squared of the last fix and the last anchor that were refused, over their dimension.
     refused_fix: f64,
+    refused_anchor: f64,
     left: Option<(Pose, Sources)>,
 }
 
@@ -127,6 +128,7 @@ impl<F: ProvidedFactor> Engine<F> {
             fixes: Agreement::default(),
             anchors: Agreement::default(),
             refused_fix: 0.0,
+            refused_anchor: 0.0,
             left: None,
         })
     }
@@ -447,8 +449,8 @@ impl<F: ProvidedFactor> Engine<F> {
     /// anything to correct it.
     fn is_plausible(&self) -> bool {
         let Some((position, velocity)) = self.strategy.motion() else { return false };
-        let origin_m = self.world.map_or(0.0, |world| world.frame().origin().height);
-        position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY && HEIGHTS.contains(&(origin_m + position.z))
+        let Some(world) = &self.world else { return false };
+        position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY && HEIGHTS.contains(&world.height(&position))
     }
 
     /// What a position says of the estimate itself.
@@ -514,7 +516,25 @@ impl<F: ProvidedFactor> Engine<F> {
         let world = self.world.ok_or(Refusal::NotStarted)?;
         let measured = world.anchor(anchor);
         let trust = self.anchors.add(anchor.time_ns, &anchor.position, &blocks(&anchor.covariance)[0]);
-        let fused = self.measure(&Measured::Anchor(measured, trust))?;
+        let is_repeated = self.strategy.refused_positions() >= u64::from(PATIENCE);
+        if trust == Trust::Believed && is_repeated && self.refused_anchor > FAR {
+            // Nothing of the estimate can be relied on, and a correction might throw it off the Earth.
+            self.start_at(now_ns, anchor, config)?;
+            self.unconfirmed = CONFIRMATIONS;
+            self.overruled += 1;
+            self.distrust(now_ns);
+            self.independent_ns = Some(now_ns);
+            self.sources.anchored(anchor.time_ns, &config.params);
+            self.is_anchor_degraded = anchor.is_covariance_degraded;
+            let factor = core::mem::take(&mut self.refused_anchor);
+            return Err(Reason::Raised { factor }.into());
+        }
+        let result = self.measure(&Measured::Anchor(measured, trust));
+        self.refused_anchor = match &result {
+            Err(Trouble::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => nis / 6.0,
+            _ => 0.0,
+        };
+        let fused = result?;
         if fused.raised > FAR || (fused.raised > 1.0 && self.overruled > 1) {
             // Far off, or not helped by the last correction: then nothing of it can be relied on.
             self.start_at(now_ns, anchor, config)?;
@@ -558,12 +578,14 @@ impl<F: ProvidedFactor> Engine<F> {
             let told = velocity.map(|velocity| (velocity.velocity, velocity.covariance));
             self.relocate(&measured, told.or_else(|| self.fixes.velocity(&world)))?;
             self.sources.anchored(fix.time_ns, &config.params);
-            return Err(Reason::Raised { factor: self.refused_fix }.into());
+            let factor = core::mem::take(&mut self.refused_fix);
+            return Err(Reason::Raised { factor }.into());
         }
         let result = self.measure(&Measured::Gnss(measured, velocity, trust));
-        if let Err(Trouble::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) = &result {
-            self.refused_fix = nis / 3.0;
-        }
+        self.refused_fix = match &result {
+            Err(Trouble::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => nis / 3.0,
+            _ => 0.0,
+        };
         let fused = result?;
         self.sources.anchored(fix.time_ns, &config.params);
         Ok(Some(fused))

@@ -309,11 +309,11 @@ fn a_receiver_that_is_alone_moves_an_estimate_that_is_kilometres_off() {
                 sent => sent.to(&mut estimator),
             });
             let newest = estimator.sink().iter().rev().take(12);
-            let raised = newest.filter_map(|event| match event.kind {
+            let mut raised = newest.filter_map(|event| match event.kind {
                 EventKind::Degraded { reason: Reason::Raised { factor }, .. } => Some((event.time_ns, factor)),
                 _ => None,
             });
-            if let (Some((time_ns, factor)), None) = (raised.last(), moved_ns) {
+            if let (Some((time_ns, factor)), None) = (raised.next_back(), moved_ns) {
                 assert!(factor > 1000.0, "{factor}");
                 moved_ns = Some(time_ns);
             }

@@ -6,6 +6,7 @@ use crate::navigation::smoother::{Factor, NavigationFactor, Rows};
 use crate::navigation::{Estimate, GnssPosition, Refusal, States};
 use nalgebra::{Matrix6, Vector3};
 
+#[expect(clippy::large_enum_variant, reason = "there are few of them")]
 /// A provider that sees nothing, or says where it is.
 #[derive(Clone, Copy, Debug)]
 enum Provided {
