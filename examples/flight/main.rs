@@ -84,15 +84,20 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     Ok(missing.is_none())
 }
 
+/// From when on fixes tell where the drone is again, s.
+const LET_IN: f64 = 73.0;
+
 /// What has not happened on the simulated flight.
 fn simulated(outcome: &Outcome) -> Option<String> {
     let fault = |is_fault: bool, text: &str| is_fault.then(|| text.to_owned());
     timeline::missing(&outcome.happened)
+        .or_else(|| timeline::unexpected(&outcome.happened))
         .or_else(|| {
             let text = "a covariance that grows while it is dead reckoning";
             fault(!outcome.grows_while_dead_reckoning(), text)
         })
         .or_else(|| fault(!outcome.is_gate_open(), "a receiver that is let in at the end"))
+        .or_else(|| fault(!outcome.is_fixed_after(LET_IN), "fixes that are used again"))
 }
 
 /// What has not happened on a recorded flight: its labels follow from when something was measured.

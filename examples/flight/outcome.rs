@@ -130,6 +130,12 @@ impl Outcome {
         grows && count > 40
     }
 
+    /// Whether from a time on, s, each estimate is younger than a second after what tells where it is: anchors are four seconds apart.
+    pub(crate) fn is_fixed_after(&self, from_s: f64) -> bool {
+        let mut points = self.points.iter().filter(|point| point.time_s > from_s).peekable();
+        points.peek().is_some() && points.all(|point| point.age_s.is_some_and(|age_s| age_s < 1.0))
+    }
+
     /// Whether the receiver is let in at the end.
     pub(crate) fn is_gate_open(&self) -> bool {
         self.health.is_some_and(|health| health.is_gate_open)

@@ -4,7 +4,7 @@ use crate::again;
 use crate::drone::{fly, fly_again};
 use crate::expected::Expected;
 use crate::recorded::Recorded;
-use crate::timeline::{Happened, missing};
+use crate::timeline::{Happened, missing, unexpected};
 use bb_estimators::navigation::state_estimator::{FlightEvents, Level};
 use bb_mcap::Recording;
 use std::error::Error;
@@ -20,7 +20,9 @@ fn both_strategies_fly() -> Result<(), Box<dyn Error>> {
         assert_eq!(missing(&outcome.happened), None, "{strategy}: {:#?}", outcome.timeline());
         assert!(outcome.worst_m() < 30.0, "{strategy}: {} m", outcome.worst_m());
         assert!(outcome.grows_while_dead_reckoning(), "{strategy}");
-        assert!(outcome.is_gate_open(), "{strategy}");
+        assert!(outcome.is_gate_open() && outcome.is_fixed_after(73.0), "{strategy}");
+        assert!(!outcome.is_fixed_after(60.0), "{strategy}: it is not let in before");
+        assert_eq!(unexpected(&outcome.happened), None, "{strategy}");
         let (mut keyframes, mut severe) = (0, 0);
         for message in Recording::open(&file)?.messages::<FlightEvents>("estimator/base/navigation/events")? {
             for event in &message?.events {
@@ -40,6 +42,19 @@ fn both_strategies_fly() -> Result<(), Box<dyn Error>> {
 fn a_flight_in_which_something_is_missing_fails() {
     let happened = Happened { time_s: 1.2, what: "started from origin".into() };
     assert_eq!(missing(&[happened]), Some("label satellite_anchored, from 1 s to 3 s".into()));
+}
+
+#[test]
+fn a_receiver_that_is_let_in_too_early_fails() {
+    for (time_s, what) in
+        [(65.0, "gate open"), (71.0, "gate blocked"), (80.0, "fatal imu: a gap"), (5.0, "started from anchor")]
+    {
+        let happened = Happened { time_s, what: what.into() };
+        assert_eq!(unexpected(&[happened]), Some(format!("a flight without `{what}` at {time_s:.2} s")));
+    }
+    let usual = [(20.1, "gate blocked"), (72.4, "gate open"), (30.0, "rejected the receiver was spoofed")];
+    let happened = usual.map(|(time_s, what)| Happened { time_s, what: what.into() });
+    assert_eq!(unexpected(&happened), None);
 }
 
 /// A recorded flight where there is one: none where `../shared/data` is missing.
@@ -84,23 +99,25 @@ fn every_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<
 }
 
 const FILE: &str = "FLIGHT_TEST_FILE";
+const STRATEGY: &str = "FLIGHT_TEST_STRATEGY";
 
 /// What is killed: it flies and records.
 #[test]
 fn child() {
-    let Ok(file) = std::env::var(FILE) else { return };
-    fly("eskf", Some(Path::new(&file))).expect("it flies until it is killed");
+    let (Ok(file), Ok(strategy)) = (std::env::var(FILE), std::env::var(STRATEGY)) else { return };
+    fly(&strategy, Some(Path::new(&file))).expect("it flies until it is killed");
 }
 
 /// The flight-data recorder of a process that was killed in the middle of it holds all up to the last chunk that was written, in order.
 #[test]
 fn the_recorder_of_a_killed_flight_can_be_read() -> Result<(), Box<dyn Error>> {
     let mut least = 100_000;
-    for round in 0..2 {
+    for (round, strategy) in ["smoother", "eskf"].into_iter().enumerate() {
         let file = std::env::temp_dir().join(format!("flight-killed-{round}-{}.mcap", std::process::id()));
         let mut child = Command::new(std::env::current_exe()?)
             .args(["--exact", "tests::child"])
             .env(FILE, &file)
+            .env(STRATEGY, strategy)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()?;

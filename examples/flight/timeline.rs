@@ -1,4 +1,4 @@
-//! What must have happened, in this order; other things may happen between.
+//! What must have happened, in this order; other things may happen between, but not all.
 
 /// Something that happened: when, s, and what.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,4 +31,19 @@ pub(crate) fn missing(happened: &[Happened]) -> Option<String> {
         let is_it = |one: &Happened| one.what.starts_with(what) && (*from_s..=*to_s).contains(&one.time_s);
         (!left.any(is_it)).then(|| format!("{what}, from {from_s} s to {to_s} s"))
     })
+}
+
+/// What may happen only as it is expected: a receiver that is let in earlier, in between, is not what is to be shown. What ends a
+/// flight may not happen at all.
+const ONLY_EXPECTED: [&str; 5] = ["gate", "started", "fatal", "fallback", "clock_set_back"];
+
+/// The first that should not have happened.
+pub(crate) fn unexpected(happened: &[Happened]) -> Option<String> {
+    let is_expected = |one: &Happened| {
+        let mut rows = EXPECTED.iter();
+        rows.any(|(what, from_s, to_s)| one.what.starts_with(what) && (*from_s..=*to_s).contains(&one.time_s))
+    };
+    let is_watched = |one: &Happened| ONLY_EXPECTED.iter().any(|what| one.what.starts_with(what));
+    let one = happened.iter().find(|one| is_watched(one) && !is_expected(one))?;
+    Some(format!("a flight without `{}` at {:.2} s", one.what, one.time_s))
 }

@@ -55,6 +55,7 @@
 //! As in [`navigation`](super). Positions are WGS 84, orientations and covariances in the tangent frame at the position. The
 //! world of the strategies moves on where the robot is more than 5 km from its origin.
 
+mod agreement;
 mod clock;
 #[cfg(feature = "runtime")]
 mod declared;

@@ -143,8 +143,14 @@ impl Stream {
         self.noise_factor * self.params.variance_factor
     }
 
+    /// Changes [`StreamParams::patience`], for those who know whether what was refused agrees.
+    #[cfg(any(feature = "smoother", feature = "eskf"))]
+    pub(crate) fn set_patience(&mut self, patience: u32) {
+        self.params.patience = patience;
+    }
+
     /// Forgets that measurements were refused in a row: the filter is elsewhere now.
-    #[cfg(feature = "runtime")]
+    #[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
     pub(crate) fn forgive(&mut self) {
         self.counts.gate_in_a_row = 0;
     }

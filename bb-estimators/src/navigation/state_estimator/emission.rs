@@ -120,6 +120,7 @@ impl Emission {
             anchor_age_ms,
             smoothed,
             degraded: engine.is_degraded(pose.time_ns),
+            resets: engine.resets(),
             quality,
         })
     }

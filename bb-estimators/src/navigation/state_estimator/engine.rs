@@ -3,23 +3,24 @@
 
 use alloc::collections::VecDeque;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
+use super::agreement::Agreement;
 use super::entry::{Entry, Key, Outcome, Payload};
 use super::error::Reason;
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
 use super::gate::{Rejection, SpoofGate};
-use super::input::{GnssReading, ImuBias, PoseAnchor, TakeoffOrigin, VioOutput, blocks};
+use super::input::{GnssReading, HEIGHTS, ImuBias, MOST_VELOCITY, PoseAnchor, TakeoffOrigin, VioOutput, blocks};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, at_anchor, warm};
-use super::strategy::{Failure, Measured, Pose, Predictor, Strategy, Trust, id_of};
+use super::strategy::{Failure, Measured, PATIENCE, Place, Pose, Predictor, Strategy, Trust, id_of};
 use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::fused::Fused;
-use crate::navigation::measurement::RelativePose;
+use crate::navigation::measurement::{GnssPosition, RelativePose};
 use crate::navigation::refusal::Refusal;
 
 /// For how long an estimate is distrusted after something that does not fit, s.
@@ -31,8 +32,8 @@ const CONFIRMATIONS: u32 = 5;
 /// Normalised innovation squared over the dimension up to which a position fits.
 const FITS: f64 = 3.0;
 
-/// Farther from the origin nothing is, m.
-const FARTHEST: f64 = 1e7;
+/// Farther from the origin nothing is, m: that is on the other side of the Earth.
+const FARTHEST: f64 = 1.4e7;
 
 /// Refused relative poses in a row that are more than outliers.
 const STORM: u64 = 3;
@@ -48,9 +49,6 @@ const FAR: f64 = 1000.0;
 /// less.
 const ALONE_NS: i64 = 60_000_000_000;
 
-/// So much time is taken to have passed while the clock was set back, ns: twice of what it takes to believe it.
-const SET_BACK_GAP_NS: i64 = 1_000_000_000;
-
 /// See the module.
 #[derive(Clone, Debug)]
 pub(super) struct Engine<F: ProvidedFactor> {
@@ -63,6 +61,8 @@ pub(super) struct Engine<F: ProvidedFactor> {
     phase: Phase,
     strategy: Strategy<F>,
     started: Option<(i64, StartedFrom)>,
+    /// How often it has jumped since it started first.
+    resets: u32,
     gate: SpoofGate,
     sources: Sources,
     /// What the estimate of each keyframe rests on.
@@ -78,6 +78,12 @@ pub(super) struct Engine<F: ProvidedFactor> {
     unconfirmed: u32,
     /// How often positions have overruled it since they last did.
     overruled: u32,
+    /// What the receiver and the anchors have said: one that does not fit overrules the estimate only if those before agree with it.
+    fixes: Agreement,
+    anchors: Agreement,
+    /// Normalised innovations squared of the last fix and the last anchor that were refused, over their dimension.
+    refused_fix: f64,
+    refused_anchor: f64,
     left: Option<(Pose, Sources)>,
 }
 
@@ -108,6 +114,7 @@ impl<F: ProvidedFactor> Engine<F> {
             phase: Phase::Starting(Starter::new(config)),
             strategy: Strategy::new(config)?,
             started: None,
+            resets: 0,
             gate: SpoofGate::default(),
             sources: Sources::default(),
             marks: VecDeque::with_capacity(config.params.window as usize + 2),
@@ -118,6 +125,10 @@ impl<F: ProvidedFactor> Engine<F> {
             independent_ns: None,
             unconfirmed: 0,
             overruled: 0,
+            fixes: Agreement::default(),
+            anchors: Agreement::default(),
+            refused_fix: 0.0,
+            refused_anchor: 0.0,
             left: None,
         })
     }
@@ -145,6 +156,10 @@ impl<F: ProvidedFactor> Engine<F> {
 
     pub(super) fn started(&self) -> Option<(i64, StartedFrom)> {
         self.started
+    }
+
+    pub(super) fn resets(&self) -> u32 {
+        self.resets
     }
 
     pub(super) fn world(&self) -> Option<&World> {
@@ -198,11 +213,12 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     /// The clock of the IMU was set back: all that is known stays, but not when it was measured. A receiver that was not let
-    /// in stays out.
-    pub(super) fn set_clock_back(&mut self, sample_ns: i64, config: &StateEstimatorConfig) {
+    /// in stays out. The new clock has been seen `for_ns`; as much again may have passed before.
+    pub(super) fn set_clock_back(&mut self, sample_ns: i64, for_ns: i64, config: &StateEstimatorConfig) {
         (self.key, self.now_ns) = (Key::FIRST, None);
         self.sources = Sources::default();
         self.gate.forget_times();
+        (self.fixes, self.anchors) = (Agreement::default(), Agreement::default());
         self.marks.clear();
         (self.degraded_ns, self.left) = (None, None);
         // As if it were now: a receiver must not gain by it.
@@ -211,10 +227,11 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Starting(_) => self.phase = Phase::Starting(Starter::new(config)),
             Phase::Lost => {}
             Phase::Running => {
-                let resumed_ns = sample_ns.saturating_sub(SET_BACK_GAP_NS);
+                let resumed_ns = sample_ns.saturating_sub(for_ns.saturating_mul(2));
                 if self.strategy.set_clock(resumed_ns).is_ok() {
                     self.now_ns = Some(resumed_ns);
                     self.unconfirmed = CONFIRMATIONS;
+                    self.resets = self.resets.wrapping_add(1);
                 } else {
                     self.phase = Phase::Lost;
                 }
@@ -235,11 +252,12 @@ impl<F: ProvidedFactor> Engine<F> {
         mark.map_or(self.sources, |(_, sources)| *sources)
     }
 
-    /// Moves on by one sample of the IMU, or a part of one.
+    /// Moves on by one sample of the IMU, or a part of one, which may follow a gap.
     pub(super) fn advance(
         &mut self,
         key: Key,
         sample: &ImuMean,
+        is_gap: bool,
         config: &StateEstimatorConfig,
     ) -> Result<(), Reason> {
         self.key = key;
@@ -260,10 +278,14 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => {
                 let gaps = self.strategy.gaps();
                 let result = self.strategy.propagate(sample);
-                if self.strategy.gaps() != gaps || self.unconfirmed > 0 {
+                if is_gap || self.strategy.gaps() != gaps || self.unconfirmed > 0 {
                     self.distrust(sample.time_ns);
                 }
                 match result {
+                    Ok(()) if !self.is_plausible() => {
+                        self.phase = Phase::Lost;
+                        return Err(Refusal::OutOfRange.into());
+                    }
                     Ok(()) => self.after(config),
                     Err(Failure::Refused(Refusal::Gap { seconds })) => {
                         self.phase = Phase::Lost;
@@ -349,6 +371,7 @@ impl<F: ProvidedFactor> Engine<F> {
     fn start(&mut self, start: &Start, from: StartedFrom) -> Result<(), Reason> {
         self.strategy.start(start)?;
         self.phase = Phase::Running;
+        self.resets = self.resets.wrapping_add(u32::from(self.started.is_some()));
         self.started = Some((start.time_ns, from));
         self.marks.clear();
         Ok(())
@@ -378,7 +401,7 @@ impl<F: ProvidedFactor> Engine<F> {
                 self.marks.push_back((keyframe_ns, self.sources));
             }
         }
-        if let (Some(world), Some(position)) = (&mut self.world, self.strategy.position()) {
+        if let (Some(world), Some((position, _))) = (&mut self.world, self.strategy.motion()) {
             let mut moved = *world;
             // What cannot be moved stays where it is, and is tried again.
             if let Some(new_from_old) = moved.moves_on(&position)
@@ -400,7 +423,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Ok(fused) if is_relative && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
             result if !is_relative => {
                 let refused = match measured {
-                    Measured::Gnss(.., trust) => self.strategy.refused_fixes(*trust),
+                    Measured::Gnss(..) => self.strategy.refused_fixes(),
                     _ => self.strategy.refused_positions(),
                 };
                 self.weigh_position(result, refused >= DOUBT);
@@ -412,14 +435,22 @@ impl<F: ProvidedFactor> Engine<F> {
             self.distrust(now_ns);
         }
         let fused = result?;
+        self.resets = self.resets.wrapping_add(u32::from(fused.raised > 1.0));
         if !matches!(measured, Measured::Gnss(..)) {
             self.independent_ns = self.now_ns;
         }
-        // Finite, but nowhere on the Earth.
-        if !self.strategy.position().is_some_and(|position| position.norm() < FARTHEST) {
+        if !self.is_plausible() {
             return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
         }
         Ok(fused)
+    }
+
+    /// Whether an aircraft may be there. What was led away by broken samples is finite, but nowhere on the Earth, or too fast for
+    /// anything to correct it.
+    fn is_plausible(&self) -> bool {
+        let Some((position, velocity)) = self.strategy.motion() else { return false };
+        let Some(world) = &self.world else { return false };
+        position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY && HEIGHTS.contains(&world.height(&position))
     }
 
     /// What a position says of the estimate itself.
@@ -484,14 +515,33 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         let world = self.world.ok_or(Refusal::NotStarted)?;
         let measured = world.anchor(anchor);
-        let fused = self.measure(&Measured::Anchor(measured))?;
+        let trust = self.anchors.add(anchor.time_ns, &anchor.position, &blocks(&anchor.covariance)[0]);
+        let is_repeated = self.strategy.refused_positions() >= u64::from(PATIENCE);
+        if trust == Trust::Believed && is_repeated && self.refused_anchor > FAR {
+            // Nothing of the estimate can be relied on, and a correction might throw it off the Earth.
+            self.start_at(now_ns, anchor, config)?;
+            self.unconfirmed = CONFIRMATIONS;
+            self.overruled += 1;
+            self.distrust(now_ns);
+            self.independent_ns = Some(now_ns);
+            self.sources.anchored(anchor.time_ns, &config.params);
+            self.is_anchor_degraded = anchor.is_covariance_degraded;
+            let factor = core::mem::take(&mut self.refused_anchor);
+            return Err(Reason::Raised { factor }.into());
+        }
+        let result = self.measure(&Measured::Anchor(measured, trust));
+        self.refused_anchor = match &result {
+            Err(Trouble::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => nis / 6.0,
+            _ => 0.0,
+        };
+        let fused = result?;
         if fused.raised > FAR || (fused.raised > 1.0 && self.overruled > 1) {
             // Far off, or not helped by the last correction: then nothing of it can be relied on.
             self.start_at(now_ns, anchor, config)?;
         }
         self.sources.anchored(anchor.time_ns, &config.params);
         self.is_anchor_degraded = anchor.is_covariance_degraded;
-        if let Some(position) = self.strategy.position() {
+        if let Some((position, _)) = self.strategy.motion() {
             let offset = measured.position - position;
             *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
         }
@@ -509,8 +559,8 @@ impl<F: ProvidedFactor> Engine<F> {
         config: &StateEstimatorConfig,
         rejection: &mut Option<Rejection>,
     ) -> Result<Option<Fused>, Trouble> {
-        let position = self.strategy.position().filter(|_| matches!(self.phase, Phase::Running));
-        let (Some(world), Some(position)) = (self.world, position) else {
+        let motion = self.strategy.motion().filter(|_| matches!(self.phase, Phase::Running));
+        let (Some(world), Some((position, _))) = (self.world, motion) else {
             return Err(Refusal::NotStarted.into());
         };
         let (measured, velocity) = world.fix(fix);
@@ -519,11 +569,46 @@ impl<F: ProvidedFactor> Engine<F> {
             *rejection = Some(rejected);
             return Err(Trouble::Degraded(Reason::Gate(rejected)));
         }
-        let is_alone = |at_ns: i64| fix.time_ns.saturating_sub(at_ns) > ALONE_NS;
-        let trust = if self.independent_ns.is_none_or(is_alone) { Trust::Alone } else { Trust::Beside };
-        let fused = self.measure(&Measured::Gnss(measured, velocity, trust))?;
+        let trust = self.fixes.add(fix.time_ns, &fix.position, &fix.covariance);
+        // Where a camera or anchors tell where it is, it overrules nothing: one that is spoofed is patient.
+        let is_alone = self.independent_ns.is_none_or(|at_ns| fix.time_ns.saturating_sub(at_ns) > ALONE_NS);
+        let trust = if is_alone { trust } else { Trust::Doubted };
+        let is_repeated = self.strategy.refused_fixes() >= u64::from(PATIENCE);
+        if trust == Trust::Believed && is_repeated && self.refused_fix > FAR {
+            let told = velocity.map(|velocity| (velocity.velocity, velocity.covariance));
+            self.relocate(&measured, told.or_else(|| self.fixes.velocity(&world)))?;
+            self.sources.anchored(fix.time_ns, &config.params);
+            let factor = core::mem::take(&mut self.refused_fix);
+            return Err(Reason::Raised { factor }.into());
+        }
+        let result = self.measure(&Measured::Gnss(measured, velocity, trust));
+        self.refused_fix = match &result {
+            Err(Trouble::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => nis / 3.0,
+            _ => 0.0,
+        };
+        let fused = result?;
         self.sources.anchored(fix.time_ns, &config.params);
         Ok(Some(fused))
+    }
+
+    /// Moves to where fixes have shown it to be: far from the estimate. A correction would take the difference for errors of attitude
+    /// and biases too.
+    fn relocate(
+        &mut self,
+        fix: &GnssPosition,
+        velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
+    ) -> Result<(), Reason> {
+        let place = Place { position: (fix.position, fix.covariance), lever_arm: fix.lever_arm, velocity };
+        self.strategy.relocate(&place)?;
+        self.marks.clear();
+        self.unconfirmed = CONFIRMATIONS;
+        self.overruled += 1;
+        self.resets = self.resets.wrapping_add(1);
+        if let Some(now_ns) = self.now_ns {
+            self.distrust(now_ns);
+            self.started = Some((now_ns, StartedFrom::Receiver));
+        }
+        Ok(())
     }
 }
 

@@ -79,6 +79,8 @@ pub enum StartedFrom {
     FlightController,
     /// From an anchor.
     Anchor,
+    /// Again, from fixes that agree and are far from the estimate.
+    Receiver,
 }
 
 impl StartedFrom {
@@ -88,6 +90,7 @@ impl StartedFrom {
             Self::Origin => "origin",
             Self::FlightController => "flight_controller",
             Self::Anchor => "anchor",
+            Self::Receiver => "receiver",
         }
     }
 }

@@ -187,12 +187,14 @@ pub(super) fn check_position(position: &Geodetic) -> Result<(), Refusal> {
     }
     let is_there = latitude.abs() <= 0.5 * core::f64::consts::PI
         && longitude.abs() <= 2.0 * core::f64::consts::PI
-        && (-1e4..=1e6).contains(&height);
+        && HEIGHTS.contains(&height);
     if is_there { Ok(()) } else { Err(Refusal::OutOfRange) }
 }
 
+/// Where aircraft are, m above the ellipsoid.
+pub(super) const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
 /// Faster than anything that flies in the air, m/s.
-const MOST_VELOCITY: f64 = 1e4;
+pub(super) const MOST_VELOCITY: f64 = 1e4;
 /// The longest way between two frames, m.
 const LONGEST_WAY: f64 = 1e5;
 

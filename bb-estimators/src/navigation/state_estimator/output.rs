@@ -33,6 +33,9 @@ pub struct EstimatorOutput {
     /// Whether it is not to be trusted as its covariance says: something did not fit, or was missing. The label stays what
     /// it is.
     pub degraded: bool,
+    /// How often the estimate has jumped since the first start: it started again elsewhere, or was corrected by what it had
+    /// refused before. Who differentiates it, or controls by it, must begin again with each.
+    pub resets: u32,
     /// How good it is.
     pub quality: Quality,
 }

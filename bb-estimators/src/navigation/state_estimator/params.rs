@@ -78,7 +78,8 @@ params! {
         input_rate: f64 = 128.0, in 1.0..=10_000.0, unit "Hz";
         /// How far ahead of the newest sample of the IMU an input may be stamped.
         lead: f64 = 0.5, in 0.0..=10.0, unit "s";
-        /// Without camera frames, a keyframe is made after this time. It must be longer than the time between two frames.
+        /// Without camera frames, a keyframe is made after this time. A camera whose frames are farther apart is waited for, by up to
+        /// two thirds of a second more than this.
         keyframe_interval: f64 = 1.0, in 0.05..=10.0, unit "s";
         /// Estimates a second.
         output_rate: f64 = 5.0, in 0.1..=1000.0, unit "Hz";

@@ -206,8 +206,8 @@ impl<F: ProvidedFactor> Queue<F> {
             Stamped::Late => return self.place_late_sample(sample, config),
             Stamped::Ahead => return Err(Refusal::InTheFuture { time_ns }.into()),
             Stamped::TooOld => return Err(Refusal::TooOld { time_ns }.into()),
-            Stamped::SetBack => {
-                self.set_back(sample, newest.time_ns, config);
+            Stamped::SetBack { for_ns } => {
+                self.set_back(sample, for_ns, newest.time_ns, config);
                 return Ok(Sampled::Bridged);
             }
         }
@@ -229,11 +229,13 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
     }
 
-    /// The first sample sets the time, once another stamp agrees with its own.
+    /// The first sample sets the time, once another stamp agrees with its own. What was told before is not given up for two
+    /// stamps: that takes as many as a jump of the clock does.
     fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
         let time_ns = sample.time_ns;
         let before = self.first.take();
-        if let Some(first) = before.filter(|first| follows(time_ns, first.time_ns)) {
+        let is_believed = self.clock.doubt(time_ns).is_some() || self.inputs.is_empty();
+        if let Some(first) = before.filter(|first| is_believed && follows(time_ns, first.time_ns)) {
             self.begin(&first, config);
             return self.place_sample(sample, config);
         }
@@ -259,7 +261,7 @@ impl<F: ProvidedFactor> Queue<F> {
     }
 
     /// The clock of the IMU was set back: the engine goes on by the new one, without the past.
-    fn set_back(&mut self, sample: &ImuMean, newest_ns: i64, config: &StateEstimatorConfig) {
+    fn set_back(&mut self, sample: &ImuMean, for_ns: i64, newest_ns: i64, config: &StateEstimatorConfig) {
         self.settle(newest_ns, config);
         for entry in self.inputs.drain(..) {
             if let (None, Some(kind)) = (entry.outcome, entry.payload.kind()) {
@@ -268,7 +270,7 @@ impl<F: ProvidedFactor> Queue<F> {
                 self.told.push(Told::Taken(entry.key, kind, Outcome::Degraded(reason)));
             }
         }
-        self.engine.set_clock_back(sample.time_ns, config);
+        self.engine.set_clock_back(sample.time_ns, for_ns, config);
         self.samples.clear();
         self.copies.clear();
         self.copies.push_back(self.engine.clone());
@@ -476,9 +478,10 @@ impl<F: ProvidedFactor> Queue<F> {
             if next > until {
                 break;
             }
+            let is_gap = self.follows_gap(sample_index, config);
             if !is_input {
                 if let Some(sample) = sample {
-                    self.advance(next, &sample, config);
+                    self.advance(next, &sample, is_gap, config);
                 }
                 sample_index += 1;
                 continue;
@@ -488,7 +491,7 @@ impl<F: ProvidedFactor> Queue<F> {
             {
                 // The sample is a mean: each part of it is the same.
                 let part = ImuMean { time_ns: next.time_ns, ..sample };
-                self.advance(Key::of_sample(next.time_ns), &part, config);
+                self.advance(Key::of_sample(next.time_ns), &part, is_gap, config);
             }
             self.apply(input_index, config)?;
             input_index += 1;
@@ -496,9 +499,16 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(())
     }
 
-    fn advance(&mut self, key: Key, sample: &ImuMean, config: &StateEstimatorConfig) {
+    /// Whether a sample is the first after a gap, however short the parts are that inputs part it into.
+    fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
+        let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
+        let (Some(before), Some(sample)) = (before, self.samples.get(index)) else { return false };
+        sample.time_ns.saturating_sub(before.time_ns) > ns(config.sensors.longest_sample)
+    }
+
+    fn advance(&mut self, key: Key, sample: &ImuMean, is_gap: bool, config: &StateEstimatorConfig) {
         let was = self.engine.condition();
-        if let Err(reason) = self.engine.advance(key, sample, config)
+        if let Err(reason) = self.engine.advance(key, sample, is_gap, config)
             && self.engine.condition() != was
         {
             self.told.push(Told::Broken(sample.time_ns, reason));
@@ -570,7 +580,8 @@ impl<F: ProvidedFactor> Queue<F> {
         let Some(oldest) = self.copies.front() else { return };
         let key = oldest.key();
         let kept_ns = oldest.needed_ns().min(self.engine.needed_ns());
-        while self.samples.front().is_some_and(|sample| sample.time_ns <= kept_ns) {
+        // The one before the first that is needed shows whether that follows a gap.
+        while self.samples.get(1).is_some_and(|sample| sample.time_ns <= kept_ns) {
             self.samples.pop_front();
         }
         while self.inputs.front().is_some_and(|entry| entry.key <= key) {

@@ -9,7 +9,7 @@ mod smoother;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use nalgebra::{Isometry3, Matrix6, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 pub(super) use self::predictor::Predictor;
 use super::factor::ProvidedFactor;
@@ -54,18 +54,31 @@ impl Pose {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Measured<'a, F> {
     Relative(RelativePose),
-    Anchor(AbsolutePose),
+    Anchor(AbsolutePose, Trust),
     Gnss(GnssPosition, Option<GnssVelocity>, Trust),
     Provided(&'a F),
 }
 
-/// What a receiver of satellite navigation may do that does not fit.
+/// What a position may do that does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Trust {
-    /// Nothing: a camera or anchors tell where it is, and one that is spoofed is patient.
-    Beside,
-    /// Overrule the estimate, as there is nothing else.
-    Alone,
+    /// Nothing: it is refused.
+    Doubted,
+    /// Overrule the estimate, if [`PATIENCE`] were refused before: they agree with it.
+    Believed,
+}
+
+/// So many measurements in a row must be refused before one overrules the estimate.
+pub(super) const PATIENCE: u32 = 3;
+
+/// Where it is, where the estimate is wrong: what is not known of it stays.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Of what was measured, an antenna.
+    pub(super) position: (Vector3<f64>, Matrix3<f64>),
+    /// Where that is in the body.
+    pub(super) lever_arm: Vector3<f64>,
+    pub(super) velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
 }
 
 /// Why something was not taken in.
@@ -89,27 +102,30 @@ pub(super) struct Streams {
     pub(super) relative: Stream,
     pub(super) anchors: Stream,
     pub(super) positions: Stream,
-    /// Of a receiver that is alone.
-    pub(super) lone: Stream,
     pub(super) velocities: Stream,
     pub(super) provided: Stream,
 }
 
 impl Streams {
-    /// That of a receiver's positions.
-    fn of_fixes(&mut self, trust: Trust) -> &mut Stream {
-        match trust {
-            Trust::Beside => &mut self.positions,
-            Trust::Alone => &mut self.lone,
-        }
-    }
-
     fn new() -> Self {
-        let firm = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
-        let usual = Stream::default();
-        Self { relative: usual, anchors: usual, positions: firm, lone: usual, velocities: firm, provided: usual }
+        let of = |patience| Stream::new(StreamParams { patience, ..StreamParams::default() });
+        let (firm, usual) = (of(0), of(PATIENCE));
+        Self { relative: usual, anchors: firm, positions: firm, velocities: firm, provided: usual }
     }
 }
+
+/// A gate for a position.
+fn trusting(stream: &mut Stream, trust: Trust) -> &mut Stream {
+    stream.set_patience(match trust {
+        Trust::Doubted => 0,
+        Trust::Believed => PATIENCE,
+    });
+    stream
+}
+
+/// How much longer than [`keyframe_interval`](super::params::StateEstimatorParams::keyframe_interval) a keyframe may wait for a slow camera:
+/// [`room`](super::params::StateEstimatorParams::room) has as much to spare.
+const SLACK_NS: i64 = 1_000_000_000;
 
 /// When keyframes were made.
 #[derive(Clone, Copy, Debug)]
@@ -117,16 +133,46 @@ pub(super) struct Cadence {
     interval_ns: i64,
     keyframe_ns: i64,
     camera_ns: i64,
+    /// Between the last two frames of the camera.
+    spacing_ns: i64,
 }
 
 impl Cadence {
     fn new(config: &StateEstimatorConfig) -> Self {
-        Self { interval_ns: ns(config.params.keyframe_interval), keyframe_ns: i64::MIN, camera_ns: i64::MIN }
+        let interval_ns = ns(config.params.keyframe_interval);
+        Self { interval_ns, keyframe_ns: i64::MIN, camera_ns: i64::MIN, spacing_ns: 0 }
+    }
+
+    /// It has begun at a time, which counts as a frame.
+    fn begin(&mut self, time_ns: i64) {
+        (self.keyframe_ns, self.camera_ns) = (time_ns, time_ns);
+    }
+
+    /// The newest keyframe is a frame of the camera.
+    fn camera_frame(&mut self) {
+        if self.keyframe_ns > self.camera_ns {
+            self.spacing_ns = self.keyframe_ns.saturating_sub(self.camera_ns);
+            self.camera_ns = self.keyframe_ns;
+        }
+    }
+
+    /// For how long after a frame the next is waited for: a keyframe between two frames would part them.
+    fn patience_ns(&self) -> i64 {
+        (self.spacing_ns / 2).saturating_mul(3).min(self.interval_ns.saturating_add(SLACK_NS))
+    }
+
+    fn awaits_camera(&self, now_ns: i64, at_least_ns: i64) -> bool {
+        now_ns.saturating_sub(self.camera_ns) <= self.patience_ns().max(at_least_ns)
     }
 
     /// Whether a keyframe is due without a camera.
     fn is_due(&self, now_ns: i64) -> bool {
-        now_ns.saturating_sub(self.keyframe_ns) >= self.interval_ns
+        now_ns.saturating_sub(self.keyframe_ns) >= self.interval_ns && !self.awaits_camera(now_ns, 0)
+    }
+
+    /// Whether the camera says where keyframes are.
+    fn has_camera(&self, now_ns: i64) -> bool {
+        self.awaits_camera(now_ns, self.interval_ns / 2)
     }
 }
 
@@ -186,9 +232,9 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.measure(measured))
     }
 
-    /// Where it is at present.
-    pub(super) fn position(&self) -> Option<Vector3<f64>> {
-        each!(self, strategy => strategy.position())
+    /// Where it is at present, and how fast.
+    pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        each!(self, strategy => strategy.motion())
     }
 
     /// How many gaps of the IMU were bridged.
@@ -238,9 +284,13 @@ impl<F: ProvidedFactor> Strategy<F> {
     }
 
     /// How many fixes the gate has refused since it let one pass.
-    pub(super) fn refused_fixes(&self, trust: Trust) -> u64 {
-        let Streams { positions, lone, .. } = each!(self, strategy => strategy.streams());
-        if trust == Trust::Alone { lone.counts().gate_in_a_row } else { positions.counts().gate_in_a_row }
+    pub(super) fn refused_fixes(&self) -> u64 {
+        each!(self, strategy => strategy.streams()).positions.counts().gate_in_a_row
+    }
+
+    /// Moves the present elsewhere; what does not depend on where it is stays. Keyframes are forgotten.
+    pub(super) fn relocate(&mut self, place: &Place) -> Result<(), Refusal> {
+        each!(self, strategy => strategy.relocate(place))
     }
 
     /// What is estimated is from now on what was so at another time; keyframes are forgotten.

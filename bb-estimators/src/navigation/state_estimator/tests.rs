@@ -1,5 +1,6 @@
 //! The rows of the design, on every strategy that was built.
 
+mod cadence;
 mod clock;
 mod errors;
 mod flight;
@@ -8,6 +9,7 @@ mod interface;
 mod labels;
 mod order;
 mod records;
+mod refusals;
 mod soak;
 
 use super::*;

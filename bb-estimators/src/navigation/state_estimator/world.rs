@@ -66,6 +66,15 @@ impl World {
         (geodetic, self.frame_from_local(&geodetic).inverse())
     }
 
+    /// Above the ellipsoid, m.
+    pub(super) fn height(&self, position: &Vector3<f64>) -> f64 {
+        if position.xy().norm() > FARTHEST {
+            return self.frame.geodetic(position).height;
+        }
+        // The Earth falls away by no more than 2 m.
+        self.frame.origin().height + position.z
+    }
+
     /// If a position is far out, moves on to a frame that is nearer by; what takes coordinates there.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
         if position.xy().norm() <= FARTHEST {

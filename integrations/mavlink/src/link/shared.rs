@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 pub(crate) struct Voice {
     system_id: u8,
     component_id: u8,
-    sequence: AtomicU8,
+    sequence: Arc<AtomicU8>,
 }
 
 /// Who speaks where nobody has chosen: the onboard computer of the first vehicle.
@@ -33,6 +33,7 @@ pub(crate) struct Shared {
     /// None once the link has failed.
     writer: Mutex<Option<Writer>>,
     voices: Mutex<Vec<Weak<Voice>>>,
+    /// Speaks where nobody else does; whoever chooses its ids continues its numbers.
     default_voice: Arc<Voice>,
 }
 
@@ -60,7 +61,7 @@ impl Shared {
             state: Mutex::default(),
             writer: Mutex::new(Some(writer)),
             voices: Mutex::default(),
-            default_voice: Arc::new(Voice::new(DEFAULT_VOICE)),
+            default_voice: Arc::new(Voice::new(DEFAULT_VOICE, Arc::default())),
         }
     }
 
@@ -93,16 +94,14 @@ impl Shared {
 
     /// A voice with these ids: that which has them already, if there is one.
     pub(super) fn voice(&self, ids: (u8, u8)) -> Arc<Voice> {
-        if ids == DEFAULT_VOICE {
-            return self.remember(Arc::clone(&self.default_voice));
-        }
-        let found = self.living().into_iter().find(|voice| voice.ids() == ids);
-        found.unwrap_or_else(|| self.remember(Arc::new(Voice::new(ids))))
-    }
-
-    fn remember(&self, voice: Arc<Voice>) -> Arc<Voice> {
         let mut voices = self.voices.lock().unwrap_or_else(PoisonError::into_inner);
-        voices.retain(|known| known.upgrade().is_some_and(|known| !Arc::ptr_eq(&known, &voice)));
+        voices.retain(|voice| voice.strong_count() > 0);
+        if let Some(voice) = voices.iter().filter_map(Weak::upgrade).find(|voice| voice.ids() == ids) {
+            return voice;
+        }
+        let is_default = ids == DEFAULT_VOICE;
+        let sequence = if is_default { Arc::clone(&self.default_voice.sequence) } else { Arc::default() };
+        let voice = Arc::new(Voice::new(ids, sequence));
         voices.push(Arc::downgrade(&voice));
         voice
     }
@@ -227,20 +226,16 @@ impl State {
 }
 
 impl Voice {
-    fn new((system_id, component_id): (u8, u8)) -> Self {
-        Self { system_id, component_id, sequence: AtomicU8::new(0) }
+    fn new((system_id, component_id): (u8, u8), sequence: Arc<AtomicU8>) -> Self {
+        Self { system_id, component_id, sequence }
     }
 
     fn ids(&self) -> (u8, u8) {
         (self.system_id, self.component_id)
     }
 
-    fn header(&self) -> MavHeader {
-        let Self { system_id, component_id, sequence } = self;
-        MavHeader {
-            system_id: *system_id,
-            component_id: *component_id,
-            sequence: sequence.fetch_add(1, Ordering::Relaxed),
-        }
+    pub(super) fn header(&self) -> MavHeader {
+        let (system_id, component_id) = self.ids();
+        MavHeader { system_id, component_id, sequence: self.sequence.fetch_add(1, Ordering::Relaxed) }
     }
 }

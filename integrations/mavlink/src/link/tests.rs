@@ -238,3 +238,23 @@ fn what_cannot_be_opened_says_why() {
         "the link `serial:/dev/ttyACM0:57600` cannot be opened: serial ports need the feature `serial` of the crate `bb-mavlink`"
     );
 }
+
+/// Beside another voice, nobody hears that of the onboard computer once it is dropped; without one, it is there again, and its
+/// numbers go on.
+#[test]
+fn a_voice_that_is_dropped_says_nothing_more() {
+    let (_other, address) = Other::new();
+    let link = Link::open(&address).expect("it opens");
+    let ids = || link.shared.voices().iter().map(|voice| voice.header().component_id).collect::<Vec<_>>();
+    assert_eq!(ids(), [191], "the default");
+    let odometry = link.voice(1, 197);
+    let onboard = link.voice(1, 191);
+    assert!(Arc::ptr_eq(&onboard, &link.voice(1, 191)), "one for all who choose it");
+    assert_eq!(ids(), [197, 191]);
+    let before = onboard.header().sequence;
+    drop(onboard);
+    assert_eq!(ids(), [197]);
+    drop(odometry);
+    assert_eq!(ids(), [191]);
+    assert!(link.shared.voices()[0].header().sequence > before, "its numbers go on");
+}

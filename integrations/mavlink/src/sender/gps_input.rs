@@ -128,6 +128,7 @@ pub(super) mod tests {
             anchor_age_ms: Some(100),
             smoothed: false,
             degraded: false,
+            resets: 0,
             covariance_norm: 27.0,
             nis: None,
             is_anchor_degraded: false,

@@ -29,8 +29,8 @@ impl Kind {
             (Self::Odometry(frame), Estimate::Flight(estimate)) => {
                 frame.of_flight(estimate, wall).map(MavMessage::ODOMETRY)
             }
-            (Self::Odometry(_), Estimate::Odometry(estimate)) => {
-                OdometryFrame::of_odometry(&estimate.payload, wall).map(MavMessage::ODOMETRY)
+            (Self::Odometry(frame), Estimate::Odometry(estimate)) => {
+                frame.of_odometry(&estimate.payload, wall).map(MavMessage::ODOMETRY)
             }
         }
     }

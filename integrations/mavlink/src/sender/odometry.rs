@@ -8,16 +8,59 @@ use bb_estimators::navigation::state_estimator::FlightEstimate;
 use bb_estimators::navigation::{Geodetic, LocalFrame};
 use mavlink::dialects::common::{MavEstimatorType, MavFrame, ODOMETRY_DATA};
 
+/// A jump of the estimate that is longer shows that the origin was nowhere near the robot, m.
+const JUMP: f64 = 1000.0;
+
 /// The frame of flight estimates.
 #[derive(Clone, Debug)]
 pub(super) struct OdometryFrame {
-    /// None before the first estimate, where none was given.
-    origin: Option<LocalFrame>,
+    origin: Origin,
+    /// How often the origin has changed.
+    moves: u32,
+    /// The last estimate: where, and after how many jumps.
+    last: Option<(Geodetic, u32)>,
+    frame_id: MavFrame,
+}
+
+/// Where the local frame begins.
+#[derive(Clone, Debug)]
+enum Origin {
+    /// In the options: it stays.
+    Given(LocalFrame),
+    /// At an estimate that was not degraded: it stays, unless that turns out to have been wrong.
+    Trusted(LocalFrame),
+    /// At an estimate, until there is one that is not degraded.
+    Provisional(LocalFrame),
+    /// There is no estimate yet.
+    Unknown,
 }
 
 impl OdometryFrame {
-    pub(super) fn new(origin: Option<LocalFrame>) -> Self {
-        Self { origin }
+    pub(super) fn new(origin: Option<LocalFrame>, frame_id: MavFrame) -> Self {
+        let origin = origin.map_or(Origin::Unknown, Origin::Given);
+        Self { origin, moves: 0, last: None, frame_id }
+    }
+
+    /// The origin for an estimate.
+    fn origin(&mut self, here: &Geodetic, estimate: &FlightEstimate) -> LocalFrame {
+        let last = self.last.replace((*here, estimate.resets));
+        let has_jumped = last.is_some_and(|(before, resets)| {
+            resets != estimate.resets && LocalFrame::new(before).position(here).norm() > JUMP
+        });
+        if let (Origin::Trusted(frame), true) = (&self.origin, has_jumped) {
+            self.origin = Origin::Provisional(*frame);
+        }
+        let frame = match &self.origin {
+            Origin::Given(frame) | Origin::Trusted(frame) => return *frame,
+            Origin::Provisional(frame) if estimate.degraded => return *frame,
+            Origin::Provisional(_) => {
+                self.moves = self.moves.wrapping_add(1);
+                LocalFrame::new(*here)
+            }
+            Origin::Unknown => LocalFrame::new(*here),
+        };
+        self.origin = if estimate.degraded { Origin::Provisional(frame) } else { Origin::Trusted(frame) };
+        frame
     }
 
     /// None if a value is not finite.
@@ -30,7 +73,7 @@ impl OdometryFrame {
         };
         let is_on_earth = [here.latitude, here.longitude, here.height].iter().all(|value| value.is_finite());
         is_on_earth.then_some(())?;
-        let origin = *self.origin.get_or_insert(LocalFrame::new(here));
+        let origin = self.origin(&here, estimate);
         // Level there is not level here.
         let origin_from_here = LocalFrame::new(here).other_from_self(&origin).rotation;
         let world_from_body = origin_from_here * estimate.world_from_body;
@@ -48,12 +91,13 @@ impl OdometryFrame {
             velocity: body_from_here * estimate.velocity,
             angular_velocity: None,
             velocity_covariance: None,
+            resets: estimate.resets.wrapping_add(self.moves),
         }
-        .message(wall, MavEstimatorType::MAV_ESTIMATOR_TYPE_VIO)
+        .message(wall, self.frame_id, MavEstimatorType::MAV_ESTIMATOR_TYPE_VIO)
     }
 
     /// None if a value is not finite.
-    pub(super) fn of_odometry(estimate: &Odometry, wall: WallTime) -> Option<ODOMETRY_DATA> {
+    pub(super) fn of_odometry(&self, estimate: &Odometry, wall: WallTime) -> Option<ODOMETRY_DATA> {
         let Odometry { pose, twist } = estimate;
         // Of the orientation, about the axes of the world; MAVLink has those of the body.
         let body_from_world = pose.world_from_body.inverse().to_rotation_matrix();
@@ -65,8 +109,10 @@ impl OdometryFrame {
             velocity: twist.linear,
             angular_velocity: Some(twist.angular),
             velocity_covariance: twist.covariance,
+            // Odometry does not tell.
+            resets: 0,
         }
-        .message(wall, MavEstimatorType::MAV_ESTIMATOR_TYPE_UNKNOWN)
+        .message(wall, self.frame_id, MavEstimatorType::MAV_ESTIMATOR_TYPE_UNKNOWN)
     }
 }
 
@@ -78,10 +124,16 @@ struct Motion {
     velocity: Vector3<f64>,
     angular_velocity: Option<Vector3<f64>>,
     velocity_covariance: Option<Matrix6<f64>>,
+    resets: u32,
 }
 
 impl Motion {
-    fn message(&self, wall: WallTime, estimator_type: MavEstimatorType) -> Option<ODOMETRY_DATA> {
+    fn message(
+        &self,
+        wall: WallTime,
+        frame_id: MavFrame,
+        estimator_type: MavEstimatorType,
+    ) -> Option<ODOMETRY_DATA> {
         let position = swap_world(&self.position).cast::<f32>();
         let rotation = ned_from_frd(&self.world_from_body);
         let velocity = swap_body(&self.velocity).cast::<f32>();
@@ -111,9 +163,10 @@ impl Motion {
             yawspeed: rates.z,
             pose_covariance: upper_triangle(pose_covariance),
             velocity_covariance: upper_triangle(velocity_covariance),
-            frame_id: MavFrame::MAV_FRAME_LOCAL_NED,
+            frame_id,
             child_frame_id: MavFrame::MAV_FRAME_BODY_FRD,
-            reset_counter: 0,
+            // It counts in a circle; who listens looks whether it has changed.
+            reset_counter: self.resets.to_le_bytes()[0],
             estimator_type,
             // Unknown: the covariance tells.
             quality: 0,
@@ -142,13 +195,14 @@ mod tests {
     use bb_core::payload::{Pose, Twist};
     use bb_core::time::WallTime;
 
+    const NED: MavFrame = MavFrame::MAV_FRAME_LOCAL_NED;
     const NOW: WallTime = WallTime::from_unix_nanos(1_795_305_600_000_000_000);
 
     #[test]
     fn a_flight_estimate_is_relative_to_the_origin() {
         let origin =
             Geodetic { latitude: 48.099_f64.to_radians(), longitude: 11.5_f64.to_radians(), height: 500.0 };
-        let mut frame = OdometryFrame::new(Some(LocalFrame::new(origin)));
+        let mut frame = OdometryFrame::new(Some(LocalFrame::new(origin)), NED);
         let message = frame.of_flight(&estimate(), NOW).expect("it can be sent");
         assert!((message.x - 111.2).abs() < 0.1 && message.y.abs() < 1e-3, "{} {}", message.x, message.y);
         assert!((message.z + 47.5).abs() < 0.01, "{}", message.z);
@@ -185,7 +239,7 @@ mod tests {
         let mut far = estimate();
         (far.position.latitude_rad, far.position.longitude_rad) = (0.0, 10_f64.to_radians());
         let message =
-            OdometryFrame::new(Some(LocalFrame::new(origin))).of_flight(&far, NOW).expect("it can be sent");
+            OdometryFrame::new(Some(LocalFrame::new(origin)), NED).of_flight(&far, NOW).expect("it can be sent");
         let [w, i, j, k] = message.q.map(f64::from);
         let ned_from_frd = UnitQuaternion::from_quaternion(bb_core::nalgebra::Quaternion::new(w, i, j, k));
         let up = ned_from_frd * Vector3::new(0.0, 0.0, -1.0);
@@ -195,13 +249,66 @@ mod tests {
 
     #[test]
     fn without_an_origin_the_first_estimate_is_it() {
-        let mut frame = OdometryFrame::new(None);
+        let mut frame = OdometryFrame::new(None, NED);
         let first = frame.of_flight(&estimate(), NOW).expect("it can be sent");
         assert!([first.x, first.y, first.z].iter().all(|coordinate| coordinate.abs() < 1e-6));
         let mut higher = estimate();
         higher.position.altitude = Some(557.5);
         let second = frame.of_flight(&higher, NOW).expect("it can be sent");
         assert!((second.z + 10.0).abs() < 1e-4, "{}", second.z);
+    }
+
+    /// Four and a half kilometres to the north.
+    fn away(estimate: &FlightEstimate) -> FlightEstimate {
+        let mut away = *estimate;
+        away.position.latitude_rad += 4500.0 / 6.37e6;
+        away
+    }
+
+    #[test]
+    fn an_origin_at_a_degraded_estimate_is_provisional() {
+        let mut frame = OdometryFrame::new(None, NED);
+        let doubted = FlightEstimate { degraded: true, ..estimate() };
+        let first = frame.of_flight(&doubted, NOW).expect("it can be sent");
+        let still = frame.of_flight(&away(&doubted), NOW).expect("it can be sent");
+        assert!((still.x - 4500.0).abs() < 20.0, "{}", still.x);
+        let trusted = frame.of_flight(&away(&estimate()), NOW).expect("it can be sent");
+        assert!(trusted.x.abs() < 1e-3, "{}", trusted.x);
+        assert_eq!([first, still, trusted].map(|message| message.reset_counter), [0, 0, 1]);
+    }
+
+    #[test]
+    fn an_origin_that_was_wrong_is_corrected_once_the_estimate_is_trusted_again() {
+        let mut frame = OdometryFrame::new(None, NED);
+        let sent = |frame: &mut OdometryFrame, estimate: &FlightEstimate| {
+            let message = frame.of_flight(estimate, NOW).expect("it can be sent");
+            (message.x.round(), message.reset_counter)
+        };
+        assert_eq!(sent(&mut frame, &estimate()), (0.0, 0));
+        // It flies there: the origin was right.
+        let (there, _) = sent(&mut frame, &away(&estimate()));
+        assert!((there - 4500.0).abs() < 20.0, "{there}");
+        // A jump back is a reset, and shows that it was not.
+        let back = FlightEstimate { degraded: true, resets: 254, ..estimate() };
+        assert_eq!(sent(&mut frame, &back), (0.0, 254));
+        let moved = FlightEstimate { degraded: false, ..away(&back) };
+        assert_eq!(sent(&mut frame, &moved), (0.0, 255));
+        // A small jump is a reset, and no reason to move; the count goes round.
+        assert_eq!(sent(&mut frame, &FlightEstimate { resets: 255, ..moved }), (0.0, 0));
+        // One that was given stays.
+        let origin = Geodetic { latitude: 0.8, longitude: 0.2, height: 0.0 };
+        let mut given = OdometryFrame::new(Some(LocalFrame::new(origin)), NED);
+        let (before, _) = sent(&mut given, &estimate());
+        let (after, counter) = sent(&mut given, &FlightEstimate { resets: 7, ..away(&estimate()) });
+        assert!(after - before > 4000.0 && counter == 7, "{before} {after} {counter}");
+    }
+
+    #[test]
+    fn the_name_of_the_frame_changes_no_number() {
+        let sent =
+            |frame_id| OdometryFrame::new(None, frame_id).of_flight(&estimate(), NOW).expect("it can be sent");
+        let [ned, frd] = [NED, MavFrame::MAV_FRAME_LOCAL_FRD].map(sent);
+        assert_eq!((ned.q, ned.vx, frd.frame_id), (frd.q, frd.vx, MavFrame::MAV_FRAME_LOCAL_FRD));
     }
 
     #[test]
@@ -213,7 +320,8 @@ mod tests {
         };
         let covariance = Some(Matrix6::from_fn(|row, column| (row.min(column) * 10 + row.max(column)) as f64));
         let twist = Twist { linear: Vector3::new(1.0, 2.0, 3.0), angular: Vector3::new(0.1, 0.2, 0.3), covariance };
-        let message = OdometryFrame::of_odometry(&Odometry { pose, twist }, NOW).expect("it can be sent");
+        let message =
+            OdometryFrame::new(None, NED).of_odometry(&Odometry { pose, twist }, NOW).expect("it can be sent");
         assert_eq!([message.x, message.y, message.z], [2.0, 1.0, -3.0]);
         assert_eq!([message.vx, message.vy, message.vz], [1.0, -2.0, -3.0]);
         assert_eq!([message.rollspeed, message.pitchspeed, message.yawspeed], [0.1, -0.2, -0.3]);
@@ -240,7 +348,8 @@ mod tests {
             covariance: Some(Matrix6::from_diagonal(&diagonal)),
         };
         let twist = Twist { linear: Vector3::zeros(), angular: Vector3::zeros(), covariance: None };
-        let message = OdometryFrame::of_odometry(&Odometry { pose, twist }, NOW).expect("it can be sent");
+        let message =
+            OdometryFrame::new(None, NED).of_odometry(&Odometry { pose, twist }, NOW).expect("it can be sent");
         // North, east, down; forward, right, down.
         let expected = [2.0, 1.0, 3.0, 4e-4, 1e-4, 9e-4];
         for (index, (at, expected)) in [0, 6, 11, 15, 18, 20].into_iter().zip(expected).enumerate() {
@@ -253,15 +362,15 @@ mod tests {
     fn what_is_not_finite_is_not_sent() {
         let mut wrong = estimate();
         wrong.velocity.x = f64::NAN;
-        assert_eq!(OdometryFrame::new(None).of_flight(&wrong, NOW), None);
+        assert_eq!(OdometryFrame::new(None, NED).of_flight(&wrong, NOW), None);
         // It is finite, but not in single precision.
         wrong = estimate();
         wrong.velocity.x = 1e39;
-        assert_eq!(OdometryFrame::new(None).of_flight(&wrong, NOW), None);
+        assert_eq!(OdometryFrame::new(None, NED).of_flight(&wrong, NOW), None);
         wrong = estimate();
         wrong.position.latitude_rad = f64::NAN;
-        let mut frame = OdometryFrame::new(None);
+        let mut frame = OdometryFrame::new(None, NED);
         assert_eq!(frame.of_flight(&wrong, NOW), None);
-        assert!(frame.origin.is_none(), "it is no origin either");
+        assert!(matches!(frame.origin, Origin::Unknown), "it is no origin either");
     }
 }

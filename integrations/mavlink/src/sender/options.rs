@@ -5,6 +5,7 @@ use super::kind::Kind;
 use super::odometry::OdometryFrame;
 use bb_core::{Fault, Options};
 use bb_estimators::navigation::{Geodetic, LocalFrame};
+use mavlink::dialects::common::MavFrame;
 use std::time::Duration;
 
 /// Options of [`MavlinkSender`](super::MavlinkSender).
@@ -54,7 +55,12 @@ pub struct MavlinkSenderOptions {
     /// `GPS_INPUT`: GPS time less UTC, s. It was 18 from 2017 to at least 2026.
     #[option(default = 18)]
     pub leap_seconds: i32,
-    /// `ODOMETRY` of a flight estimate: origin of the local frame. Not a number for the position of the first estimate sent.
+    /// `ODOMETRY`: what its frame is called, `local_ned` or `local_frd`. ArduPilot takes only `local_frd`; the numbers are the
+    /// same, with forward to the north.
+    #[option(default = "local_ned")]
+    pub frame: String,
+    /// `ODOMETRY` of a flight estimate: origin of the local frame. Not a number for the position of the first estimate sent that
+    /// is not degraded.
     #[option(default = f64::NAN, unit = "rad")]
     pub origin_latitude: f64,
     /// Of the origin.
@@ -87,9 +93,18 @@ impl MavlinkSenderOptions {
             "odometry" => {
                 let (latitude, longitude) = (self.origin_latitude, self.origin_longitude);
                 let origin = Geodetic { latitude, longitude, height: self.origin_height };
-                Ok(Kind::Odometry(OdometryFrame::new((!latitude.is_nan()).then(|| LocalFrame::new(origin)))))
+                let origin = (!latitude.is_nan()).then(|| LocalFrame::new(origin));
+                Ok(Kind::Odometry(OdometryFrame::new(origin, self.mav_frame()?)))
             }
             other => Err(Fault::permanent(format!("message is `{other}`: write `gps_input` or `odometry`"))),
+        }
+    }
+
+    fn mav_frame(&self) -> Result<MavFrame, Fault> {
+        match self.frame.as_str() {
+            "local_ned" => Ok(MavFrame::MAV_FRAME_LOCAL_NED),
+            "local_frd" => Ok(MavFrame::MAV_FRAME_LOCAL_FRD),
+            other => Err(Fault::permanent(format!("frame is `{other}`: write `local_ned` or `local_frd`"))),
         }
     }
 }

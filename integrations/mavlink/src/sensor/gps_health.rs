@@ -40,7 +40,7 @@ pub struct MavlinkGpsHealthOptions {
 /// The health of the flight controller's receiver, with each `GPS_RAW_INT`, as the state estimator takes it.
 ///
 /// The dialect `common` has no message about spoofing, so the receiver is taken for spoofed for a while after a
-/// `STATUSTEXT` that contains "spoof", which PX4 and ArduPilot send.
+/// `STATUSTEXT` that says so, as "GPS1: spoofing indicated", unless one says that it has ended, as "spoofing cleared".
 #[derive(Debug)]
 pub struct MavlinkGpsHealth {
     stream: Stream,
@@ -64,25 +64,53 @@ impl Sensor for MavlinkGpsHealth {
         let Some(received) = self.stream.next()? else { return Ok(Reading::nothing()) };
         let arrival = received.arrival;
         let health = match &received.message {
-            MavMessage::STATUSTEXT(text) if says_spoofed(text) => {
-                self.spoofed = Some(arrival);
-                GpsHealth::Spoofed
-            }
+            MavMessage::STATUSTEXT(text) => match spoofing(text) {
+                Some(true) => {
+                    self.spoofed = Some(arrival);
+                    GpsHealth::Spoofed
+                }
+                said => {
+                    self.spoofed = self.spoofed.filter(|_| said.is_none());
+                    // A flood of texts must not hide that nothing else comes.
+                    return self.stream.check_silence().map(|()| Reading::nothing());
+                }
+            },
             MavMessage::GPS_RAW_INT(data) => {
                 self.stream.has_value();
                 let is_recent =
                     |at: MonotonicTime| arrival.seconds_since(at) <= self.options.spoofed_for.as_secs_f64();
                 if self.spoofed.is_some_and(is_recent) { GpsHealth::Spoofed } else { health(data, &self.options) }
             }
-            // A flood of texts must not hide that nothing else comes.
-            _ => return self.stream.check_silence().map(|()| Reading::nothing()),
+            _ => return Ok(Reading::nothing()),
         };
         Ok(Reading::at(arrival, GpsReport { health }))
     }
 }
 
-fn says_spoofed(text: &STATUSTEXT_DATA) -> bool {
-    text.text.to_str().is_ok_and(|text| text.to_ascii_lowercase().contains("spoof"))
+/// What makes the next word its contrary.
+const NOT: [&str; 4] = ["no", "not", "none", "without"];
+
+/// What may be between that and the word.
+const BETWEEN: [&str; 6] = ["gps", "gnss", "gps1", "gps2", "longer", "more"];
+
+/// What says after the word that it has ended, or is not so.
+const ENDED: [&str; 11] =
+    ["cleared", "clear", "ended", "over", "gone", "stopped", "resolved", "recovered", "none", "ok", "inactive"];
+
+/// Whether a text says that there is spoofing, or that there is none; none if it is about something else. In doubt there is.
+fn spoofing(text: &STATUSTEXT_DATA) -> Option<bool> {
+    // A colon is a word: what was denied before it, as in "not trusted: spoofed", is something else.
+    let text = text.text.to_str().ok()?.to_ascii_lowercase().replace(':', " : ");
+    let is_between = |c: char| !c.is_ascii_alphanumeric() && c != ':';
+    let words: Vec<&str> = text.split(is_between).filter(|word| !word.is_empty()).collect();
+    let at = words.iter().position(|word| word.starts_with("spoof"))?;
+    let (before, after) = words.split_at(at);
+    let is_denied = |before: &[&str]| {
+        let last = before.iter().rev().find(|word| !BETWEEN.contains(word));
+        last.is_some_and(|word| NOT.contains(word))
+    };
+    let has_ended = after.iter().enumerate().any(|(i, word)| ENDED.contains(word) && !is_denied(&after[..i]));
+    Some(!has_ended && !is_denied(before))
 }
 
 fn health(data: &GPS_RAW_INT_DATA, options: &MavlinkGpsHealthOptions) -> GpsHealth {
@@ -129,9 +157,32 @@ mod tests {
     }
 
     #[test]
-    fn texts_about_spoofing_are_found() {
-        let text = |text: &str| STATUSTEXT_DATA { text: text.into(), ..Default::default() };
-        assert!(says_spoofed(&text("GPS1: Spoofing indicated")));
-        assert!(!says_spoofed(&text("GPS1: detected u-blox")));
+    fn texts_about_spoofing_are_read() {
+        let said = |text: &str| spoofing(&STATUSTEXT_DATA { text: text.into(), ..Default::default() });
+        for text in [
+            "GPS1: Spoofing indicated",
+            "GPS reports multiple spoofing indicated",
+            "GPS spoofed",
+            "GPS 1 not trusted: spoofed",
+            "GPS lost, no fix, spoofing detected",
+            "Spoofing not cleared",
+            "SPOOFING!",
+        ] {
+            assert_eq!(said(text), Some(true), "{text}");
+        }
+        for text in [
+            "GPS1: spoofing cleared",
+            "No spoofing indicated",
+            "GPS: no GNSS spoofing",
+            "GPS no longer spoofed",
+            "GPS spoofing state: none",
+            "Spoofing OK",
+            "GPS not spoofed",
+        ] {
+            assert_eq!(said(text), Some(false), "{text}");
+        }
+        for text in ["GPS1: detected u-blox", "", "no fix"] {
+            assert_eq!(said(text), None, "{text}");
+        }
     }
 }

@@ -2,12 +2,15 @@
 
 mod faults;
 mod other;
+mod pymavlink;
 mod reads;
 mod sends;
 
 use bb_core::event::ComponentFault;
+use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use bb_core::payload::GeodeticPosition;
 use bb_core::prelude::*;
-use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvents};
+use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvent, FlightEvents, Level, SourceLabel};
 use bb_mavlink::{MavlinkAttitude, MavlinkGnss, MavlinkGpsHealth, MavlinkHeartbeat, MavlinkImu, MavlinkSender};
 
 /// Far longer than anything takes.
@@ -62,4 +65,44 @@ fn fault_of_imu(faults: &Subscription<ComponentFault>, text: &str) -> String {
         .unwrap_or_else(|| panic!("no fault says that `{text}`"))
         .payload
         .message
+}
+
+/// At 48° north.
+fn estimate(time: MonotonicTime, longitude_deg: f64) -> FlightEstimate {
+    FlightEstimate {
+        frame_id: [0; 16],
+        emitted: time,
+        time,
+        position: GeodeticPosition {
+            latitude_rad: 48_f64.to_radians(),
+            longitude_rad: longitude_deg.to_radians(),
+            altitude: Some(500.0),
+        },
+        world_from_body: UnitQuaternion::identity(),
+        velocity: Vector3::new(1.0, 2.0, 3.0),
+        covariance: Matrix6::identity() * 4.0,
+        label: SourceLabel::SatelliteAnchored,
+        anchor_age_ms: None,
+        smoothed: false,
+        degraded: false,
+        resets: 0,
+        covariance_norm: 1.0,
+        nis: None,
+        is_anchor_degraded: false,
+    }
+}
+
+/// What is sent to the ground.
+fn text(level: Level, text: &str) -> FlightEvent {
+    FlightEvent {
+        time: MonotonicTime::ZERO,
+        level,
+        kind: "label".into(),
+        input: None,
+        reason: None,
+        from: None,
+        to: None,
+        status_text: Some(text.into()),
+        keyframe: None,
+    }
 }

@@ -1,50 +1,13 @@
 //! What the bridge sends.
 
-use super::{LONG, drone};
+use super::{LONG, drone, estimate, text};
 use crate::other::Other;
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
-use bb_core::payload::{GeodeticPosition, Pose, Twist};
+use bb_core::payload::{Pose, Twist};
 use bb_core::prelude::*;
-use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvent, FlightEvents, Level, SourceLabel};
+use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvents, Level};
 use mavlink::MavHeader;
 use mavlink::dialects::common::{MavFrame, MavMessage, MavSeverity};
-
-fn estimate(time: MonotonicTime, longitude_deg: f64) -> FlightEstimate {
-    FlightEstimate {
-        frame_id: [0; 16],
-        emitted: time,
-        time,
-        position: GeodeticPosition {
-            latitude_rad: 48_f64.to_radians(),
-            longitude_rad: longitude_deg.to_radians(),
-            altitude: Some(500.0),
-        },
-        world_from_body: UnitQuaternion::identity(),
-        velocity: Vector3::new(1.0, 2.0, 3.0),
-        covariance: Matrix6::identity() * 4.0,
-        label: SourceLabel::SatelliteAnchored,
-        anchor_age_ms: None,
-        smoothed: false,
-        degraded: false,
-        covariance_norm: 1.0,
-        nis: None,
-        is_anchor_degraded: false,
-    }
-}
-
-fn text(level: Level, text: &str) -> FlightEvent {
-    FlightEvent {
-        time: MonotonicTime::ZERO,
-        level,
-        kind: "label".into(),
-        input: None,
-        reason: None,
-        from: None,
-        to: None,
-        status_text: Some(text.into()),
-        keyframe: None,
-    }
-}
 
 #[test]
 fn an_estimate_arrives_and_a_stale_one_does_not() {
@@ -101,6 +64,30 @@ fn texts_arrive_with_their_severities() {
             (MavSeverity::MAV_SEVERITY_INFO, Ok(10), 1, 1),
         ]
     );
+}
+
+/// The estimator says how often its estimate has jumped, and the origin may move on besides.
+#[test]
+fn resets_of_the_estimate_are_counted_in_its_odometry() {
+    let other = Other::new();
+    let mut builder = drone(&other.address);
+    builder.options(drone::bridge::odometry).source = "sensor/base/estimate".into();
+    builder.options(drone::bridge::odometry).frame = "local_frd".into();
+    let running = builder.start().expect("the link can be opened");
+    for resets in [0, 3, 259] {
+        let now = Clock::real().now();
+        let estimate = FlightEstimate { resets, ..estimate(now, 11.0) };
+        running.live().publish(drone::sensor::base::estimate, now, estimate);
+        let odometry = other.hears(|_, message| match message {
+            MavMessage::ODOMETRY(data) => Some(data),
+            _ => None,
+        });
+        let odometry = odometry.expect("it is sent");
+        assert_eq!(
+            (odometry.reset_counter, odometry.frame_id),
+            ((resets % 256) as u8, MavFrame::MAV_FRAME_LOCAL_FRD)
+        );
+    }
 }
 
 #[test]

@@ -45,6 +45,8 @@ pub struct FlightEstimate {
     pub smoothed: bool,
     /// Whether it is not to be trusted as its covariance says.
     pub degraded: bool,
+    /// How often the estimate has jumped since the first start.
+    pub resets: u32,
     /// Frobenius norm of the covariance.
     pub covariance_norm: f64,
     /// Normalised innovation squared of the last measurement, over its dimension.
@@ -69,6 +71,7 @@ impl FlightEstimate {
             anchor_age_ms: output.anchor_age_ms,
             smoothed: output.smoothed,
             degraded: output.degraded,
+            resets: output.resets,
             covariance_norm: output.quality.covariance_norm,
             nis: output.quality.nis,
             is_anchor_degraded: output.quality.is_anchor_degraded,

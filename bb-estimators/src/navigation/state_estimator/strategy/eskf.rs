@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, SMatrix, Vector3};
 
-use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, id_of};
+use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, id_of, trusting};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
@@ -57,7 +57,7 @@ impl EskfStrategy {
     /// The present is the first keyframe.
     fn begin(&mut self, time_ns: i64) {
         self.filter.set_keyframe(id_of(time_ns));
-        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (time_ns, time_ns);
+        self.cadence.begin(time_ns);
         self.is_next = false;
         self.past.clear();
         self.past.extend(self.pose());
@@ -74,7 +74,7 @@ impl EskfStrategy {
 
     pub(super) fn camera_frame(&mut self) -> Result<(), Failure> {
         self.keyframe()?;
-        self.cadence.camera_ns = self.cadence.keyframe_ns;
+        self.cadence.camera_frame();
         self.is_next = true;
         Ok(())
     }
@@ -99,9 +99,9 @@ impl EskfStrategy {
         let streams = &mut self.streams;
         let fused = match measured {
             Measured::Relative(pose) => self.filter.update(&mut streams.relative, pose)?,
-            Measured::Anchor(pose) => self.filter.update(&mut streams.anchors, pose)?,
+            Measured::Anchor(pose, trust) => self.filter.update(trusting(&mut streams.anchors, *trust), pose)?,
             Measured::Gnss(position, velocity, trust) => {
-                let fused = self.filter.update(streams.of_fixes(*trust), position)?;
+                let fused = self.filter.update(trusting(&mut streams.positions, *trust), position)?;
                 if let Some(velocity) = velocity {
                     // A receiver whose position is good is trusted, whether its velocity is or not.
                     let _ = self.filter.update(&mut streams.velocities, velocity);
@@ -122,8 +122,8 @@ impl EskfStrategy {
         self.filter.estimate().map(|estimate| Pose::of(estimate, self.filter.covariance()))
     }
 
-    pub(super) fn position(&self) -> Option<Vector3<f64>> {
-        self.filter.estimate().map(|estimate| estimate.position)
+    pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        self.filter.estimate().map(|estimate| (estimate.position, estimate.velocity))
     }
 
     pub(super) fn streams(&self) -> &Streams {
@@ -164,6 +164,16 @@ impl EskfStrategy {
         let covariance = *self.filter.covariance();
         self.filter.adopt::<Navigated, NAVIGATED>(&estimate, &covariance)?;
         self.begin(time_ns);
+        Ok(())
+    }
+
+    pub(super) fn relocate(&mut self, place: &Place) -> Result<(), Refusal> {
+        let world_from_body = self.filter.estimate().ok_or(Refusal::NotStarted)?.world_from_body;
+        let (antenna, covariance) = place.position;
+        let position = (antenna - world_from_body * place.lever_arm, covariance);
+        self.filter.relocate(position, place.velocity, None)?;
+        self.streams.positions.forgive();
+        self.begin(self.filter.estimate().ok_or(Refusal::NotStarted)?.time_ns);
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, id_of};
+use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, id_of, trusting};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start, seconds_between};
 use crate::navigation::fused::Fused;
@@ -82,7 +82,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.smoother.start(id_of(start.time_ns), start)?;
-        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (start.time_ns, start.time_ns);
+        self.cadence.begin(start.time_ns);
         Ok(())
     }
 
@@ -93,7 +93,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn camera_frame(&mut self) -> Result<(), Failure> {
         self.keyframe()?;
-        self.cadence.camera_ns = self.cadence.keyframe_ns;
+        self.cadence.camera_frame();
         Ok(())
     }
 
@@ -133,7 +133,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
         let now_ns = self.smoother.predicted().ok_or(Refusal::NotStarted)?.time_ns;
         // Without a camera nothing else says where keyframes must be.
-        if now_ns.saturating_sub(self.cadence.camera_ns) > self.cadence.interval_ns / 2 {
+        if !self.cadence.has_camera(now_ns) {
             self.keyframe()?;
         }
         let id = id_of(self.cadence.keyframe_ns);
@@ -142,7 +142,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                 let factor = Held::Navigation((*relative).into());
                 self.smoother.add(&mut self.streams.relative, id, factor)?
             }
-            Measured::Anchor(anchor) => {
+            Measured::Anchor(anchor, trust) => {
                 let way = self.way()?;
                 let factor = AbsolutePose {
                     position: anchor.position - way.position,
@@ -150,7 +150,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                     position_covariance: anchor.position_covariance + way.covariance,
                     rotation_covariance: anchor.rotation_covariance,
                 };
-                self.smoother.add(&mut self.streams.anchors, id, Held::Navigation(factor.into()))?
+                let stream = trusting(&mut self.streams.anchors, *trust);
+                self.smoother.add(stream, id, Held::Navigation(factor.into()))?
             }
             Measured::Gnss(position, velocity, trust) => {
                 let way = self.way()?;
@@ -159,7 +160,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                     covariance: position.covariance + way.covariance,
                     ..*position
                 };
-                let stream = self.streams.of_fixes(*trust);
+                let stream = trusting(&mut self.streams.positions, *trust);
                 let fused = self.smoother.add(stream, id, Held::Navigation(moved.into()))?;
                 if let Some(velocity) = velocity {
                     let moved = GnssVelocity { velocity: velocity.velocity - way.velocity, ..*velocity };
@@ -198,8 +199,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         })
     }
 
-    pub(super) fn position(&self) -> Option<Vector3<f64>> {
-        self.smoother.predicted().map(|estimate| estimate.position)
+    pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        self.smoother.predicted().map(|estimate| (estimate.position, estimate.velocity))
     }
 
     pub(super) fn streams(&self) -> &Streams {
@@ -244,7 +245,25 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         let covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
         let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
         self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
-        (self.cadence.keyframe_ns, self.cadence.camera_ns) = (time_ns, time_ns);
+        self.cadence.begin(time_ns);
+        Ok(())
+    }
+
+    /// The window begins again with the present.
+    pub(super) fn relocate(&mut self, place: &Place) -> Result<(), Refusal> {
+        if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
+            return Err(refusal);
+        }
+        let mut covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
+        let mut estimate = self.smoother.estimate().ok_or(Refusal::NotStarted)?;
+        estimate.position = place.position.0 - estimate.world_from_body * place.lever_arm;
+        replace(&mut covariance, POSITION, &place.position.1);
+        if let Some((velocity, of_velocity)) = place.velocity {
+            estimate.velocity = velocity;
+            replace(&mut covariance, VELOCITY, &of_velocity);
+        }
+        self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(estimate.time_ns), &estimate, &covariance)?;
+        self.streams.positions.forgive();
         Ok(())
     }
 
@@ -271,6 +290,13 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             &(0.5 * (covariance + covariance.transpose())),
         )
     }
+}
+
+/// The covariance of three errors, which are correlated with no other from here on.
+fn replace(covariance: &mut SMatrix<f64, SMOOTHED, SMOOTHED>, first: usize, by: &Matrix3<f64>) {
+    covariance.rows_mut(first, 3).fill(0.0);
+    covariance.columns_mut(first, 3).fill(0.0);
+    covariance.fixed_view_mut::<3, 3>(first, first).copy_from(by);
 }
 
 const _: () = assert!(SMOOTHED == Smoothed::DIMENSION);

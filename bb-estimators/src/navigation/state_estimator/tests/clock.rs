@@ -1,8 +1,9 @@
 //! Stamps that cannot be believed, clocks that are set back, and more samples than there is room for.
 
-use super::flight::SECOND;
+use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::{ImuMean, Refusal};
+use proptest::prelude::*;
 
 /// Something sent, on a clock that is behind by so much.
 fn behind(sent: &Sent, by_ns: i64) -> Sent {
@@ -116,6 +117,135 @@ fn one_absurd_stamp_moves_nothing() {
                 assert_eq!(told, 1, "{absurd_ns} at {at}: it is refused, and said so");
             }
         }
+    }
+}
+
+/// Fewer stamps than it takes: what they cannot do.
+#[derive(Clone, Copy, Debug)]
+struct Burst {
+    /// Before which sample.
+    at: usize,
+    count: i64,
+    step_ns: i64,
+    /// How far from the present.
+    off_ns: i64,
+    /// Whether the right samples of that time are missing.
+    replaces: bool,
+}
+
+fn burst() -> impl Strategy<Value = Burst> {
+    let off = prop_oneof![2 * SECOND + STEP..10 * SECOND, 10 * SECOND..8000 * SECOND];
+    // Many within less than half a second, or four in any time.
+    let size = prop_oneof![(1..100_i64, Just(STEP)), (1..=4_i64, STEP..SECOND)];
+    (0..2000_usize, size, off, any::<bool>(), any::<bool>()).prop_map(
+        |(at, (count, step_ns), off_ns, is_ahead, replaces)| {
+            // In front of the start of the clock is time as well.
+            let off_ns = if is_ahead { off_ns } else { -off_ns - count * step_ns };
+            Burst { at, count, step_ns, off_ns, replaces }
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    /// The estimate is as if they had not been there, but for what is missing.
+    #[test]
+    fn stamps_that_are_too_few_move_nothing(mut bursts in prop::collection::vec(burst(), 1..6), seed in 0..1000_u64) {
+        let flight = Flight::new(10, seed);
+        bursts.sort_by_key(|burst| burst.at);
+        for strategy in StrategyKind::ALL {
+            let mut estimator = started(&flight, *strategy);
+            let mut left = bursts.iter().peekable();
+            let mut missing_until = 0;
+            let mut seen = 0;
+            for sent in &flight.sent(true, true, false) {
+                if let Sent::Imu(sample) = sent {
+                    seen += 1;
+                    // Two in a row would be one of more stamps.
+                    while let Some(burst) = left.next_if(|burst| burst.at <= seen) {
+                        if seen < missing_until + 2 {
+                            continue;
+                        }
+                        for i in 0..burst.count {
+                            let time_ns = sample.time_ns + burst.off_ns + i * burst.step_ns;
+                            let refused = estimator.add_imu(&ImuMean { time_ns, ..*sample });
+                            prop_assert!(matches!(refused, Err(EstimatorError::Degraded(_))), "{refused:?}");
+                        }
+                        missing_until = seen + if burst.replaces { burst.count.min(20) as usize } else { 0 };
+                    }
+                    if seen < missing_until {
+                        continue;
+                    }
+                }
+                ignore(sent.to(&mut estimator));
+            }
+            prop_assert_eq!(estimator.counts().set_back, 0);
+            prop_assert_eq!(count(estimator.sink(), "started"), 1);
+            prop_assert_eq!(count(estimator.sink(), "fatal"), 0);
+            let (error_m, _) = flight.error(&estimator.predicted(10 * SECOND).unwrap());
+            prop_assert!(error_m < 5.0, "{}: {error_m} m", strategy.name());
+        }
+    }
+
+    /// A clock that jumps and stays there: there is an estimate again within a second, or with the next anchor where the gap is
+    /// longer than any that is bridged, and it is right once anchors confirm it.
+    #[test]
+    fn a_clock_that_jumps_is_followed(
+        off_ns in prop_oneof![2100 * SECOND / 1000..61 * SECOND, 61 * SECOND..8000 * SECOND],
+        is_ahead in any::<bool>(),
+        silence_ns in 0..2 * SECOND,
+        seed in 0..1000_u64,
+    ) {
+        let flight = Flight::new(24, seed);
+        let by_ns = if is_ahead { -off_ns } else { off_ns };
+        let jump_ns = 6 * SECOND;
+        for strategy in StrategyKind::ALL {
+            let mut estimator = started(&flight, *strategy);
+            let (mut again_ns, mut last) = (None, None);
+            for sent in &flight.sent(true, true, false) {
+                let time_ns = sent.time_ns();
+                if (jump_ns..jump_ns + silence_ns).contains(&time_ns) {
+                    continue;
+                }
+                let behind_ns = if time_ns >= jump_ns { by_ns } else { 0 };
+                ignore(behind(sent, behind_ns).to(&mut estimator));
+                if time_ns < jump_ns {
+                    continue;
+                }
+                let now = estimator.predicted(time_ns - behind_ns);
+                if let Some(output) = now {
+                    again_ns.get_or_insert(time_ns);
+                    let of_then = EstimatorOutput { time_ns: output.time_ns + by_ns, ..output };
+                    last = Some((flight.error(&of_then).0, output.degraded));
+                }
+            }
+            let again_ns = again_ns.unwrap() - jump_ns - silence_ns;
+            // A gap of a minute, with what it takes to believe it.
+            let is_lost = is_ahead && off_ns + silence_ns + SECOND / 2 + 2 * STEP > 60 * SECOND;
+            let bound_ns = if is_lost { 3 * SECOND / 2 + 5 * STEP } else { SECOND / 2 + 2 * STEP };
+            prop_assert!(again_ns <= bound_ns, "{}: again after {again_ns} ns", strategy.name());
+            let (error_m, degraded) = last.unwrap();
+            // After a long gap its attitude is unknown, and it may take longer to confirm it.
+            let is_long = is_ahead && !is_lost && off_ns + silence_ns > 10 * SECOND;
+            let is_told = error_m < 6.0 && (!degraded || is_long);
+            prop_assert!(is_told, "{}: {error_m} m, degraded {degraded}", strategy.name());
+        }
+    }
+}
+
+/// What was told before the first sample is not given up for two stamps that agree.
+#[test]
+fn two_absurd_stamps_before_the_first_do_not_cost_the_warm_start() {
+    let flight = Flight::new(4, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = estimator(*strategy);
+        estimator.warm_start(flight.warm_start(0)).unwrap();
+        for i in 0..2 {
+            ignore(estimator.add_imu(&ImuMean { time_ns: 3600 * SECOND + i * STEP, ..flight.samples[0] }));
+        }
+        flight.samples.iter().for_each(|sample| ignore(estimator.add_imu(sample)));
+        assert!(flight.error(&estimator.predicted(4 * SECOND).unwrap()).0 < 5.0, "{}", strategy.name());
     }
 }
 

@@ -56,6 +56,8 @@ impl Sent {
 pub(super) struct Flight {
     pub(super) frame: LocalFrame,
     pub(super) samples: Vec<ImuMean>,
+    /// Of the accelerometer, and of the gyroscope.
+    pub(super) biases: [Vector3<f64>; 2],
     pub(super) vio: Vec<VioOutput>,
     /// One a second, between two frames.
     pub(super) anchors: Vec<PoseAnchor>,
@@ -184,7 +186,8 @@ impl Flight {
         let fixes = fixes.collect();
         let health =
             (0..5 * length_s).map(|i| GpsHealthReading { time_ns: i * SECOND / 5, health: GpsHealth::Stable });
-        Self { frame, samples, vio, anchors, fixes, health: health.collect() }
+        let biases = [accelerometer_bias, gyroscope_bias];
+        Self { frame, samples, biases, vio, anchors, fixes, health: health.collect() }
     }
 
     /// What the flight controller knows at a time: nearly the truth.

@@ -2,6 +2,8 @@
 
 use super::flight::{SECOND, STEP};
 use super::*;
+use crate::navigation::Refusal;
+use crate::navigation::geodesy::Geodetic;
 use nalgebra::Vector3;
 
 /// What the receiver and the anchors do.
@@ -143,6 +145,46 @@ fn a_fix_beyond_the_bounded_distance_begins_the_dwell_again() {
     }
 }
 
+/// Each reason, and that it goes to the recorder: at warn.
+#[test]
+fn every_rejection_is_provoked_and_told() {
+    // Unhealthy before, spoofed, then far off, then elsewhere than the anchor, then right.
+    let health = |time_ns| match time_ns / SECOND {
+        0..2 => GpsHealth::NoFix,
+        5..6 => GpsHealth::Spoofed,
+        _ => GpsHealth::Stable,
+    };
+    let off = |time_ns| match time_ns / SECOND {
+        6..8 => 250.0,
+        8..22 => 60.0,
+        _ => 0.0,
+    };
+    // Between two anchors, a receiver that was stable for long enough waits.
+    let scenario = Scenario { health, off, anchors: |time_ns| (time_ns / SECOND) % 5 == 4 };
+    for strategy in StrategyKind::ALL {
+        let (estimator, _) = play(*strategy, &scenario);
+        let told = |is_it: fn(&Rejection) -> bool| {
+            let rejected = kinds(estimator.sink(), "rejected").filter(|event| {
+                matches!(&event.kind, EventKind::Rejected { rejection } if is_it(rejection))
+                    && event.level() == Level::Warn
+                    && event.status_text().is_some()
+            });
+            rejected.count()
+        };
+        let counts = [
+            told(|rejection| matches!(rejection, Rejection::Unhealthy)),
+            told(|rejection| matches!(rejection, Rejection::Spoofed)),
+            told(|rejection| matches!(rejection, Rejection::TooFar { .. })),
+            told(|rejection| matches!(rejection, Rejection::Dwelling { .. })),
+            told(|rejection| matches!(rejection, Rejection::AwaitsAnchor)),
+            told(|rejection| matches!(rejection, Rejection::Disagrees { .. })),
+        ];
+        assert!(counts.iter().all(|count| *count > 0), "{}: {counts:?}", strategy.name());
+        assert_eq!((counts[2], counts[5]), (10, 1), "{}: {counts:?}", strategy.name());
+        assert!(estimator.health().gate.is_open());
+    }
+}
+
 #[test]
 fn every_rejection_is_a_text_that_fits() {
     let scenario = Scenario { health: spoofed_from_5_to_10, off: |_| 60.0, anchors: |_| true };
@@ -204,6 +246,90 @@ fn a_receiver_that_is_alone_overrules_the_estimate() {
         }
         let (_, error_m, degraded) = outputs[outputs.len() - 1];
         assert!(error_m < 10.0 && !degraded, "{}: {error_m} m", strategy.name());
+    }
+}
+
+/// Fixes that are wild contradict one another: however many are refused, none is believed, and nothing learns from them.
+#[test]
+fn fixes_and_anchors_that_do_not_agree_overrule_nothing() {
+    let flight = Flight::new(80, 3);
+    let wild = |position: &Geodetic, i: usize| {
+        let (sin, cos) = (i as f64 * 2.4).sin_cos();
+        let off = Vector3::new(cos, sin, 0.1) * 3000.0 * (1.0 + (i % 3) as f64);
+        flight.frame.geodetic(&(flight.frame.position(position) + off))
+    };
+    for strategy in StrategyKind::ALL {
+        for with_anchors in [false, true] {
+            let mut estimator = started(&flight, *strategy);
+            for (i, sent) in flight.sent(with_anchors, with_anchors, !with_anchors).iter().enumerate() {
+                let is_wild = (65 * SECOND..75 * SECOND).contains(&sent.time_ns());
+                ignore(match sent {
+                    Sent::Fix(fix) if is_wild => {
+                        let position = wild(&fix.position, i);
+                        estimator.add_gnss(GnssReading { position, ..*fix }).map(drop)
+                    }
+                    Sent::Anchor(anchor) if is_wild => {
+                        let position = wild(&anchor.position, i);
+                        estimator.add_pose_anchor(PoseAnchor { position, ..*anchor }).map(drop)
+                    }
+                    sent => sent.to(&mut estimator),
+                });
+                if let Some(output) = estimator.tick(sent.time_ns()) {
+                    let (error_m, _) = flight.error(&output);
+                    assert!(error_m < 10.0, "{}: {error_m} m at {}", strategy.name(), output.time_ns);
+                }
+            }
+            assert_eq!(count(estimator.sink(), "started"), 1);
+            let refused = |event: &Event| {
+                matches!(event.kind, EventKind::Degraded { reason: Reason::Refused(Refusal::Gate { .. }), .. })
+            };
+            // Each that is wild, and no other.
+            let expected = if with_anchors { 10 } else { 50 };
+            assert_eq!(estimator.sink().iter().filter(|event| refused(event)).count(), expected);
+            assert_eq!(count(estimator.sink(), "degraded"), expected, "{}", strategy.name());
+        }
+    }
+}
+
+/// Kilometres away by a clock that stood, or a world that was wrong: the fixes agree, and what is known of attitude stays.
+#[test]
+fn a_receiver_that_is_alone_moves_an_estimate_that_is_kilometres_off() {
+    let flight = Flight::new(80, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let off = Vector3::new(-7000.0, 9000.0, 30.0);
+        let (mut moved_ns, mut worst) = (None, 0.0_f64);
+        for sent in &flight.sent(false, false, true) {
+            let is_off = sent.time_ns() > 65 * SECOND;
+            ignore(match sent {
+                Sent::Fix(fix) if is_off => {
+                    let position = flight.frame.geodetic(&(flight.frame.position(&fix.position) + off));
+                    estimator.add_gnss(GnssReading { position, ..*fix }).map(drop)
+                }
+                sent => sent.to(&mut estimator),
+            });
+            let newest = estimator.sink().iter().rev().take(12);
+            let mut raised = newest.filter_map(|event| match event.kind {
+                EventKind::Degraded { reason: Reason::Raised { factor }, .. } => Some((event.time_ns, factor)),
+                _ => None,
+            });
+            if let (Some((time_ns, factor)), None) = (raised.next_back(), moved_ns) {
+                assert!(factor > 1000.0, "{factor}");
+                moved_ns = Some(time_ns);
+            }
+            if let (Some(_), Some(output)) = (moved_ns, estimator.tick(sent.time_ns())) {
+                let apart = flight.frame.position(&output.position) - Flight::truth(output.time_ns).position - off;
+                worst = worst.max(apart.norm());
+                assert!(flight.error(&output).1 < 0.02, "{}: its attitude stays", strategy.name());
+            }
+        }
+        // The fourth that agrees.
+        assert_eq!(moved_ns.map(|time_ns| (time_ns - 65 * SECOND) / (SECOND / 5)), Some(3));
+        assert!(worst < 10.0, "{}: {worst} m", strategy.name());
+        let started: Vec<_> = kinds(estimator.sink(), "started").map(|event| event.kind).collect();
+        assert_eq!(started[1..], [EventKind::Started { from: StartedFrom::Receiver }], "once");
+        assert_eq!(estimator.predicted(80 * SECOND).map(|output| output.resets), Some(1));
+        assert_eq!(estimator.health().state, HealthState::Tracking, "five fixes have confirmed it");
     }
 }
 

@@ -204,6 +204,37 @@ fn nothing_grows_over_a_long_flight() {
     }
 }
 
+/// However far away wrong anchors are, right ones find the way back: even from the other side of the Earth.
+#[test]
+fn anchors_lead_back_from_anywhere() {
+    let flight = Flight::new(30, 8);
+    for strategy in StrategyKind::ALL {
+        for (latitude, longitude) in [(-0.8, -2.9), (-1.0, 0.2), (0.85, 0.19), (1.57, 1.0)] {
+            let mut estimator = started(&flight, *strategy);
+            let mut believed = false;
+            for sent in &flight.sent(true, true, false) {
+                let time_ns = sent.time_ns();
+                match sent {
+                    Sent::Anchor(anchor) if (5 * SECOND..15 * SECOND).contains(&time_ns) => {
+                        let position = Geodetic { latitude, longitude, ..anchor.position };
+                        ignore(estimator.add_pose_anchor(PoseAnchor { position, ..*anchor }));
+                    }
+                    sent => ignore(sent.to(&mut estimator)),
+                }
+                if let Some(output) = estimator.tick(time_ns) {
+                    let (error_m, _) = flight.error(&output);
+                    believed |= error_m > 10_000.0;
+                    let is_told = output.degraded || time_ns < 17 * SECOND;
+                    assert!(error_m < 20.0 || is_told, "{error_m} m at {time_ns}");
+                }
+            }
+            assert!(believed, "{}, {latitude}: they agree", strategy.name());
+            let (error_m, _) = flight.error(&estimator.predicted(30 * SECOND).unwrap());
+            assert!(error_m < 5.0, "{}, {latitude}: {error_m} m", strategy.name());
+        }
+    }
+}
+
 /// Anchors that are far off and agree are believed; what counts is that the right ones are believed again, and that it says so
 /// meanwhile.
 #[test]

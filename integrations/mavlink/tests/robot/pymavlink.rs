@@ -1,57 +1,21 @@
 //! A robot beside a flight controller in Python; see `tests/mavlink/check`.
 
-use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use super::{Drone, LONG, drone, text};
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::payload::GeodeticPosition;
 use bb_core::prelude::*;
-use bb_estimators::navigation::state_estimator::{
-    FlightEstimate, FlightEvent, FlightEvents, GpsHealth, Level, SourceLabel,
-};
-use bb_mavlink::{MavlinkAttitude, MavlinkGnss, MavlinkGpsHealth, MavlinkHeartbeat, MavlinkImu, MavlinkSender};
+use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvent, FlightEvents, GpsHealth, Level};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, Command as Process, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 
-/// Far longer than anything takes.
-const LONG: Duration = Duration::from_secs(60);
-
-robot! {
-    robot Drone;
-
-    bridges {
-        bridge position: MavlinkSender(
-            link = "of the test", source = "sensor/base/estimate", texts = "sensor/base/events", geoid_height = 30 m,
-            send_yaw = true, max_age = 60 s
-        );
-        bridge odometry: MavlinkSender(
-            link = "of the test", source = "sensor/base/estimate", message = "odometry", component_id = 197, max_age = 60 s
-        );
-    }
-    link base {
-        sensor imu: MavlinkImu(link = "of the test");
-        sensor other_imu: MavlinkImu(link = "of the test", message = "scaled_imu2");
-        sensor attitude: MavlinkAttitude(link = "of the test");
-        sensor gps: MavlinkGnss(link = "of the test");
-        sensor gps_health: MavlinkGpsHealth(link = "of the test");
-        sensor heartbeat: MavlinkHeartbeat(link = "of the test");
-        sensor estimate: External<FlightEstimate>();
-        sensor events: External<FlightEvents>();
-    }
-}
-
-/// A drone all of whose links lead to `address`.
-fn drone(address: &str) -> bb_core::Builder<Drone> {
-    let mut builder = Drone::builder();
-    for imu in [drone::sensor::base::imu, drone::sensor::base::other_imu] {
-        builder.options(imu).link = address.to_owned();
-    }
-    for bridge in [drone::bridge::position, drone::bridge::odometry] {
-        builder.options(bridge).link = address.to_owned();
-    }
-    builder.options(drone::sensor::base::attitude).link = address.to_owned();
-    builder.options(drone::sensor::base::gps).link = address.to_owned();
-    builder.options(drone::sensor::base::gps_health).link = address.to_owned();
-    builder.options(drone::sensor::base::heartbeat).link = address.to_owned();
+/// The drone, whose bridges both send the flight's estimate.
+fn flying(peer: &Peer) -> bb_core::Builder<Drone> {
+    let mut builder = drone(&peer.address);
+    let position = builder.options(drone::bridge::position);
+    (position.geoid_height, position.send_yaw) = (30.0, true);
+    builder.options(drone::bridge::odometry).source = "sensor/base/estimate".into();
     builder
 }
 
@@ -103,27 +67,14 @@ impl Drop for Peer {
     }
 }
 
+/// To the north, in Sydney.
 fn estimate(time: MonotonicTime) -> FlightEstimate {
+    let (latitude_rad, longitude_rad) = ((-33.8_f64).to_radians(), 151.2_f64.to_radians());
     FlightEstimate {
-        frame_id: [0; 16],
-        emitted: time,
-        time,
-        position: GeodeticPosition {
-            latitude_rad: (-33.8_f64).to_radians(),
-            longitude_rad: 151.2_f64.to_radians(),
-            altitude: Some(62.5),
-        },
-        // To the north.
+        position: GeodeticPosition { latitude_rad, longitude_rad, altitude: Some(62.5) },
         world_from_body: UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2),
-        velocity: Vector3::new(1.0, 2.0, 3.0),
-        covariance: Matrix6::identity() * 4.0,
-        label: SourceLabel::SatelliteAnchored,
-        anchor_age_ms: None,
-        smoothed: false,
-        degraded: false,
-        covariance_norm: 1.0,
-        nis: None,
-        is_anchor_degraded: false,
+        resets: 5,
+        ..super::estimate(time, 0.0)
     }
 }
 
@@ -131,7 +82,7 @@ fn estimate(time: MonotonicTime) -> FlightEstimate {
 #[ignore = "needs pymavlink: run tests/mavlink/check"]
 fn a_robot_and_pymavlink_understand_each_other() {
     let peer = Peer::start();
-    let builder = drone(&peer.address);
+    let builder = flying(&peer);
     let imu = builder.subscribe(drone::sensor::base::imu);
     let other_imu = builder.subscribe(drone::sensor::base::other_imu);
     let attitude = builder.subscribe(drone::sensor::base::attitude);
@@ -170,8 +121,9 @@ fn a_robot_and_pymavlink_understand_each_other() {
     for (name, value) in [("alt", 32.5), ("vn", 2.0), ("ve", 1.0), ("vd", -3.0), ("horiz_accuracy", 2.0)] {
         assert_eq!(heard[name], json!(value), "{name}");
     }
-    // Accuracy of the speed, and both dilutions of precision.
-    assert_eq!((&heard["ignore_flags"], &heard["from"]), (&json!(32 + 4 + 2), &json!([1, 191])));
+    // Accuracy of the speed, and vertical dilution of precision.
+    assert_eq!((&heard["ignore_flags"], &heard["from"]), (&json!(32 + 4), &json!([1, 220])));
+    assert_eq!(heard["hdop"], json!(1.0));
 
     live.publish(drone::sensor::base::estimate, now, estimate(now));
     let heard = peer.hears("ODOMETRY", |_| true);
@@ -179,6 +131,7 @@ fn a_robot_and_pymavlink_understand_each_other() {
         (&heard["frame_id"], &heard["child_frame_id"], &heard["from"]),
         (&json!(1), &json!(12), &json!([1, 197]))
     );
+    assert_eq!(heard["reset_counter"], json!(5));
     let number = |value: &Value| value.as_f64().expect("it is a number");
     // To the north, where the velocity is 2 m/s forward, 1 m/s to the right and 3 m/s up.
     for (name, value) in [("x", 0.0), ("y", 0.0), ("z", 0.0), ("vx", 2.0), ("vy", 1.0), ("vz", -3.0)] {
@@ -189,17 +142,7 @@ fn a_robot_and_pymavlink_understand_each_other() {
     assert_eq!((&heard["rollspeed"], &heard["velocity_covariance"][0]), (&Value::Null, &Value::Null));
 
     let long = "0123456789".repeat(5);
-    let event = |text: &str| FlightEvent {
-        time: now,
-        level: Level::Error,
-        kind: "fallback_engaged".into(),
-        input: None,
-        reason: None,
-        from: None,
-        to: None,
-        status_text: Some(text.to_owned()),
-        keyframe: None,
-    };
+    let event = |said: &str| FlightEvent { kind: "fallback_engaged".into(), ..text(Level::Error, said) };
     let events = vec![event("no estimate"), event(&format!("{long}{long}"))];
     live.publish(drone::sensor::base::events, now, FlightEvents { events, lost: 0 });
     let heard: Vec<Value> = (0..4).map(|_| peer.hears("STATUSTEXT", |_| true)).collect();
@@ -216,7 +159,7 @@ fn a_robot_and_pymavlink_understand_each_other() {
             (&empty, &one, &two, &two)
         ]
     );
-    for component_id in [191, 197] {
+    for component_id in [220, 197] {
         let hello = peer.hears("HEARTBEAT", |message| message["from"] == json!([1, component_id]));
         assert_eq!((&hello["type"], &hello["autopilot"]), (&json!(18), &json!(8)));
     }
@@ -226,7 +169,7 @@ fn a_robot_and_pymavlink_understand_each_other() {
 #[ignore = "needs pymavlink: run tests/mavlink/check"]
 fn a_peer_that_stops_lies_or_floods_is_survived_and_reported() {
     let mut peer = Peer::start();
-    let builder = drone(&peer.address);
+    let builder = flying(&peer);
     let faults = builder.subscribe(system::Faults);
     let readings = builder.subscribe(drone::sensor::base::imu);
     let heartbeats = builder.subscribe(drone::sensor::base::heartbeat);
