@@ -6,7 +6,9 @@ mod joint;
 #[cfg(feature = "urdf")]
 pub(crate) use body::Material;
 pub(crate) use body::{Geometry, Inertial, Shape};
-pub(crate) use joint::{Axis, Dynamics, Joint, JointProperties, Limit, Mimic, Origin, Transmission};
+#[cfg(feature = "urdf")]
+pub(crate) use joint::Axis;
+pub(crate) use joint::{Dynamics, Joint, JointProperties, Limit, Mimic, Origin, Transmission};
 
 use super::block::{Head, opened, semicolon};
 use super::items::items;
