@@ -6,6 +6,9 @@
 use bb_core::kinematics::{Frames, InverseKinematics, InverseParams, Kinematics, LinkId, Target};
 use bb_core::nalgebra::Matrix6xX;
 use bb_core::prelude::*;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardUniform};
 use std::error::Error;
 use std::hint::black_box;
 use std::time::Instant;
@@ -25,8 +28,8 @@ fn arm<R: Robot>(base: &str, tip: &str) -> Result<(), Box<dyn Error>> {
     let kinematics = Kinematics::new(R::TOPOLOGY)?;
     let (base, tip) = (kinematics.link(base).ok_or("no base")?, kinematics.link(tip).ok_or("no tip")?);
     let chain = kinematics.chain(base, tip)?;
-    let mut random = Random(1);
-    let positions: Vec<Vec<f64>> = (0..1_000).map(|_| random.position(&kinematics)).collect();
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let positions: Vec<Vec<f64>> = (0..1_000).map(|_| position(&mut random, &kinematics)).collect();
     let mut jacobian = Matrix6xX::zeros(kinematics.velocities());
     let mut frames = Frames::new(kinematics.clone());
     let transform_ns = each(&positions, |positions| drop(black_box(chain.transform(positions))));
@@ -45,14 +48,14 @@ fn inverse<R: Robot>(
     kinematics: &Kinematics,
     base: LinkId,
     tip: LinkId,
-    random: &mut Random,
+    random: &mut ChaCha8Rng,
 ) -> Result<(), Box<dyn Error>> {
     let chain = kinematics.chain(base, tip)?;
     let mut solver = InverseKinematics::new(kinematics, base, tip, InverseParams::default())?;
     let neutral = kinematics.neutral();
     let (mut times, mut iterations) = (Vec::new(), 0);
     for _ in 0..POSES {
-        let target = Target::Pose(chain.transform(&random.position(kinematics))?);
+        let target = Target::Pose(chain.transform(&position(random, kinematics))?);
         let start = Instant::now();
         if let Ok(solution) = black_box(solver.solve(&target, &neutral)) {
             times.push(start.elapsed().as_secs_f64() * 1e6);
@@ -84,16 +87,10 @@ fn each(positions: &[Vec<f64>], mut call: impl FnMut(&[f64])) -> f64 {
     rounds.fold(f64::INFINITY, f64::min)
 }
 
-/// A linear congruential generator (Knuth's MMIX).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn position(&mut self, kinematics: &Kinematics) -> Vec<f64> {
-        kinematics.bounds().iter().map(|(lower, upper)| lower + (upper - lower) * self.next()).collect()
-    }
+fn position(random: &mut ChaCha8Rng, kinematics: &Kinematics) -> Vec<f64> {
+    let mut between = |(lower, upper): &(f64, f64)| {
+        let part: f64 = StandardUniform.sample(random);
+        lower + (upper - lower) * part
+    };
+    kinematics.bounds().iter().map(&mut between).collect()
 }

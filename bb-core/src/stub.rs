@@ -20,10 +20,11 @@ use std::marker::PhantomData;
 #[derive(Debug)]
 pub struct Probe<T>(PhantomData<fn() -> T>);
 
-// The bounds of associated types are repeated: an implementation that violates one is reported there, and does not count.
+// `Send` and the bounds of associated types are repeated: an implementation that violates one is reported there, and does not
+// count.
 impl<T> Probe<T>
 where
-    T: Sensor<Options: Options, Output: Payload>,
+    T: Sensor<Options: Options, Output: Payload> + Send,
 {
     /// `T` is a sensor.
     pub const IS_SENSOR: bool = true;
@@ -31,7 +32,7 @@ where
 
 impl<T> Probe<T>
 where
-    T: Estimator<Options: Options, Input: Inputs, Output: Outputs>,
+    T: Estimator<Options: Options, Input: Inputs, Output: Outputs> + Send,
 {
     /// `T` is an estimator.
     pub const IS_ESTIMATOR: bool = true;
@@ -39,7 +40,7 @@ where
 
 impl<T> Probe<T>
 where
-    T: Actuator<Options: Options, Command: Payload>,
+    T: Actuator<Options: Options, Command: Payload> + Send,
 {
     /// `T` is an actuator.
     pub const IS_ACTUATOR: bool = true;
@@ -47,7 +48,7 @@ where
 
 impl<T> Probe<T>
 where
-    T: Service<Options: Options, Output: Payload>,
+    T: Service<Options: Options, Output: Payload> + Send,
 {
     /// `T` is a service.
     pub const IS_SERVICE: bool = true;
@@ -55,7 +56,7 @@ where
 
 impl<T> Probe<T>
 where
-    T: Command<Options: Options>,
+    T: Command<Options: Options> + Send,
 {
     /// `T` is a command.
     pub const IS_COMMAND: bool = true;

@@ -21,8 +21,8 @@ pub(crate) use trigger::Trigger;
 
 use crate::language::EstimatorSetting;
 use crate::parse::{
-    self, Axis, Component, Dynamics, Given, Inertial, JointKind, Limit, Mimic, Origin, Output, Path, Quantity,
-    Reactions, ServiceKind, Settings, Shape, State, Transmission,
+    self, Component, Given, JointKind, JointProperties, LinkBody, Output, Path, Quantity, Reactions, ServiceKind,
+    Settings, State,
 };
 use proc_macro2::Ident;
 use std::collections::HashMap;
@@ -71,9 +71,7 @@ pub(crate) struct Link {
     pub(crate) label: String,
     /// The joint that carries it; none for a root.
     pub(crate) joint: Option<JointId>,
-    pub(crate) inertials: Vec<Inertial>,
-    pub(crate) visuals: Vec<Shape>,
-    pub(crate) collisions: Vec<Shape>,
+    pub(crate) body: LinkBody,
 }
 
 #[derive(Clone, Debug)]
@@ -88,12 +86,7 @@ pub(crate) struct Joint {
     pub(crate) kind_word: Ident,
     pub(crate) parent: LinkId,
     pub(crate) children: Vec<LinkId>,
-    pub(crate) origins: Vec<Origin>,
-    pub(crate) axes: Vec<Axis>,
-    pub(crate) limits: Vec<Limit>,
-    pub(crate) dynamics: Vec<Dynamics>,
-    pub(crate) mimics: Vec<Mimic>,
-    pub(crate) transmissions: Vec<Transmission>,
+    pub(crate) properties: JointProperties,
 }
 
 /// Where a sensor is mounted.

@@ -34,8 +34,10 @@ pub(crate) use estimator::Estimator;
 pub(crate) use health::{Reaction, Reactions};
 pub(crate) use input::Input;
 #[cfg(feature = "urdf")]
-pub(crate) use link::Material;
-pub(crate) use link::{Axis, Dynamics, Geometry, Inertial, Joint, Limit, Link, Mimic, Origin, Shape, Transmission};
+pub(crate) use link::{Axis, Material};
+pub(crate) use link::{
+    Dynamics, Geometry, Inertial, Joint, JointProperties, Limit, Link, LinkBody, Mimic, Origin, Shape, Transmission,
+};
 pub(crate) use literal::{Literal, Value};
 pub(crate) use notes::Given;
 pub(crate) use output::Output;

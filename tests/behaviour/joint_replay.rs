@@ -2,29 +2,12 @@
 
 use crate::components::at;
 use crate::joints::{Fusion, Pixel, Spotter};
-use crate::replay::{Heard, Lines, counts, hear, overflow, same};
+use crate::replay::{Heard, Lines, Random, counts, hear, overflow, same};
 use bb_core::Report;
 use bb_core::journal::{Entry, Event};
 use bb_core::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::PoisonError;
-
-/// Xorshift.
-#[derive(Debug)]
-struct Random(u64);
-
-impl Random {
-    fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) % end
-    }
-}
 
 /// An encoder of a bad day: it pauses, repeats itself, stamps late, and now and then gives a NaN.
 #[derive(Debug)]

@@ -4,23 +4,29 @@ use crate::components::{Number, Seen, Snapshot, at};
 use bb_core::journal::{Entry, Event};
 use bb_core::prelude::*;
 use bb_core::{DynamicMessage, HealthTransition, Report};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What a sensor of a bad day gives: numbers that come late, twice, with a NaN, or not at all, and now and then it fails.
 #[derive(Debug)]
 pub(crate) struct BadDay {
-    random: u64,
+    random: Random,
     reads: u32,
 }
 
-impl BadDay {
-    /// Xorshift: the same on every run.
-    fn next(&mut self) -> u64 {
-        self.random ^= self.random << 13;
-        self.random ^= self.random >> 7;
-        self.random ^= self.random << 17;
-        self.random
+/// The same on every run of a seed.
+#[derive(Debug)]
+pub(crate) struct Random(ChaCha8Rng);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    pub(crate) fn below(&mut self, end: u64) -> u64 {
+        self.0.next_u64() % end
     }
 }
 
@@ -39,7 +45,7 @@ impl Sensor for BadDay {
 
     fn init(options: BadDayOptions, _: &SensorContext) -> Result<Self, Fault> {
         // One that restarts must not give the same again.
-        Ok(Self { random: options.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1, reads: options.reads })
+        Ok(Self { random: Random::new(options.seed), reads: options.reads })
     }
 
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
@@ -47,8 +53,8 @@ impl Sensor for BadDay {
             return Ok(Reading::finished());
         }
         self.reads -= 1;
-        let number = Number((self.next() % 1000) as f64 - 20.0);
-        Ok(match self.next() % 200 {
+        let number = Number(self.random.below(1000) as f64 - 20.0);
+        Ok(match self.random.below(200) {
             0 => Reading::now(Number(f64::NAN)),
             1 => Reading::at(now - Duration::from_millis(50), number),
             2 => Reading::at(now + Duration::from_secs(5), number),

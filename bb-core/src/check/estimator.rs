@@ -2,15 +2,29 @@
 
 use super::find::find_input;
 use super::names::list;
-use super::options::missing_option;
-use super::text::{Text, equal};
-use crate::component::{Estimator, Inputs, OptionField, Options, Outputs, TakenAt};
+use super::options::{describe_missing, missing_option};
+use super::text::{Text, contains};
+use crate::component::{Estimator, Inputs, Options, Outputs, TakenAt};
 use crate::stub::UNKNOWN_INDEX;
+
+/// What is wrong with the inputs of an estimator.
+#[derive(Clone, Copy)]
+enum InputFault {
+    /// The algorithm takes one input, and several are declared.
+    Single,
+    /// A required one is not declared.
+    Missing(&'static str),
+    /// It is nested, and the algorithm needs several inputs.
+    NeedsSeveral,
+    /// It is nested, and the algorithm needs none of its several inputs.
+    NeedsNone,
+}
 
 /// Checks that an estimator has its required options among `given`, its required inputs among `declared`, and an output if it
 /// has several. `declared` is `None` for a nested estimator, whose one input is its sensor's.
 ///
-/// Everything that is missing is one message, since it is reported at one word.
+/// Everything that is missing is one message, since it is reported at one word. The text is made only if something is missing:
+/// rustc interprets these functions for each estimator of each robot.
 #[track_caller]
 pub const fn check_estimator<E: Estimator>(
     estimator: &str,
@@ -18,59 +32,48 @@ pub const fn check_estimator<E: Estimator>(
     declared: Option<&[&str]>,
     has_outputs: bool,
 ) {
-    let fields: &[OptionField] = <E::Options as Options>::FIELDS;
-    let mut fault = missing_option(estimator, fields, given);
-    fault = and(
-        fault,
-        match declared {
-            Some(declared) => missing_input::<E::Input>(estimator, declared),
-            None => no_nested_input::<E::Input>(estimator),
-        },
-    );
-    if !has_outputs {
-        fault = and(fault, no_output::<E::Output>(estimator));
-    }
-    if let Some(text) = fault {
+    let option = missing_option(<E::Options as Options>::FIELDS, given);
+    let input = match declared {
+        Some(declared) => missing_input::<E::Input>(declared),
+        None => no_nested_input::<E::Input>(),
+    };
+    let outputs = <E::Output as Outputs>::FIELDS;
+    let lacks_output = !has_outputs && !outputs.is_empty();
+    if option.is_some() || input.is_some() || lacks_output {
+        let text = Text::new("");
+        let text = if let Some(option) = option { describe_missing(text, estimator, option) } else { text };
+        let text = if let Some(fault) = input { describe_input(and(text), estimator, fault) } else { text };
+        let text = if lacks_output { describe_outputs(and(text), estimator, outputs) } else { text };
         panic!("{}", text.as_str())
     }
 }
 
-const fn and(first: Option<Text>, second: Option<Text>) -> Option<Text> {
-    match (first, second) {
-        (Some(first), Some(second)) => Some(first.push("; and ").push(second.as_str())),
-        (Some(fault), None) | (None, Some(fault)) => Some(fault),
-        (None, None) => None,
-    }
+const fn and(text: Text) -> Text {
+    if text.as_str().is_empty() { text } else { text.push("; and ") }
 }
 
 /// The first required input that is not declared.
-const fn missing_input<I: Inputs>(estimator: &str, declared: &[&str]) -> Option<Text> {
+const fn missing_input<I: Inputs>(declared: &[&str]) -> Option<InputFault> {
     if !I::KNOWN {
         return None;
     }
     let fields = I::FIELDS;
-    let mut misspelt = false;
+    if fields.is_empty() {
+        return if declared.len() > 1 { Some(InputFault::Single) } else { None };
+    }
     let mut number = 0;
     while number < declared.len() {
-        misspelt = misspelt || find_input::<I>(declared[number]) == UNKNOWN_INDEX;
+        // A misspelt name is reported as such, and may be meant to be the missing one.
+        if find_input::<I>(declared[number]) == UNKNOWN_INDEX {
+            return None;
+        }
         number += 1;
-    }
-    if fields.is_empty() && declared.len() > 1 {
-        return Some(Text::new("").name(estimator).push(" takes a single input; leave out all but one"));
     }
     let mut index = 0;
     while index < fields.len() {
-        let field = fields[index];
-        let mut found = field.optional;
-        let mut number = 0;
-        while number < declared.len() {
-            found = found || equal(declared[number], field.name);
-            number += 1;
-        }
-        // A misspelt name is reported as such, and may be meant to be this one.
-        if !found && !misspelt {
-            let text = Text::new("").name(estimator).push(" needs an input ").name(field.name);
-            return Some(text.push("; declare it: `input ").push(field.name).push(": …;`"));
+        let field = &fields[index];
+        if !field.optional && !contains(declared, field.name) {
+            return Some(InputFault::Missing(field.name));
         }
         index += 1;
     }
@@ -78,7 +81,7 @@ const fn missing_input<I: Inputs>(estimator: &str, declared: &[&str]) -> Option<
 }
 
 /// Why the sensor of a nested estimator is not its input: the algorithm must have exactly one required input, or only one.
-const fn no_nested_input<I: Inputs>(estimator: &str) -> Option<Text> {
+const fn no_nested_input<I: Inputs>() -> Option<InputFault> {
     if !I::KNOWN || <I::Nested as TakenAt<I>>::INDEX != UNKNOWN_INDEX {
         return None;
     }
@@ -88,21 +91,27 @@ const fn no_nested_input<I: Inputs>(estimator: &str) -> Option<Text> {
         needed += if fields[index].optional { 0 } else { 1 };
         index += 1;
     }
-    let text = Text::new("").name(estimator);
-    let text = if needed > 1 {
-        text.push(" needs several inputs, and a nested estimator has one; ")
-    } else {
-        text.push(" needs none of its several inputs, and which of them the sensor feeds cannot be told; ")
-    };
-    Some(text.push("declare it on the link, with an `input` for each"))
+    Some(if needed > 1 { InputFault::NeedsSeveral } else { InputFault::NeedsNone })
 }
 
-/// Reports that an algorithm of several outputs has none declared.
-const fn no_output<O: Outputs>(estimator: &str) -> Option<Text> {
-    let fields = O::FIELDS;
-    if fields.is_empty() {
-        return None;
+const fn describe_input(text: Text, estimator: &str, fault: InputFault) -> Text {
+    let text = text.name(estimator);
+    match fault {
+        InputFault::Single => text.push(" takes a single input; leave out all but one"),
+        InputFault::Missing(name) => {
+            text.push(" needs an input ").name(name).push("; declare it: `input ").push(name).push(": …;`")
+        }
+        InputFault::NeedsSeveral => text
+            .push(" needs several inputs, and a nested estimator has one; ")
+            .push("declare it on the link, with an `input` for each"),
+        InputFault::NeedsNone => text
+            .push(" needs none of its several inputs, and which of them the sensor feeds cannot be told; ")
+            .push("declare it on the link, with an `input` for each"),
     }
-    let text = Text::new("").name(estimator).push(" has several outputs; declare the ones to publish, `output ");
-    Some(list(text.push(fields[0]).push(";`, of "), fields))
+}
+
+/// An algorithm of several outputs has none declared.
+const fn describe_outputs(text: Text, estimator: &str, fields: &[&str]) -> Text {
+    let text = text.name(estimator).push(" has several outputs; declare the ones to publish, `output ");
+    list(text.push(fields[0]).push(";`, of "), fields)
 }

@@ -1,6 +1,6 @@
 //! Whether the options given to a component are complete, of the right dimension and in range.
 
-use super::text::{Text, equal};
+use super::text::{Text, contains, equal};
 use crate::component::OptionField;
 use crate::declaration::Dimension;
 
@@ -20,9 +20,10 @@ pub struct Given {
 pub const fn check_option(component: &str, fields: &[OptionField], given: Given) {
     let mut index = 0;
     while index < fields.len() {
-        if equal(fields[index].name, given.name) {
-            check_dimension(component, fields[index], given);
-            check_range(component, fields[index], given);
+        let field = &fields[index];
+        if equal(field.name, given.name) {
+            check_dimension(component, field, &given);
+            check_range(component, field, &given);
             return;
         }
         index += 1;
@@ -32,44 +33,37 @@ pub const fn check_option(component: &str, fields: &[OptionField], given: Given)
 /// Checks that every required option is given.
 #[track_caller]
 pub const fn check_required(component: &str, fields: &[OptionField], given: &[&str]) {
-    if let Some(text) = missing_option(component, fields, given) {
-        panic!("{}", text.as_str())
+    if let Some(field) = missing_option(fields, given) {
+        panic!("{}", describe_missing(Text::new(""), component, field).as_str())
     }
 }
 
 /// The first required option that is not given.
-pub(super) const fn missing_option(component: &str, fields: &[OptionField], given: &[&str]) -> Option<Text> {
+pub(super) const fn missing_option<'a>(fields: &'a [OptionField], given: &[&str]) -> Option<&'a OptionField> {
     let mut index = 0;
     while index < fields.len() {
-        let field = fields[index];
-        let mut found = !field.required;
-        let mut number = 0;
-        while number < given.len() {
-            found = found || equal(given[number], field.name);
-            number += 1;
-        }
-        if !found {
-            let text = Text::new("").name(component).push(" needs the option ").name(field.name);
-            return Some(text.push("; give it: `").push(component).push("(").push(field.name).push(" = …)`"));
+        let field = &fields[index];
+        if field.required && !contains(given, field.name) {
+            return Some(field);
         }
         index += 1;
     }
     None
 }
 
+/// That it is missing.
+pub(super) const fn describe_missing(text: Text, component: &str, field: &OptionField) -> Text {
+    let text = text.name(component).push(" needs the option ").name(field.name);
+    text.push("; give it: `").push(component).push("(").push(field.name).push(" = …)`")
+}
+
 #[track_caller]
-const fn check_dimension(component: &str, field: OptionField, given: Given) {
-    match (field.dimension, given.dimension) {
-        (Some(expected), Some(found)) => {
-            let mut index = 0;
-            while index < expected.exponents.len() {
-                if expected.exponents[index] != found.exponents[index] {
-                    let text = Text::new("expected ").push(expected.name).push(", found ").push(found.name);
-                    let text = text.push("; ").name(field.name).push(" of ").name(component);
-                    panic!("{}", text.push(" is in ").push(field.unit).as_str())
-                }
-                index += 1;
-            }
+const fn check_dimension(component: &str, field: &OptionField, given: &Given) {
+    match (&field.dimension, &given.dimension) {
+        (Some(expected), Some(found)) if !expected.equals(found) => {
+            let text = Text::new("expected ").push(expected.name).push(", found ").push(found.name);
+            let text = text.push("; ").name(field.name).push(" of ").name(component);
+            panic!("{}", text.push(" is in ").push(field.unit).as_str())
         }
         (Some(expected), None) if given.number.is_some() => {
             let text = Text::new("expected ").push(expected.name).push(", found a number without a unit; ");
@@ -84,8 +78,8 @@ const fn check_dimension(component: &str, field: OptionField, given: Given) {
 }
 
 #[track_caller]
-const fn check_range(component: &str, field: OptionField, given: Given) {
-    if let (Some(range), Some(number)) = (field.range, given.number)
+const fn check_range(component: &str, field: &OptionField, given: &Given) {
+    if let (Some(range), Some(number)) = (&field.range, given.number)
         && !(number >= range.start && number <= range.end)
     {
         let text = Text::new("").name(field.name).push(" of ").name(component).push(" must be in ");

@@ -60,6 +60,18 @@ pub(super) const fn equal(a: &str, b: &str) -> bool {
     true
 }
 
+/// Whether `name` is among `names`.
+pub(super) const fn contains(names: &[&str], name: &str) -> bool {
+    let mut index = 0;
+    while index < names.len() {
+        if equal(names[index], name) {
+            return true;
+        }
+        index += 1;
+    }
+    false
+}
+
 /// The number of the name nearest to `name`, if any is near enough to be meant.
 pub(super) const fn nearest(names: &[&str], name: &str) -> Option<usize> {
     let mut best = None;

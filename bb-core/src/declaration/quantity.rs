@@ -9,6 +9,20 @@ pub struct Dimension {
     pub name: &'static str,
 }
 
+impl Dimension {
+    /// Whether both are the same dimension, whatever their names.
+    pub(crate) const fn equals(&self, other: &Self) -> bool {
+        let [metre, kilogram, second, ampere, kelvin, radian] = self.exponents;
+        let theirs = other.exponents;
+        metre == theirs[0]
+            && kilogram == theirs[1]
+            && second == theirs[2]
+            && ampere == theirs[3]
+            && kelvin == theirs[4]
+            && radian == theirs[5]
+    }
+}
+
 /// An interval of numbers, both ends included.
 #[derive(Clone, Copy, Debug)]
 pub struct Range {

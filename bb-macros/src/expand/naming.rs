@@ -84,7 +84,9 @@ impl Naming {
 /// `__Rover_2_11`: the prefix of a robot's items, and the module of its type.
 pub(super) fn prefix(robot: &Ident) -> Ident {
     let place = robot.span().start();
-    format_ident!("__{robot}_{}_{}", place.line, place.column + 1, span = Span::call_site())
+    // Without the `r#` of a name that is a keyword.
+    let name = crate::names::text(robot);
+    format_ident!("__{name}_{}_{}", place.line, place.column + 1, span = Span::call_site())
 }
 
 fn fresh(path: &[String], taken: &mut HashSet<String>) -> Ident {

@@ -26,9 +26,9 @@ fn link(robot: &Robot, id: LinkId, link: &Link) -> TokenStream {
     let name = &link.label;
     let joint = option(link.joint.map(|joint| quote!(#joint)));
     let root = root_from(robot, Mount::Link(id));
-    let inertial = option(link.inertials.first().map(inertial));
-    let visuals = link.visuals.iter().map(visual);
-    let collisions = link.collisions.iter().map(collision);
+    let inertial = option(link.body.inertials.first().map(inertial));
+    let visuals = link.body.visuals.iter().map(visual);
+    let collisions = link.body.collisions.iter().map(collision);
     quote!(__private::Link {
         name: #name,
         parent_joint: #joint,
@@ -51,15 +51,15 @@ fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
     let name = &joint.label;
     let kind = joint_kind(joint.kind);
     let parent = joint.parent;
-    let parent_from_joint = origin(joint.origins.first());
-    let axis = option(joint.axes.first().map(|axis| {
+    let parent_from_joint = origin(joint.properties.origins.first());
+    let axis = option(joint.properties.axes.first().map(|axis| {
         let direction = axis.unit();
         quote!([#(#direction),*])
     }));
-    let limit = option(joint.limits.first().map(limit));
-    let dynamics = option(joint.dynamics.first().map(dynamics));
-    let mimic = option(joint.mimics.first().and_then(|data| mimic(robot, data)));
-    let transmission = option(joint.transmissions.first().map(transmission));
+    let limit = option(joint.properties.limits.first().map(limit));
+    let dynamics = option(joint.properties.dynamics.first().map(dynamics));
+    let mimic = option(joint.properties.mimics.first().and_then(|data| mimic(robot, data)));
+    let transmission = option(joint.properties.transmissions.first().map(transmission));
     quote!(__private::Joint {
         name: #name,
         kind: __private::JointKind::#kind,

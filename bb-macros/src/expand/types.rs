@@ -11,20 +11,38 @@ use crate::model::{EstimatorId, From, Id as _, PublisherId, Robot, SensorId};
 use crate::parse::Component;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{ToTokens, format_ident, quote, quote_spanned};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 /// `type __Rover_2_11__sensor_base_imu = Bmi270;`, if it is a sensor, else `Unknown`; as the user wrote it,
 /// `__Rover_2_11__given__sensor_base_imu`; and the payload of each estimator's output,
 /// `__Rover_2_11__payload__sensor_base_imu_tilt`.
+///
+/// Parts of one kind and one type are probed once. A type that fails is still reported at each part, since its options are
+/// those of the type as written there.
 pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
+    let mut probed = HashMap::new();
     let parts = Part::all(robot).map(|part| {
         let kind = &part.component(robot).kind;
         let PartNames { alias, given, .. } = types.names(part);
         let (_, is_known) = part.contract();
-        let known = quote!(<#given as ::bb_core::__private::Known<{
-            use ::bb_core::__private::NotProbed as _;
-            <::bb_core::__private::Probe<#given>>::#is_known
-        }>>::Type);
+        let same = match probed.entry((is_known.to_string(), kind.to_token_stream().to_string())) {
+            // `$crate` of two macros may be two crates.
+            Entry::Occupied(first) if !first.key().1.contains('$') => Some(*first.get()),
+            Entry::Occupied(_) => None,
+            Entry::Vacant(new) => {
+                new.insert(alias);
+                None
+            }
+        };
+        let known = match same {
+            Some(first) => without_span(first).into_token_stream(),
+            None => quote!(<#given as ::bb_core::__private::Known<{
+                use ::bb_core::__private::NotProbed as _;
+                <::bb_core::__private::Probe<#given>>::#is_known
+            }>>::Type),
+        };
         [(without_span(given), quote!(#kind)), (without_span(alias), known)]
     });
     let outputs = robot.publishers.ids().filter_map(|id| match types.from(id) {

@@ -19,7 +19,7 @@ impl Robot {
     /// The publishers at a joint that may tell its position; `None` if none is needed.
     pub(crate) fn position_sources(&self, id: JointId) -> Option<Vec<PublisherId>> {
         let joint = &self.joints[id];
-        if joint.kind == JointKind::Fixed || !joint.mimics.is_empty() {
+        if joint.kind == JointKind::Fixed || !joint.properties.mimics.is_empty() {
             return None;
         }
         Some(self.publishers.ids().filter(|publisher| self.mount_of(*publisher) == Mount::Joint(id)).collect())
@@ -52,7 +52,7 @@ impl Robot {
 
     /// `parent_from_joint` of the joint's origin.
     pub(crate) fn parent_from_joint(&self, joint: JointId) -> Rigid {
-        let origin = self.joints[joint].origins.first();
+        let origin = self.joints[joint].properties.origins.first();
         let values = |triple: Option<&[crate::parse::Quantity; 3]>| {
             triple.map_or([0.0; 3], |triple| triple.each_ref().map(|quantity| quantity.value))
         };

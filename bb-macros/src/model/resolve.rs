@@ -70,10 +70,9 @@ pub(crate) fn resolve(tree: parse::Robot) -> Robot {
 impl Robot {
     fn add_link(&mut self, link: parse::Link, joint: Option<JointId>, above: &[Ident]) -> LinkId {
         let path = below(above, &link.name);
-        let parse::Link { attributes, name, label, sensors, estimators, joints, inertials, visuals, collisions } =
-            link;
+        let parse::Link { attributes, name, label, sensors, estimators, joints, body } = link;
         let label = label.unwrap_or_else(|| text(&name));
-        let id = self.links.push(Link { attributes, name, label, joint, inertials, visuals, collisions });
+        let id = self.links.push(Link { attributes, name, label, joint, body });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Link(id), &path);
         }
@@ -89,22 +88,8 @@ impl Robot {
 
     fn add_joint(&mut self, joint: parse::Joint, parent: LinkId, above: &[Ident]) {
         let path = below(above, &joint.name);
-        let parse::Joint {
-            attributes,
-            name,
-            label,
-            kind,
-            kind_word,
-            origins,
-            axes,
-            limits,
-            dynamics,
-            mimics,
-            transmissions,
-            sensors,
-            actuators,
-            links,
-        } = joint;
+        let parse::Joint { attributes, name, label, kind, kind_word, properties, sensors, actuators, links } =
+            joint;
         let from_urdf = label.is_some();
         let label = label.unwrap_or_else(|| text(&name));
         let id = self.joints.push(Joint {
@@ -116,12 +101,7 @@ impl Robot {
             kind_word,
             parent,
             children: Vec::new(),
-            origins,
-            axes,
-            limits,
-            dynamics,
-            mimics,
-            transmissions,
+            properties,
         });
         for sensor in sensors {
             self.add_sensor(sensor, Mount::Joint(id), &path);

@@ -6,7 +6,9 @@ mod joint;
 #[cfg(feature = "urdf")]
 pub(crate) use body::Material;
 pub(crate) use body::{Geometry, Inertial, Shape};
-pub(crate) use joint::{Axis, Dynamics, Joint, Limit, Mimic, Origin, Transmission};
+#[cfg(feature = "urdf")]
+pub(crate) use joint::Axis;
+pub(crate) use joint::{Dynamics, Joint, JointProperties, Limit, Mimic, Origin, Transmission};
 
 use super::block::{Head, opened, semicolon};
 use super::items::items;
@@ -17,6 +19,14 @@ use proc_macro2::{Ident, TokenTree};
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
+/// What a link weighs and looks like. Each is kept as often as it is written.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LinkBody {
+    pub(crate) inertials: Vec<Inertial>,
+    pub(crate) visuals: Vec<Shape>,
+    pub(crate) collisions: Vec<Shape>,
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Link {
     pub(crate) attributes: Vec<Attribute>,
@@ -26,9 +36,7 @@ pub(crate) struct Link {
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) estimators: Vec<Estimator>,
     pub(crate) joints: Vec<Joint>,
-    pub(crate) inertials: Vec<Inertial>,
-    pub(crate) visuals: Vec<Shape>,
-    pub(crate) collisions: Vec<Shape>,
+    pub(crate) body: LinkBody,
 }
 
 impl Link {
@@ -41,9 +49,7 @@ impl Link {
             sensors: Vec::new(),
             estimators: Vec::new(),
             joints: Vec::new(),
-            inertials: Vec::new(),
-            visuals: Vec::new(),
-            collisions: Vec::new(),
+            body: LinkBody::default(),
         };
         let is_set = input.peek(Token![:]) || input.peek(Token![=]);
         if is_set && input.peek2(syn::token::Brace) {
@@ -72,9 +78,9 @@ impl Link {
             LinkItem::Sensor => self.sensors.push(Sensor::parse(head, input, notes)?),
             LinkItem::Estimator => self.estimators.push(Estimator::parse(head, input, notes)?),
             LinkItem::Joint => self.joints.push(Joint::parse(head, input, notes)?),
-            LinkItem::Inertial => self.inertials.push(Inertial::parse(head, input, notes)?),
-            LinkItem::Visual => self.visuals.push(Shape::visual(head, input, notes)?),
-            LinkItem::Collision => self.collisions.push(Shape::collision(head, input, notes)?),
+            LinkItem::Inertial => self.body.inertials.push(Inertial::parse(head, input, notes)?),
+            LinkItem::Visual => self.body.visuals.push(Shape::visual(head, input, notes)?),
+            LinkItem::Collision => self.body.collisions.push(Shape::collision(head, input, notes)?),
         }
         Ok(())
     }

@@ -186,3 +186,11 @@ fn the_expansion_is_linear_in_size() {
         assert!((bytes / each[0] - 1.0).abs() < 0.2, "bytes per estimator at 10, 100 and 1000: {each:?}");
     }
 }
+
+#[test]
+fn a_robot_named_by_a_keyword_is_no_panic() {
+    let expansion = pipeline(tokens("robot r#type; link base;"));
+    let text = expansion.to_string();
+    assert!(text.contains("struct r#type") && text.contains("mod __type_1_"), "{text}");
+    assert!(syn::parse2::<syn::File>(expansion).is_ok(), "{text}");
+}

@@ -2,8 +2,8 @@
 
 use crate::diagnostics::Place;
 use crate::parse::{
-    Axis, Dynamics, Geometry, Inertial, Joint, JointKind, Limit, Link, Material, Mimic, Origin, Quantity, Shape,
-    Transmission,
+    Axis, Dynamics, Geometry, Inertial, Joint, JointKind, JointProperties, Limit, Link, LinkBody, Material, Mimic,
+    Origin, Quantity, Shape, Transmission,
 };
 use crate::units::Dimension;
 use proc_macro2::{Ident, Span};
@@ -56,9 +56,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             sensors: Vec::new(),
             estimators: Vec::new(),
             joints: Vec::new(),
-            inertials,
-            visuals,
-            collisions,
+            body: LinkBody { inertials, visuals, collisions },
         }
     }
 
@@ -122,12 +120,14 @@ impl<'a, 'input> Reader<'a, 'input> {
             name: self.joint_name(&label, robot),
             kind,
             kind_word: self.word(kind_text),
-            origins,
-            axes,
-            limits,
-            dynamics,
-            mimics,
-            transmissions: self.transmissions(robot, &label),
+            properties: JointProperties {
+                origins,
+                axes,
+                limits,
+                dynamics,
+                mimics,
+                transmissions: self.transmissions(robot, &label),
+            },
             sensors: Vec::new(),
             actuators: Vec::new(),
             links: Vec::new(),

@@ -71,9 +71,9 @@ fn add_to_link(tree: &mut Robot, addition: Link, diagnostics: &mut Diagnostics) 
     link.sensors.extend(addition.sensors);
     link.estimators.extend(addition.estimators);
     link.joints.extend(addition.joints);
-    link.inertials.extend(addition.inertials);
-    link.visuals.extend(addition.visuals);
-    link.collisions.extend(addition.collisions);
+    link.body.inertials.extend(addition.body.inertials);
+    link.body.visuals.extend(addition.body.visuals);
+    link.body.collisions.extend(addition.body.collisions);
 }
 
 fn add_to_joint(tree: &mut Robot, addition: JointAddition, diagnostics: &mut Diagnostics) {

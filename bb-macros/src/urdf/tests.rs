@@ -76,7 +76,7 @@ fn a_moment_that_misses_zero_by_a_rounding_is_zero() {
     let link = root(
         "<robot name=\"r\"><link name=\"a\"><inertial><mass value=\"1\"/><inertia ixx=\"-5e-20\"/></inertial></link></robot>",
     );
-    let moment = link.map(|link| link.inertials[0].inertia[0].as_ref().map(|moment| moment.value));
+    let moment = link.map(|link| link.body.inertials[0].inertia[0].as_ref().map(|moment| moment.value));
     assert_eq!(moment.ok().flatten(), Some(0.0));
 }
 

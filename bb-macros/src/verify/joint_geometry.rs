@@ -23,7 +23,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
 const FARTHEST_M: f64 = 9.46e15;
 
 fn origin(joint: &Joint, diagnostics: &mut Diagnostics) {
-    for length in joint.origins.iter().filter_map(|origin| origin.xyz.as_ref()).flatten() {
+    for length in joint.properties.origins.iter().filter_map(|origin| origin.xyz.as_ref()).flatten() {
         if length.dimension == Dimension::LENGTH && length.value.abs() > FARTHEST_M {
             diagnostics.at(length.place, "this is farther than a light year; bring it nearer".into());
         }
@@ -33,7 +33,7 @@ fn origin(joint: &Joint, diagnostics: &mut Diagnostics) {
 fn axis(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
     let (kind, name) = (&joint.kind_word, &joint.name);
     let moves_about_none = matches!(joint.kind, JointKind::Fixed | JointKind::Floating);
-    match joint.axes.first() {
+    match joint.properties.axes.first() {
         Some(axis) if moves_about_none => {
             diagnostics.error(&axis.word, format!("a {kind} joint has no axis; leave it out of `{name}`"));
         }
@@ -56,7 +56,7 @@ fn axis(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
 fn limit(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
     let (kind, name) = (&joint.kind_word, &joint.name);
     let needs_one = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
-    match joint.limits.first() {
+    match joint.properties.limits.first() {
         Some(limit) if joint.kind == JointKind::Fixed => {
             diagnostics.error(&limit.word, format!("a fixed joint has no limit; leave it out of `{name}`"));
         }

@@ -11,10 +11,10 @@ use proc_macro2::Ident;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for link in &robot.links {
-        for body in &link.inertials {
+        for body in &link.body.inertials {
             inertial(body, diagnostics);
         }
-        for body in link.visuals.iter().chain(&link.collisions) {
+        for body in link.body.visuals.iter().chain(&link.body.collisions) {
             shape(body, diagnostics);
         }
     }

@@ -11,7 +11,7 @@ use proc_macro2::Ident;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for (id, joint) in robot.joints.enumerate() {
-        let Some(mimic) = joint.mimics.first() else { continue };
+        let Some(mimic) = joint.properties.mimics.first() else { continue };
         match &mimic.joint {
             None => diagnostics.error(&mimic.word, "the joint to follow is missing, as in `joint: other`".into()),
             Some(_) if !moves(joint) => {
@@ -54,7 +54,7 @@ fn find<'a>(robot: &'a Robot, name: &Ident) -> Option<(JointId, &'a Joint)> {
 fn is_circle(robot: &Robot, start: JointId) -> bool {
     let mut id = start;
     for _ in robot.joints.ids() {
-        let name = robot.joints[id].mimics.first().and_then(|Mimic { joint, .. }| joint.as_ref());
+        let name = robot.joints[id].properties.mimics.first().and_then(|Mimic { joint, .. }| joint.as_ref());
         let Some((next, _)) = name.and_then(|name| find(robot, name)) else { return false };
         if next == start {
             return true;

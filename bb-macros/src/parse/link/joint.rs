@@ -17,6 +17,17 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
+/// How a joint moves. Each property is kept as often as it is written: a rule refuses the second.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct JointProperties {
+    pub(crate) origins: Vec<Origin>,
+    pub(crate) axes: Vec<Axis>,
+    pub(crate) limits: Vec<Limit>,
+    pub(crate) dynamics: Vec<Dynamics>,
+    pub(crate) mimics: Vec<Mimic>,
+    pub(crate) transmissions: Vec<Transmission>,
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
     pub(crate) attributes: Vec<Attribute>,
@@ -25,12 +36,7 @@ pub(crate) struct Joint {
     pub(crate) label: Option<String>,
     pub(crate) kind: JointKind,
     pub(crate) kind_word: Ident,
-    pub(crate) origins: Vec<Origin>,
-    pub(crate) axes: Vec<Axis>,
-    pub(crate) limits: Vec<Limit>,
-    pub(crate) dynamics: Vec<Dynamics>,
-    pub(crate) mimics: Vec<Mimic>,
-    pub(crate) transmissions: Vec<Transmission>,
+    pub(crate) properties: JointProperties,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) actuators: Vec<Actuator>,
     pub(crate) links: Vec<Link>,
@@ -51,12 +57,7 @@ impl Joint {
             label: None,
             kind: kind.clone().unwrap_or(JointKind::Fixed),
             kind_word,
-            origins: Vec::new(),
-            axes: Vec::new(),
-            limits: Vec::new(),
-            dynamics: Vec::new(),
-            mimics: Vec::new(),
-            transmissions: Vec::new(),
+            properties: JointProperties::default(),
             sensors: Vec::new(),
             actuators: Vec::new(),
             links: Vec::new(),
@@ -80,8 +81,8 @@ impl Joint {
         if let Err(error) = kind {
             // What it carries is known all the same; whether it needs an axis and a limit is not.
             notes.syntax(&error);
-            joint.axes.clear();
-            joint.limits.clear();
+            joint.properties.axes.clear();
+            joint.properties.limits.clear();
         }
         Ok(joint)
     }
@@ -94,12 +95,12 @@ impl Joint {
         notes: &mut Notes<'_>,
     ) -> syn::Result<()> {
         match item {
-            JointItem::Origin => self.origins.push(Origin::parse(head, input, notes)?),
-            JointItem::Axis => self.axes.push(Axis::parse(head, input, notes)?),
-            JointItem::Limit => self.limits.push(Limit::parse(head, input, notes)?),
-            JointItem::Dynamics => self.dynamics.push(Dynamics::parse(head, input, notes)?),
-            JointItem::Mimic => self.mimics.push(Mimic::parse(head, input, notes)?),
-            JointItem::Transmission => self.transmissions.push(Transmission::parse(head, input, notes)?),
+            JointItem::Origin => self.properties.origins.push(Origin::parse(head, input, notes)?),
+            JointItem::Axis => self.properties.axes.push(Axis::parse(head, input, notes)?),
+            JointItem::Limit => self.properties.limits.push(Limit::parse(head, input, notes)?),
+            JointItem::Dynamics => self.properties.dynamics.push(Dynamics::parse(head, input, notes)?),
+            JointItem::Mimic => self.properties.mimics.push(Mimic::parse(head, input, notes)?),
+            JointItem::Transmission => self.properties.transmissions.push(Transmission::parse(head, input, notes)?),
             JointItem::Sensor => self.sensors.push(Sensor::parse(head, input, notes)?),
             JointItem::Actuator => self.actuators.push(Actuator::parse(head, input, notes)?),
             JointItem::Link => self.links.push(Link::parse(&head, input, notes)?),

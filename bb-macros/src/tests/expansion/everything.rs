@@ -1,10 +1,15 @@
 // What `robot!` makes of everything.txt. Written by a test: `UPDATE_EXPANSION=1 cargo test -p bb-macros expansion`.
 
-#[allow(non_snake_case, unreachable_pub, unused_imports)]
+#[allow(
+    non_snake_case,
+    unreachable_pub,
+    unused_imports,
+    missing_copy_implementations,
+    missing_debug_implementations
+)]
 mod __Rover_2_11 {
     use super::*;
     /// One of everything.
-    #[derive(Clone, Copy, Debug)]
     pub struct Rover;
 }
 impl __Rover_2_11::Rover {
