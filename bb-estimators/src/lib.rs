@@ -32,6 +32,8 @@ extern crate alloc;
 pub mod attitude;
 pub mod calibration;
 mod moments;
+#[cfg(feature = "motion")]
+pub mod motion;
 pub mod navigation;
 pub mod params;
 #[cfg(feature = "simulation")]
@@ -47,7 +49,7 @@ pub use attitude::{Attitude, ImuAndMagnetometer};
 #[cfg(feature = "runtime")]
 pub use calibration::Calibrated;
 #[cfg(feature = "simulation")]
-pub use simulation::SimulatedImu;
+pub use simulation::{SimulatedActuator, SimulatedEncoder, SimulatedImu, SimulatedLinkImu};
 
 /// The error-state Kalman filter of position, velocity and attitude as an estimator: it emits `O`, and estimates the optional states
 /// `S`, `N` states in all.
