@@ -71,15 +71,13 @@ impl Pid {
         let params = &self.params;
         let is_step = step_s > 0.0 && (setpoint + measurement + step_s).is_finite();
         let error = setpoint - measurement;
-        if is_step {
-            if let Some(last) = self.measurement.replace(measurement) {
-                // The low pass in its exact form for a rate that is constant during the step.
-                let share = match params.derivative_filter_s > 0.0 {
-                    true => 1.0 - (-step_s / params.derivative_filter_s).exp(),
-                    false => 1.0,
-                };
-                self.rate += share * ((measurement - last) / step_s - self.rate);
-            }
+        if is_step && let Some(last) = self.measurement.replace(measurement) {
+            // The low pass in its exact form for a rate that is constant during the step.
+            let share = match params.derivative_filter_s > 0.0 {
+                true => 1.0 - (-step_s / params.derivative_filter_s).exp(),
+                false => 1.0,
+            };
+            self.rate += share * ((measurement - last) / step_s - self.rate);
         }
         let proportional = params.proportional * error;
         let derivative = -params.derivative * self.rate;

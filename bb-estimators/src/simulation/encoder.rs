@@ -41,6 +41,7 @@ impl Sensor for SimulatedEncoder {
 
     fn init(options: SimulatedEncoderOptions, context: &SensorContext) -> Result<Self, Fault> {
         let world = context.shared(|| SimulatedWorld::new(context.topology()));
+        world.check_plugged(context.path())?;
         let joint = context.frame().name();
         if context.topology().joint(joint).is_none() {
             return Err(Fault::permanent("it measures a joint; declare it in one"));

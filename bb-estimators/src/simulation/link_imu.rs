@@ -59,6 +59,7 @@ impl Sensor for SimulatedLinkImu {
     fn init(options: SimulatedLinkImuOptions, context: &SensorContext) -> Result<Self, Fault> {
         let topology = context.topology();
         let world = context.shared(|| SimulatedWorld::new(topology));
+        world.check_plugged(context.path())?;
         let kinematics = Kinematics::new(topology)?;
         let link = kinematics.link(context.frame().name());
         let link = link.ok_or_else(|| Fault::permanent("it is mounted on a link; declare it in one"))?;
