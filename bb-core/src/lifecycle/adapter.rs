@@ -1,6 +1,6 @@
 //! The common interface of all components, whatever trait they implement.
 
-use crate::component::replacement::{AnySensor, StandIn};
+use super::stand_in::{AnySensor, StandIn, make_actuator, make_sensor};
 use crate::component::{
     Actuator, ActuatorContext, Context, Estimator, Options, Reading, Sensor, SensorContext, Service, ServiceContext,
 };
@@ -113,7 +113,7 @@ impl<S: Sensor> Component for AsSensor<S> {
 
     fn make(options: S::Options, context: &SensorContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => replacement.make_sensor(context).map(|made| Self::Replaced(StandInSensor(made))),
+            Some(replacement) => make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made))),
             None => S::init(options, context).map(Self::Declared),
         }
     }
@@ -179,7 +179,7 @@ impl<A: Actuator> Component for AsActuator<A> {
 
     fn make(options: A::Options, context: &ActuatorContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => replacement.make_actuator(context).map(Self::Replaced),
+            Some(replacement) => make_actuator(&replacement, context).map(Self::Replaced),
             None => A::init(options, context).map(Self::Declared),
         }
     }

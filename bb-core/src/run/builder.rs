@@ -19,7 +19,7 @@ use crate::event::ParameterValue;
 use crate::fault::caught;
 use crate::joints::{JointSettings, Joints};
 use crate::journal::{Entry, Event, Journal, Sink};
-use crate::lifecycle::HostHandle;
+use crate::lifecycle::{HostHandle, replacement_of_actuator, replacement_of_sensor};
 use crate::message::nearest::nearest_path;
 use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode, contained};
@@ -114,7 +114,7 @@ impl<R: Robot> Builder<R> {
     {
         let sensors = R::SENSORS.iter().map(|declared| declared.path).filter(|path| path.starts_with("sensor/"));
         let path = declared_path("sensor", path, sensors)?;
-        self.replacements.insert(path, Replacement::sensor::<S>(options));
+        self.replacements.insert(path, replacement_of_sensor::<S>(options));
         Ok(())
     }
 
@@ -127,7 +127,7 @@ impl<R: Robot> Builder<R> {
         A::Options: Sync,
     {
         let path = declared_path("actuator", path, R::ACTUATORS.iter().map(|declared| declared.path))?;
-        self.replacements.insert(path, Replacement::actuator::<A>(options));
+        self.replacements.insert(path, replacement_of_actuator::<A>(options));
         Ok(())
     }
 
