@@ -3,6 +3,8 @@
 use crate::components::at;
 use crate::journals::Failure;
 use bb_core::component::ActuatorError;
+use bb_core::kinematics::Kinematics;
+use bb_core::nalgebra::{Isometry3, Vector3};
 use bb_core::payload::{ActuatorCommand, EndMotion, MotionEnd};
 use bb_core::prelude::*;
 use bb_core::run::{Bus, Execution};
@@ -10,9 +12,10 @@ use bb_core::{DynamicSubscription, LimitedQuantity};
 use bb_estimators::motion::{
     Drive, Easing, JointTarget, JointTargets, MotionProgress, MoveJoints, OpenLoopPosition, PidController,
 };
-use bb_estimators::simulation::{SimulatedActuatorOptions, SimulatedEncoderOptions, SimulatedWorld};
-use bb_estimators::{SimulatedActuator, SimulatedEncoder};
-use std::sync::{Arc, Mutex};
+use bb_estimators::simulation::{GRAVITY, SimulatedActuatorOptions, SimulatedEncoderOptions, SimulatedWorld};
+use bb_estimators::{SimulatedActuator, SimulatedEncoder, SimulatedLinkImu};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A driver of hardware that is not there.
 #[derive(Debug)]
@@ -150,13 +153,18 @@ robot! {
     }
 }
 
-fn ready() -> Result<Simulation<Crane>, Failure> {
+/// The crane with simulated components in the place of its drivers.
+fn simulated() -> Result<bb_core::Builder<Crane>, Failure> {
     let mut builder = Crane::builder();
     let motor = SimulatedActuatorOptions { acceleration: 4.0, ..SimulatedActuatorOptions::defaults() };
     builder.replace_actuator::<SimulatedActuator>("actuator/base/slew/boom/reach/motor", motor)?;
     let encoder = SimulatedEncoderOptions::defaults();
     builder.replace_sensor::<SimulatedEncoder>("sensor/base/slew/boom/reach/encoder", encoder)?;
-    let mut simulation = builder.simulate()?;
+    Ok(builder)
+}
+
+fn ready() -> Result<Simulation<Crane>, Failure> {
+    let mut simulation = simulated()?.simulate()?;
     simulation.run_until(at(10));
     assert_eq!(simulation.arm(), Ok(()));
     Ok(simulation)
@@ -207,14 +215,8 @@ fn what_is_declared_for_hardware_starts_only_where_it_is_replaced() -> Result<()
 #[test]
 fn commands_beyond_a_limit_are_brought_back_and_counted() -> Result<(), Failure> {
     let told = Arc::new(Mutex::new(Vec::new()));
-    let mut builder = Crane::builder();
+    let mut builder = simulated()?;
     builder.options(crane::actuator::base::flap::servo).told = Arc::clone(&told);
-    let motor = SimulatedActuatorOptions::defaults();
-    builder.replace_actuator::<SimulatedActuator>("actuator/base/slew/boom/reach/motor", motor)?;
-    builder.replace_sensor::<SimulatedEncoder>(
-        "sensor/base/slew/boom/reach/encoder",
-        SimulatedEncoderOptions::defaults(),
-    )?;
     let simulation = builder.simulate()?;
     assert_eq!(simulation.arm(), Ok(()));
     let servo = crane::actuator::base::flap::servo;
@@ -452,5 +454,139 @@ fn a_controller_holds_its_setpoint_which_is_a_parameter() -> Result<(), Failure>
     let report = simulation.report();
     let counts = report.actuator("actuator/base/spin/motor").ok_or("it is declared")?;
     assert!(counts.limited(LimitedQuantity::Velocity) > 100);
+    Ok(())
+}
+
+/// What was published at each path below `actuator` and `command`.
+fn heard(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
+    let mut heard: BTreeMap<&'static str, Vec<String>> = BTreeMap::new();
+    for message in all.drain() {
+        heard.entry(message.path()).or_default().push(format!("{} {message:?}", message.stamp().monotonic_time));
+    }
+    heard
+}
+
+#[test]
+fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
+    let lines = Arc::new(Mutex::new(Vec::new()));
+    let mut builder = simulated()?;
+    let sink = Arc::clone(&lines);
+    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let mut simulation = builder.simulate()?;
+    let selected = Select::AnyOf(&[Select::Below("actuator"), Select::Below("command")]);
+    let all = simulation.subscribe_any(selected, None, Overflow::DropOldest { capacity: 1 << 16 });
+    simulation.run_until(at(10));
+    assert_eq!(simulation.arm(), Ok(()));
+    let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
+    simulation.run_until(at(1000));
+    execution.cancel();
+    simulation.run_until(at(1500));
+    let servo = crane::actuator::base::slew::boom::reach::trolley::jaw::servo;
+    simulation.actuate(servo, PositionCommand { position: 9.0, ..Default::default() }.into())?;
+    simulation.run_until(at(2000));
+    simulation.stop();
+    let first = heard(&all);
+    for path in ["actuator/base/slew/motor", "actuator/base/slew/motor/end_motion", "command/go/progress"] {
+        assert!(first.contains_key(path), "nothing at {path}");
+    }
+
+    let mut replay = Crane::builder().replay()?;
+    let all = replay.subscribe_any(selected, None, Overflow::DropOldest { capacity: 1 << 16 });
+    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    lines.sort_by_key(|line| line.number);
+    replay.play(lines)?;
+    replay.stop();
+    let again = heard(&all);
+    for (path, messages) in &first {
+        assert_eq!(Some(messages), again.get(path), "{path}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_simulated_motor_moves_in_real_time() -> Result<(), Failure> {
+    let running = simulated()?.start()?;
+    assert_eq!(running.arm(), Ok(()));
+    let ends = ends(&running.bus());
+    let servo = crane::actuator::base::slew::boom::reach::trolley::jaw::servo;
+    let begin = running.clock().now();
+    running.actuate(servo, PositionCommand { position: 0.4, ..Default::default() }.into())?;
+    let end = ends.recv_timeout(Duration::from_secs(20)).ok_or("it arrives")?;
+    let motion = end.downcast::<EndMotion>().ok_or("an end")?;
+    assert_eq!((motion.frame.name(), &motion.end), ("jaw", &MotionEnd::Reached));
+    // At 10 rad/s² half of the way each: 2 √(0.4 / 10) s, however late it is noticed.
+    assert!(motion.monotonic_time.seconds_since(begin) >= 0.4);
+    running.stop();
+    Ok(())
+}
+
+robot! {
+    robot Swing;
+    link base {
+        joint turn: continuous {
+            origin: { xyz: [0.1 m, 0 m, 0.2 m], rpy: [10 deg, 20 deg, 30 deg] };
+            axis: z;
+            limit: { velocity: 2 rad/s, effort: 20 N*m };
+            actuator motor: SimulatedActuator(acceleration = 5.0);
+            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+            link arm {
+                joint slide: prismatic {
+                    origin: { xyz: [0.3 m, 0 m, 0 m] };
+                    axis: [1, 0, 1];
+                    limit: { lower: -1 m, upper: 1 m, velocity: 1 m/s, effort: 20 N };
+                    actuator motor: SimulatedActuator(acceleration = 3.0);
+                    sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+                    link carriage {
+                        sensor imu: SimulatedLinkImu(
+                            gyroscope_noise = 0.0, gyroscope_bias = 0 rad/s, accelerometer_noise = 0.0,
+                            accelerometer_bias = 0 m/s^2,
+                        ) { rate: 1 kHz; }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What it reads is what follows from where the link is: second differences of its position, and the turning of its axes. This
+/// uses the kinematics of positions alone, not those of velocities and accelerations that the sensor uses. Joints accelerate
+/// evenly within a millisecond of the world, so the three poses are taken within one.
+#[test]
+fn an_imu_on_a_moving_link_measures_how_that_moves() -> Result<(), Failure> {
+    let mut simulation = Swing::builder().simulate()?;
+    assert_eq!(simulation.arm(), Ok(()));
+    // The world's steps begin with a command; the sensor is read in the middle of them.
+    simulation.run_until(MonotonicTime::from_nanos(500_000));
+    simulation
+        .actuate(swing::actuator::base::turn::motor, VelocityCommand { velocity: 1.5, effort: None }.into())?;
+    let there = PositionCommand { position: 0.8, ..Default::default() };
+    simulation.actuate(swing::actuator::base::turn::arm::slide::motor, there.into())?;
+    let readings = simulation.subscribe(swing::sensor::base::turn::arm::slide::carriage::imu);
+    let kinematics = Kinematics::new(Swing::TOPOLOGY)?;
+    let (base, carriage) = (kinematics.link("base").ok_or("a link")?, kinematics.link("carriage").ok_or("a link")?);
+    let chain = kinematics.chain(base, carriage)?;
+    let world = simulation.shared(|| SimulatedWorld::new(Swing::TOPOLOGY));
+    let (mut worst_force, mut worst_rate, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for millis in 1..1200_i64 {
+        let mut pose_at = |micros: i64| -> Result<Isometry3<f64>, Failure> {
+            let time = MonotonicTime::from_nanos((millis * 1000 + micros) * 1000);
+            simulation.run_until(time);
+            let (turn, slide) = (world.joint("turn", time)?.point, world.joint("slide", time)?.point);
+            Ok(chain.transform(&[turn.position, slide.position])?)
+        };
+        let (before, now, after) = (pose_at(-100)?, pose_at(0)?, pose_at(100)?);
+        let reading = readings.drain().last().ok_or("it is read each millisecond")?;
+        assert_eq!(reading.monotonic_time, at(millis));
+        let sum = before.translation.vector + after.translation.vector - 2.0 * now.translation.vector;
+        let force = now.rotation.inverse() * (sum / 1e-8 + Vector3::new(0.0, 0.0, GRAVITY));
+        let rate = (before.rotation.inverse() * after.rotation).scaled_axis() / 2e-4;
+        worst_force = worst_force.max((reading.linear_acceleration - force).norm());
+        worst_rate = worst_rate.max((reading.angular_velocity - rate).norm());
+        fastest = fastest.max(reading.angular_velocity.norm());
+    }
+    assert!(fastest > 1.4, "{fastest}");
+    // Rounding of a position, 1e-16 m, over the square of 0.1 ms; and its fourth derivative.
+    assert!(worst_force < 1e-6, "{worst_force}");
+    assert!(worst_rate < 1e-6, "{worst_rate}");
     Ok(())
 }

@@ -66,7 +66,7 @@ impl JointMotionLimits {
 /// point each `period`. All joints arrive at the same time.
 ///
 /// The points keep the limits. Between two points in which the acceleration jumps, because a jerk is infinite, a
-/// [`JointPath`](super::JointPath) exceeds the velocity by at most a sixteenth of acceleration times period.
+/// [`JointPath`](super::JointPath) exceeds the velocity by at most a fourteenth of acceleration times period.
 ///
 /// With one target it takes the shortest time that the limits allow (Berscheid and Kröger, *Jerk-limited Real-time
 /// Trajectory Generation with Arbitrary Target States*, 2021; the solver is `rsruckig`). With several it passes through them

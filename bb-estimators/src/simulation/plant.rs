@@ -138,11 +138,13 @@ impl Plant {
         wanted.min(speed).min(self.drivetrain.velocity) * direction
     }
 
-    /// Whether it is so near a position that within a step it can rest there.
+    /// Whether the next step brings it to rest at a position, but for what the length of the steps leaves: an eighth of the way
+    /// that the deceleration makes in a step.
     fn is_at(&self, target: f64) -> bool {
         let d = self.deceleration();
         let JointPoint { position, velocity, .. } = self.state.point;
-        (position - target).abs() <= d * STEP_S * STEP_S && velocity.abs() <= 1.5 * d * STEP_S
+        let left = target - (position + velocity * STEP_S / 2.0);
+        velocity.abs() <= d * STEP_S * (1.0 + 1e-9) && left.abs() <= d * STEP_S * STEP_S / 4.0
     }
 
     /// The velocity that the servo wants after the next step; none if it gives an effort instead.
@@ -232,16 +234,19 @@ impl Plant {
         self.stopped(PlantState { point: next, effort, stalled_s }, step_s)
     }
 
-    /// At rest at `target` by the end of the step.
+    /// It comes to rest within the step, and is at `target` at its end.
     fn to_rest(&self, target: f64, step_s: f64) -> PlantState {
         let JointPoint { position, velocity, .. } = self.state.point;
-        let share = (step_s / STEP_S).min(1.0);
-        let point = JointPoint {
-            position: position + share * (target - position),
-            velocity: velocity * (1.0 - share),
-            acceleration: -velocity / STEP_S,
+        let acceleration = -velocity / STEP_S;
+        let point = match step_s >= STEP_S {
+            true => JointPoint { position: target, velocity: 0.0, acceleration },
+            false => JointPoint {
+                position: position + velocity * step_s + acceleration * step_s * step_s / 2.0,
+                velocity: velocity + acceleration * step_s,
+                acceleration,
+            },
         };
-        PlantState { point, effort: self.drivetrain.inertia * point.acceleration, stalled_s: 0.0 }
+        PlantState { point, effort: self.drivetrain.inertia * acceleration, stalled_s: 0.0 }
     }
 
     /// The state at an end of the range or at an obstacle, if it would be beyond.

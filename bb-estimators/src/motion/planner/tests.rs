@@ -49,7 +49,7 @@ proptest! {
                 let point = path.at(path.duration_s() * f64::from(step) / f64::from(steps));
                 prop_assert!((-3.0 - 1e-6..=3.0 + 1e-6).contains(&point.position));
                 // Points are exact. Between two of them, 10 ms apart, the polynomial rounds off a jump of the acceleration.
-                let rounded = limit.acceleration * 0.01 / 16.0;
+                let rounded = limit.acceleration * 0.01 / 14.0;
                 prop_assert!(point.velocity.abs() <= limit.velocity + rounded + 1e-9, "{point:?} {limit:?}");
             }
             for point in trajectory.points.iter() {
