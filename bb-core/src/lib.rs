@@ -66,7 +66,10 @@ pub use event::{
     Safety,
 };
 pub use fault::Fault;
-pub use message::{Field, Finite, Frame, JointPositions, JointReading, JointSide, Origin, Payload, Stamped};
+pub use message::{
+    Exceeded, Field, Finite, Frame, JointBounds, JointCommand, JointPositions, JointReading, JointSide,
+    LimitedQuantity, Origin, OutOfBounds, Payload, Stamped,
+};
 pub use pubsub::{
     DynamicMessage, DynamicSubscription, Overflow, Payloads, Publisher, Select, Subscription, Unmatched,
 };
@@ -135,7 +138,10 @@ pub mod __private {
     pub use crate::message::codec::{
         DecodeError, EnumShape, FieldShape, Reader, RosLayout, Shape, StructShape, Writer,
     };
-    pub use crate::message::{Feeds, Finite, Frame, JointPositions, JointReading, Stamp, Stamped};
+    pub use crate::message::{
+        Exceeded, Feeds, Finite, Frame, JointBounds, JointCommand, JointPositions, JointReading, OutOfBounds,
+        Stamp, Stamped,
+    };
     pub use crate::node::{
         Act, Environment, Island, IslandOf, IslandState, IslandWiring, Key, Member, Node, Turn, act, alone, enter,
         feed, island_of, receive, start,

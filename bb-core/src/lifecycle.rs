@@ -14,8 +14,10 @@
 mod adapter;
 mod backoff;
 mod slot;
+mod stand_in;
 
 pub(crate) use adapter::{AsActuator, AsEstimator, Component, HostHandle};
 pub use adapter::{AsSensor, AsService, Periodic};
 pub use backoff::Supervision;
 pub(crate) use slot::{AfterFault, Recipe, Slot};
+pub(crate) use stand_in::{replacement_of_actuator, replacement_of_sensor};

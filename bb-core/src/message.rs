@@ -4,6 +4,7 @@ pub mod codec;
 mod copy;
 mod finite;
 mod joint;
+mod joint_command;
 pub(crate) mod nearest;
 mod stamped;
 
@@ -11,6 +12,7 @@ pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};
 pub(crate) use copy::{Panic, copied, copy_to};
 pub use finite::Finite;
 pub use joint::{JointPositions, JointReading, JointSide};
+pub use joint_command::{Exceeded, JointBounds, JointCommand, LimitedQuantity, OutOfBounds};
 pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 
 /// What a message carries: plain data in SI units. Derive it:
@@ -79,6 +81,23 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     #[doc(hidden)]
     fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
         let _ = listener;
+    }
+
+    /// Whether it commands a joint, and is held to the limits of that: `#[payload(joint_command)]` says so. It implements
+    /// [`JointCommand`].
+    const COMMANDS_JOINT: bool = false;
+
+    /// Brings what exceeds the bounds of a joint back to them, see [`JointCommand`].
+    #[doc(hidden)]
+    fn limit_command(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
+        let _ = bounds;
+        Ok(Exceeded::default())
+    }
+
+    /// The command that stops a joint, see [`JointCommand`].
+    #[doc(hidden)]
+    fn stop_command() -> Option<Self> {
+        None
     }
 
     /// False for the stand-in of a payload that is not known, in a robot that does not compile.

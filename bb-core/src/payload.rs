@@ -11,7 +11,7 @@
 //! | motion and forces | [`Twist`], [`TwistWithCovariance`], [`Accel`], [`Wrench`] |
 //! | pose with motion | [`Odometry`] |
 //! | joints | [`JointState`], [`JointStates`], [`MotorState`], [`JointSnapshot`] |
-//! | commands to actuators, and their reports | [`PositionCommand`], [`VelocityCommand`], [`EffortCommand`], [`JointTrajectory`], [`BeginMotion`], [`EndMotion`] |
+//! | commands to actuators, and their reports | [`ActuatorCommand`], [`PositionCommand`], [`VelocityCommand`], [`EffortCommand`], [`JointTrajectory`], [`BeginMotion`], [`EndMotion`] |
 
 mod actuator;
 mod attitude;
@@ -27,7 +27,9 @@ mod ros;
 mod sensor;
 mod trajectory;
 
-pub use actuator::{BeginMotion, EffortCommand, EndMotion, MotionEnd, PositionCommand, VelocityCommand};
+pub use actuator::{
+    ActuatorCommand, BeginMotion, EffortCommand, EndMotion, MotionEnd, PositionCommand, VelocityCommand,
+};
 pub use attitude::{Orientation, Pose};
 pub use geometry::{Accel, PoseWithCovariance, TwistWithCovariance, Wrench};
 pub use gnss::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};

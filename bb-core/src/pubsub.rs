@@ -17,7 +17,7 @@ mod unmatched;
 mod wakers;
 
 pub use any::{AnyTopic, DynamicMessage};
-pub use dynamic::DynamicSubscription;
+pub use dynamic::{DynamicSubscription, RecvDynamic};
 pub(crate) use publisher::Gate;
 pub use publisher::Publisher;
 pub use queue::Overflow;

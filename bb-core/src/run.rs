@@ -31,6 +31,7 @@ pub use crate::event::ComponentFault;
 pub use crate::lifecycle::Supervision;
 pub use crate::node::{DropReason, EstimatorStatistics, InputStatistics, LatencyStatistics};
 pub use crate::pubsub::{SubscriberStatistics, TopicStatistics};
+pub use actuator::ActuatorStatistics;
 pub(crate) use actuator::{ActuatorNode, AnyActuator};
 pub use builder::Builder;
 pub use error::StartError;

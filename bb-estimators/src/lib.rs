@@ -18,6 +18,7 @@
 //! | `WheeledEskf(…)`, `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, and `input relative` and `input pressure` for [states](navigation::States) `S` that have them | as before |
 //! | `PlanarEkf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input orientation` | `Odometry` of the link, on a plane |
 //! | `PlanarEkf<PlanarOutputs>(…)` | as before | `output odometry`, and `output status`: bias, scale of the wheels, refusals |
+//! | `OpenLoopPosition(…)` as a sensor in a joint | what the joint's actuator reports | `JointState` |
 //! | `StateEstimator(…)` on a link | `input imu`, driver, and any of `input vio`, `anchor`, `gnss`, `gps_health`, `attitude` and `warm_start` | `output estimate`, `output health` and `output events` |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
@@ -32,6 +33,8 @@ extern crate alloc;
 pub mod attitude;
 pub mod calibration;
 mod moments;
+#[cfg(feature = "motion")]
+pub mod motion;
 pub mod navigation;
 pub mod params;
 #[cfg(feature = "simulation")]
@@ -47,7 +50,7 @@ pub use attitude::{Attitude, ImuAndMagnetometer};
 #[cfg(feature = "runtime")]
 pub use calibration::Calibrated;
 #[cfg(feature = "simulation")]
-pub use simulation::SimulatedImu;
+pub use simulation::{SimulatedActuator, SimulatedEncoder, SimulatedImu, SimulatedLinkImu};
 
 /// The error-state Kalman filter of position, velocity and attitude as an estimator: it emits `O`, and estimates the optional states
 /// `S`, `N` states in all.

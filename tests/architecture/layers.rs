@@ -97,7 +97,8 @@ fn folders_of_the_runtime_import_only_from_below() {
 }
 
 /// The modules of the algorithms, from the bottom up.
-const ALGORITHMS: [&str; 6] = ["params", "moments", "attitude", "navigation", "calibration", "simulation"];
+const ALGORITHMS: [&str; 7] =
+    ["params", "moments", "attitude", "navigation", "calibration", "motion", "simulation"];
 
 #[test]
 fn algorithms_import_only_from_below() {

@@ -38,6 +38,7 @@ mod journals;
 mod late_code;
 mod left_behind;
 mod made_safe;
+mod motion;
 mod navigation;
 mod optional_states;
 mod order;

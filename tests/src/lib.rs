@@ -27,6 +27,10 @@ struct Navigation;
 struct Kinematics;
 
 #[cfg(doctest)]
+#[doc = include_str!("../../docs/motion.md")]
+struct Motion;
+
+#[cfg(doctest)]
 #[doc = include_str!("../../docs/joints.md")]
 struct Joints;
 

@@ -2,12 +2,15 @@
 
 use super::{ActuatorContext, Fault, Options};
 use crate::message::{Payload, Stamped};
+use crate::time::MonotonicTime;
 
 /// Moves a joint.
 ///
 /// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. The
 /// framework starts and stops it with the robot, makes it safe when the robot is disarmed, and publishes the commands it was
-/// given at its path. There is no motion planning yet.
+/// carried out at its path. A command whose payload is a [`JointCommand`](crate::JointCommand), as the standard ones are, is held
+/// to the limits of the joint first. An actuator says what it does with [`ActuatorContext::begin_motion`] and
+/// [`ActuatorContext::end_motion`].
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -67,6 +70,21 @@ pub trait Actuator: Sized + Send + 'static {
     /// # Errors
     /// Any error: it is reported, and the actuator is made safe and restarted.
     fn handle_command(&mut self, command: &Stamped<Self::Command>) -> Result<(), Fault>;
+
+    /// When [`update`](Self::update) is to be called; asked after each call of its code. None, the default: not at all.
+    fn next_update(&self) -> Option<MonotonicTime> {
+        None
+    }
+
+    /// Goes on with a motion at the time that [`next_update`](Self::next_update) asked for, or later if it was busy.
+    /// It is called in any safety state, so that it can report the end of a motion.
+    ///
+    /// # Errors
+    /// As for [`handle_command`](Self::handle_command).
+    fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
+        let _ = now;
+        Ok(())
+    }
 
     /// Makes it safe. Called whenever the robot is disarmed, and before a restart; it must return within 5 s.
     ///

@@ -2,11 +2,15 @@
 
 use super::Permit;
 use crate::event::Safety;
-use crate::message::Payload;
+use crate::message::{OutOfBounds, Payload};
 use std::fmt;
 use std::sync::Arc;
 
 /// Sends commands of type `T` to one actuator.
+///
+/// If the [`Command`](crate::Command) that obtained it is cancelled or times out, dropping it with the command's future stops
+/// the joint, if the last command that the actuator carried out was sent by that command, and `T` has a command that stops
+/// ([`JointCommand::stop`](crate::JointCommand::stop)).
 pub struct ActuatorLink<T: Payload> {
     accepts: Arc<dyn Accepts<T>>,
     permit: Permit,
@@ -27,6 +31,14 @@ impl<T: Payload> ActuatorLink<T> {
     }
 }
 
+impl<T: Payload> Drop for ActuatorLink<T> {
+    fn drop(&mut self) {
+        if !self.permit.is_valid() {
+            self.accepts.stop_motion_of(&self.permit);
+        }
+    }
+}
+
 impl<T: Payload> fmt::Debug for ActuatorLink<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ActuatorLink").finish_non_exhaustive()
@@ -43,6 +55,8 @@ pub enum ActuatorError {
     Cancelled,
     /// The command holds a NaN or an infinity.
     NonFinite,
+    /// The command leads beyond a limit of the joint, and cannot be brought back to it.
+    OutOfBounds(String),
     /// The actuator has failed and does not run.
     Stopped,
     /// The actuator has failed at this command.
@@ -58,6 +72,7 @@ impl fmt::Display for ActuatorError {
             Self::NotArmed(safety) => write!(f, "the robot is not armed ({safety})"),
             Self::Cancelled => f.write_str("the command that sent this has ended or was cancelled"),
             Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
+            Self::OutOfBounds(message) => f.write_str(message),
             Self::Stopped => f.write_str("the actuator has failed and does not run"),
             Self::Failed(message) => write!(f, "the actuator failed: {message}"),
             Self::Inside => {
@@ -69,7 +84,15 @@ impl fmt::Display for ActuatorError {
 
 impl std::error::Error for ActuatorError {}
 
+impl From<OutOfBounds> for ActuatorError {
+    fn from(out: OutOfBounds) -> Self {
+        Self::OutOfBounds(out.to_string())
+    }
+}
+
 /// An actuator that takes commands of type `T`.
 pub(crate) trait Accepts<T>: Send + Sync {
     fn accept(&self, command: T, permit: &Permit) -> Result<(), ActuatorError>;
+    /// Stops the joint if the last command that was carried out came with that permit.
+    fn stop_motion_of(&self, permit: &Permit);
 }

@@ -12,6 +12,7 @@ use crate::pubsub::{
     SubscriberStatistics, Subscription, Topic, unmatched_at,
 };
 use crate::time::Clock;
+use crate::topology::Topology;
 use std::fmt;
 use std::sync::Arc;
 
@@ -111,6 +112,16 @@ impl Bus {
     /// The paths of all actuators.
     pub fn actuators(&self) -> Vec<&'static str> {
         self.host.actuators()
+    }
+
+    /// The path of the actuator that moves a joint, the first that is declared if several do; none if none does.
+    pub fn actuator_of(&self, joint: &str) -> Option<&'static str> {
+        self.host.actuated_joints().into_iter().find(|(_, moved)| *moved == joint).map(|(path, _)| path)
+    }
+
+    /// The links and joints of the robot.
+    pub fn topology(&self) -> &'static Topology {
+        self.host.topology()
     }
 
     /// The value of the parameter at `path`.

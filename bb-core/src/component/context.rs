@@ -2,15 +2,17 @@
 
 use super::guardian::Guardian;
 use super::host::Host;
+use super::replacement::Replacement;
 use super::{Bus, Fault, Permit, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
 use crate::message::Frame;
+use crate::payload::{BeginMotion, EndMotion};
 use crate::time::{Clock, MonotonicTime};
-use crate::topology::Transform;
+use crate::topology::{Topology, Transform};
 use nalgebra::Isometry3;
 use std::cell::RefCell;
 use std::ops::Deref;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What an estimator is given when it starts: its place in the robot, and where its inputs come from.
 #[derive(Debug)]
@@ -181,6 +183,22 @@ impl ComponentContext {
         self.host.is_stopping()
     }
 
+    /// The links and joints of the robot.
+    pub fn topology(&self) -> &'static Topology {
+        self.host.topology()
+    }
+
+    /// A value that the components of this run share, made by the first that asks for its type: the world in which
+    /// simulated components are, or the bus that several drivers use. It lives as long as the robot runs, through restarts
+    /// of the components.
+    pub fn shared<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Arc<T> {
+        self.host.shared().get(make)
+    }
+
+    pub(crate) fn replacement(&self) -> Option<Replacement> {
+        self.host.replacement(self.path)
+    }
+
     /// Registers a callback that makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches a laser off. All
     /// callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that fails or takes longer
     /// leads to the safety state `error`. A restart of the component replaces what it registered before.
@@ -229,9 +247,27 @@ component_context! {
     ServiceContext, SensorDeclaration
 }
 
-component_context! {
-    /// What an actuator is given when it starts.
-    ActuatorContext, ActuatorDeclaration
+/// What an actuator is given when it starts.
+#[derive(Clone, Debug)]
+pub struct ActuatorContext {
+    common: ComponentContext,
+    declaration: &'static ActuatorDeclaration,
+    /// What it has reported and what is not yet published.
+    reports: Arc<Mutex<Vec<MotionReport>>>,
+}
+
+/// What an actuator reports of its motion.
+#[derive(Clone, Debug)]
+pub(crate) enum MotionReport {
+    Begin(BeginMotion),
+    End(EndMotion),
+}
+
+impl Deref for ActuatorContext {
+    type Target = ComponentContext;
+    fn deref(&self) -> &ComponentContext {
+        &self.common
+    }
 }
 
 impl SensorContext {
@@ -243,6 +279,12 @@ impl SensorContext {
     /// The declared period in seconds, if it has a `rate`.
     pub fn period_s(&self) -> Option<f64> {
         period_s(self.declaration)
+    }
+
+    /// Topics, actuators, parameters and commands, by path: for a sensor that computes what it reads from what others
+    /// publish. What it reads in `read` is no input: neither declared nor checked.
+    pub fn bus(&self) -> Bus {
+        Bus::new(Arc::clone(&self.common.host), Permit::UNLIMITED)
     }
 
     /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; `None` if
@@ -265,10 +307,38 @@ impl ServiceContext {
 }
 
 impl ActuatorContext {
+    pub(crate) fn new(declaration: &'static ActuatorDeclaration, host: Arc<dyn Host>) -> Self {
+        let common = ComponentContext::new(declaration.path, host);
+        Self { common, declaration, reports: Arc::default() }
+    }
+
     /// The joint that it moves.
     pub fn joint(&self) -> &'static str {
         self.declaration.joint
     }
+
+    /// Publishes at `begin_motion` below the actuator's path that it begins to move its joint, once the call of its code
+    /// that says so has returned. What threads of its own report waits for the next call of its code.
+    pub fn begin_motion(&self, motion: BeginMotion) {
+        self.report(MotionReport::Begin(motion));
+    }
+
+    /// The same at `end_motion` of the end of a motion.
+    pub fn end_motion(&self, motion: EndMotion) {
+        self.report(MotionReport::End(motion));
+    }
+
+    fn report(&self, report: MotionReport) {
+        lock(&self.reports).push(report);
+    }
+
+    pub(crate) fn take_reports(&self) -> Vec<MotionReport> {
+        std::mem::take(&mut *lock(&self.reports))
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn period_s(declaration: &SensorDeclaration) -> Option<f64> {

@@ -1,6 +1,8 @@
 //! The robot as its components see it.
 
 use super::guardian::Guardian;
+use super::replacement::Replacement;
+use super::shared::SharedValues;
 use super::{CommandInfo, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
@@ -8,6 +10,7 @@ use crate::joints::Joints;
 use crate::message::Origin;
 use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::time::Clock;
+use crate::topology::Topology;
 use std::any::Any;
 use std::fmt;
 
@@ -16,6 +19,11 @@ pub(crate) trait Host: Guardian {
     fn origin(&self) -> Origin;
     fn clock(&self) -> &Clock;
     fn joints(&self) -> Joints;
+    fn topology(&self) -> &'static Topology;
+    /// What components of this run share.
+    fn shared(&self) -> &SharedValues;
+    /// What takes the place of the component at `path`, if anything does.
+    fn replacement(&self, path: &str) -> Option<Replacement>;
     fn is_stopping(&self) -> bool;
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
@@ -38,6 +46,8 @@ pub(crate) trait Host: Guardian {
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
     fn actuators(&self) -> Vec<&'static str>;
+    /// The paths of all actuators, each with its joint.
+    fn actuated_joints(&self) -> Vec<(&'static str, &'static str)>;
     fn commands(&self) -> Vec<CommandInfo>;
     fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault>;
 }

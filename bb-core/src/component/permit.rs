@@ -44,6 +44,11 @@ impl Permit {
         self.0.as_ref().is_some_and(|state| state.load(Ordering::SeqCst) & !REVOKED > 0)
     }
 
+    /// Whether both are of the same execution of a command.
+    pub(crate) fn is_of_same(&self, other: &Self) -> bool {
+        matches!((&self.0, &other.0), (Some(one), Some(other)) if Arc::ptr_eq(one, other))
+    }
+
     /// # Errors
     /// It was revoked.
     pub(crate) fn check(&self) -> Result<(), Fault> {

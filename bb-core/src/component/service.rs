@@ -7,8 +7,7 @@ use crate::time::MonotonicTime;
 /// A controller or a bridge: it runs beside the dataflow and reaches everything by path, through [`ServiceContext::bus`].
 ///
 /// A controller drives actuators from what sensors and estimators publish; a bridge connects the robot to a dashboard, a
-/// middleware or a radio. They differ only in the word they are declared with, and so in their path. Motion planning is
-/// later work of this framework.
+/// middleware or a radio. They differ only in the word they are declared with, and so in their path.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a service",
     label = "cannot be declared as a controller or a bridge",

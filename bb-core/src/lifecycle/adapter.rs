@@ -1,12 +1,14 @@
 //! The common interface of all components, whatever trait they implement.
 
+use super::stand_in::{AnySensor, StandIn, make_actuator, make_sensor};
 use crate::component::{
     Actuator, ActuatorContext, Context, Estimator, Options, Reading, Sensor, SensorContext, Service, ServiceContext,
 };
 use crate::declaration::SensorDeclaration;
 use crate::fault::Fault;
-use crate::message::Payload;
+use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
+use std::fmt;
 
 /// A component as its `Slot` sees it.
 pub trait Component: Sized + Send + 'static {
@@ -80,9 +82,56 @@ component! {
     pub(crate) AsEstimator: Estimator, Context
 }
 
-component! {
-    /// A sensor.
-    pub AsSensor: Sensor, SensorContext
+/// A sensor, or what takes its place.
+#[doc(hidden)]
+pub enum AsSensor<S: Sensor> {
+    /// As declared.
+    Declared(S),
+    /// A replacement.
+    Replaced(StandInSensor<S::Output>),
+}
+
+/// What takes the place of a sensor.
+#[doc(hidden)]
+pub struct StandInSensor<T>(Box<dyn AnySensor<T>>);
+
+impl<S: Sensor> fmt::Debug for AsSensor<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("AsSensor").finish_non_exhaustive()
+    }
+}
+
+impl<T> fmt::Debug for StandInSensor<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("StandInSensor").finish_non_exhaustive()
+    }
+}
+
+impl<S: Sensor> Component for AsSensor<S> {
+    type Options = S::Options;
+    type Context = SensorContext;
+
+    fn make(options: S::Options, context: &SensorContext) -> Result<Self, Fault> {
+        match context.replacement() {
+            Some(replacement) => make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made))),
+            None => S::init(options, context).map(Self::Declared),
+        }
+    }
+
+    fn change(&mut self, options: S::Options, context: &SensorContext) -> Result<(), Fault> {
+        match self {
+            Self::Declared(sensor) => sensor.handle_options(options, context),
+            // The options are those of what it replaces.
+            Self::Replaced(_) => Ok(()),
+        }
+    }
+
+    fn close(&mut self) {
+        match self {
+            Self::Declared(sensor) => sensor.terminate(),
+            Self::Replaced(StandInSensor(sensor)) => sensor.terminate(),
+        }
+    }
 }
 
 component! {
@@ -90,9 +139,62 @@ component! {
     pub AsService: Service, ServiceContext
 }
 
-component! {
-    /// An actuator.
-    pub(crate) AsActuator: Actuator, ActuatorContext
+/// An actuator, or what takes its place.
+pub(crate) enum AsActuator<A: Actuator> {
+    Declared(A),
+    Replaced(Box<dyn StandIn<A::Command>>),
+}
+
+/// Calls the actuator, whichever it is.
+macro_rules! whichever {
+    ($self:expr, $actuator:ident => $call:expr, $replaced:ident => $other:expr) => {
+        match $self {
+            Self::Declared($actuator) => $call,
+            Self::Replaced($replaced) => $other,
+        }
+    };
+}
+
+impl<A: Actuator> AsActuator<A> {
+    pub(crate) fn handle_command(&mut self, command: &Stamped<A::Command>) -> Result<(), Fault> {
+        whichever!(self, own => own.handle_command(command), other => other.handle_command(command))
+    }
+
+    pub(crate) fn next_update(&self) -> Option<MonotonicTime> {
+        whichever!(self, own => own.next_update(), other => other.next_update())
+    }
+
+    pub(crate) fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
+        whichever!(self, own => own.update(now), other => other.update(now))
+    }
+
+    pub(crate) fn disarm(&mut self) -> Result<(), Fault> {
+        whichever!(self, own => own.disarm(), other => other.disarm())
+    }
+}
+
+impl<A: Actuator> Component for AsActuator<A> {
+    type Options = A::Options;
+    type Context = ActuatorContext;
+
+    fn make(options: A::Options, context: &ActuatorContext) -> Result<Self, Fault> {
+        match context.replacement() {
+            Some(replacement) => make_actuator(&replacement, context).map(Self::Replaced),
+            None => A::init(options, context).map(Self::Declared),
+        }
+    }
+
+    fn change(&mut self, options: A::Options, context: &ActuatorContext) -> Result<(), Fault> {
+        match self {
+            Self::Declared(actuator) => actuator.handle_options(options, context),
+            // The options are those of what it replaces.
+            Self::Replaced(_) => Ok(()),
+        }
+    }
+
+    fn close(&mut self) {
+        whichever!(self, own => own.terminate(), other => other.terminate());
+    }
 }
 
 impl<S: Sensor> Periodic for AsSensor<S> {
@@ -103,11 +205,17 @@ impl<S: Sensor> Periodic for AsSensor<S> {
     }
 
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
-        self.0.read(now)
+        match self {
+            Self::Declared(sensor) => sensor.read(now),
+            Self::Replaced(StandInSensor(sensor)) => sensor.read(now),
+        }
     }
 
     fn starts_at(&self) -> Option<MonotonicTime> {
-        self.0.starts_at()
+        match self {
+            Self::Declared(sensor) => sensor.starts_at(),
+            Self::Replaced(StandInSensor(sensor)) => sensor.starts_at(),
+        }
     }
 }
 

@@ -1,11 +1,31 @@
 //! Commands to an actuator, and its reports of a motion. The message's frame names the joint.
 
+use super::JointTrajectory;
 use crate::Payload;
+use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds};
 use crate::time::MonotonicTime;
+
+/// What an actuator that takes all standard commands can be told. The limits of the joint are applied before it gets one.
+#[derive(Clone, Debug, PartialEq, Payload)]
+#[payload(joint_command)]
+pub enum ActuatorCommand {
+    /// Go to a position.
+    Position(PositionCommand),
+    /// Move at a velocity.
+    Velocity(VelocityCommand),
+    /// Apply an effort.
+    Effort(EffortCommand),
+    /// Follow the points of a trajectory that belong to the joint, from now on.
+    Trajectory(JointTrajectory),
+    /// Come to rest as fast as the joint may, and stay where that is.
+    Hold,
+    /// Come to rest as fast as the joint may; then the actuator applies no effort.
+    Stop,
+}
 
 /// Move a joint to a position (`sensor_msgs/JointState` with the values that are set).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
-#[payload(ros)]
+#[payload(ros, joint_command)]
 pub struct PositionCommand {
     /// Angle in rad of a revolute or continuous joint; displacement in m of a prismatic one.
     pub position: f64,
@@ -17,7 +37,7 @@ pub struct PositionCommand {
 
 /// Move a joint at a velocity (`sensor_msgs/JointState` with a velocity and no position).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
-#[payload(ros)]
+#[payload(ros, joint_command)]
 pub struct VelocityCommand {
     /// rad/s or m/s.
     pub velocity: f64,
@@ -27,7 +47,7 @@ pub struct VelocityCommand {
 
 /// Apply an effort to a joint (`sensor_msgs/JointState` with an effort alone).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
-#[payload(ros)]
+#[payload(ros, joint_command)]
 pub struct EffortCommand {
     /// Torque in N·m or force in N.
     pub effort: f64,
@@ -64,8 +84,83 @@ pub enum MotionEnd {
     Replaced,
     /// The actuator was told to stop, or was disarmed.
     Stopped,
-    /// The joint is at a limit or held by something.
-    Blocked,
+    /// The actuator gives all it may, and the joint does not move: something holds it.
+    Stalled,
+    /// The joint is at the end of its range, short of the target.
+    Limit,
     /// The actuator failed, with its reason.
     Failed(String),
+}
+
+impl JointCommand for ActuatorCommand {
+    fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
+        match self {
+            Self::Position(command) => command.limit(bounds),
+            Self::Velocity(command) => command.limit(bounds),
+            Self::Effort(command) => command.limit(bounds),
+            Self::Trajectory(command) => command.limit(bounds),
+            Self::Hold | Self::Stop => Ok(Exceeded::default()),
+        }
+    }
+
+    fn stop() -> Option<Self> {
+        Some(Self::Hold)
+    }
+}
+
+impl JointCommand for PositionCommand {
+    fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
+        let mut exceeded = Exceeded::default();
+        bounds.hold_position(&mut self.position, &mut exceeded);
+        // That of the target, or a speed: where the joint is does not matter to it.
+        let bounds = JointBounds { position: None, ..*bounds };
+        self.velocity.iter_mut().for_each(|velocity| bounds.hold_velocity(velocity, &mut exceeded));
+        self.effort.iter_mut().for_each(|effort| bounds.hold_effort(effort, &mut exceeded));
+        Ok(exceeded)
+    }
+}
+
+impl JointCommand for VelocityCommand {
+    fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
+        let mut exceeded = Exceeded::default();
+        bounds.hold_velocity(&mut self.velocity, &mut exceeded);
+        self.effort.iter_mut().for_each(|effort| bounds.hold_effort(effort, &mut exceeded));
+        Ok(exceeded)
+    }
+
+    fn stop() -> Option<Self> {
+        Some(Self::default())
+    }
+}
+
+impl JointCommand for EffortCommand {
+    fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
+        let mut exceeded = Exceeded::default();
+        bounds.hold_effort(&mut self.effort, &mut exceeded);
+        Ok(exceeded)
+    }
+}
+
+impl From<PositionCommand> for ActuatorCommand {
+    fn from(command: PositionCommand) -> Self {
+        Self::Position(command)
+    }
+}
+
+impl From<VelocityCommand> for ActuatorCommand {
+    fn from(command: VelocityCommand) -> Self {
+        Self::Velocity(command)
+    }
+}
+
+impl From<EffortCommand> for ActuatorCommand {
+    fn from(command: EffortCommand) -> Self {
+        Self::Effort(command)
+    }
+}
+
+impl From<JointTrajectory> for ActuatorCommand {
+    fn from(command: JointTrajectory) -> Self {
+        Self::Trajectory(command)
+    }
 }

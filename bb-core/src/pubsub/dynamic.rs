@@ -5,7 +5,10 @@ use super::queue::{Overflow, Queue};
 use super::select::{Payloads, Select};
 use super::unmatched::{Unmatched, unmatched};
 use crate::message::Schema;
+use std::future::Future;
+use std::pin::Pin;
 use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 /// The messages of all selected publishers, in the order in which they were published, including publishers created later
@@ -92,6 +95,12 @@ impl DynamicSubscription {
         self.queue.wait(Some(timeout))
     }
 
+    /// Awaits the next message, on any executor. One task at a time may await a subscription. (It does not end by itself
+    /// when the robot stops.)
+    pub fn recv_async(&mut self) -> RecvDynamic<'_> {
+        RecvDynamic(self)
+    }
+
     /// The messages that wait now; those that arrive meanwhile are left.
     pub fn drain(&self) -> impl Iterator<Item = DynamicMessage> + '_ {
         (0..self.queue.len()).map_while(|_| self.try_recv())
@@ -105,6 +114,18 @@ impl DynamicSubscription {
     /// How many messages were lost because this subscriber was slow.
     pub fn lagged(&self) -> u64 {
         self.queue.lagged()
+    }
+}
+
+/// The future of [`DynamicSubscription::recv_async`].
+#[derive(Debug)]
+pub struct RecvDynamic<'a>(&'a mut DynamicSubscription);
+
+impl Future for RecvDynamic<'_> {
+    type Output = Option<DynamicMessage>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        self.0.queue.poll(context)
     }
 }
 

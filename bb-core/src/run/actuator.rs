@@ -1,8 +1,13 @@
 //! A running actuator: when it may move, and what happens when it fails.
 
 mod held;
+mod limits;
+mod reports;
 
 use self::held::{Guarded, Held};
+pub use self::limits::ActuatorStatistics;
+use self::limits::Counts;
+use self::reports::Reports;
 use super::occupied::Occupied;
 use super::source::Assembly;
 use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Permit};
@@ -11,7 +16,7 @@ use crate::declaration::ActuatorDeclaration;
 use crate::event::Safety;
 use crate::fault::{Failed, Fault, caught};
 use crate::journal::{Event, Recorded};
-use crate::lifecycle::{AfterFault, AsActuator, Recipe, Slot};
+use crate::lifecycle::{AfterFault, AsActuator, HostHandle, Recipe, Slot};
 use crate::message::{Finite, Frame, Payload, Stamp};
 use crate::node::{BindTarget, Environment, Mode};
 use crate::pubsub::{AnyTopic, DynamicMessage, Topic, Wakers};
@@ -22,6 +27,9 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::task::{Wake, Waker};
 use std::time::{Duration, Instant};
+
+/// An actuator that asks to be updated at once, or in the past, is updated after this.
+const LEAST_PERIOD: Duration = Duration::from_micros(10);
 
 /// An actuator in the wiring.
 pub struct ActuatorNode<A: Actuator>(Arc<Inner<A>>);
@@ -38,6 +46,9 @@ struct Inner<A: Actuator> {
     orders: Mutex<Vec<Order>>,
     /// When its code was entered.
     occupied: Occupied,
+    counts: Counts,
+    reports: Reports,
+    host: HostHandle,
     /// Held while its code runs: nothing that must not wait for user code takes it.
     state: Guarded<State<A>>,
 }
@@ -46,6 +57,10 @@ struct State<A: Actuator> {
     slot: Slot<AsActuator<A>>,
     /// It has failed, and could not be made safe then.
     is_unsafe: bool,
+    /// Which execution of a command has sent what it carried out last.
+    moved_by: Permit,
+    /// When it is to be updated, as far as the alarms know that are set.
+    alarm: Option<MonotonicTime>,
     /// On virtual time: what the control state is to be told once the lock is released. Loggers, handlers of telemetry and
     /// subscribers are told of it on this thread, and may disarm the robot, which takes the lock.
     told: Vec<Told>,
@@ -95,8 +110,24 @@ impl<A: Actuator> ActuatorNode<A> {
             topic: Topic::new(declaration.path),
             orders: Mutex::default(),
             occupied: Occupied::new(),
-            state: Guarded::new(State { slot, is_unsafe: false, told: Vec::new() }),
+            counts: Counts::default(),
+            reports: Reports::default(),
+            host: assembly.host.clone(),
+            state: Guarded::new(State {
+                slot,
+                is_unsafe: false,
+                moved_by: Permit::UNLIMITED,
+                alarm: None,
+                told: Vec::new(),
+            }),
         });
+        if A::Command::COMMANDS_JOINT && inner.environment.mode() != Mode::Replay {
+            inner.reports.announce(&inner.context, &*inner.host.0);
+        }
+        // It may have something to do from the start.
+        if inner.environment.mode() != Mode::Replay {
+            inner.alone(|_| ());
+        }
         // Weak, since the control state that keeps these is kept by the actuator.
         let told = Arc::downgrade(&inner);
         let target = BindTarget::Other(Box::new(move || Inner::tell(&told, Order::Options)));
@@ -144,6 +175,18 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
         wakers.run();
         done.unwrap_or(Err(ActuatorError::Inside))
     }
+
+    fn stop_motion_of(&self, permit: &Permit) {
+        let Some(stop) = A::Command::stop_command() else { return };
+        let mut wakers = Wakers::default();
+        self.alone(|state| {
+            if state.moved_by.is_of_same(permit) {
+                // A robot that is disarmed has stopped it already, and an actuator that fails is made safe.
+                let _ = self.carry_out(state, stop, &Permit::UNLIMITED, &mut wakers);
+            }
+        });
+        wakers.run();
+    }
 }
 
 impl<A: Actuator> Inner<A> {
@@ -156,16 +199,47 @@ impl<A: Actuator> Inner<A> {
             let _within = self.control.enter_actuator();
             run(&mut state)
         };
+        let mut wakers = Wakers::default();
+        self.reports.publish(&self.context, &*self.host.0, &self.environment, &mut wakers);
+        self.schedule_update(&mut state);
         let told = std::mem::take(&mut state.told);
         drop(state);
+        wakers.run();
         told.into_iter().for_each(|told| self.tell_now(told));
         Some(result)
+    }
+
+    /// Has it woken when it is to be updated.
+    fn schedule_update(&self, state: &mut State<A>) {
+        let Some(actuator) = state.slot.running() else { return };
+        let Some(due) = actuator.next_update() else { return };
+        // It must not keep virtual time from passing.
+        let due = due.max(self.environment.clock().now() + LEAST_PERIOD);
+        if state.alarm.is_none_or(|alarm| due < alarm) {
+            state.alarm = Some(due);
+            self.control.wake_at(due, Waker::from(Arc::new(Due(Weak::clone(&self.this)))));
+        }
+    }
+
+    fn update_if_due(&self, state: &mut State<A>, now: MonotonicTime) {
+        state.alarm.take_if(|alarm| *alarm <= now);
+        let Some(actuator) = state.slot.running() else { return };
+        if actuator.next_update().is_none_or(|due| due > now) {
+            return;
+        }
+        let updated = {
+            let _entered = self.occupied.enter(self.environment.clock());
+            caught(|| actuator.update(now))
+        };
+        if let Err(failed) = updated {
+            self.fail(state, &failed, now);
+        }
     }
 
     fn carry_out(
         &self,
         state: &mut State<A>,
-        command: A::Command,
+        mut command: A::Command,
         permit: &Permit,
         wakers: &mut Wakers,
     ) -> Result<(), ActuatorError> {
@@ -181,7 +255,8 @@ impl<A: Actuator> Inner<A> {
         let clock = self.environment.clock();
         let now = clock.now();
         self.restart_if_due(state, now);
-        let Some(AsActuator(actuator)) = state.slot.running() else { return Err(ActuatorError::Stopped) };
+        let Some(actuator) = state.slot.running() else { return Err(ActuatorError::Stopped) };
+        self.counts.limit(&mut command, &self.context, self.environment.joints())?;
         let stamp = Stamp {
             monotonic_time: now,
             wall_time: clock.wall_at(now),
@@ -198,6 +273,8 @@ impl<A: Actuator> Inner<A> {
             self.fail(state, &failed, now);
             return Err(ActuatorError::Failed(text));
         }
+        state.moved_by = permit.clone();
+        self.counts.carried_out();
         if let Some(journal) = self.environment.journal() {
             let message = Recorded::Message(DynamicMessage::new(self.declaration.path, &message));
             journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
@@ -297,7 +374,7 @@ impl<A: Actuator> Inner<A> {
 
     /// After a panic too: hardware that may still move is worse than a second panic, which is caught.
     fn make_safe(&self, state: &mut State<A>) {
-        let Some(AsActuator(actuator)) = state.slot.running() else { return };
+        let Some(actuator) = state.slot.running() else { return };
         if let Err(failed) = caught(|| actuator.disarm()) {
             state.is_unsafe = true;
             let message = format!("it has failed and could not be made safe: {}", failed.fault);
@@ -334,7 +411,7 @@ impl<A: Actuator> Inner<A> {
     /// The disarm callback.
     fn disarm(&self) -> Result<(), Fault> {
         let disarmed = self.alone(|state| {
-            if let Some(AsActuator(actuator)) = state.slot.running() {
+            if let Some(actuator) = state.slot.running() {
                 return actuator.disarm();
             }
             if state.is_unsafe {
@@ -346,7 +423,7 @@ impl<A: Actuator> Inner<A> {
     }
 }
 
-/// Its backoff is over.
+/// Its backoff is over, or it is to be updated.
 struct Due<A: Actuator>(Weak<Inner<A>>);
 
 impl<A: Actuator> Wake for Due<A> {
@@ -354,7 +431,9 @@ impl<A: Actuator> Wake for Due<A> {
         if let Some(inner) = self.0.upgrade() {
             inner.alone(|state| {
                 inner.obey(state);
-                inner.restart_if_due(state, inner.environment.clock().now());
+                let now = inner.environment.clock().now();
+                inner.restart_if_due(state, now);
+                inner.update_if_due(state, now);
             });
         }
     }
@@ -380,6 +459,9 @@ pub trait AnyActuator {
     /// When its code was entered, if a thread is inside.
     #[doc(hidden)]
     fn entered_at(&self) -> Option<MonotonicTime>;
+    /// What was counted.
+    #[doc(hidden)]
+    fn statistics(&self) -> ActuatorStatistics;
 }
 
 impl<A: Actuator> AnyActuator for ActuatorNode<A> {
@@ -420,6 +502,10 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
 
     fn entered_at(&self) -> Option<MonotonicTime> {
         self.0.occupied.entered_at()
+    }
+
+    fn statistics(&self) -> ActuatorStatistics {
+        self.0.counts.statistics(self.0.declaration.path)
     }
 }
 

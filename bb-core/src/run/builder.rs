@@ -11,20 +11,24 @@ use super::remains::Remains;
 use super::running::STOP_WITHIN;
 use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
-use crate::component::{Fault, Host};
+use crate::component::replacement::Replacement;
+use crate::component::shared::SharedValues;
+use crate::component::{Actuator, Fault, Host, Sensor};
 use crate::control::{Control, Declared, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterType, ParameterValues};
 use crate::event::ParameterValue;
 use crate::fault::caught;
 use crate::joints::{JointSettings, Joints};
 use crate::journal::{Entry, Event, Journal, Sink};
-use crate::lifecycle::HostHandle;
+use crate::lifecycle::{HostHandle, replacement_of_actuator, replacement_of_sensor};
+use crate::message::nearest::nearest_path;
 use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode, contained};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
 use crate::schedule::Agenda;
 use crate::telemetry::{Telemetry, TelemetryEvent};
 use crate::time::{Clock, MonotonicTime};
+use std::collections::HashMap;
 use std::fmt;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -44,6 +48,7 @@ pub struct Builder<R: Robot> {
     joints: JointSettings,
     journal: Option<Sink>,
     telemetry: Telemetry,
+    replacements: HashMap<&'static str, Replacement>,
     node: &'static str,
 }
 
@@ -63,6 +68,7 @@ impl<R: Robot> Builder<R> {
             joints: JointSettings::default(),
             journal: None,
             telemetry: Telemetry::default(),
+            replacements: HashMap::new(),
             node: "local",
         }
     }
@@ -93,6 +99,36 @@ impl<R: Robot> Builder<R> {
             return Err(ParameterError { path: declared.path.to_owned(), message });
         }
         self.parameters = parameters;
+        Ok(())
+    }
+
+    /// Has a sensor of type `S` take the place of the one at `path`: a simulated one of a driver, or one that plays a recording
+    /// back. It keeps its path, frame, rate and supervision, and what is downstream does not notice; options that are declared,
+    /// set or bound to parameters are those of the driver, and are not used. If it publishes another payload than the one that
+    /// is declared, the robot does not start.
+    ///
+    /// # Errors
+    /// No sensor is at `path`; the error names the nearest one.
+    pub fn replace_sensor<S: Sensor>(&mut self, path: &str, options: S::Options) -> Result<(), Fault>
+    where
+        S::Options: Sync,
+    {
+        let sensors = R::SENSORS.iter().map(|declared| declared.path).filter(|path| path.starts_with("sensor/"));
+        let path = declared_path("sensor", path, sensors)?;
+        self.replacements.insert(path, replacement_of_sensor::<S>(options));
+        Ok(())
+    }
+
+    /// The same for an actuator: `A` takes the same type of commands.
+    ///
+    /// # Errors
+    /// No actuator is at `path`; the error names the nearest one.
+    pub fn replace_actuator<A: Actuator>(&mut self, path: &str, options: A::Options) -> Result<(), Fault>
+    where
+        A::Options: Sync,
+    {
+        let path = declared_path("actuator", path, R::ACTUATORS.iter().map(|declared| declared.path))?;
+        self.replacements.insert(path, replacement_of_actuator::<A>(options));
         Ok(())
     }
 
@@ -237,6 +273,8 @@ impl<R: Robot> Builder<R> {
             journal: journal.clone(),
             door: environment.door().clone(),
             joints,
+            shared: SharedValues::default(),
+            replacements: self.replacements,
             wiring: Arc::clone(&place),
         });
         control.set_host(&host);
@@ -314,6 +352,19 @@ impl<R: Robot> Builder<R> {
         };
         Ok((machine, sources))
     }
+}
+
+/// The declared path that `path` names.
+fn declared_path(
+    kind: &str,
+    path: &str,
+    declared: impl Iterator<Item = &'static str> + Clone,
+) -> Result<&'static str, Fault> {
+    declared.clone().find(|other| *other == path).ok_or_else(|| {
+        let near = nearest_path(path, declared);
+        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        Fault::new(format!("no {kind} is at `{path}`{hint}"))
+    })
 }
 
 fn declared<R: Robot>() -> Declared {

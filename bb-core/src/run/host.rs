@@ -2,6 +2,8 @@
 
 use super::Robot;
 use super::actuator::AnyActuator;
+use crate::component::replacement::Replacement;
+use crate::component::shared::SharedValues;
 use crate::component::{CommandInfo, DisarmHook, DynamicExecution, Guardian, Host, Permit};
 use crate::control::{Control, Islands, Wired};
 use crate::declaration::ParameterError;
@@ -14,7 +16,9 @@ use crate::node::NodeEntry;
 use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::schedule::Door;
 use crate::time::{Clock, MonotonicTime};
+use crate::topology::Topology;
 use std::any::Any;
+use std::collections::HashMap;
 use std::sync::{Arc, OnceLock, Weak};
 
 /// Weak, since components that have a bus are a part of the wiring.
@@ -23,6 +27,8 @@ pub(super) struct RobotHost<R: Robot> {
     pub(super) journal: Option<Journal>,
     pub(super) door: Door,
     pub(super) joints: Joints,
+    pub(super) shared: SharedValues,
+    pub(super) replacements: HashMap<&'static str, Replacement>,
     pub(super) wiring: Arc<OnceLock<Weak<R::Wiring>>>,
 }
 
@@ -61,6 +67,18 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn joints(&self) -> Joints {
         self.joints.clone()
+    }
+
+    fn topology(&self) -> &'static Topology {
+        R::TOPOLOGY
+    }
+
+    fn shared(&self) -> &SharedValues {
+        &self.shared
+    }
+
+    fn replacement(&self, path: &str) -> Option<Replacement> {
+        self.replacements.get(path).cloned()
     }
 
     fn is_stopping(&self) -> bool {
@@ -135,6 +153,10 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn actuators(&self) -> Vec<&'static str> {
         R::ACTUATORS.iter().map(|declared| declared.path).collect()
+    }
+
+    fn actuated_joints(&self) -> Vec<(&'static str, &'static str)> {
+        R::ACTUATORS.iter().map(|declared| (declared.path, declared.joint)).collect()
     }
 
     fn commands(&self) -> Vec<CommandInfo> {

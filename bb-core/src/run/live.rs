@@ -35,6 +35,12 @@ impl<R: Robot> Live<R> {
         self.0.environment.joints().clone()
     }
 
+    /// A value that the components of this run share, made if none of them has; see
+    /// [`ComponentContext::shared`](crate::component::ComponentContext::shared). What it gives of a simulated robot is its world.
+    pub fn shared<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Arc<T> {
+        self.0.host.shared().get(make)
+    }
+
     /// Subscribes from now on, with room for 1024 messages.
     pub fn subscribe<P: Publisher<R>>(&self, publisher: P) -> Subscription<P::Payload> {
         self.subscribe_with(publisher, Overflow::default())

@@ -215,6 +215,7 @@ impl<R: Robot> Machine<R> {
             topics: topics.iter().map(|topic| topic.statistics()).chain(made).collect(),
             estimators,
             sources: sources.iter().map(SharedSource::statistics).collect(),
+            actuators: R::all_actuators(&self.wiring).into_iter().map(|actuator| actuator.statistics()).collect(),
             commands,
             joints: self.environment.joints().statistics(),
             state,

@@ -1,9 +1,11 @@
 //! What a run has done: what was published where, and what was dropped and why.
 
 use super::SourceStatistics;
+use super::actuator::ActuatorStatistics;
 use crate::control::CommandStatistics;
 use crate::event::{ComponentFault, Safety};
 use crate::joints::{JointRefusal, JointStatistics};
+use crate::message::LimitedQuantity;
 use crate::node::{DropReason, EstimatorStatistics};
 use crate::pubsub::TopicStatistics;
 use std::fmt;
@@ -18,6 +20,8 @@ pub struct Report {
     pub estimators: Vec<EstimatorStatistics>,
     /// Every sensor and service.
     pub sources: Vec<SourceStatistics>,
+    /// Every actuator.
+    pub actuators: Vec<ActuatorStatistics>,
     /// Every command.
     pub commands: Vec<CommandStatistics>,
     /// Every joint that moves by itself, and names that messages gave of joints that there are not.
@@ -41,6 +45,11 @@ impl Report {
     /// The estimator of that path.
     pub fn estimator(&self, path: &str) -> Option<&EstimatorStatistics> {
         self.estimators.iter().find(|estimator| estimator.path == path)
+    }
+
+    /// The actuator of that path.
+    pub fn actuator(&self, path: &str) -> Option<&ActuatorStatistics> {
+        self.actuators.iter().find(|actuator| actuator.path == path)
     }
 
     pub(super) fn add_fault(&mut self, fault: ComponentFault) {
@@ -91,6 +100,13 @@ impl fmt::Display for Report {
         }
         for source in self.sources.iter().filter(|source| source.skipped > 0) {
             writeln!(f, "{}: {} readings, {} skipped", source.path, source.readings, source.skipped)?;
+        }
+        let has_exceeded = |actuator: &&ActuatorStatistics| {
+            let mut quantities = LimitedQuantity::ALL.iter().copied();
+            quantities.any(|quantity| actuator.limited(quantity) + actuator.refused(quantity) > 0)
+        };
+        for actuator in self.actuators.iter().filter(has_exceeded) {
+            writeln!(f, "{actuator}")?;
         }
         for command in &self.commands {
             if let Some(refusal) = &command.last_refusal {

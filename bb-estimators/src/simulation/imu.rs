@@ -1,12 +1,12 @@
 //! A simulated sensor of nine axes.
 
 use super::Motion;
+use super::random::{hash, normal};
 use bb_core::payload::{Imu, MagneticField, Marg};
 use bb_core::{Fault, MonotonicTime, Options, Reading, Sensor, SensorContext};
 use nalgebra::{Isometry3, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 
 /// The magnetic field of the simulated world in T: that of middle Europe, its horizontal part due north.
 const MAGNETIC_FIELD: Vector3<f64> = Vector3::new(0.0, 20e-6, -44e-6);
@@ -81,14 +81,4 @@ impl Sensor for SimulatedImu {
             magnetic_field: Some(MagneticField::new(magnetic_field)),
         }))
     }
-}
-
-/// Three independent standard normal numbers.
-fn normal(random: &mut ChaCha8Rng) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| StandardNormal.sample(random))
-}
-
-/// FNV-1a: the same on every machine.
-fn hash(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -15,6 +15,8 @@ struct Attributes {
     is_ros: bool,
     /// It tells the position of a joint.
     tells_position: bool,
+    /// It commands a joint.
+    commands_joint: bool,
     /// It is the same from every frame.
     has_no_frame: bool,
     /// The name of its definition, where that is not its own.
@@ -61,6 +63,21 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
             }
         )
     });
+    let command = attributes.commands_joint.then(|| {
+        quote!(
+            const COMMANDS_JOINT: bool = true;
+            fn limit_command(
+                &mut self,
+                bounds: &::bb_core::__private::JointBounds,
+            ) -> ::core::result::Result<::bb_core::__private::Exceeded, ::bb_core::__private::OutOfBounds>
+            {
+                ::bb_core::__private::JointCommand::limit(self, bounds)
+            }
+            fn stop_command() -> ::core::option::Option<Self> {
+                <Self as ::bb_core::__private::JointCommand>::stop()
+            }
+        )
+    });
     let frame = (attributes.has_no_frame || attributes.tells_position).then(|| {
         quote!(
             const DEPENDS_ON_FRAME: bool = false;
@@ -72,6 +89,7 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
             const NAME: &'static str = #text;
             #ros
             #position
+            #command
             #frame
         }
         #[automatically_derived]
@@ -108,12 +126,16 @@ fn attributes(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Attributes {
                 attributes.is_ros = true;
             } else if meta.path.is_ident("joint_position") {
                 attributes.tells_position = true;
+            } else if meta.path.is_ident("joint_command") {
+                attributes.commands_joint = true;
             } else if meta.path.is_ident("no_frame") {
                 attributes.has_no_frame = true;
             } else if meta.path.is_ident("name") {
                 attributes.name = Some(meta.value()?.parse()?);
             } else {
-                return Err(meta.error("expected `ros`, `joint_position`, `no_frame` or `name = \"package/Name\"`"));
+                return Err(meta.error(
+                    "expected `ros`, `joint_position`, `joint_command`, `no_frame` or `name = \"package/Name\"`",
+                ));
             }
             Ok(())
         });

@@ -1,0 +1,38 @@
+//! Values that components of a run share.
+
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// One value of each type.
+#[derive(Default)]
+pub(crate) struct SharedValues(Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>);
+
+impl SharedValues {
+    /// The value of type `T`, made if it is not there.
+    pub(crate) fn get<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Arc<T> {
+        if let Some(found) = self.find() {
+            return found;
+        }
+        // Not under the lock, since it is user code; of two that are made at the same time, the first is kept.
+        let made = Arc::new(make());
+        let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = Arc::clone(values.entry(TypeId::of::<T>()).or_insert_with(|| Arc::clone(&made) as _));
+        drop(values);
+        kept.downcast().unwrap_or(made)
+    }
+
+    fn find<T: Send + Sync + 'static>(&self) -> Option<Arc<T>> {
+        let values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = values.get(&TypeId::of::<T>()).map(Arc::clone)?;
+        drop(values);
+        found.downcast().ok()
+    }
+}
+
+impl fmt::Debug for SharedValues {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SharedValues").finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,124 @@
+//! How an actuator's commands are held to the limits of its joint, and what was counted of that.
+
+use crate::component::ActuatorContext;
+use crate::joints::Joints;
+use crate::message::{Exceeded, JointBounds, LimitedQuantity, OutOfBounds, Payload};
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const QUANTITIES: usize = LimitedQuantity::ALL.len();
+
+/// What was counted of one actuator.
+#[derive(Debug, Default)]
+pub(super) struct Counts {
+    commands: AtomicU64,
+    limited: [AtomicU64; QUANTITIES],
+    refused: [AtomicU64; QUANTITIES],
+}
+
+/// What an actuator has done since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ActuatorStatistics {
+    /// Its path.
+    pub path: &'static str,
+    /// Commands that it carried out.
+    pub commands: u64,
+    limited: [u64; QUANTITIES],
+    refused: [u64; QUANTITIES],
+}
+
+impl ActuatorStatistics {
+    /// How many commands exceeded the joint's limit of that quantity, and were brought back to it.
+    pub fn limited(&self, quantity: LimitedQuantity) -> u64 {
+        self.limited[quantity as usize]
+    }
+
+    /// How many commands were refused because they led beyond the joint's limit of that quantity.
+    pub fn refused(&self, quantity: LimitedQuantity) -> u64 {
+        self.refused[quantity as usize]
+    }
+}
+
+impl Counts {
+    /// Brings a command back to the limits of its joint.
+    pub(super) fn limit<T: Payload>(
+        &self,
+        command: &mut T,
+        context: &ActuatorContext,
+        joints: &Joints,
+    ) -> Result<(), OutOfBounds> {
+        if !T::COMMANDS_JOINT {
+            return Ok(());
+        }
+        let (path, joint) = (context.path(), context.joint());
+        match command.limit_command(&bounds(context, joints)) {
+            Ok(exceeded) => {
+                self.count(exceeded, path, joint);
+                Ok(())
+            }
+            Err(out) => {
+                if self.refused[out.quantity as usize].fetch_add(1, Ordering::Relaxed) == 0 {
+                    tracing::warn!(component = path, joint, reason = %out, "a command was refused");
+                }
+                Err(out)
+            }
+        }
+    }
+
+    fn count(&self, exceeded: Exceeded, path: &'static str, joint: &'static str) {
+        for quantity in exceeded.quantities() {
+            if self.limited[quantity as usize].fetch_add(1, Ordering::Relaxed) == 0 {
+                let quantity = quantity.name();
+                tracing::warn!(
+                    component = path,
+                    joint,
+                    quantity,
+                    "a command exceeded a limit and was brought back to it"
+                );
+            }
+        }
+    }
+
+    pub(super) fn carried_out(&self) {
+        self.commands.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn statistics(&self, path: &'static str) -> ActuatorStatistics {
+        let load = |all: &[AtomicU64; QUANTITIES]| std::array::from_fn(|index| all[index].load(Ordering::Relaxed));
+        let commands = self.commands.load(Ordering::Relaxed);
+        ActuatorStatistics { path, commands, limited: load(&self.limited), refused: load(&self.refused) }
+    }
+}
+
+/// The declared limits of the joint, and where it is.
+fn bounds(context: &ActuatorContext, joints: &Joints) -> JointBounds {
+    let bounds = JointBounds { joint: context.joint(), ..JointBounds::NONE };
+    let Some(limit) = context.topology().joint(context.joint()).and_then(|joint| joint.limit) else {
+        return bounds;
+    };
+    let status = joints.status(context.joint()).filter(|status| !status.is_stale);
+    JointBounds {
+        lower: limit.lower.unwrap_or(bounds.lower),
+        upper: limit.upper.unwrap_or(bounds.upper),
+        velocity: limit.velocity.unwrap_or(bounds.velocity),
+        effort: limit.effort.unwrap_or(bounds.effort),
+        position: status.and_then(|status| status.position.first().copied()),
+        ..bounds
+    }
+}
+
+impl fmt::Display for ActuatorStatistics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} commands", self.path, self.commands)?;
+        for quantity in LimitedQuantity::ALL.iter().copied() {
+            if self.limited(quantity) > 0 {
+                write!(f, ", {} beyond the limit of {quantity} and brought back to it", self.limited(quantity))?;
+            }
+            if self.refused(quantity) > 0 {
+                write!(f, ", {} refused for its {quantity}", self.refused(quantity))?;
+            }
+        }
+        Ok(())
+    }
+}

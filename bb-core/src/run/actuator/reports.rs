@@ -1,0 +1,92 @@
+//! Where an actuator reports its motions: at `begin_motion` and `end_motion` below its path.
+
+use crate::component::{ActuatorContext, Host, MotionReport};
+use crate::journal::{Event, Recorded};
+use crate::message::{Frame, Payload, Stamp, Stamped};
+use crate::node::Environment;
+use crate::payload::{BeginMotion, EndMotion};
+use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic, Wakers};
+use std::sync::{Arc, OnceLock};
+
+/// The topics are made with the first report, or at the start for an actuator of standard commands, so that subscriptions
+/// find them.
+#[derive(Debug, Default)]
+pub(super) struct Reports {
+    begin: OnceLock<Option<Arc<Topic<BeginMotion>>>>,
+    end: OnceLock<Option<Arc<Topic<EndMotion>>>>,
+}
+
+impl Reports {
+    /// Makes the topics.
+    pub(super) fn announce(&self, context: &ActuatorContext, host: &dyn Host) {
+        let _ = (self.begin(context, host), self.end(context, host));
+    }
+
+    /// Publishes what the actuator has reported, in its order. The caller holds the actuator's lock; `wakers` are for after.
+    pub(super) fn publish(
+        &self,
+        context: &ActuatorContext,
+        host: &dyn Host,
+        environment: &Environment,
+        wakers: &mut Wakers,
+    ) {
+        let reports = context.take_reports();
+        if reports.is_empty() {
+            return;
+        }
+        let Some(_inside) = environment.door().enter() else { return };
+        let clock = environment.clock();
+        let now = clock.now();
+        let stamp = Stamp {
+            monotonic_time: now,
+            wall_time: clock.wall_at(now),
+            frame: Frame::new(context.joint()),
+            origin: environment.origin(),
+        };
+        for report in reports {
+            match report {
+                MotionReport::Begin(motion) => {
+                    publish(self.begin(context, host), &stamp.message(motion), environment, wakers);
+                }
+                MotionReport::End(motion) => {
+                    publish(self.end(context, host), &stamp.message(motion), environment, wakers);
+                }
+            }
+        }
+    }
+
+    fn begin(&self, context: &ActuatorContext, host: &dyn Host) -> Option<&Topic<BeginMotion>> {
+        self.begin.get_or_init(|| topic(context, host, "begin_motion")).as_deref()
+    }
+
+    fn end(&self, context: &ActuatorContext, host: &dyn Host) -> Option<&Topic<EndMotion>> {
+        self.end.get_or_init(|| topic(context, host, "end_motion")).as_deref()
+    }
+}
+
+fn topic<T: Payload>(context: &ActuatorContext, host: &dyn Host, name: &str) -> Option<Arc<Topic<T>>> {
+    let path = format!("{}/{name}", context.path());
+    match host.registry().topic(&path) {
+        Ok(topic) => Some(topic),
+        Err(error) => {
+            tracing::warn!(component = context.path(), %error, "its motions are not published");
+            None
+        }
+    }
+}
+
+fn publish<T: Payload>(
+    topic: Option<&Topic<T>>,
+    message: &Stamped<T>,
+    environment: &Environment,
+    wakers: &mut Wakers,
+) {
+    let Some(topic) = topic else { return };
+    if let Some(journal) = environment.journal() {
+        let path = topic.path();
+        let recorded = Recorded::Message(DynamicMessage::new(path, message));
+        let offset = environment.clock().wall_offset_nanos();
+        journal.write(message.monotonic_time, offset, Event::Own { path, message: recorded });
+    }
+    topic.publish_deferred(message, wakers);
+}

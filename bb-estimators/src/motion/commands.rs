@@ -1,0 +1,247 @@
+//! Commands that move joints.
+
+use super::{JointMotionLimits, JointPoint, plan};
+use bb_core::component::{ActuatorError, ActuatorLink};
+use bb_core::payload::{ActuatorCommand, EndMotion, JointTrajectory, MotionEnd};
+use bb_core::pubsub::Select;
+use bb_core::{
+    Bus, Command, CommandContext, DynamicMessage, DynamicSubscription, Fault, MonotonicTime, Options, Outcome,
+    Overflow, Payload, Stamped,
+};
+use std::future::Future;
+use std::pin::pin;
+use std::sync::Arc;
+use std::task::Poll;
+use std::time::Duration;
+
+/// Moves joints through positions, and comes to rest at the last of them; all joints arrive together.
+///
+/// The trajectory is [planned](plan) from where the joints are, and each actuator, which takes [`ActuatorCommand`], follows its part of it. It
+/// publishes a [`MotionProgress`] ten times a second at `progress` below its path. It succeeds when all actuators have
+/// reported that they have reached their target. If one reports anything else, the others are told to hold, and it fails
+/// with the reason. If it is cancelled or times out, its actuators come to rest and hold.
+#[derive(Debug)]
+pub struct MoveJoints;
+
+/// Options of [`MoveJoints`] and [`MoveJoints::follow`].
+#[derive(Clone, Debug, PartialEq, Options)]
+pub struct MoveJointsOptions {
+    /// Share of the declared velocities that it uses. Default: 0.5.
+    #[option(default = 0.5, range = 0.001..=1.0)]
+    pub speed: f64,
+    /// Largest acceleration of each joint, rad/s² or m/s². Default: 2.
+    #[option(default = 2.0, range = 1e-6..=1e6)]
+    pub acceleration: f64,
+    /// Largest derivative of the acceleration, rad/s³ or m/s³. Default: 20.
+    #[option(default = 20.0, range = 1e-6..=f64::INFINITY)]
+    pub jerk: f64,
+    /// How long after the planned arrival it waits for the actuators' reports. Unit: s. Default: 2 s.
+    #[option(default = Duration::from_secs(2))]
+    pub patience: Duration,
+}
+
+/// Where the joints are to go.
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+pub struct JointTargets {
+    /// The joints.
+    pub joints: Vec<String>,
+    /// The positions that they pass through; at the last they come to rest.
+    pub points: Vec<JointTarget>,
+}
+
+/// A position of each joint.
+#[derive(Clone, Debug, Default, PartialEq, Payload)]
+pub struct JointTarget {
+    /// rad or m, in the order of the joints.
+    pub positions: Vec<f64>,
+}
+
+/// How far a motion has come.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct MotionProgress {
+    /// Share of the planned time that is over, 0 to 1.
+    pub progress: f64,
+    /// s
+    pub elapsed: f64,
+    /// s
+    pub remaining: f64,
+    /// How many joints have reached their targets.
+    pub reached: u32,
+}
+
+impl Command for MoveJoints {
+    type Options = MoveJointsOptions;
+    type Arguments = JointTargets;
+    type Output = ();
+
+    async fn run(
+        options: MoveJointsOptions,
+        targets: JointTargets,
+        context: CommandContext,
+    ) -> Result<Outcome<()>, Fault> {
+        let points: Vec<Vec<f64>> = targets.points.into_iter().map(|point| point.positions).collect();
+        Self::follow(&context, &targets.joints, &points, &options).await?;
+        Ok(Outcome::done(()))
+    }
+}
+
+/// How often progress is published.
+const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
+
+/// Between two points of a trajectory.
+const POINT_PERIOD: Duration = Duration::from_millis(10);
+
+impl MoveJoints {
+    /// What the command does, for other commands: moves `joints` through `points`.
+    ///
+    /// # Errors
+    /// A joint is unknown, has no actuator or no known position, there is no trajectory, an actuator refuses its part, or a
+    /// motion ended before its target.
+    pub async fn follow(
+        context: &CommandContext,
+        joints: &[String],
+        points: &[Vec<f64>],
+        options: &MoveJointsOptions,
+    ) -> Result<(), Fault> {
+        let bus = context.bus();
+        let trajectory = planned(&bus, joints, points, options)?;
+        let mut motion = Motion::new(&bus, joints, context.now())?;
+        let duration = trajectory.points.last().map_or(Duration::ZERO, |last| last.time_from_start);
+        let progress = bus.publisher::<MotionProgress>(&format!("command/{}/progress", context.name()))?;
+        motion.start(&trajectory)?;
+        let deadline = motion.start + duration + options.patience;
+        loop {
+            let report = next_within(&mut motion.reports, context, PROGRESS_PERIOD).await;
+            if let Some(end) = report.as_ref().and_then(|report| report.downcast::<EndMotion>()) {
+                motion.note(end)?;
+            }
+            let now = context.now();
+            progress.publish(motion.progress(now, duration));
+            if motion.has_reached() {
+                return Ok(());
+            }
+            if now >= deadline {
+                return Err(motion.fail("the joints have not arrived in time".to_owned(), None));
+            }
+        }
+    }
+}
+
+/// The trajectory from where the joints are.
+fn planned(
+    bus: &Bus,
+    joints: &[String],
+    points: &[Vec<f64>],
+    options: &MoveJointsOptions,
+) -> Result<JointTrajectory, Fault> {
+    let known = bus.joints();
+    let mut from = Vec::with_capacity(joints.len());
+    let mut limits = Vec::with_capacity(joints.len());
+    for name in joints {
+        let joint = bus.topology().joint(name).ok_or_else(|| Fault::new(format!("there is no joint `{name}`")))?;
+        let state = known.status(name).filter(|status| !status.is_stale);
+        let position = state.as_ref().and_then(|state| state.position.first().copied());
+        let position =
+            position.ok_or_else(|| Fault::new(format!("the position of the joint `{name}` is not known")))?;
+        // A joint that a sensor sees just beyond its limit may move back; the solver refuses a start outside.
+        let mut limit = JointMotionLimits::of(joint, f64::INFINITY, options.acceleration, options.jerk);
+        if !limit.velocity.is_finite() {
+            return Err(Fault::new(format!("the joint `{name}` declares no limit of its velocity")));
+        }
+        limit.velocity *= options.speed;
+        from.push(JointPoint { position: position.clamp(limit.lower, limit.upper), ..JointPoint::default() });
+        limits.push(limit);
+    }
+    let names: Arc<[String]> = joints.into();
+    Ok(plan(&names, &from, points, &limits, POINT_PERIOD)?)
+}
+
+/// Joints that move.
+struct Motion {
+    links: Vec<ActuatorLink<ActuatorCommand>>,
+    joints: Vec<String>,
+    has_reached: Vec<bool>,
+    reports: DynamicSubscription,
+    start: MonotonicTime,
+}
+
+impl Motion {
+    fn new(bus: &Bus, joints: &[String], start: MonotonicTime) -> Result<Self, Fault> {
+        let links: Result<Vec<_>, Fault> = joints
+            .iter()
+            .map(|joint| {
+                let path = bus.actuator_of(joint);
+                bus.actuator(path.ok_or_else(|| Fault::new(format!("no actuator moves the joint `{joint}`")))?)
+            })
+            .collect();
+        let reports = bus.subscribe_any(Select::Below("actuator"), "EndMotion", Overflow::default());
+        let has_reached = vec![false; joints.len()];
+        Ok(Self { links: links?, joints: joints.to_vec(), has_reached, reports, start })
+    }
+
+    fn start(&mut self, trajectory: &JointTrajectory) -> Result<(), Fault> {
+        let sent: Result<(), ActuatorError> =
+            self.links.iter().try_for_each(|link| link.send(trajectory.clone().into()));
+        // What they replaced has ended before.
+        self.reports.drain().for_each(drop);
+        sent.map_err(|error| self.fail(error.to_string(), None))
+    }
+
+    /// An actuator has reported the end of a motion.
+    fn note(&mut self, end: &Stamped<EndMotion>) -> Result<(), Fault> {
+        let Some(index) = self.joints.iter().position(|joint| joint == end.frame.name()) else { return Ok(()) };
+        let joint = &self.joints[index];
+        let reason = match &end.end {
+            MotionEnd::Reached => {
+                self.has_reached[index] = true;
+                return Ok(());
+            }
+            MotionEnd::Stalled => format!("the joint `{joint}` has stalled at {}", end.position),
+            MotionEnd::Limit => format!("the joint `{joint}` is at its limit, {}", end.position),
+            MotionEnd::Replaced => format!("another command has taken over the joint `{joint}`"),
+            MotionEnd::Stopped => format!("the joint `{joint}` was stopped"),
+            MotionEnd::Failed(reason) => format!("the actuator of the joint `{joint}` has failed: {reason}"),
+        };
+        // What another command moves now is that one's.
+        Err(self.fail(reason, (end.end == MotionEnd::Replaced).then_some(index)))
+    }
+
+    /// The fault, after all joints but one were told to hold.
+    fn fail(&self, reason: String, except: Option<usize>) -> Fault {
+        for (_, link) in self.links.iter().enumerate().filter(|(index, _)| Some(*index) != except) {
+            // One that does not take it has been stopped otherwise, or has failed and was made safe.
+            let _ = link.send(ActuatorCommand::Hold);
+        }
+        Fault::new(reason)
+    }
+
+    fn has_reached(&self) -> bool {
+        self.has_reached.iter().all(|has_reached| *has_reached)
+    }
+
+    fn progress(&self, now: MonotonicTime, duration: Duration) -> MotionProgress {
+        let elapsed = now.duration_since(self.start);
+        let progress = if duration.is_zero() { 1.0 } else { elapsed.as_secs_f64() / duration.as_secs_f64() };
+        MotionProgress {
+            progress: progress.min(1.0),
+            elapsed: elapsed.as_secs_f64(),
+            remaining: duration.saturating_sub(elapsed).as_secs_f64(),
+            reached: self.has_reached.iter().map(|has_reached| u32::from(*has_reached)).sum(),
+        }
+    }
+}
+
+/// The next report, if one comes within `timeout`.
+async fn next_within(
+    reports: &mut DynamicSubscription,
+    context: &CommandContext,
+    timeout: Duration,
+) -> Option<DynamicMessage> {
+    let mut report = pin!(reports.recv_async());
+    let mut alarm = pin!(context.sleep(timeout));
+    std::future::poll_fn(|task| match report.as_mut().poll(task) {
+        Poll::Ready(report) => Poll::Ready(report),
+        Poll::Pending => alarm.as_mut().poll(task).map(|()| None),
+    })
+    .await
+}

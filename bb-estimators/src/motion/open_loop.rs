@@ -1,0 +1,104 @@
+//! The position of a joint that nothing measures, from what its actuator reports.
+
+use super::{Easing, Pace, Profile};
+use bb_core::payload::{BeginMotion, EndMotion, JointState};
+use bb_core::pubsub::Select;
+use bb_core::{
+    DynamicMessage, DynamicSubscription, Fault, MonotonicTime, Options, Overflow, Reading, Sensor, SensorContext,
+};
+
+/// The position of a joint without an encoder, such as that of a hobby servo: it follows the motions that the actuator of the joint
+/// reports with [`BeginMotion`] and [`EndMotion`], and takes their easing to be known.
+///
+/// Declare it in the joint, as `sensor position: OpenLoopPosition(easing = Easing::SCurve) { rate: 50 Hz; }`. It publishes a
+/// [`JointState`] of the time of its reading, so that the joint counts as one with a source of its position. Until the
+/// actuator has reported a motion, the position is that of the option `initial`; without it, it is not known, and nothing is
+/// published.
+#[derive(Debug)]
+pub struct OpenLoopPosition {
+    options: OpenLoopOptions,
+    motions: DynamicSubscription,
+    current: Option<Current>,
+}
+
+/// Options of [`OpenLoopPosition`].
+#[derive(Clone, Debug, PartialEq, Options)]
+pub struct OpenLoopOptions {
+    /// How the actuator moves. Default: trapezoidal.
+    #[option(default = Easing::Trapezoidal)]
+    pub easing: Easing,
+    /// Acceleration of its motions, rad/s² or m/s². Default: what speeds up for a quarter of each motion.
+    #[option(default = None)]
+    pub acceleration: Option<f64>,
+    /// Position at the start, rad or m. Default: not known.
+    #[option(default = None)]
+    pub initial: Option<f64>,
+}
+
+/// A motion and when it began.
+#[derive(Clone, Copy, Debug)]
+struct Current {
+    start: MonotonicTime,
+    profile: Profile,
+}
+
+impl Sensor for OpenLoopPosition {
+    type Options = OpenLoopOptions;
+    type Output = JointState;
+
+    fn init(options: OpenLoopOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let bus = context.bus();
+        let (_, place) = context.path().split_once('/').unwrap_or_default();
+        let (joint, _) = place.rsplit_once('/').unwrap_or_default();
+        let below = format!("actuator/{joint}");
+        let is_there = |path: &&str| path.strip_prefix(&below).is_some_and(|rest| rest.starts_with('/'));
+        if !bus.actuators().iter().any(is_there) {
+            return Err(Fault::permanent("no actuator moves its joint; declare it in the joint of the actuator"));
+        }
+        let motions = bus.subscribe_any(Select::Below(&below), ["BeginMotion", "EndMotion"], Overflow::default());
+        let current = options.initial.map(|position| Current::at_rest(position, MonotonicTime::ZERO));
+        Ok(Self { options, motions, current })
+    }
+
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<JointState>, Fault> {
+        while let Some(report) = self.motions.try_recv() {
+            self.follow(&report);
+        }
+        let Some(current) = &self.current else { return Ok(Reading::nothing()) };
+        let point = current.profile.at(now.seconds_since(current.start));
+        Ok(Reading::now(JointState { position: point.position, velocity: Some(point.velocity), effort: None }))
+    }
+}
+
+impl OpenLoopPosition {
+    fn follow(&mut self, report: &DynamicMessage) {
+        if let Some(begin) = report.downcast::<BeginMotion>() {
+            self.current = Some(Current::of(begin, begin.monotonic_time, &self.options));
+        } else if let Some(end) = report.downcast::<EndMotion>() {
+            self.current = Some(Current::at_rest(end.position, end.monotonic_time));
+        }
+    }
+}
+
+impl Current {
+    /// An arrival that is known says more than a speed: it includes that the joint speeds up and slows down.
+    fn of(begin: &BeginMotion, start: MonotonicTime, options: &OpenLoopOptions) -> Self {
+        let duration = begin.expected_arrival.map(|arrival| Pace::Duration(arrival.seconds_since(start)));
+        let speed = begin.speed.map(|speed| Pace::Speed(speed.abs()));
+        let profile = match duration.or(speed) {
+            Some(pace) => {
+                let (initial, target) = (begin.initial_position, begin.target_position);
+                Profile::new(options.easing, initial, target, pace, options.acceleration)
+            }
+            // How fast it is, nobody says: it is there when it reports so.
+            None => {
+                Profile::new(options.easing, begin.initial_position, begin.initial_position, Pace::Speed(1.0), None)
+            }
+        };
+        Self { start, profile }
+    }
+
+    fn at_rest(position: f64, start: MonotonicTime) -> Self {
+        Self { start, profile: Profile::new(Easing::Linear, position, position, Pace::Speed(1.0), None) }
+    }
+}

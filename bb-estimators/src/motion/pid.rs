@@ -1,0 +1,110 @@
+//! A PID controller.
+
+/// The gains of a [`Pid`], and its limits. The output is in the unit of what it drives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PidParams {
+    /// Output for each unit of the error.
+    pub proportional: f64,
+    /// Output for each unit of the error and second.
+    pub integral: f64,
+    /// Output for each unit of the rate at which the measurement changes, per second.
+    pub derivative: f64,
+    /// Time constant of the low-pass filter of the derivative, s. 0: none.
+    pub derivative_filter_s: f64,
+    /// Smallest output.
+    pub minimum: f64,
+    /// Largest output.
+    pub maximum: f64,
+    /// How fast the integral gives way while the output is at a limit, s: a small time follows the limit closely. 0: at
+    /// once.
+    pub tracking_s: f64,
+}
+
+/// A PID controller with back-calculation against windup and a filtered derivative.
+///
+/// u = P e + I ∫ e dt − D dy/dt, where e = setpoint − y; Åström and Hägglund, *Advanced PID Control*, 2006, sections 3.5 and 13.
+/// The derivative is that of the measurement, so that a setpoint that jumps causes no kick, through a low pass of first order.
+/// While the output is at a limit, the integral is drawn to where the output is just there. Steps may have any length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pid {
+    params: PidParams,
+    integral: f64,
+    /// The rate of the measurement, filtered.
+    rate: f64,
+    measurement: Option<f64>,
+}
+
+/// What a step of a [`Pid`] gave: `output` is the sum of the three terms within the limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PidTerms {
+    /// setpoint − measurement.
+    pub error: f64,
+    /// The proportional term.
+    pub proportional: f64,
+    /// The integral term.
+    pub integral: f64,
+    /// The derivative term.
+    pub derivative: f64,
+    /// What to apply.
+    pub output: f64,
+}
+
+impl Pid {
+    /// A controller that has integrated nothing.
+    pub fn new(params: PidParams) -> Self {
+        Self { params, integral: 0.0, rate: 0.0, measurement: None }
+    }
+
+    /// Changes the gains; what is integrated stays, so that the output does not jump with the integral gain.
+    pub fn set_params(&mut self, params: PidParams) {
+        self.params = params;
+    }
+
+    /// Forgets what it has integrated and measured.
+    pub fn reset(&mut self) {
+        *self = Self::new(self.params);
+    }
+
+    /// The output for a measurement, `step_s` after the last one. A step that is not positive, and values that are not finite,
+    /// change nothing that is kept: the output is then that of the proportional and the kept terms.
+    pub fn update(&mut self, setpoint: f64, measurement: f64, step_s: f64) -> PidTerms {
+        let params = &self.params;
+        let is_step = step_s > 0.0 && (setpoint + measurement + step_s).is_finite();
+        let error = setpoint - measurement;
+        if is_step && let Some(last) = self.measurement.replace(measurement) {
+            // The low pass in its exact form for a rate that is constant during the step.
+            let share = match params.derivative_filter_s > 0.0 {
+                true => 1.0 - (-step_s / params.derivative_filter_s).exp(),
+                false => 1.0,
+            };
+            self.rate += share * ((measurement - last) / step_s - self.rate);
+        }
+        let proportional = params.proportional * error;
+        let derivative = -params.derivative * self.rate;
+        if is_step {
+            self.integral += params.integral * error * step_s;
+            let unlimited = proportional + self.integral + derivative;
+            let beyond = unlimited - params.limit(unlimited);
+            let share = if params.tracking_s > 0.0 { (step_s / params.tracking_s).min(1.0) } else { 1.0 };
+            self.integral -= share * params.windup(beyond, self.integral);
+        }
+        let output = params.limit(proportional + self.integral + derivative);
+        let output = if output.is_finite() { output } else { params.limit(0.0) };
+        PidTerms { error, proportional, integral: self.integral, derivative, output }
+    }
+}
+
+impl PidParams {
+    fn limit(&self, output: f64) -> f64 {
+        output.max(self.minimum).min(self.maximum)
+    }
+
+    /// How much of what is beyond the limit the integral is blamed for: never more than it holds, so that a proportional term
+    /// that saturates alone does not wind it up the other way.
+    fn windup(&self, beyond: f64, integral: f64) -> f64 {
+        if beyond * integral > 0.0 { beyond.abs().min(integral.abs()).copysign(integral) } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests;

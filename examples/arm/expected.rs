@@ -1,0 +1,89 @@
+//! What must happen, and in which order.
+
+use crate::timeline::{Kind, Line};
+use std::fmt;
+
+/// What belongs to the story, without its times.
+const EXPECTED: &[(Kind, &str)] = &[
+    (Kind::State, "disarmed -> idle"),
+    (Kind::Command, "follow started"),
+    (Kind::Parameter, "leg 0 -> 1"),
+    (Kind::Hardware, "the IMU is unplugged"),
+    (Kind::Health, "healthy -> lost"),
+    (Kind::Command, "stop started"),
+    (Kind::Command, "stop finished"),
+    (Kind::State, "executing -> held"),
+    (Kind::Hardware, "the IMU is plugged in"),
+    (Kind::Health, "lost -> degraded"),
+    (Kind::Health, "degraded -> healthy"),
+    (Kind::Command, "resume started"),
+    (Kind::Parameter, "leg 3 -> 4"),
+    (Kind::Command, "resume finished"),
+    (Kind::State, "held -> idle"),
+    (Kind::Command, "disarm finished"),
+];
+
+/// The arm moves, rad/s.
+const MOVES: f64 = 0.05;
+
+/// Slower than this, the arm rests, rad/s.
+const RESTS: f64 = 1e-3;
+
+/// The arm is at the end of its path, rad.
+const NEAR: f64 = 1e-6;
+
+/// An estimate is right, rad/s: three axes of two gyroscopes with biases of 3 mrad/s each.
+const RIGHT: f64 = 0.03;
+
+/// What has happened.
+#[derive(Debug, Default)]
+pub(crate) struct Outcome {
+    pub(crate) lines: Vec<Line>,
+    /// The largest speed of a joint when the IMU was unplugged, rad/s.
+    pub(crate) speed_when_unplugged: f64,
+    /// The same while the arm was held.
+    pub(crate) speed_while_held: f64,
+    /// The largest distance of a joint from the end of the path, rad.
+    pub(crate) distance_from_end: f64,
+    /// The largest error of the tip's angular velocity, rad/s.
+    pub(crate) worst_error: f64,
+    /// How many estimates were compared.
+    pub(crate) compared: u32,
+}
+
+impl Outcome {
+    /// What of the story has not happened, or not after what comes before it.
+    pub(crate) fn missing(&self) -> Vec<String> {
+        let mut rest = self.lines.as_slice();
+        let mut is_missing = |(kind, event): &&(Kind, &str)| {
+            let position = rest.iter().position(|line| line.kind == *kind && line.event == *event);
+            if let Some(position) = position {
+                rest = &rest[position + 1..];
+            }
+            position.is_none()
+        };
+        let events = EXPECTED.iter().filter(|expected| is_missing(expected));
+        let mut missing: Vec<String> = events.map(|(kind, event)| format!("{} {event}", kind.name())).collect();
+        let facts = [
+            (self.speed_when_unplugged > MOVES, "an arm that moves when its IMU is unplugged"),
+            (self.speed_while_held < RESTS, "an arm that rests while it is held"),
+            (self.distance_from_end < NEAR, "an arm at the end of its path"),
+            (self.worst_error < RIGHT, "estimates of the tip that are right"),
+        ];
+        missing.extend(facts.iter().filter(|(is_so, _)| !is_so).map(|(_, fact)| (*fact).to_owned()));
+        missing
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { speed_when_unplugged, speed_while_held, distance_from_end, worst_error, compared, .. } = self;
+        writeln!(f, "Fastest joint when the IMU was unplugged: {speed_when_unplugged:.2} rad/s")?;
+        writeln!(f, "Fastest joint while the arm was held: {speed_while_held:.4} rad/s")?;
+        write!(f, "Largest distance from the end of the path: {distance_from_end:.6} rad")?;
+        if *compared > 0 {
+            write!(f, "\nWorst angular velocity of the tip, of {compared} compared: {worst_error:.3} rad/s off")?;
+        }
+        Ok(())
+    }
+}
