@@ -337,13 +337,15 @@ fn measurements_of_which_most_were_refused_are_an_error() {
         cells.join(",") + "\n"
     });
     std::fs::write(&anchors, elsewhere.collect::<String>()).expect("there is room");
-    let output = bb(&["eval", "navigation", text(&prefix), "--filter", "eskf-single"]);
-    assert!(
-        output.code == Some(1)
-            && output.err.contains(" poses were refused (the first: normalised innovation squared"),
-        "{}",
-        output.err
-    );
+    for filter in ["eskf-single", "state-eskf", "state-smoother"] {
+        let output = bb(&["eval", "navigation", text(&prefix), "--filter", filter]);
+        assert!(
+            output.code == Some(1)
+                && output.err.contains(" poses were refused (the first: normalised innovation squared"),
+            "{filter}: {}",
+            output.err
+        );
+    }
 }
 
 /// Of which none begins the world, nor the filter.

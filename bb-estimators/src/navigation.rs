@@ -27,6 +27,7 @@ mod fused;
 mod fusion;
 mod geodesy;
 mod history;
+mod layout;
 mod math;
 pub mod measurement;
 mod navigator;

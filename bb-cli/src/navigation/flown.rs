@@ -6,7 +6,7 @@ use super::step::{Known, Step};
 use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::state_estimator::{
     Added, AttitudeReading, EstimatorError, EstimatorOutput, FlightControllerState, GnssReading, GpsHealth,
-    GpsHealthReading, PoseAnchor, StateEstimator, StateEstimatorConfig, StateEstimatorParams, StrategyKind,
+    GpsHealthReading, PoseAnchor, Reason, StateEstimator, StateEstimatorConfig, StateEstimatorParams, StrategyKind,
     VioOutput,
 };
 use bb_estimators::navigation::{AbsolutePose, EskfParams, Geodetic, ImuMean, LocalFrame, RelativePose, Start};
@@ -92,9 +92,11 @@ impl Flown {
             now_ns = nanoseconds(time_s);
             let (angular_velocity, specific_force) = (sample.angular_velocity, sample.specific_force);
             let sample = ImuMean { time_ns: now_ns, angular_velocity, specific_force };
-            let is_refused = u64::from(self.estimator.add_imu(&sample).is_err());
-            step.refused += is_refused;
-            step.samples.0 += is_refused;
+            if let Err(error) = taken(self.estimator.add_imu(&sample)) {
+                step.refused += 1;
+                step.samples.0 += 1;
+                step.samples.1.get_or_insert(error);
+            }
         }
         step.propagation_s = began.elapsed().as_secs_f64();
         self.stamps_ns.push(now_ns);
@@ -103,7 +105,8 @@ impl Flown {
         let counted = allocation_counter::measure(|| added = self.measure(&Measured::at(data, k as u64), now_ns));
         step.keyframe_s = keyframe_began.elapsed().as_secs_f64();
         step.allocations = counted.count_total;
-        step.refused += added.iter().flatten().map(|added| u64::from(added.is_err())).sum::<u64>();
+        let [vio, anchor, fix] = added.map(|added| added.map(taken));
+        step.take([vio, anchor, fix, None]);
         Ok(())
     }
 
@@ -185,6 +188,14 @@ impl Flown {
         let oldest = history.last().filter(|oldest| oldest.smoothed && history.len() + 1 == self.window)?;
         let k = self.stamps_ns.binary_search(&oldest.time_ns).ok()?;
         Some((k, self.known(oldest)))
+    }
+}
+
+/// Whether an input is in the estimate, or why not. One that was taken in although it did not fit, and a gap that was bridged, are.
+fn taken<T>(added: Result<T, EstimatorError>) -> Result<(), String> {
+    match added {
+        Ok(_) | Err(EstimatorError::Degraded(Reason::Raised { .. } | Reason::Bridged)) => Ok(()),
+        Err(error) => Err(error.reason().to_string()),
     }
 }
 

@@ -48,11 +48,6 @@ impl Sensor {
 /// What became of the measurements at a keyframe, in the order of [`Sensor::ALL`].
 pub(crate) type Answers = [Option<Result<Fused, Refusal>>; 4];
 
-/// How many were refused.
-pub(crate) fn refused(answers: &Answers) -> u64 {
-    answers.iter().flatten().map(|answer| u64::from(answer.is_err())).sum()
-}
-
 impl Measured {
     pub(crate) fn at(data: &DataSet, keyframe: u64) -> Self {
         Self {

@@ -3,7 +3,7 @@
 use super::data::{DataSet, Keyframe, nanoseconds};
 use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
 use super::flown::Flown;
-use super::measured::{Answers, Measured, refused};
+use super::measured::{Answers, Measured};
 use super::step::{Known, Step};
 use bb_core::nalgebra::Matrix6;
 use bb_estimators::navigation::{
@@ -138,15 +138,15 @@ impl Player {
                 Err(error @ Refusal::Gap { .. }) => return Err(format!("at {time_s} s: {error}")),
                 Err(error) => {
                     step.refused += 1;
-                    step.samples = (step.samples.0 + 1, step.samples.1.or(Some(error)));
+                    step.samples.0 += 1;
+                    step.samples.1.get_or_insert_with(|| error.to_string());
                 }
             }
         }
         step.propagation_s = began.elapsed().as_secs_f64();
         match self {
             Self::Filter(navigator) => {
-                step.answers = Measured::at(data, k as u64).filter(navigator);
-                step.refused += refused(&step.answers);
+                step.answer(Measured::at(data, k as u64).filter(navigator));
                 if to.is_referred_to {
                     navigator.set_keyframe(k as u64);
                 }
@@ -223,8 +223,7 @@ impl Smoothed {
         let counted = allocation_counter::measure(|| result = self.keyframe(&measured, k));
         step.keyframe_s = began.elapsed().as_secs_f64();
         step.allocations = counted.count_total;
-        step.answers = result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?;
-        step.refused += refused(&step.answers);
+        step.answer(result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?);
         self.learn(Some(k));
         Ok(())
     }

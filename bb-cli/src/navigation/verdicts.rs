@@ -3,14 +3,13 @@
 use super::doubt::{distrusted, is_most};
 use super::measured::Sensor;
 use super::step::Step;
-use bb_estimators::navigation::Refusal;
 
 /// Of one sensor.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Debug, Default)]
 struct Verdict {
     all: u64,
     refused: u64,
-    first: Option<Refusal>,
+    first: Option<String>,
 }
 
 /// What became of the samples of the IMU and of the measurements.
@@ -23,16 +22,18 @@ pub(crate) struct Verdicts {
 impl Verdicts {
     /// Adds what happened on the way to a keyframe, over so many samples.
     pub(crate) fn add(&mut self, step: &Step, samples: usize) {
-        let (refused, first) = step.samples;
+        let (refused, first) = &step.samples;
         self.samples.all += samples as u64;
         self.samples.refused += refused;
-        self.samples.first = self.samples.first.or(first);
-        for (verdict, answer) in self.measured.iter_mut().zip(&step.answers) {
-            let Some(answer) = answer else { continue };
+        if self.samples.first.is_none() {
+            self.samples.first.clone_from(first);
+        }
+        for (verdict, taken) in self.measured.iter_mut().zip(&step.taken) {
+            let Some(taken) = taken else { continue };
             verdict.all += 1;
-            if let Err(refusal) = answer {
+            if let Err(why) = taken {
                 verdict.refused += 1;
-                verdict.first = verdict.first.or(Some(*refusal));
+                verdict.first.get_or_insert_with(|| why.clone());
             }
         }
     }
@@ -43,7 +44,7 @@ impl Verdicts {
         let all = std::iter::once(("samples of the IMU", &self.samples)).chain(names.zip(&self.measured));
         let refused = all.filter(|(_, verdict)| is_most(verdict.refused, verdict.all));
         let said = |(name, Verdict { all, refused, first }): (&str, &Verdict)| {
-            let why = first.map_or_else(String::new, |refusal| format!(" (the first: {refusal})"));
+            let why = first.as_ref().map_or_else(String::new, |why| format!(" (the first: {why})"));
             distrusted(&format!("{refused} of {all} {name} were refused{why}"))
         };
         refused.map(said).collect()

@@ -4,11 +4,16 @@
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 
+use super::layout::Layout;
 use super::math::{ln, sqrt};
 
 /// One update never takes more than this ratio of variance out of a direction: what rounding adds, 1e-16 of what was
 /// there, stays far below what is left.
 const LEAST_NOISE: f64 = 1e-10;
+
+/// Nor do several leave less than this ratio of the variances of what they see: of a sum or a difference that is known that much
+/// better than its terms, rounding would take the rest.
+const LEAST_REST: f64 = 1e-13;
 
 /// The largest variance of a position or a velocity that says anything: 10,000 km, or as much a second.
 pub(in crate::navigation) const MOST_VARIANCE: f64 = 1e14;
@@ -16,11 +21,57 @@ pub(in crate::navigation) const MOST_VARIANCE: f64 = 1e14;
 /// The largest variance of a rotation error, rad²: a hundred turns are as good as one.
 pub(in crate::navigation) const MOST_ROTATION: f64 = 4e5;
 
+/// Where an update leaves less than this ratio of a variance, rounding may take the rest: the covariance is checked at once.
+const RISKY: f64 = 1e-8;
+
 /// Updates between two checks by a Cholesky decomposition.
 const CHECK_EVERY: u32 = 1024;
 
+/// What a check wants to be left of a variance once all others are known: far above rounding.
+const MARGIN: f64 = 1e-13;
+
 /// What a variance is raised by, relatively, where a check fails.
-const REPAIR: f64 = 1e-9;
+const REPAIR: f64 = 1e-12;
+
+/// Rounding of a covariance that was computed, as a part of the variances.
+const ROUNDING: f64 = 1e-9;
+
+/// Whether a covariance is one: symmetric, and positive semi-definite up to rounding. One of zeros is, which is that of what is
+/// known exactly.
+#[inline]
+pub(in crate::navigation) fn is_covariance<const D: usize>(noise: &SMatrix<f64, D, D>) -> bool {
+    let mut lower = [[0.0; D]; D];
+    let mut pivots = [0.0; D];
+    for i in 0..D {
+        let least = ROUNDING * noise[(i, i)];
+        for j in 0..i {
+            // Nor if it is not a number.
+            let largest = ROUNDING * (noise[(i, i)] * noise[(j, j)]);
+            let apart = noise[(i, j)] - noise[(j, i)];
+            if !(apart * apart <= largest) {
+                return false;
+            }
+            let mut rest = noise[(i, j)];
+            for k in 0..j {
+                rest -= lower[i][k] * pivots[k] * lower[j][k];
+            }
+            if pivots[j] > 0.0 {
+                lower[i][j] = rest / pivots[j];
+            } else if !(rest * rest <= largest) {
+                return false;
+            }
+        }
+        let mut pivot = noise[(i, i)];
+        for k in 0..i {
+            pivot -= lower[i][k] * lower[i][k] * pivots[k];
+        }
+        if !(pivot >= -least) {
+            return false;
+        }
+        pivots[i] = if pivot > least { pivot } else { 0.0 };
+    }
+    true
+}
 
 /// Covariance of `N` errors, in the square of their units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +90,8 @@ pub(in crate::navigation) struct Innovation<const D: usize, const N: usize> {
     pub(in crate::navigation) whitened: [f64; D],
     /// `det S` to the power of -½.
     density: f64,
+    /// It leaves next to nothing of a variance.
+    is_risky: bool,
 }
 
 impl<const D: usize, const N: usize> Innovation<D, N> {
@@ -145,26 +198,46 @@ impl<const N: usize> Covariance<N> {
         p[state][state] += variance;
     }
 
-    /// Multiplies all of it: what is known is known so much less.
-    pub(in crate::navigation) fn raise(&mut self, factor: f64) {
-        self.matrix *= factor;
+    /// Multiplies the covariance of the states of a block, and cuts their correlations with all others: what is known of those
+    /// says nothing of these any more, nor the other way round.
+    pub(in crate::navigation) fn raise(&mut self, layout: &Layout<N>, block: u8, factor: f64) {
+        let blocks = &layout.blocks;
+        for i in 0..N {
+            for j in 0..N {
+                match (blocks[i] == block, blocks[j] == block) {
+                    (true, true) => self.rows_mut()[i][j] *= factor,
+                    (false, false) => {}
+                    _ => self.rows_mut()[i][j] = 0.0,
+                }
+            }
+        }
+        self.bound(layout);
     }
 
-    /// Keeps the first variances below limits that are as good as unknown, so that no number overflows.
+    /// Keeps variances below limits that are as good as unknown, so that no number overflows.
     #[inline]
-    pub(in crate::navigation) fn bound<const L: usize>(&mut self, limits: &[f64; L]) {
-        for (i, limit) in limits.iter().enumerate() {
-            let variance = self.matrix[(i, i)];
-            if variance > *limit {
-                self.shrink(i, sqrt(limit / variance));
-            }
+    pub(in crate::navigation) fn bound(&mut self, layout: &Layout<N>) {
+        if self.is_lost(layout) {
+            self.shrink(&layout.largest);
         }
     }
 
+    #[inline]
+    fn is_lost(&self, layout: &Layout<N>) -> bool {
+        (0..N).any(|i| self.matrix[(i, i)] > layout.lost[i])
+    }
+
     #[cold]
-    fn shrink(&mut self, state: usize, factor: f64) {
-        self.decay(state, factor, 0.0);
-        self.updates = CHECK_EVERY;
+    fn shrink(&mut self, limits: &[f64; N]) {
+        for (i, limit) in limits.iter().enumerate() {
+            let variance = self.matrix[(i, i)];
+            if variance > *limit {
+                self.decay(i, sqrt(limit / variance), 0.0);
+                // Rounding must not leave it above.
+                self.rows_mut()[i][i] = *limit;
+            }
+        }
+        self.enforce();
     }
 
     /// Adds to a variance.
@@ -222,19 +295,29 @@ impl<const N: usize> Covariance<N> {
         noise: &SMatrix<f64, D, D>,
     ) -> Option<Innovation<D, N>> {
         let mut lower = [[0.0; D]; D];
+        let mut is_risky = false;
         for i in 0..D {
             for j in 0..=i {
                 let mut sum = 0.0;
                 for k in 0..N {
                     sum += jacobian[i][k] * projected[j][k];
                 }
-                let least = if i == j { LEAST_NOISE * sum } else { f64::NEG_INFINITY };
-                lower[i][j] = sum + noise[(i, j)].max(least);
+                lower[i][j] = sum + noise[(i, j)];
+                if i == j {
+                    let mut terms = 0.0;
+                    for k in 0..N {
+                        terms += jacobian[i][k] * jacobian[i][k] * self.matrix[(k, k)];
+                    }
+                    let noise = noise[(i, i)].max(LEAST_NOISE * sum).max(LEAST_REST * terms);
+                    lower[i][i] = sum + noise;
+                    is_risky |= noise < RISKY * terms;
+                }
             }
         }
         let mut gain = *projected;
         let mut whitened = *residual;
         for i in 0..D {
+            let variance = lower[i][i];
             for j in 0..i {
                 for k in 0..j {
                     lower[i][j] -= lower[i][k] * lower[j][k];
@@ -252,6 +335,7 @@ impl<const N: usize> Covariance<N> {
             if !(lower[i][i] > 0.0 && lower[i][i].is_finite()) {
                 return None;
             }
+            is_risky |= lower[i][i] < RISKY * variance;
             lower[i][i] = 1.0 / sqrt(lower[i][i]);
             whitened[i] *= lower[i][i];
             for value in &mut gain[i] {
@@ -259,7 +343,7 @@ impl<const N: usize> Covariance<N> {
             }
         }
         let density = (0..D).map(|i| lower[i][i]).product();
-        Some(Innovation { gain, whitened, density })
+        Some(Innovation { gain, whitened, density, is_risky })
     }
 
     /// `P ← P - Wᵀ W`, the update in the order of the decomposition, one scalar after the other.
@@ -276,13 +360,26 @@ impl<const N: usize> Covariance<N> {
             }
         }
         self.updates += 1;
-        if self.updates >= CHECK_EVERY || (0..N).any(|i| self.matrix[(i, i)] <= 0.0) {
+        if innovation.is_risky || (0..N).any(|i| self.matrix[(i, i)] <= 0.0) {
+            self.updates = CHECK_EVERY;
+        }
+    }
+
+    /// Checks the matrix if that is due, once all that belongs to an update is done.
+    #[inline]
+    pub(in crate::navigation) fn settle(&mut self, layout: &Layout<N>) {
+        if self.updates >= CHECK_EVERY || self.is_lost(layout) {
             self.enforce();
         }
     }
 
     /// Whether a Cholesky decomposition exists.
     pub(in crate::navigation) fn is_positive_definite(&self) -> bool {
+        self.is_regular(0.0)
+    }
+
+    /// Whether a Cholesky decomposition leaves more than this part of each variance.
+    fn is_regular(&self, margin: f64) -> bool {
         let mut lower = self.matrix;
         for i in 0..N {
             for j in 0..=i {
@@ -292,7 +389,7 @@ impl<const N: usize> Covariance<N> {
                 }
                 if i != j {
                     lower[(i, j)] = sum / lower[(j, j)];
-                } else if sum > 0.0 && sum.is_finite() {
+                } else if sum > margin * self.matrix[(i, i)] && sum.is_finite() {
                     lower[(i, i)] = sqrt(sum);
                 } else {
                     return false;
@@ -304,14 +401,23 @@ impl<const N: usize> Covariance<N> {
 
     /// Raises variances until the matrix is positive definite.
     #[cold]
-    fn enforce(&mut self) {
+    pub(in crate::navigation) fn enforce(&mut self) {
         self.updates = 0;
         let mut fraction = REPAIR;
-        while !self.is_positive_definite() && fraction < 1.0 {
+        while !self.is_regular(MARGIN) {
             self.repairs += 1;
-            let p = self.rows_mut();
-            for (i, row) in p.iter_mut().enumerate() {
-                row[i] = (row[i] * (1.0 + fraction)).max(f64::MIN_POSITIVE);
+            if fraction > 1.0 {
+                // All but the variances is rounding.
+                self.matrix = SMatrix::from_diagonal(&self.matrix.diagonal());
+            }
+            for i in 0..N {
+                let row = self.matrix.row(i);
+                // What a state shares with others is no more than its own variance, were it not for rounding.
+                let shared = (0..N).filter(|j| *j != i && self.matrix[(*j, *j)] > 0.0);
+                let shared = shared.map(|j| row[j] * row[j] / self.matrix[(j, j)]);
+                let least = shared.fold(f64::MIN_POSITIVE, f64::max);
+                let variance = self.matrix[(i, i)];
+                self.matrix[(i, i)] = if variance > 0.0 { variance * (1.0 + fraction) } else { least };
             }
             fraction *= 10.0;
         }

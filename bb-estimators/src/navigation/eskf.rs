@@ -14,8 +14,13 @@
 //!
 //! A measurement of several numbers is decomposed once, `H P Hᵀ + R = L Lᵀ`, for its normalised innovation squared and for
 //! the update `P - Wᵀ W` with `W = L⁻¹ H P`, which is that of one scalar after the other. The covariance is symmetric to
-//! the last bit. The noise of a scalar is taken as at least 1e-10 of its predicted variance, which bounds what rounding
-//! can do; a Cholesky decomposition every 1024 updates checks it, and [`Eskf::repairs`] counts what it found.
+//! the last bit.
+//!
+//! Two bounds keep rounding from breaking it. The noise of a scalar is taken as at least 1e-10 of its predicted variance, and as
+//! 1e-13 of the variances that its terms have by themselves. A Cholesky decomposition checks the covariance every 1024 updates,
+//! and at once after an update that leaves less than 1e-8 of a variance, after a gap, and while the filter is lost (a position
+//! known to 100 km). [`Eskf::repairs`] counts what it found. Variances are bounded, see `layout.rs`, and a correction by more than
+//! anything on the Earth can be off is refused as [`Refusal::OutOfRange`](super::Refusal).
 
 mod elsewhere;
 mod filter;

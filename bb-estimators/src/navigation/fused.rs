@@ -9,7 +9,8 @@ pub struct Fused {
     pub dimension: usize,
     /// The weight that it had, 1 unless [`StreamParams::robust`](super::StreamParams::robust) took it down.
     pub weight: f64,
-    /// What the covariance was raised by before, 1 unless the gate had run out of patience.
+    /// The normalised innovation squared in parts of its mean, which the covariance was raised by before, about; 1 unless the gate
+    /// had run out of patience.
     pub raised: f64,
     /// What the gate lets pass, all but when it was overruled.
     pub limit: f64,

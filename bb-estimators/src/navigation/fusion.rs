@@ -1,10 +1,19 @@
 //! How a linearised measurement is weighed, for every filter alike.
 
-use super::covariance::{Covariance, Innovation};
+use nalgebra::{SMatrix, SVector};
+
+use super::covariance::{Covariance, Innovation, is_covariance};
 use super::fused::Fused;
+use super::layout::Layout;
 use super::measurement::Linearised;
 use super::refusal::Refusal;
 use super::stream::{Gate, Stream, Verdict};
+
+/// Blocks that are raised for one measurement, and rounds until it fits, which two numbers or more need.
+const ROUNDS: usize = 12;
+
+/// The normalised innovation squared of what fits, in parts of its mean.
+const FITS: f64 = 1.01;
 
 /// A measurement that the gate has let pass, with what it does to the errors.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +38,7 @@ pub(super) fn prepared<const D: usize, const N: usize>(
     {
         return Err(Refusal::NonFinite);
     }
-    if (0..D).any(|i| model.noise[(i, i)] < 0.0) {
+    if !is_covariance(&model.noise) {
         return Err(Refusal::Noise);
     }
     model.noise *= stream.noise_factor();
@@ -48,32 +57,39 @@ pub(super) fn innovation<const D: usize, const N: usize>(
 }
 
 impl<const D: usize, const N: usize> Weighed<D, N> {
-    /// Asks the gate of `stream`. If that has run out of patience, the covariance is raised until the measurement fits.
+    /// Asks the gate of `stream`. If that has run out of patience, the covariance of what is wrong is raised until the measurement
+    /// fits.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Gate`] and [`Refusal::Noise`]; the covariance is then as it was.
+    /// [`Refusal::Gate`], [`Refusal::NonFinite`] and [`Refusal::Noise`]; the covariance is then as it was.
     #[inline]
     pub(super) fn new(
         covariance: &mut Covariance<N>,
         stream: &Stream,
         model: &Linearised<D, N>,
         gate: Gate,
+        layout: &Layout<N>,
     ) -> Result<Self, Refusal> {
         let plain = innovation(covariance, model)?;
         let nis = plain.nis();
+        if nis.is_nan() {
+            return Err(Refusal::NonFinite);
+        }
         let verdict = stream.weigh(nis, D, plain.log_density(), gate)?;
         let mut weighed = Self { innovation: plain, nis, verdict, before: None };
-        if verdict.weight < 1.0 || verdict.raised > 1.0 {
+        if verdict.weight < 1.0 {
             let mut softened = *model;
             softened.noise /= verdict.weight;
+            weighed.innovation = innovation(covariance, &softened)?;
+        }
+        if verdict.raised > 1.0 {
             weighed.before = Some(*covariance);
-            covariance.raise(verdict.raised);
-            match innovation(covariance, &softened) {
-                Ok(softened) => weighed.innovation = softened,
-                Err(error) => {
+            match fitted(covariance, model, layout) {
+                Some(fitted) => weighed.innovation = fitted,
+                None => {
                     weighed.undo(covariance);
-                    return Err(error);
+                    return Err(Refusal::Gate { nis, limit: verdict.limit });
                 }
             }
         }
@@ -94,4 +110,44 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
         let whitened = self.innovation.whitened.first().copied().unwrap_or(0.0);
         Fused { nis: self.nis, dimension: D, weight, raised, limit, log_likelihood, whitened }
     }
+}
+
+/// The innovation of a measurement that the filter is taken to be wrong about, with the covariance raised until it fits; none if
+/// nothing that it sees explains it.
+///
+/// With the residual r of covariance `S = H P Hᵀ + R`, block b of the errors has the part `uᵀ H_b P_bb H_bᵀ u` of the normalised
+/// innovation squared, `uᵀ S u` with `u = S⁻¹ r`, whatever the axes and units. The block with the largest part is the one that is
+/// wrong: its covariance is raised until the normalised innovation squared is what it is on average, and its correlations are
+/// cut. All else stays as well known as it was.
+#[cold]
+fn fitted<const D: usize, const N: usize>(
+    covariance: &mut Covariance<N>,
+    model: &Linearised<D, N>,
+    layout: &Layout<N>,
+) -> Option<Innovation<D, N>> {
+    let jacobian = SMatrix::<f64, D, N>::from_fn(|i, j| model.jacobian[i][j]);
+    for _ in 0..ROUNDS {
+        let plain = innovation(covariance, model).ok()?;
+        let nis = plain.nis();
+        let mean = D as f64;
+        if nis <= FITS * mean {
+            return Some(plain);
+        }
+        let p = covariance.matrix();
+        let s = jacobian * p * jacobian.transpose() + model.noise;
+        let seen = jacobian.transpose() * s.try_inverse()? * SVector::from(model.residual);
+        let mut parts = [0.0; N];
+        for i in 0..N {
+            for j in (0..N).filter(|j| layout.blocks[*j] == layout.blocks[i]) {
+                parts[usize::from(layout.blocks[i])] += seen[i] * p[(i, j)] * seen[j];
+            }
+        }
+        let (block, part) = parts.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+        let factor = 1.0 + nis * (nis - mean) / (mean * part);
+        if !(*part > 0.0 && factor.is_finite()) {
+            return None;
+        }
+        covariance.raise(layout, u8::try_from(block).ok()?, factor);
+    }
+    innovation(covariance, model).ok()
 }

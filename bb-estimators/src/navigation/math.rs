@@ -76,6 +76,11 @@ pub(crate) fn renormalised(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     Unit::new_unchecked(q.into_inner() * scale)
 }
 
+/// A quaternion that a user calls a rotation, of norm 1; none if it is no rotation.
+pub(crate) fn unit(q: &UnitQuaternion<f64>) -> Option<UnitQuaternion<f64>> {
+    (0.5..2.0).contains(&q.norm()).then(|| Unit::new_normalize(q.into_inner()))
+}
+
 /// Integrals of the rotation group along a constant rate, for the rotation vector φ of the whole interval.
 ///
 /// With `R(s) = exp(s φ)`: `Γ1 = ∫₀¹ R(s) ds` and `Γ2 = ∫₀¹ ∫₀ˢ R(r) dr ds`; Γ1 is the left Jacobian of SO(3).

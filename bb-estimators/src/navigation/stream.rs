@@ -10,7 +10,7 @@ use crate::params::params;
 /// The largest dimension of a measurement whose limits are kept.
 const DIMENSIONS: usize = 7;
 
-/// The most that a covariance is raised by at once.
+/// The most that a misfit is told to be.
 const MOST_RAISED: f64 = 1e6;
 
 params! {
@@ -25,8 +25,8 @@ params! {
         /// How many measurements in a row the gate refuses before it takes the filter to be wrong, not the sensor: the next
         /// is fused with the covariance raised to fit it; 0 for never.
         ///
-        /// All errors take a part of the difference then, those of attitude and biases too: a filter that is kilometres off is
-        /// better [moved](super::Eskf::relocate).
+        /// What explains the difference best is raised alone, the position for a fix, and loses its correlations; all else stays
+        /// as it is. A filter that should move only where several positions agree is better [moved](super::Eskf::relocate).
         ///
         /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long.
         patience: u32 = 3;

@@ -4,6 +4,8 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::filter::Eskf;
 use crate::navigation::covariance::Covariance;
+use crate::navigation::layout::is_on_earth;
+use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     Estimate, Keyframe, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
@@ -20,7 +22,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if the covariance is not positive definite. The
+    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if the covariance is not positive definite. The
     /// filter is then as it was.
     pub fn adopt<T: States, const M: usize>(
         &mut self,
@@ -32,7 +34,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             time_ns: other.time_ns,
             position: other.position,
             velocity: other.velocity,
-            world_from_body: other.world_from_body,
+            world_from_body: unit(&other.world_from_body).ok_or(Refusal::NonFinite)?,
             accelerometer_bias: other.accelerometer_bias,
             gyroscope_bias: other.gyroscope_bias,
             angular_velocity: other.angular_velocity,
@@ -64,9 +66,13 @@ impl<S: States, const N: usize> Eskf<S, N> {
         if !estimate.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
             return Err(Refusal::NonFinite);
         }
+        if !estimate.is_plausible() {
+            return Err(Refusal::OutOfRange);
+        }
         if !adopted.is_positive_definite() {
             return Err(Refusal::Noise);
         }
+        adopted.bound(&Self::LAYOUT);
         self.upkeep.started(estimate.time_ns);
         self.estimate = Some(estimate);
         self.covariance = adopted;
@@ -79,7 +85,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if a covariance is not positive definite. The filter
+    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if a covariance is not positive definite. The filter
     /// is then as it was.
     pub fn relocate(
         &mut self,
@@ -88,6 +94,10 @@ impl<S: States, const N: usize> Eskf<S, N> {
         world_from_body: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
     ) -> Result<(), Refusal> {
         let mut estimate = self.estimate.ok_or(Refusal::NotStarted)?;
+        let world_from_body = match world_from_body {
+            Some((turned, covariance)) => Some((unit(&turned).ok_or(Refusal::NonFinite)?, covariance)),
+            None => None,
+        };
         let before = self.covariance;
         estimate.position = position.0;
         self.covariance.set(POSITION, &position.1);
@@ -96,7 +106,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.covariance.set(VELOCITY, &covariance);
         }
         if let Some((world_from_body, covariance)) = world_from_body {
-            estimate.world_from_body = UnitQuaternion::new_normalize(world_from_body.into_inner());
+            estimate.world_from_body = world_from_body;
             self.covariance.set(ROTATION, &covariance);
         }
         estimate.keyframe = None;
@@ -107,15 +117,18 @@ impl<S: States, const N: usize> Eskf<S, N> {
                 self.covariance.forget(i, self.params.variance(state));
             }
         }
-        let refused = match (estimate.is_finite(), self.covariance.is_positive_definite()) {
-            (true, true) => None,
-            (true, false) => Some(Refusal::Noise),
-            (false, _) => Some(Refusal::NonFinite),
+        let is_there = estimate.is_plausible();
+        let refused = match (estimate.is_finite(), is_there, self.covariance.is_positive_definite()) {
+            (true, true, true) => None,
+            (true, true, false) => Some(Refusal::Noise),
+            (true, false, _) => Some(Refusal::OutOfRange),
+            (false, ..) => Some(Refusal::NonFinite),
         };
         if let Some(refusal) = refused {
             self.covariance = before;
             return Err(refusal);
         }
+        self.covariance.bound(&Self::LAYOUT);
         self.estimate = Some(estimate);
         self.upkeep.started(estimate.time_ns);
         Ok(())
@@ -127,10 +140,11 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let (Some(estimate), Some(first)) = (&mut self.estimate, offset::<S>(Optional::Keyframe)) else { return };
         let (position, world_from_body) = (estimate.position, estimate.world_from_body);
         estimate.keyframe = Some(Keyframe { id, position, world_from_body });
+        // Far above rounding, far below what any sensor resolves. It keeps the covariance regular.
+        let variances = self.covariance.matrix().diagonal();
+        let differs = |first: usize| COPY * variances.fixed_rows::<3>(first).max();
+        let (position, rotation) = (differs(POSITION), differs(ROTATION));
         for i in 0..3 {
-            // Far above rounding, far below what any sensor resolves. It keeps the covariance regular.
-            let differs = |index: usize| COPY * self.covariance.matrix()[(index, index)];
-            let (position, rotation) = (differs(POSITION + i), differs(ROTATION + i));
             self.covariance.copy(POSITION + i, first + i, position);
             self.covariance.copy(ROTATION + i, first + 3 + i, rotation);
         }
@@ -140,14 +154,17 @@ impl<S: States, const N: usize> Eskf<S, N> {
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if that has a component that is not finite. The filter is then as it was.
+    /// [`Refusal::NonFinite`] if that has a component that is not finite, or its rotation is none, [`Refusal::OutOfRange`] if it
+    /// is absurdly far. The filter is then as it was.
     pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
         let Some(estimate) = &mut self.estimate else { return Ok(()) };
-        let mut components = new_from_old.translation.vector.iter().chain(new_from_old.rotation.coords.iter());
-        if !components.all(|x| x.is_finite()) {
-            return Err(Refusal::NonFinite);
+        let translation = &new_from_old.translation.vector;
+        let is_finite = translation.iter().all(|x| x.is_finite());
+        let rotation = unit(&new_from_old.rotation).filter(|_| is_finite).ok_or(Refusal::NonFinite)?;
+        if !is_on_earth(translation) {
+            return Err(Refusal::OutOfRange);
         }
-        let rotation = new_from_old.rotation;
+        let new_from_old = Isometry3::from_parts(new_from_old.translation, rotation);
         estimate.position = new_from_old.transform_point(&estimate.position.into()).coords;
         estimate.velocity = rotation * estimate.velocity;
         estimate.world_from_body = rotation * estimate.world_from_body;
@@ -164,6 +181,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.covariance.transform(first, &rotation);
             self.covariance.transform(first + 3, &rotation);
         }
+        self.covariance.enforce();
         Ok(())
     }
 
@@ -177,6 +195,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             return Err(Refusal::Noise);
         }
         self.covariance.inflate(error, variance);
+        self.covariance.bound(&Self::LAYOUT);
         Ok(())
     }
 }

@@ -7,10 +7,11 @@ use super::propagation::Transition;
 use super::sample::{ImuMean, LONGEST_GAP_S, seconds_between};
 use super::start::Start;
 use crate::attitude::ParamsError;
-use crate::navigation::covariance::{Covariance, MOST_ROTATION, MOST_VARIANCE};
+use crate::navigation::covariance::Covariance;
 use crate::navigation::fused::Fused;
 use crate::navigation::fusion::{Weighed, innovation, prepared};
-use crate::navigation::math::{Integrals, exp};
+use crate::navigation::layout::Layout;
+use crate::navigation::math::{Integrals, exp, sqrt};
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
@@ -23,18 +24,8 @@ use crate::params::Params as _;
 /// A correction of the rotation below this squared angle, rad², leaves the covariance as it is: to rounding, the same.
 const RESET: f64 = 1e-12;
 
-/// The largest variances of position, velocity and rotation.
-const LIMITS: [f64; 9] = [
-    MOST_VARIANCE,
-    MOST_VARIANCE,
-    MOST_VARIANCE,
-    MOST_VARIANCE,
-    MOST_VARIANCE,
-    MOST_VARIANCE,
-    MOST_ROTATION,
-    MOST_ROTATION,
-    MOST_ROTATION,
-];
+/// A larger correction, rad, is transferred as one by so much: first order says nothing there, and by a whole turn Γ1 is singular.
+const LARGEST_RESET: f64 = 1.0;
 
 /// An error-state Kalman filter with the optional states `S` and `N` errors in all; see the [module](super).
 ///
@@ -66,6 +57,8 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
 }
 
 impl<S: States, const N: usize> Eskf<S, N> {
+    pub(super) const LAYOUT: Layout<N> = Layout::of::<S>();
+
     /// Makes a filter that has not started.
     ///
     /// # Errors
@@ -92,10 +85,12 @@ impl<S: States, const N: usize> Eskf<S, N> {
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite or the orientation no rotation, [`Refusal::Noise`] if a covariance is
+    /// [`Refusal::NonFinite`] if a value is not finite or the orientation no rotation, [`Refusal::OutOfRange`] if it is absurdly
+    /// large, [`Refusal::Noise`] if a covariance is
     /// not positive definite. The filter is then as it was.
     pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
-        let (estimate, covariance) = start.state::<S, N>(&self.params)?;
+        let (estimate, mut covariance) = start.state::<S, N>(&self.params)?;
+        covariance.bound(&Self::LAYOUT);
         self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
@@ -124,7 +119,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         transition.apply(self.covariance.rows_mut(), &self.densities);
-        self.covariance.bound(&LIMITS);
+        self.covariance.bound(&Self::LAYOUT);
         self.decay(dt);
         Ok(())
     }
@@ -139,7 +134,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
                 continue;
             }
             let factor = exp(-dt / process.time_s);
-            let variance = process.deviation * process.deviation * (1.0 - factor * factor);
+            let variance = self.params.variance(*state) * (1.0 - factor * factor);
             for i in first..first + state.dimension() {
                 estimate.optional[i] *= factor;
                 self.covariance.decay(i, factor, variance);
@@ -161,7 +156,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.specific_force = estimate.world_from_body.inverse_transform_vector(&up);
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         transition.apply(self.covariance.rows_mut(), &self.params.gap_densities());
-        self.covariance.bound(&LIMITS);
+        self.covariance.bound(&Self::LAYOUT);
+        self.covariance.enforce();
         self.upkeep.bridged();
         self.decay(dt);
         Ok(())
@@ -211,14 +207,13 @@ impl<S: States, const N: usize> Eskf<S, N> {
         gate: Gate,
     ) -> Result<Fused, Refusal> {
         let model = self.linearised(stream, measurement)?;
-        let weighed = Weighed::new(&mut self.covariance, stream, &model, gate)?;
+        let weighed = Weighed::new(&mut self.covariance, stream, &model, gate, &Self::LAYOUT)?;
         let error = weighed.innovation.mean();
-        let corrected = self.estimate.as_ref().ok_or(Refusal::NotStarted)?.corrected::<S>(&error);
-        // Of finite numbers all is finite, unless they are beyond all reason.
-        if !corrected.is_finite() {
+        if !Self::LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
-            return Err(Refusal::NonFinite);
+            return Err(Refusal::OutOfRange);
         }
+        let corrected = self.estimate.as_ref().ok_or(Refusal::NotStarted)?.corrected::<S>(&error);
         self.estimate = Some(corrected);
         self.covariance.update(&weighed.innovation);
         if Self::fixes_position(&model) {
@@ -228,6 +223,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         if let Some(index) = offset::<S>(Optional::Keyframe) {
             self.reset_rotation(index + 3, &error);
         }
+        self.covariance.settle(&Self::LAYOUT);
         Ok(weighed.fused())
     }
 
@@ -254,8 +250,12 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// The errors are about the corrected rotation from now on: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.
     fn reset_rotation(&mut self, index: usize, error: &SVector<f64, N>) {
-        let correction = error.fixed_rows::<3>(index).into_owned();
-        if correction.norm_squared() > RESET {
+        let mut correction = error.fixed_rows::<3>(index).into_owned();
+        let squared = correction.norm_squared();
+        if squared > RESET {
+            if squared > LARGEST_RESET * LARGEST_RESET {
+                correction *= LARGEST_RESET / sqrt(squared);
+            }
             let jacobian = Integrals::new(&correction).first_matrix(&correction);
             self.covariance.transform(index, &jacobian);
         }

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
 use super::params::EskfParams;
 use crate::navigation::covariance::Covariance;
+use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, States, VELOCITY, offset,
@@ -80,12 +81,12 @@ impl Start {
             let variance = params.variance(*state);
             (first..first + state.dimension()).for_each(|i| covariance.forget(i, variance));
         }
-        let norm = self.world_from_body.norm();
+        let world_from_body = unit(&self.world_from_body).ok_or(Refusal::NonFinite)?;
         let estimate = Estimate {
             time_ns: self.time_ns,
             position: self.position,
             velocity: self.velocity,
-            world_from_body: UnitQuaternion::new_normalize(self.world_from_body.into_inner()),
+            world_from_body,
             accelerometer_bias: self.accelerometer_bias,
             gyroscope_bias: self.gyroscope_bias,
             angular_velocity: Vector3::zeros(),
@@ -93,8 +94,11 @@ impl Start {
             keyframe: None,
             optional: SVector::zeros(),
         };
-        if !estimate.is_finite() || !(0.5..2.0).contains(&norm) {
+        if !estimate.is_finite() {
             return Err(Refusal::NonFinite);
+        }
+        if !estimate.is_plausible() {
+            return Err(Refusal::OutOfRange);
         }
         if !covariance.is_positive_definite() {
             return Err(Refusal::Noise);

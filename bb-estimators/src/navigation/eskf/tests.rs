@@ -1,6 +1,7 @@
 //! The transition and every Jacobian against numeric differentiation, and the laws of the filter.
 
 mod adopt;
+mod attack;
 mod cases;
 mod consistency;
 mod jacobians;

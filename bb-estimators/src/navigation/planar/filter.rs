@@ -6,11 +6,12 @@ use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES,
 use super::measurement::PlanarMeasurement;
 use super::params::PlanarParams;
 use super::propagation::Transition;
-use crate::attitude::ParamsError;
+use crate::attitude::{MAX_ANGULAR_VELOCITY, ParamsError};
 use crate::navigation::covariance::{Covariance, MOST_ROTATION, MOST_VARIANCE};
 use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S, seconds_between};
 use crate::navigation::fused::Fused;
 use crate::navigation::fusion::{Weighed, prepared};
+use crate::navigation::layout::{Layout, is_on_earth, is_within};
 use crate::navigation::math::{exp, wrapped};
 use crate::navigation::measurement::Linearised;
 use crate::navigation::refusal::Refusal;
@@ -18,8 +19,16 @@ use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
-/// The largest variances of position, heading and velocity.
-const LIMITS: [f64; 5] = [MOST_VARIANCE, MOST_VARIANCE, MOST_ROTATION, MOST_VARIANCE, MOST_VARIANCE];
+const LAYOUT: Layout<STATES> = {
+    let mut layout = Layout::EMPTY;
+    layout.set((POSITION, 2), 0, MOST_VARIANCE);
+    layout.set((HEADING, 1), 1, MOST_ROTATION);
+    layout.set((VELOCITY, 2), 2, MOST_VARIANCE);
+    layout.set((GYROSCOPE_BIAS, 1), 3, MAX_ANGULAR_VELOCITY * MAX_ANGULAR_VELOCITY);
+    // A hundred of the largest deviation that its parameter accepts.
+    layout.set((WHEEL_SCALE, 1), 4, 1e4);
+    layout
+};
 
 /// A variance that is taken as known, where 0 would make the matrix singular.
 const KNOWN: f64 = 1e-24;
@@ -91,6 +100,11 @@ impl PlanarStart {
         if !estimate.is_finite() {
             return Err(Refusal::NonFinite);
         }
+        if !is_on_earth(estimate.position.iter().chain(&estimate.velocity))
+            || !is_within([&estimate.gyroscope_bias], MAX_ANGULAR_VELOCITY)
+        {
+            return Err(Refusal::OutOfRange);
+        }
         if !covariance.is_positive_definite() {
             return Err(Refusal::Noise);
         }
@@ -127,10 +141,11 @@ impl PlanarEkf {
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if a covariance is not positive definite. The filter
+    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if a covariance is not positive definite. The filter
     /// is then as it was.
     pub fn start(&mut self, start: &PlanarStart) -> Result<(), Refusal> {
-        let (estimate, covariance) = start.state(&self.params)?;
+        let (estimate, mut covariance) = start.state(&self.params)?;
+        covariance.bound(&LAYOUT);
         self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
@@ -168,7 +183,10 @@ impl PlanarEkf {
             let variance = scale.deviation * scale.deviation * (1.0 - factor * factor);
             self.covariance.decay(WHEEL_SCALE, factor, variance.max(KNOWN));
         }
-        self.covariance.bound(&LIMITS);
+        self.covariance.bound(&LAYOUT);
+        if is_gap {
+            self.covariance.enforce();
+        }
         Ok(())
     }
 
@@ -198,17 +216,18 @@ impl PlanarEkf {
         let mut model = Linearised::new();
         measurement.linearise(estimate, &mut model)?;
         let model = prepared(model, stream)?;
-        let weighed = Weighed::new(&mut self.covariance, stream, &model, Gate::Closed)?;
-        let corrected = estimate.corrected(&weighed.innovation.mean());
-        if !corrected.is_finite() {
+        let weighed = Weighed::new(&mut self.covariance, stream, &model, Gate::Closed, &LAYOUT)?;
+        let error = weighed.innovation.mean();
+        if !LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
-            return Err(Refusal::NonFinite);
+            return Err(Refusal::OutOfRange);
         }
-        *estimate = corrected;
+        *estimate = estimate.corrected(&error);
         self.covariance.update(&weighed.innovation);
+        self.covariance.settle(&LAYOUT);
         let sees_position = |row: &[f64; STATES]| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0;
         if model.jacobian.iter().any(sees_position) {
-            self.upkeep.fixed_ns = corrected.time_ns;
+            self.upkeep.fixed_ns = estimate.time_ns;
         }
         Ok(weighed.fused())
     }
@@ -219,7 +238,7 @@ impl PlanarEkf {
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::Noise`] if a covariance is not positive definite. The filter
+    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if a covariance is not positive definite. The filter
     /// is then as it was.
     pub fn relocate(
         &mut self,
@@ -243,9 +262,15 @@ impl PlanarEkf {
         if !estimate.is_finite() {
             return Err(Refusal::NonFinite);
         }
+        if !is_on_earth(estimate.position.iter().chain(&estimate.velocity))
+            || !is_within([&estimate.gyroscope_bias], MAX_ANGULAR_VELOCITY)
+        {
+            return Err(Refusal::OutOfRange);
+        }
         if !covariance.is_positive_definite() {
             return Err(Refusal::Noise);
         }
+        covariance.bound(&LAYOUT);
         self.estimate = Some(estimate);
         self.covariance = covariance;
         self.upkeep.started(estimate.time_ns);

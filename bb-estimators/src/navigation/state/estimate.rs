@@ -5,6 +5,8 @@ use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 use super::states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
+use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
+use crate::navigation::layout::{is_on_earth, is_within};
 use crate::navigation::math::{renormalised, rotation, rotation_vector};
 
 /// Pose at an earlier time that relative poses refer to.
@@ -124,6 +126,13 @@ impl<const N: usize> Estimate<N> {
             keyframe: None,
             optional: SVector::zeros(),
         }
+    }
+
+    /// Whether a filter may begin here: no component is absurdly large, or not a number.
+    pub(in crate::navigation) fn is_plausible(&self) -> bool {
+        is_on_earth(self.position.iter().chain(&self.velocity))
+            && is_within(&self.accelerometer_bias, MAX_SPECIFIC_FORCE)
+            && is_within(&self.gyroscope_bias, MAX_ANGULAR_VELOCITY)
     }
 
     /// Whether every component is a number.

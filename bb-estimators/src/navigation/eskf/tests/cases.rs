@@ -196,6 +196,29 @@ fn the_covariance_stays_positive_definite() {
     assert_eq!(covariance, &covariance.transpose());
 }
 
+/// Fixes of a millimetre and of a metre in turn.
+#[test]
+#[ignore = "takes a minute in release: cargo test --release -p bb-estimators --lib -- --ignored hundred_million"]
+fn the_covariance_stays_positive_definite_through_a_hundred_million_updates() {
+    let mut filter: Plain = started();
+    let mut stream = Stream::default();
+    for i in 1..=100_000_000_i64 {
+        let rest = ImuMean {
+            time_ns: i * 10_000_000,
+            angular_velocity: Vector3::zeros(),
+            specific_force: Vector3::new(0.0, 0.0, EskfParams::default().gravity),
+        };
+        filter.propagate(&rest).unwrap();
+        let deviation = if i % 2 == 0 { 1e-3 } else { 1.0 };
+        filter.update(&mut stream, &GnssPosition::new(Vector3::zeros(), deviation, deviation)).unwrap();
+        if i % 1_000_000 == 0 {
+            assert!(filter.is_consistent(), "after {i}");
+            assert_eq!(filter.covariance(), &filter.covariance().transpose());
+        }
+    }
+    assert_eq!((filter.repairs(), stream.counts().fused), (0, 100_000_000));
+}
+
 #[test]
 fn the_output_is_predicted_to_any_time_within_a_sample() {
     let mut filter: Plain = started();

@@ -98,17 +98,22 @@ impl EskfStrategy {
     pub(super) fn measure<F: ProvidedFactor>(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
         let streams = &mut self.streams;
         let fused = match measured {
-            Measured::Relative(pose) => self.filter.update(&mut streams.relative, pose)?,
-            Measured::Anchor(pose, trust) => self.filter.update(trusting(&mut streams.anchors, *trust), pose)?,
+            Measured::Relative(pose) => self.filter.update(&mut streams.relative, pose).map_err(absurd)?,
+            Measured::Anchor(pose, trust) => {
+                self.filter.update(trusting(&mut streams.anchors, *trust), pose).map_err(absurd)?
+            }
             Measured::Gnss(position, velocity, trust) => {
-                let fused = self.filter.update(trusting(&mut streams.positions, *trust), position)?;
+                let stream = trusting(&mut streams.positions, *trust);
+                let fused = self.filter.update(stream, position).map_err(absurd)?;
                 if let Some(velocity) = velocity {
                     // A receiver whose position is good is trusted, whether its velocity is or not.
                     let _ = self.filter.update(&mut streams.velocities, velocity);
                 }
                 fused
             }
-            Measured::Provided(factor) => update(&mut self.filter, &mut streams.provided, *factor)?,
+            Measured::Provided(factor) => {
+                update(&mut self.filter, &mut streams.provided, *factor).map_err(absurd)?
+            }
         };
         let pose = self.pose().filter(Pose::is_finite).ok_or(Failure::Fatal(Refusal::NonFinite))?;
         // What was measured at a keyframe belongs to it.
@@ -189,6 +194,14 @@ impl EskfStrategy {
             pose.covariance = block * pose.covariance * block.transpose();
         }
         Ok(())
+    }
+}
+
+/// What would move the filter farther than anything on the Earth goes is fatal, as it is to the smoother.
+fn absurd(refusal: Refusal) -> Failure {
+    match refusal {
+        Refusal::OutOfRange => Failure::Fatal(refusal),
+        _ => Failure::Refused(refusal),
     }
 }
 

@@ -1,0 +1,240 @@
+//! Bad and extreme input: each case broke the covariance, or moved what it says nothing about, before it was met.
+
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+
+use super::super::*;
+use super::{ALL, All, sample, started};
+use crate::navigation::Refusal;
+use crate::navigation::measurement::{
+    AbsolutePose, BarometricHeight, BodyVelocity, GnssPosition, GnssVelocity, Height, MagneticField, RelativePose,
+    WheelSpeed, ZeroVelocity,
+};
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, POSITION, ROTATION, States, VELOCITY,
+};
+use crate::navigation::stream::{Stream, StreamParams};
+
+type Plain = Eskf<Navigation, NAVIGATION>;
+
+fn open() -> Stream {
+    Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() })
+}
+
+/// By a whole turn, the Jacobian of the reset is singular.
+#[test]
+fn a_correction_by_whole_turns_keeps_the_covariance_regular() {
+    for turns in [1.0, 2.0, 3.0] {
+        let mut filter: Plain = started();
+        for i in 1..100 {
+            filter.propagate(&sample(i)).unwrap();
+        }
+        // Chosen so that the correction about up is that.
+        let variance = filter.covariance()[(ROTATION + 2, ROTATION + 2)];
+        let residual = core::f64::consts::TAU * turns * (variance + Turned::VARIANCE) / variance;
+        filter.update(&mut open(), &Turned(residual)).unwrap();
+        assert!(filter.is_consistent(), "{turns}");
+        let least = filter.covariance().symmetric_eigenvalues().min();
+        assert!(least > 0.0, "{turns}: {least}");
+    }
+}
+
+/// A rotation error that is measured as it is.
+#[derive(Clone, Copy, Debug)]
+struct Turned(f64);
+
+impl Turned {
+    const VARIANCE: f64 = 1e-6;
+}
+
+impl crate::navigation::Measurement<3> for Turned {
+    fn linearise<S: States, const N: usize>(
+        &self,
+        _: &crate::navigation::Estimate<N>,
+        model: &mut crate::navigation::Linearised<3, N>,
+    ) -> Result<(), Refusal> {
+        model.set_residual(0, &Vector3::new(0.0, 0.0, self.0));
+        model.set_noise(0, &(Matrix3::identity() * Self::VARIANCE));
+        model.set_block(0, ROTATION, &Matrix3::identity());
+        Ok(())
+    }
+}
+
+#[test]
+fn a_noise_that_is_no_covariance_is_refused() {
+    let mut filter: Plain = started();
+    let before = filter;
+    let indefinite = Matrix3::new(1.0, 2.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    let asymmetric = Matrix3::new(1.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    let negative = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, 1.0));
+    let without_variance = Matrix3::new(1.0, 0.1, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let mut stream = Stream::default();
+    for covariance in [indefinite, asymmetric, negative, without_variance] {
+        let fix = GnssPosition { covariance, ..GnssPosition::new(Vector3::zeros(), 1.0, 1.0) };
+        assert_eq!(filter.update(&mut stream, &fix), Err(Refusal::Noise), "{covariance}");
+        assert_eq!(filter, before);
+    }
+    assert_eq!(stream.counts().invalid, 4);
+    // What is known exactly, and what is known in one direction alone, is a covariance.
+    let flat = Matrix3::new(1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0);
+    for covariance in [Matrix3::zeros(), flat] {
+        let fix = GnssPosition { covariance, ..GnssPosition::new(Vector3::zeros(), 1.0, 1.0) };
+        filter.update(&mut stream, &fix).unwrap();
+        assert!(filter.is_consistent(), "{covariance}");
+    }
+}
+
+#[test]
+fn what_is_nowhere_on_the_earth_is_refused() {
+    let mut filter: Plain = started();
+    let before = filter;
+    let mut stream = open();
+    let far = Vector3::new(1e127, 0.0, 0.0);
+    assert_eq!(filter.update(&mut stream, &GnssPosition::new(far, 1.0, 1.0)), Err(Refusal::OutOfRange));
+    assert_eq!(stream.counts().invalid, 1);
+    let known = Matrix3::identity();
+    assert_eq!(filter.relocate((far, known), None, None), Err(Refusal::OutOfRange));
+    assert_eq!(filter.relocate((Vector3::zeros(), known), Some((far, known)), None), Err(Refusal::OutOfRange));
+    let level = UnitQuaternion::identity();
+    let start = |position, velocity| Start::at(0, (position, 1.0), (velocity, 1.0), (level, 0.1));
+    assert_eq!(filter.start(&start(far, Vector3::zeros())), Err(Refusal::OutOfRange));
+    assert_eq!(filter.start(&start(Vector3::zeros(), far)), Err(Refusal::OutOfRange));
+    let spun = Start { gyroscope_bias: far, ..start(Vector3::zeros(), Vector3::zeros()) };
+    assert_eq!(filter.start(&spun), Err(Refusal::OutOfRange));
+    let away = Isometry3::from_parts(Translation3::from(far), level);
+    assert_eq!(filter.move_world(&away), Err(Refusal::OutOfRange));
+    let none = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(0.1, 0.2, 0.0, 0.0));
+    let turned = Isometry3::from_parts(Translation3::identity(), none);
+    assert_eq!(filter.move_world(&turned), Err(Refusal::NonFinite));
+    assert_eq!(filter.relocate((Vector3::zeros(), known), None, Some((none, known))), Err(Refusal::NonFinite));
+    assert_eq!(filter, before);
+}
+
+/// A wheel whose scale is known, and forgets at once that it is.
+#[test]
+fn a_state_without_deviation_keeps_the_covariance_regular() {
+    let params = EskfParams { wheel_scale: GaussMarkov::new(0.0, 1e-3), ..EskfParams::default() };
+    let mut filter = Eskf::<All, ALL>::new(params).unwrap();
+    let at_rest = Start::at(0, (Vector3::zeros(), 2.0), (Vector3::zeros(), 0.5), (UnitQuaternion::identity(), 0.1));
+    filter.start(&at_rest).unwrap();
+    for i in 1..2000 {
+        filter.propagate(&sample(i)).unwrap();
+        assert!(filter.is_consistent(), "after {i}");
+    }
+}
+
+/// The sum of the height and the barometer's bias, far better than both.
+#[test]
+fn what_is_measured_exactly_again_and_again_keeps_the_covariance_regular() {
+    let mut filter: Eskf<All, ALL> = started();
+    let mut stream = open();
+    for i in 0..20 {
+        filter.update(&mut stream, &BarometricHeight { height: 1.0, deviation: 1e-12 }).unwrap();
+        assert!(filter.is_consistent(), "after {i}");
+    }
+}
+
+/// Fixes that jump: the position is raised and moved; what they say nothing about stays as it is, to the last bit.
+#[test]
+fn a_filter_that_gives_way_changes_what_was_wrong_alone() {
+    let mut filter: Plain = started();
+    let mut stream = Stream::default();
+    for i in 1..=2000 {
+        filter.propagate(&sample(i)).unwrap();
+        let at = filter.estimate().unwrap().position;
+        if i % 20 == 0 {
+            filter.update(&mut stream, &GnssPosition::new(at, 0.5, 0.5)).unwrap();
+        }
+    }
+    for jump in [300.0, 5e4, 1e6] {
+        let before = filter;
+        let at = before.estimate().unwrap().position;
+        let far = GnssPosition::new(at + Vector3::new(jump, -jump, 0.0), 0.5, 0.5);
+        for _ in 0..3 {
+            assert!(matches!(filter.update(&mut stream, &far), Err(Refusal::Gate { .. })), "{jump}");
+        }
+        let fused = filter.update(&mut stream, &far).unwrap();
+        assert!(fused.raised > 1.0 && filter.is_consistent());
+        let (old, new) = (before.estimate().unwrap(), filter.estimate().unwrap());
+        assert!((new.position - far.position).norm() < 2.0, "{jump}: {}", new.position - far.position);
+        assert_eq!((old.velocity, old.world_from_body), (new.velocity, new.world_from_body), "{jump}");
+        assert_eq!((old.accelerometer_bias, old.gyroscope_bias), (new.accelerometer_bias, new.gyroscope_bias));
+        for first in [VELOCITY, ROTATION, ACCELEROMETER_BIAS, GYROSCOPE_BIAS] {
+            for i in first..first + 3 {
+                assert_eq!(before.covariance()[(i, i)], filter.covariance()[(i, i)], "{jump}: {i}");
+            }
+        }
+        assert!(filter.covariance()[(POSITION, POSITION)] < 0.5, "the fix says where it is");
+    }
+}
+
+/// Numbers of all sizes, and what is none.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        12 => -3.0..3.0,
+        1 => any::<f64>(),
+        1 => prop_oneof![Just(1e300), Just(-1e154), Just(5e-324), Just(0.0), Just(1e9), Just(f64::NAN)],
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// No gate, exact sensors and absurd ones, samples of any length.
+    #[test]
+    fn nothing_breaks_the_covariance(
+        steps in proptest::collection::vec((0..12_u8, proptest::collection::vec(number(), 12), 0..8_u8), 30..100),
+        patience in 0..4_u32,
+        is_gated in any::<bool>(),
+    ) {
+        let mut filter: Eskf<All, ALL> = started();
+        let gate = if is_gated { 1e-4 } else { 0.0 };
+        let mut stream = Stream::new(StreamParams { gate, patience, ..StreamParams::default() });
+        let (mut time_ns, mut updates) = (0_i64, 0);
+        for (kind, x, size) in steps {
+            let vector = |i: usize| Vector3::new(x[i], x[i + 1], x[i + 2]);
+            let deviation = x[9].abs() * 10_f64.powi(-i32::from(size));
+            let turned = UnitQuaternion::from_scaled_axis(vector(3).map(|x| x.clamp(-9.0, 9.0)));
+            let before = filter;
+            let result = match kind {
+                0 => filter.update(&mut stream, &GnssPosition { lever_arm: vector(3), ..GnssPosition::new(vector(0), deviation, deviation) }),
+                1 => filter.update(&mut stream, &GnssVelocity { lever_arm: vector(3), ..GnssVelocity::new(vector(0), deviation, deviation) }),
+                2 => filter.update(&mut stream, &Height { height: x[0], deviation }),
+                3 => filter.update(&mut stream, &BarometricHeight { height: x[0], deviation }),
+                4 => filter.update(&mut stream, &MagneticField { field: vector(0), reference: vector(3), deviation }),
+                5 => filter.update(&mut stream, &AbsolutePose::new((vector(0), deviation), (turned, deviation))),
+                6 => filter.update(&mut stream, &RelativePose::new(7, (vector(0), deviation), (turned, deviation))),
+                7 => filter.update(&mut stream, &ZeroVelocity { deviation }),
+                8 => filter.update(&mut stream, &BodyVelocity { velocity: vector(0), deviation, body_from_sensor: turned, lever_arm: vector(6) }),
+                9 => filter.update(&mut stream, &WheelSpeed { speed: x[0], deviation, forward: vector(3), lever_arm: vector(6) }),
+                10 => {
+                    filter.set_keyframe(7);
+                    continue;
+                }
+                _ => {
+                    time_ns += 10_000_000 * if size == 7 { 300 } else { 1 };
+                    let specific_force = vector(3) + Vector3::z() * 9.8;
+                    let _ = filter.propagate(&ImuMean { time_ns, angular_velocity: vector(0), specific_force });
+                    continue;
+                }
+            };
+            updates += 1;
+            if result.is_err() {
+                prop_assert_eq!(&filter, &before);
+            }
+            let counts = stream.counts();
+            prop_assert_eq!(counts.fused + counts.gate + counts.invalid + counts.not_applicable, updates);
+            let covariance = filter.covariance();
+            prop_assert!(covariance.iter().all(|x| x.is_finite()), "{:?}", result);
+            prop_assert_eq!(covariance, &covariance.transpose());
+            // Up to rounding: of variances that differ by sixteen orders no smaller one is left.
+            let deviations = covariance.diagonal().map(f64::sqrt);
+            let correlation = covariance.map_with_location(|i, j, x| x / (deviations[i] * deviations[j]));
+            let least = correlation.symmetric_eigenvalues().min();
+            prop_assert!(least > -1e-12, "{}", least);
+            let estimate = filter.estimate().unwrap();
+            prop_assert!(estimate.position.iter().chain(&estimate.velocity).all(|x| x.is_finite()));
+            prop_assert!((estimate.world_from_body.norm() - 1.0).abs() < 1e-9);
+        }
+    }
+}
