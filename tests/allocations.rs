@@ -2,13 +2,13 @@
 //! it replaces the allocator by one that counts.
 
 use bb_core::component::InputTransforms;
-use bb_core::nalgebra::{UnitQuaternion, Vector3};
+use bb_core::nalgebra::{UnitQuaternion, Vector2, Vector3};
 use bb_core::prelude::*;
 use bb_core::pubsub::Topic;
 use bb_estimators::attitude::ImuAndMagnetometer;
 use bb_estimators::navigation::{
-    AbsolutePose, EskfParams, FixedLagSmoother, GnssPosition, ImuMean, Kernel, Refusal, RelativePose,
-    SmootherParams, Start, Stream,
+    AbsolutePose, Camera, EskfParams, FixedLagSmoother, GnssPosition, ImuMean, Kernel, LandmarkParams, Observation,
+    Refusal, RelativePose, SmootherParams, Start, Stream,
 };
 use bb_estimators::{Madgwick, OrientationAverage};
 use std::future::Future;
@@ -184,6 +184,9 @@ fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>
     let params =
         SmootherParams { sensors, window: 12, factors: 4, relinearise_rotation: 1e-4, ..SmootherParams::default() };
     let mut smoother: FixedLagSmoother = FixedLagSmoother::new(params)?;
+    let camera = Camera::pinhole((400.0, 400.0), (320.0, 240.0), (640.0, 480.0));
+    smoother.set_camera(camera, LandmarkParams { landmarks: 40, ..LandmarkParams::default() })?;
+    let mut sights = Stream::default();
     let (rest, level) = (Vector3::zeros(), UnitQuaternion::identity());
     let mut streams = [Stream::default(); 2];
     let [poses, odometry] = &mut streams;
@@ -209,6 +212,18 @@ fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>
             let fix = GnssPosition::new(Vector3::new(0.0, f64::NAN * f64::from(late == 3), 0.0), 2.0, 4.0);
             let _ = smoother.add(poses, k.saturating_sub(late * 5), fix);
         }
+        // A camera that looks up: tracks of twenty keyframes, some late, some wrong, and more new ones than there is room for.
+        for landmark in 0..12 {
+            let (age, generation) = ((k + landmark) % 20, (k + landmark) / 20);
+            let pixel = Vector2::new(30.0 * age as f64 + 20.0, 40.0 * landmark as f64 + sway);
+            let id = landmark + 100 * generation;
+            let place = (Vector3::new(0.5 * sway, 0.0, 30.0), 20.0);
+            let guess = (landmark % 3 == 0).then_some(place);
+            let seen = Observation { guess, ..Observation::new(id, pixel, 5.0) };
+            let _ = smoother.observe(&mut sights, k.saturating_sub(landmark % 4), &seen);
+            let new = Observation::new(1_000_000 + 20 * k + landmark, pixel, 1.0);
+            let _ = smoother.observe(&mut sights, k, &new);
+        }
         moved += smoother.update()?.relinearised;
         let _ = (smoother.estimate(), smoother.pose_covariance(), smoother.smoothed(k.saturating_sub(5)));
         Ok(())
@@ -229,6 +244,8 @@ fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>
         counts.gate > 20 && counts.recoveries > 0 && counts.invalid > 20 && counts.not_applicable > 20,
         "{counts:?}"
     );
+    let seen = sights.counts();
+    assert!(seen.fused + seen.weighed_down > 500 && seen.gate > 20 && seen.not_applicable > 100, "{seen:?}");
     assert!(moved > 100 && smoother.gaps() > 10 && smoother.marginalised() > 900, "{moved}");
     Ok(())
 }

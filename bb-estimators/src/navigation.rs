@@ -17,6 +17,8 @@
 
 mod alignment;
 mod bank;
+#[cfg(feature = "smoother")]
+mod camera;
 pub mod chi_square;
 mod consistency;
 mod covariance;
@@ -46,6 +48,8 @@ mod upkeep;
 
 pub use alignment::{Alignment, AlignmentParams};
 pub use bank::Bank;
+#[cfg(feature = "smoother")]
+pub use camera::{Camera, Seen, Undistorted};
 pub use consistency::{Consistency, nees};
 pub use eskf::{Eskf, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
 #[cfg(feature = "runtime")]
@@ -68,7 +72,9 @@ pub use smoother::{Automatic, Differentiable, Expectation};
 #[cfg(any(feature = "smoother", feature = "eskf"))]
 pub use smoother::{Factor, Kernel, NavigationFactor, Rows};
 #[cfg(feature = "smoother")]
-pub use smoother::{FixedLagSmoother, Preintegration, SmootherParams, Updated};
+pub use smoother::{
+    FixedLagSmoother, LandmarkParams, Observation, Preintegration, Sighted, SmootherParams, Updated,
+};
 pub use state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
     States, VELOCITY, Wheeled, offset,

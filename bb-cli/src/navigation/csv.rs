@@ -1,10 +1,10 @@
 //! A data set as CSV files with one prefix: `_imu`, `_keyframes`, `_truth`, `_init`, `_noise`, and whichever there are of
-//! `_vio`, `_anchor` and `_gps`.
+//! `_vio`, `_anchor`, `_gps`, `_obs` with `_landmarks`, and `_camera`.
 
 use super::data::{DEVIATIONS, DataSet, Keyframe, Noise, Sample, Truth, nanoseconds};
-use bb_core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use bb_estimators::navigation::{AbsolutePose, GnssPosition, RelativePose, Start};
-use std::collections::HashMap;
+use bb_core::nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector2, Vector3};
+use bb_estimators::navigation::{AbsolutePose, Camera, GnssPosition, Observation, RelativePose, Start};
+use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -82,6 +82,7 @@ impl DataSet {
             let (horizontal, vertical) = (row.deviation(5)?, row.deviation(6)?);
             Ok((row.index(0)? as u64, GnssPosition::new(row.position(2)?, horizontal, vertical)))
         })?;
+        let seen = seen(prefix)?;
         let data = Self {
             prefix: prefix.to_owned(),
             samples,
@@ -92,11 +93,57 @@ impl DataSet {
             anchors: anchors.into_iter().collect(),
             fixes: fixes.into_iter().collect(),
             velocities: HashMap::new(),
+            camera: (!seen.is_empty()).then(|| camera(prefix)).transpose()?,
+            seen,
             fixes_beside_relative: false,
             antenna: Vector3::zeros(),
         };
         Ok(data.referred())
     }
+}
+
+/// What the camera sees, by keyframe; a landmark comes with what is known of it beforehand where it is seen first.
+fn seen(prefix: &Path) -> Result<HashMap<u64, Vec<Observation>>, String> {
+    let known = Rows::read_if_there(prefix, "landmarks", 8)?.map(|row| {
+        let (place, deviation) = (row.position(4)?, row.deviation(7)?);
+        Ok((row.index(0)? as u64, (place, deviation)))
+    })?;
+    let known: HashMap<_, _> = known.into_iter().collect();
+    let rows = Rows::read_if_there(prefix, "obs", 5)?.map(|row| {
+        let pixel = Vector2::new(row.0[2], row.0[3]);
+        Ok((row.index(0)? as u64, Observation::new(row.index(1)? as u64, pixel, row.deviation(4)?)))
+    })?;
+    let (mut seen, mut begun) = (HashMap::<u64, Vec<Observation>>::new(), HashSet::new());
+    for (keyframe, mut observation) in rows {
+        if begun.insert(observation.landmark) {
+            observation.guess = known.get(&observation.landmark).copied();
+        }
+        seen.entry(keyframe).or_default().push(observation);
+    }
+    Ok(seen)
+}
+
+/// The camera of a file `_camera`: focal lengths, principal point, size, distortion k1, k2, k3, p1, p2, and its pose on the body
+/// as a quaternion and a position. Without one, that of the simulated flights.
+fn camera(prefix: &Path) -> Result<Camera, String> {
+    let rows = Rows::read_if_there(prefix, "camera", 18)?;
+    if rows.rows.is_empty() {
+        let down = Matrix3::new(0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
+        return Ok(Camera {
+            body_from_camera: UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(down)),
+            position: Vector3::new(0.1, 0.0, -0.05),
+            ..Camera::pinhole((458.0, 458.0), (376.0, 240.0), (752.0, 480.0))
+        });
+    }
+    rows.first(|row| {
+        let pair = |first: usize| (row.0[first], row.0[first + 1]);
+        Ok(Camera {
+            distortion: core::array::from_fn(|i| row.0[6 + i]),
+            body_from_camera: row.rotation(11)?,
+            position: row.vector(15),
+            ..Camera::pinhole(pair(0), pair(2), pair(4))
+        })
+    })
 }
 
 /// Time, angular velocity and specific force.

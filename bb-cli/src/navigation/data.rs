@@ -1,7 +1,9 @@
 //! A drive or a flight: what was measured, and the truth.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
-use bb_estimators::navigation::{AbsolutePose, BodyVelocity, GnssPosition, RelativePose, Start};
+use bb_estimators::navigation::{
+    AbsolutePose, BodyVelocity, Camera, GnssPosition, Observation, RelativePose, Start,
+};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -24,6 +26,10 @@ pub struct DataSet {
     pub(crate) anchors: HashMap<u64, AbsolutePose>,
     pub(crate) fixes: HashMap<u64, GnssPosition>,
     pub(crate) velocities: HashMap<u64, BodyVelocity>,
+    /// What sees landmarks, if there are any.
+    pub(crate) camera: Option<Camera>,
+    /// The landmarks that each keyframe sees; smoothers alone use them.
+    pub(crate) seen: HashMap<u64, Vec<Observation>>,
     /// Whether filters, too, use fixes where there are relative poses; smoothers always do.
     pub(crate) fixes_beside_relative: bool,
     /// The point of the body whose position the truth without an orientation tells, m.

@@ -81,6 +81,9 @@ impl FromStr for NavigationSetting {
     }
 }
 
+/// Whether smoothers use landmarks.
+const LANDMARKS: &str = "landmarks";
+
 /// What is set of bags alone: where filters start, and the noise of what tells none.
 const OF_BAGS: [&str; 6] = [
     "heading",
@@ -94,15 +97,26 @@ const OF_BAGS: [&str; 6] = [
 impl NavigationSetting {
     fn apply(&self, params: &mut EskfParams, options: &mut NavigationOptions) -> Result<(), String> {
         let Self { name, value } = self;
+        if name == LANDMARKS {
+            return value.parse::<bool>().map(drop).map_err(|_| format!("`{value}` is not `true` or `false`"));
+        }
         let set = if OF_BAGS.contains(&&**name) { options.set(name, value) } else { params.set(name, value) };
         set.map_err(|error| error.to_string())
     }
 }
 
+/// Whether smoothers use landmarks: unless the last that is set says otherwise.
+pub(crate) fn uses_landmarks(settings: &[NavigationSetting]) -> bool {
+    settings.iter().rfind(|setting| setting.name == LANDMARKS).is_none_or(|setting| setting.value == "true")
+}
+
 /// The parameters of all of them, for `--list`.
 pub(crate) fn listed() -> String {
     let of_bags = parameters(&NavigationOptions::default(), |name| OF_BAGS.contains(&name));
-    format!("{}\nof bags:\n{of_bags}", parameters(&EskfParams::default(), |_| true))
+    format!(
+        "{}\nof smoothers:\n  {LANDMARKS} = true\nof bags:\n{of_bags}",
+        parameters(&EskfParams::default(), |_| true)
+    )
 }
 
 impl NavigationFilter {

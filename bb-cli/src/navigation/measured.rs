@@ -2,18 +2,20 @@
 
 use super::data::DataSet;
 use bb_estimators::navigation::{
-    AbsolutePose, BodyVelocity, Fused, GnssPosition, Navigator, Refusal, RelativePose,
+    AbsolutePose, BodyVelocity, Fused, GnssPosition, Navigator, Observation, Refusal, RelativePose,
 };
 
 /// Whatever there is, in the order in which it is fused.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Measured {
+pub(crate) struct Measured<'a> {
     pub(crate) relative: Option<RelativePose>,
     pub(crate) anchor: Option<AbsolutePose>,
     /// Whether a filter uses the fix.
     pub(crate) filters_take_fixes: bool,
     pub(crate) fix: Option<GnssPosition>,
     pub(crate) velocity: Option<BodyVelocity>,
+    /// Landmarks.
+    pub(crate) seen: &'a [Observation],
 }
 
 /// A kind of measurement.
@@ -48,14 +50,15 @@ impl Sensor {
 /// What became of the measurements at a keyframe, in the order of [`Sensor::ALL`].
 pub(crate) type Answers = [Option<Result<Fused, Refusal>>; 4];
 
-impl Measured {
-    pub(crate) fn at(data: &DataSet, keyframe: u64) -> Self {
+impl<'a> Measured<'a> {
+    pub(crate) fn at(data: &'a DataSet, keyframe: u64) -> Self {
         Self {
             relative: data.relative.get(&keyframe).copied(),
             anchor: data.anchors.get(&keyframe).copied(),
             filters_take_fixes: data.relative.is_empty() || data.fixes_beside_relative,
             fix: data.fixes.get(&keyframe).copied(),
             velocity: data.velocities.get(&keyframe).copied(),
+            seen: data.seen.get(&keyframe).map_or(&[], Vec::as_slice),
         }
     }
 

@@ -1,14 +1,14 @@
 //! A filter while a data set is played: what all of them are asked for.
 
 use super::data::{DataSet, Keyframe, nanoseconds};
-use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params};
+use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params, uses_landmarks};
 use super::flown::Flown;
 use super::measured::{Answers, Measured};
 use super::step::{Known, Step};
 use bb_core::nalgebra::Matrix6;
 use bb_estimators::navigation::{
-    FixedLagSmoother, ImuMean, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional, POSITION, ROTATION,
-    Refusal, SmootherParams, Start, States, Stream, StreamParams,
+    FixedLagSmoother, ImuMean, LandmarkParams, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional,
+    POSITION, ROTATION, Refusal, SmootherParams, Start, States, Stream, StreamParams,
 };
 use std::time::Instant;
 
@@ -38,6 +38,10 @@ pub(crate) struct Smoothed {
     poses: Stream,
     relative: Stream,
     velocities: Stream,
+    landmarks: Stream,
+    /// Observations of landmarks that were refused at the last keyframe.
+    unseen: u64,
+    is_watching: bool,
 }
 
 impl Player {
@@ -56,7 +60,13 @@ impl Player {
         let smoothed = |is_bank: bool| {
             let twin = if is_bank { Some(navigator(true)?) } else { None };
             let params = SmootherParams { sensors, window, ..SmootherParams::default() };
-            let smoother = Smoother::new(params).map_err(|error| error.to_string())?;
+            let mut smoother = Smoother::new(params).map_err(|error| error.to_string())?;
+            let camera = data.camera.filter(|_| uses_landmarks(settings));
+            if let Some(camera) = camera {
+                // So many that a data set of any density fits.
+                let params = LandmarkParams { landmarks: 2000, ..LandmarkParams::default() };
+                smoother.set_camera(camera, params).map_err(|error| error.to_string())?;
+            }
             // As in a bank: fixes are not gated.
             let gnss = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
             let gated = Stream::default();
@@ -68,6 +78,9 @@ impl Player {
                 poses: gated,
                 relative: gated,
                 velocities: gated,
+                landmarks: gated,
+                unseen: 0,
+                is_watching: camera.is_some(),
             })))
         };
         match filter.kind {
@@ -224,6 +237,7 @@ impl Smoothed {
         step.keyframe_s = began.elapsed().as_secs_f64();
         step.allocations = counted.count_total;
         step.answer(result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?);
+        step.refused += self.unseen;
         self.learn(Some(k));
         Ok(())
     }
@@ -238,6 +252,12 @@ impl Smoothed {
             measured.fix.map(|fix| smoother.add(&mut self.gnss, k, fix)),
             measured.velocity.map(|velocity| smoother.add(&mut self.velocities, k, velocity)),
         ];
+        self.unseen = 0;
+        if self.is_watching {
+            for observation in measured.seen {
+                self.unseen += u64::from(smoother.observe(&mut self.landmarks, k, observation).is_err());
+            }
+        }
         smoother.update()?;
         let _ = (smoother.estimate(), smoother.pose_covariance());
         Ok(answers)

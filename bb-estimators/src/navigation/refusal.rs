@@ -43,6 +43,11 @@ pub enum Refusal {
         /// The keyframe.
         id: u64,
     },
+    /// The keyframe has seen this landmark already.
+    Repeated {
+        /// The landmark.
+        landmark: u64,
+    },
     /// The measurement says nothing in this state: the heading of a body that points up, say.
     NotObservable,
     /// Older than the history reaches.
@@ -73,6 +78,7 @@ impl fmt::Display for Refusal {
             }
             Self::NoKeyframe { id } => write!(f, "keyframe {id} is not held"),
             Self::Full { id } => write!(f, "keyframe {id} has as many factors as it takes"),
+            Self::Repeated { landmark } => write!(f, "the keyframe has seen landmark {landmark} already"),
             Self::NotObservable => f.write_str("the measurement says nothing in this state"),
             Self::TooOld { time_ns } => write!(f, "time stamp {time_ns} ns is older than the history"),
             Self::InTheFuture { time_ns } => write!(f, "time stamp {time_ns} ns is in the future"),

@@ -19,11 +19,22 @@
 //! linearised where it was from then on: a direction that nothing observes, heading without a compass for one, then stays
 //! unobserved.
 //!
+//! # Landmarks
+//!
+//! [`FixedLagSmoother::set_camera`] gives it a camera, and [`FixedLagSmoother::observe`] points that it sees. Each is eliminated
+//! when it is added, which ties all keyframes that saw it; these ties go along the elimination of the chain, see
+//! `coupling.rs` and `landmark.rs`. When its first keyframe leaves, what it says of the others stays as a prior on them, and they
+//! keep their linearisation points.
+//!
+//! # Robustness
+//!
 //! Nothing is inverted that may be singular, and no system is refused as indeterminate: what is not known has a variance that
 //! says so.
 
 #[cfg(feature = "autodiff")]
 mod automatic;
+#[cfg(feature = "smoother")]
+mod coupling;
 #[cfg(feature = "smoother")]
 mod elimination;
 #[cfg(feature = "smoother")]
@@ -37,6 +48,10 @@ mod kernel;
 #[cfg(feature = "smoother")]
 mod keyframe;
 #[cfg(feature = "smoother")]
+mod landmark;
+#[cfg(feature = "smoother")]
+mod landmarks;
+#[cfg(feature = "smoother")]
 mod link;
 #[cfg_attr(not(feature = "smoother"), expect(dead_code, reason = "a filter needs none of it but the check"))]
 mod matrix;
@@ -46,6 +61,10 @@ mod params;
 mod preintegration;
 mod relative;
 mod rows;
+#[cfg(feature = "smoother")]
+mod scratch;
+#[cfg(feature = "smoother")]
+mod sight;
 #[cfg(feature = "smoother")]
 mod solution;
 #[cfg(all(test, feature = "smoother"))]
@@ -58,9 +77,11 @@ pub use factor::{Factor, NavigationFactor};
 pub use filter::FixedLagSmoother;
 pub use kernel::Kernel;
 #[cfg(feature = "smoother")]
-pub use params::SmootherParams;
+pub use params::{LandmarkParams, SmootherParams};
 #[cfg(feature = "smoother")]
 pub use preintegration::Preintegration;
 pub use rows::{MOST_ROWS, Rows};
+#[cfg(feature = "smoother")]
+pub use sight::{Observation, Sighted};
 #[cfg(feature = "smoother")]
 pub use solution::Updated;

@@ -56,7 +56,7 @@ pub struct Counts {
     pub gate: u64,
     /// [`Refusal::NonFinite`], [`Refusal::OutOfRange`] and [`Refusal::Noise`].
     pub invalid: u64,
-    /// [`Refusal::NoKeyframe`], [`Refusal::Full`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
+    /// [`Refusal::NoKeyframe`], [`Refusal::Full`], [`Refusal::Repeated`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
     pub not_applicable: u64,
     /// [`Refusal::TooOld`], [`Refusal::TimeNotIncreasing`] and [`Refusal::Gap`].
     pub late: u64,
@@ -208,7 +208,11 @@ impl Stream {
             }
             Err(Refusal::NonFinite | Refusal::OutOfRange | Refusal::Noise) => self.counts.invalid += 1,
             Err(
-                Refusal::NoKeyframe { .. } | Refusal::Full { .. } | Refusal::NotObservable | Refusal::NotStarted,
+                Refusal::NoKeyframe { .. }
+                | Refusal::Full { .. }
+                | Refusal::Repeated { .. }
+                | Refusal::NotObservable
+                | Refusal::NotStarted,
             ) => {
                 self.counts.not_applicable += 1;
             }

@@ -89,6 +89,8 @@ pub(super) fn data_set(
         anchors: numbered(&anchors, &numbers),
         fixes: numbered(&fixes, &numbers),
         velocities: numbered(&velocities, &numbers),
+        camera: None,
+        seen: HashMap::new(),
         fixes_beside_relative: true,
         antenna: sensors.antenna,
         keyframes,

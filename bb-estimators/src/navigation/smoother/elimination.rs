@@ -15,6 +15,28 @@ use super::matrix::{Root, Square, add_gram, axpy, dot, mirror, times, transpose_
 use super::rows::{MOST_ROWS, Rows};
 use crate::navigation::math::ln;
 
+/// What the elimination of a keyframe makes of its ties to later poses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Carried<const N: usize> {
+    /// `Gᵀ (I + M Q)⁻¹`, for the next keyframe.
+    pub(super) carry: Square<N>,
+    /// A root of Q': `spreadᵀ spread = Q'`.
+    pub(super) spread: Square<N>,
+    /// `g + Q' (v - M g)`: where it would be if the next were where it is linearised.
+    pub(super) at: [f64; N],
+}
+
+/// See [`Pivot::respond`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Response<const N: usize> {
+    /// `R⁻ᵀ v`.
+    pub(super) mean: [f64; N],
+    /// What later poses are pushed by, times the ties.
+    pub(super) at: [f64; N],
+    /// What arrives at the next keyframe.
+    pub(super) next: [f64; N],
+}
+
 /// A keyframe, eliminated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pivot<const N: usize> {
@@ -66,6 +88,57 @@ impl<const N: usize> Pivot<N> {
         message
     }
 
+    /// What eliminating it makes of its ties to later poses, after [`eliminate`](Self::eliminate); see `coupling.rs`.
+    pub(super) fn carried(&self, link: &Link<N>) -> Carried<N> {
+        let mut identity = zeros();
+        for i in 0..N {
+            identity[i][i] = 1.0;
+        }
+        // Xᵀ S⁻ᵀ R⁻ᵀ
+        let lower = self.inner.solve_transposed_rows(&self.root.solve_transposed_rows(&identity));
+        let mut carry = zeros();
+        for k in 0..N {
+            for i in 0..N {
+                axpy(&mut carry[i], self.through[k][i], &lower[k]);
+            }
+        }
+        // Q' = Lᵀ (I + L M Lᵀ)⁻¹ L with Q = Lᵀ L: nothing cancels.
+        let noise = Root::of(&link.noise).upper;
+        let weighted = self.root.times_rows(&transposed(&noise));
+        let mut inner = identity;
+        add_gram(&mut inner, &weighted);
+        let spread = Root::of(&inner).solve_transposed_rows(&noise);
+        let mut rest = self.mean;
+        for i in 0..N {
+            rest[i] -= dot(&self.root.upper[i], &link.offset);
+        }
+        let rest = transpose_times(&self.root.upper, &rest);
+        let mut at = link.offset;
+        axpy(&mut at, 1.0, &transpose_times(&spread, &times(&spread, &rest)));
+        Carried { carry, spread, at }
+    }
+
+    /// What information `arrived` on this keyframe says of it alone and of the next, if all else is zero.
+    pub(super) fn respond(&self, link: &Link<N>, arrived: &[f64; N]) -> Response<N> {
+        let mean = self.root.solve_transposed(arrived);
+        let half = self.inner.solve_transposed(&mean);
+        let weighted = transpose_times(&self.root.upper, &self.inner.solve(&half));
+        Response { mean, at: times(&link.noise, &weighted), next: transpose_times(&self.through, &half) }
+    }
+
+    /// The mean of this keyframe then, as `back_pulled`.
+    pub(super) fn respond_back(
+        &self,
+        mean: &[f64; N],
+        link: &Link<N>,
+        next: &[f64; N],
+        pull: &[f64; N],
+    ) -> [f64; N] {
+        let mut mean = *mean;
+        axpy(&mut mean, -1.0, &self.root.solve_transposed(pull));
+        self.back_from(&mean, link, &[0.0; N], next)
+    }
+
     /// The mean of the newest keyframe.
     pub(super) fn newest(&self) -> [f64; N] {
         self.root.solve(&self.mean)
@@ -74,9 +147,21 @@ impl<const N: usize> Pivot<N> {
     /// The mean of this keyframe, given that of the next.
     #[inline]
     pub(super) fn back(&self, link: &Link<N>, next: &[f64; N]) -> [f64; N] {
+        self.back_from(&self.mean, link, &link.offset, next)
+    }
+
+    /// The same where it is tied to later poses as well: by `C P`.
+    pub(super) fn back_pulled(&self, link: &Link<N>, next: &[f64; N], pull: &[f64; N]) -> [f64; N] {
+        let mut mean = self.mean;
+        axpy(&mut mean, -1.0, &self.root.solve_transposed(pull));
+        self.back_from(&mean, link, &link.offset, next)
+    }
+
+    #[inline]
+    fn back_from(&self, known: &[f64; N], link: &Link<N>, offset: &[f64; N], next: &[f64; N]) -> [f64; N] {
         let mut mean = times(&link.back, next);
-        axpy(&mut mean, 1.0, &link.offset);
-        let mut missing = self.mean;
+        axpy(&mut mean, 1.0, offset);
+        let mut missing = *known;
         for i in 0..N {
             missing[i] -= dot(&self.root.upper[i], &mean);
         }

@@ -2,10 +2,12 @@
 
 use nalgebra::{Matrix6, SMatrix};
 
+use super::coupling::{Coupling, POSE, place};
 use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::link::predicted;
 use super::matrix::{Square, mirror};
+use super::scratch::Scratch;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
@@ -71,8 +73,73 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// keyframes after it.
     pub fn smoothed_covariance(&self, id: u64) -> Option<SMatrix<f64, N, N>> {
         let index = self.window.iter().position(|keyframe| keyframe.id == id)?;
-        let covariance = self.covariance_at(index)?;
+        let covariance = if self.is_tied() {
+            self.covariance_tied(index, &mut Scratch::new(self.window.len()))?
+        } else {
+            self.covariance_at(index)?
+        };
         Some(SMatrix::from_fn(|i, j| covariance[i][j]))
+    }
+
+    /// The same, without taking memory.
+    pub(super) fn covariance_now(&mut self, index: usize) -> Option<Square<N>> {
+        if !self.is_tied() {
+            return self.covariance_at(index);
+        }
+        let mut scratch = core::mem::take(&mut self.scratch);
+        let covariance = self.covariance_tied(index, &mut scratch);
+        self.scratch = scratch;
+        covariance
+    }
+
+    /// The covariance where landmarks tie keyframes: column by column, what the window makes of an impulse.
+    fn covariance_tied(&self, index: usize, scratch: &mut Scratch<N>) -> Option<Square<N>> {
+        let newest = self.newest_covariance()?;
+        if index + 1 == self.window.len() {
+            return Some(newest);
+        }
+        let coupling = &self.landmarks.as_ref()?.coupling;
+        let mut covariance = [[0.0; N]; N];
+        for column in 0..N {
+            let mut impulse = [0.0; N];
+            impulse[column] = 1.0;
+            let response = self.response(index, impulse, coupling, scratch)?;
+            (0..N).for_each(|row| covariance[row][column] = response[row]);
+        }
+        Some(covariance)
+    }
+
+    /// What the correction of a keyframe is if there is no information vector but this, at that keyframe.
+    fn response(
+        &self,
+        index: usize,
+        impulse: [f64; N],
+        coupling: &Coupling<N>,
+        scratch: &mut Scratch<N>,
+    ) -> Option<[f64; N]> {
+        let last = self.window.len() - 1;
+        let Scratch { means, corrections, poses } = scratch;
+        poses.fill(0.0);
+        let mut arrived = impulse;
+        for k in index..last {
+            let (keyframe, next) = (self.window.get(k)?, self.window.get(k + 1)?);
+            let response = keyframe.pivot.respond(&next.link, &arrived);
+            *means.get_mut(k)? = response.mean;
+            coupling.push(k, &response.at, poses.get_mut(POSE * (k + 1)..POSE * (last + 1))?);
+            arrived = response.next;
+            for i in 0..POSE {
+                arrived[place(i)] += poses[POSE * (k + 1) + i];
+            }
+        }
+        let root = &self.window.get(last)?.pivot.root;
+        *corrections.get_mut(last)? = root.solve(&root.solve_transposed(&arrived));
+        for k in (index..last).rev() {
+            let (keyframe, next) = (self.window.get(k)?, self.window.get(k + 1)?);
+            let pull = coupling.pull(k, corrections.get(k + 1..=last)?.iter());
+            let correction = keyframe.pivot.respond_back(means.get(k)?, &next.link, corrections.get(k + 1)?, &pull);
+            *corrections.get_mut(k)? = correction;
+        }
+        corrections.get(index).copied()
     }
 
     pub(super) fn covariance_at(&self, index: usize) -> Option<Square<N>> {

@@ -8,10 +8,12 @@ use core::marker::PhantomData;
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::factor::{Factor, NavigationFactor};
-use super::keyframe::{Keyframe, Prior, after};
+use super::keyframe::{Keyframe, Prior, Window, after};
+use super::landmarks::Landmarks;
 use super::link::Information;
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
+use super::scratch::Scratch;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{EskfParams, ImuMean, LONGEST_GAP_S, Start, seconds_between};
 use crate::navigation::refusal::Refusal;
@@ -48,7 +50,7 @@ use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, State
 #[derive(Clone, Debug)]
 pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION, F = NavigationFactor> {
     pub(super) params: SmootherParams,
-    pub(super) window: VecDeque<Box<Keyframe<F, N>>>,
+    pub(super) window: Window<F, N>,
     /// Keyframes that are not in the window.
     pub(super) spare: Vec<Box<Keyframe<F, N>>>,
     /// Since the newest keyframe.
@@ -59,6 +61,9 @@ pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION,
     pub(super) dirty: usize,
     /// Keyframes before this one may have an older correction than could be had.
     pub(super) exact_from: usize,
+    /// None without a camera.
+    pub(super) landmarks: Option<Landmarks<N>>,
+    pub(super) scratch: Scratch<N>,
     pub(super) gaps: u32,
     pub(super) marginalised: u64,
     pub(super) states: PhantomData<S>,
@@ -100,6 +105,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             last: ImuMean { time_ns: 0, angular_velocity: rest, specific_force: rest },
             dirty: 0,
             exact_from: 0,
+            landmarks: None,
+            scratch: Scratch::new(params.window + 1),
             gaps: 0,
             marginalised: 0,
             states: PhantomData,
@@ -192,6 +199,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
 
     /// Begins a window with one keyframe.
     pub(super) fn begin(&mut self, id: u64, point: Estimate<N>, prior: Prior<N>) {
+        if let Some(landmarks) = &mut self.landmarks {
+            landmarks.clear();
+        }
         let Some(mut keyframe) = self.spare.pop() else { return };
         let motion = Preintegration::new(point.accelerometer_bias, point.gyroscope_bias);
         keyframe.renew(id, point, &motion);
@@ -262,6 +272,10 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let Some(mut keyframe) = self.spare.pop() else { return Err(Refusal::NotStarted) };
         keyframe.renew(id, point, &self.motion);
         keyframe.linearise::<S>(self.window.back().map(|before| &**before), &self.params);
+        if let Some(landmarks) = &mut self.landmarks {
+            landmarks.coupling.append(self.window.len());
+            landmarks.judged = None;
+        }
         self.window.push_back(keyframe);
         self.dirty = self.dirty.min(self.window.len() - 1);
         self.motion = Preintegration::new(point.accelerometer_bias, point.gyroscope_bias);
@@ -269,10 +283,11 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 
     /// The oldest keyframe leaves.
-    fn marginalise(&mut self) {
+    pub(super) fn marginalise(&mut self) {
         if self.dirty <= 1 {
             self.eliminate(2);
         }
+        self.release();
         let Some(oldest) = self.window.pop_front() else { return };
         self.spare.push(oldest);
         if let Some(next) = self.window.front_mut() {
@@ -285,6 +300,21 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.dirty = self.dirty.saturating_sub(1);
         self.exact_from = self.exact_from.saturating_sub(1);
         self.marginalised = self.marginalised.wrapping_add(1);
+    }
+
+    /// What landmarks say of the oldest keyframe goes on to the others.
+    fn release(&mut self) {
+        let Some(landmarks) = &mut self.landmarks else { return };
+        let len = self.window.len();
+        if !landmarks.coupling.is_tied() {
+            landmarks.release(&mut self.window);
+            landmarks.coupling.leave_untied();
+            return;
+        }
+        landmarks.release(&mut self.window);
+        if let (Some(oldest), Some(next)) = (self.window.front(), self.window.get(1)) {
+            landmarks.coupling.leave(len, &oldest.pivot.carried(&next.link));
+        }
     }
 
     /// How many gaps were bridged.

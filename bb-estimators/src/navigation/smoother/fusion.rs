@@ -51,6 +51,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let missing = Refusal::NoKeyframe { id };
         // Ids increase, but not always by one.
         let index = self.window.iter().rposition(|keyframe| keyframe.id == id).ok_or(missing)?;
+        if let Some(landmarks) = &mut self.landmarks {
+            landmarks.judged = None;
+        }
         let trust = 1.0 / stream.noise_factor();
         let mut rows = Rows::new();
         let keyframe = self.window.get(index).ok_or(missing)?;
@@ -95,23 +98,27 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Compares a factor with what is known so far. Corrections stay as they were at the last update, all but the newest.
     fn judged(&mut self, index: usize, rows: &Rows<N>, ties: bool) -> Option<Judged> {
         self.eliminate(self.window.len());
+        let is_newest = index + 1 == self.window.len();
         let newest = self.window.back_mut()?;
         newest.correction = newest.pivot.newest();
-        let is_newest = index + 1 == self.window.len();
-        let correction = self.correction_at(index)?;
-        let covariance = if is_newest { None } else { Some(self.covariance_at(index)?) };
+        let correction = if is_newest { newest.correction } else { self.correction_at(index)? };
+        let covariance = if is_newest { None } else { Some(self.covariance_now(index)?) };
         let keyframe = self.window.get(index)?;
         let known = covariance.as_ref().map_or(Known::Newest(&keyframe.pivot.root), Known::Other);
         if !ties {
             return judge(rows, &correction, &known);
         }
         let before = self.window.get(index.checked_sub(1)?)?;
-        let earlier = before.pivot.back(&keyframe.link, &correction);
+        let earlier = self.back(index - 1, &correction)?;
         judge_pair(rows, &before.pivot, &keyframe.link, (&earlier, &correction), &known)
     }
 
     /// The correction of a keyframe as it would be solved.
-    fn correction_at(&self, index: usize) -> Option<[f64; N]> {
+    fn correction_at(&mut self, index: usize) -> Option<[f64; N]> {
+        if self.is_tied() {
+            self.solve_all();
+            return Some(self.window.get(index)?.correction);
+        }
         let mut correction = self.window.back()?.correction;
         for index in (index..self.window.len() - 1).rev() {
             let (keyframe, next) = (self.window.get(index)?, self.window.get(index + 1)?);
@@ -132,8 +139,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
         let Some(keyframe) = self.window.back() else { return newest };
         let (id, point) = (keyframe.id, keyframe.estimate::<S>());
-        let mut information = keyframe.own;
-        information.add(&keyframe.incoming);
+        let mut information = keyframe.known();
         information.matrix.iter_mut().flatten().for_each(|x| *x /= factor);
         information.vector = [0.0; N];
         self.marginalised = self.marginalised.wrapping_add(newest as u64);

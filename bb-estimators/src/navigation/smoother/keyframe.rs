@@ -1,9 +1,12 @@
 //! A keyframe of the window: where it is linearised, and all that is held of it.
 
+use alloc::boxed::Box;
+use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use nalgebra::SVector;
 
+use super::coupling::{PoseInformation, place};
 use super::elimination::Pivot;
 use super::factor::Factor;
 use super::kernel::Kernel;
@@ -40,6 +43,9 @@ pub(super) struct Prior<const N: usize> {
     pub(super) mean: Option<Estimate<N>>,
 }
 
+/// The keyframes that are held, the oldest first.
+pub(super) type Window<F, const N: usize> = VecDeque<Box<Keyframe<F, N>>>;
+
 /// See the module.
 #[derive(Clone, Debug)]
 pub(super) struct Keyframe<F, const N: usize> {
@@ -62,6 +68,12 @@ pub(super) struct Keyframe<F, const N: usize> {
     pub(super) link: Link<N>,
     /// What the ones before say of it.
     pub(super) incoming: Information<N>,
+    /// What landmarks say of it, besides what those before it have of that.
+    pub(super) seen: PoseInformation,
+    /// Changes whenever it is linearised elsewhere.
+    pub(super) version: u32,
+    /// Whether a landmark that was marginalised is linearised about where it is.
+    pub(super) is_fixed: bool,
     pub(super) pivot: Pivot<N>,
 }
 
@@ -79,6 +91,9 @@ impl<F, const N: usize> Keyframe<F, N> {
             own: Information::none(),
             link: Link::none(),
             incoming: Information::none(),
+            seen: PoseInformation::none(),
+            version: 0,
+            is_fixed: false,
             pivot: Pivot::none(),
         }
     }
@@ -95,6 +110,23 @@ impl<F, const N: usize> Keyframe<F, N> {
         self.is_robust = false;
         self.own = Information::none();
         self.incoming = Information::none();
+        self.seen = PoseInformation::none();
+        self.version = self.version.wrapping_add(1);
+        self.is_fixed = false;
+    }
+
+    /// All that is known of it from what was measured at it and before, and from landmarks.
+    pub(super) fn known(&self) -> Information<N> {
+        let mut known = self.own;
+        known.add(&self.incoming);
+        for (i, row) in self.seen.matrix.iter().enumerate() {
+            known.vector[place(i)] += self.seen.vector[i];
+            // The places increase, so it is on and above the diagonal as well.
+            for (j, value) in row.iter().enumerate().skip(i) {
+                known.matrix[place(i)][place(j)] += value;
+            }
+        }
+        known
     }
 
     /// What is estimated.
@@ -104,7 +136,7 @@ impl<F, const N: usize> Keyframe<F, N> {
 
     /// Whether it may be linearised elsewhere.
     pub(super) fn is_free(&self) -> bool {
-        self.prior.is_none_or(|prior| prior.mean.is_some())
+        !self.is_fixed && self.prior.is_none_or(|prior| prior.mean.is_some())
     }
 
     /// Whether it is farther from where it was linearised than it may be.
@@ -120,6 +152,7 @@ impl<F, const N: usize> Keyframe<F, N> {
     pub(super) fn relinearise<S: States>(&mut self) {
         self.point = self.estimate::<S>();
         self.correction = [0.0; N];
+        self.version = self.version.wrapping_add(1);
     }
 }
 

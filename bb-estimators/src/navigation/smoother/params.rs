@@ -1,5 +1,6 @@
 //! How large the window is, and how it is solved.
 
+use super::kernel::Kernel;
 use crate::navigation::eskf::EskfParams;
 use crate::params::{Params, ParamsError};
 
@@ -62,6 +63,55 @@ impl SmootherParams {
         accept("relinearise_rotation", self.relinearise_rotation, (0.0, 1.0), "rad")?;
         accept("relinearise_position", self.relinearise_position, (0.0, 1e9), "m")?;
         accept("iterations", self.iterations as f64, (0.0, 100.0), "")
+    }
+}
+
+/// How landmarks are used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LandmarkParams {
+    /// How many are held at once; more are refused.
+    ///
+    /// Small: landmarks are refused although their tracks would help. Large: costs memory, about 4 kB each with a window of
+    /// 20. From 1 to 100,000.
+    ///
+    /// Unit: landmarks. Default: 512. Source: 100 in each image, with tracks of 10 keyframes in a window of 20.
+    pub landmarks: usize,
+    /// The angle between two directions from which a landmark can be triangulated; those with a guess need none.
+    ///
+    /// Small: landmarks are used sooner, where their distance is a guess. Large: later. From 1e-4 to 1.
+    ///
+    /// Unit: rad. Default: 0.02. Source: at 0.1° of noise, a distance known to a tenth.
+    pub parallax: f64,
+    /// How much an observation weighs that does not fit once it has passed the gate.
+    ///
+    /// Default: Huber's with 1.345·√2, as an observation has two numbers.
+    pub kernel: Kernel,
+    /// A landmark that is off by more of its distance from where it was linearised is linearised again.
+    ///
+    /// Small: as exact as a batch, at its cost. Large: errors of the second order stay. From 0 to 1.
+    ///
+    /// Default: 0.01. Source: leaves 1e-4 of the distance to the principal point, a twentieth of a pixel.
+    pub relinearise: f64,
+    /// After how many refusals in a row an id is taken to be that of another landmark now, and begins afresh.
+    ///
+    /// Small: a few wrong matches cost a landmark. Large: an id that was reused is refused for longer. From 1 to 1000.
+    ///
+    /// Unit: observations. Default: 3. Source: the patience of a stream.
+    pub patience: u32,
+}
+
+impl Default for LandmarkParams {
+    fn default() -> Self {
+        Self { landmarks: 512, parallax: 0.02, kernel: Kernel::Huber(1.9), relinearise: 0.01, patience: 3 }
+    }
+}
+
+impl LandmarkParams {
+    pub(super) fn check(&self) -> Result<(), ParamsError> {
+        accept("landmarks", self.landmarks as f64, (1.0, 1e5), "")?;
+        accept("parallax", self.parallax, (1e-4, 1.0), "rad")?;
+        accept("relinearise", self.relinearise, (0.0, 1.0), "")?;
+        accept("patience", f64::from(self.patience), (1.0, 1000.0), "")
     }
 }
 

@@ -30,18 +30,38 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
 
     /// Eliminates what has changed, and all that follows it, up to a keyframe.
     pub(super) fn eliminate(&mut self, end: usize) -> usize {
-        let end = end.min(self.window.len());
+        let len = self.window.len();
+        let end = end.min(len);
+        let mut coupling = self.landmarks.as_mut().map(|landmarks| &mut landmarks.coupling);
+        coupling = coupling.filter(|coupling| coupling.is_tied());
+        // What landmarks say of the poses is not kept as it is between: all is eliminated again, but for the newest alone.
+        let end = if coupling.is_some() { len } else { end };
+        if coupling.is_some() && self.dirty + 1 < len {
+            self.dirty = 0;
+        }
         let first = self.dirty;
+        let is_full = first == 0;
+        if let Some(coupling) = coupling.as_mut().filter(|_| is_full) {
+            coupling.begin(len);
+        }
         let window = self.window.make_contiguous();
         for index in first..end {
             let (before, after) = window.split_at_mut(index);
             let Some(keyframe) = after.first_mut() else { break };
             if let Some(before) = before.last_mut() {
                 keyframe.incoming = before.pivot.eliminate(&keyframe.link);
+                if let Some(coupling) = &mut coupling {
+                    let carried = before.pivot.carried(&keyframe.link);
+                    coupling.fold(index - 1, &carried, &mut keyframe.incoming.matrix);
+                    if is_full {
+                        coupling.pass(index - 1, len, &carried);
+                    }
+                }
             }
-            let mut known = keyframe.own;
-            known.add(&keyframe.incoming);
-            keyframe.pivot.take(&known);
+            if let Some(coupling) = coupling.as_mut().filter(|_| is_full) {
+                keyframe.seen = coupling.arrive(index, len);
+            }
+            keyframe.pivot.take(&keyframe.known());
         }
         self.dirty = self.dirty.max(end);
         self.exact_from = self.exact_from.max(first.min(self.window.len()));
@@ -57,16 +77,46 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
 
     /// The correction of a keyframe, from that of the next.
     fn solve_one(&mut self, index: usize) {
-        let window = self.window.make_contiguous();
-        let (these, after) = window.split_at_mut(index + 1);
-        if let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) {
-            keyframe.correction = keyframe.pivot.back(&next.link, &next.correction);
+        let next = self.window.get(index + 1).map(|next| next.correction);
+        let correction = next.and_then(|next| self.back(index, &next));
+        if let (Some(keyframe), Some(correction)) = (self.window.get_mut(index), correction) {
+            keyframe.correction = correction;
         }
+    }
+
+    /// The same, given that of the next.
+    pub(super) fn back(&self, index: usize, next: &[f64; N]) -> Option<[f64; N]> {
+        let (keyframe, after) = (self.window.get(index)?, self.window.get(index + 1)?);
+        let coupling = self.landmarks.as_ref().map(|landmarks| &landmarks.coupling);
+        let Some(coupling) = coupling.filter(|coupling| coupling.is_tied()) else {
+            return Some(keyframe.pivot.back(&after.link, next));
+        };
+        let later = self.window.range(index + 2..).map(|keyframe| &keyframe.correction);
+        let pull = coupling.pull(index, core::iter::once(next).chain(later));
+        Some(keyframe.pivot.back_pulled(&after.link, next, &pull))
+    }
+
+    /// Corrections of all keyframes.
+    pub(super) fn solve_all(&mut self) {
+        if let Some(newest) = self.window.back_mut() {
+            newest.correction = newest.pivot.newest();
+        }
+        self.solve_back(self.window.len().saturating_sub(1), 0);
+        self.exact_from = 0;
+    }
+
+    /// Whether landmarks tie keyframes to others than their neighbours.
+    pub(super) fn is_tied(&self) -> bool {
+        self.landmarks.as_ref().is_some_and(|landmarks| landmarks.coupling.is_tied())
     }
 
     /// Corrections of all keyframes that have changed by more than matters, at least of those from `least` on; the first of
     /// them.
     fn solve(&mut self, least: usize) -> usize {
+        if self.is_tied() {
+            self.solve_all();
+            return 0;
+        }
         let Some(newest) = self.window.back_mut() else { return 0 };
         newest.correction = newest.pivot.newest();
         let mut first = self.window.len() - 1;
@@ -99,6 +149,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             return Err(Refusal::NotStarted);
         }
         let mut updated = Updated::default();
+        if let Some(landmarks) = &mut self.landmarks {
+            landmarks.judged = None;
+        }
         for iteration in 0..=self.params.iterations {
             let least = self.dirty;
             updated.eliminated += self.eliminate(self.window.len());
@@ -139,6 +192,11 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
                 self.dirty = self.dirty.min(index);
             }
             is_next = is_off;
+        }
+        if let Some(landmarks) = &mut self.landmarks {
+            if landmarks.relinearise::<F, S>(&self.window) > 0 {
+                self.dirty = 0;
+            }
         }
         moved
     }

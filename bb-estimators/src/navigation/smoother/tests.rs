@@ -10,5 +10,9 @@ mod consistency;
 mod factors;
 mod flight;
 mod kernels;
+#[cfg(feature = "std")]
+mod landmarks;
 mod laws;
 mod preintegration;
+mod scenery;
+mod sights;

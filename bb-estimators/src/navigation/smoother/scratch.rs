@@ -1,0 +1,24 @@
+//! Room that is taken once.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::coupling::POSE;
+
+/// Room for what the covariance of an earlier keyframe takes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch<const N: usize> {
+    pub(super) means: Vec<[f64; N]>,
+    pub(super) corrections: Vec<[f64; N]>,
+    pub(super) poses: Vec<f64>,
+}
+
+impl<const N: usize> Scratch<N> {
+    pub(super) fn new(keyframes: usize) -> Self {
+        Self {
+            means: vec![[0.0; N]; keyframes],
+            corrections: vec![[0.0; N]; keyframes],
+            poses: vec![0.0; POSE * keyframes],
+        }
+    }
+}

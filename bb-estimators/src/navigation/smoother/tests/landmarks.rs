@@ -1,0 +1,235 @@
+//! Landmarks against a dense batch solution that has them as unknowns of their own, random problems.
+
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
+use proptest::prelude::*;
+
+use super::super::coupling::POSE;
+use super::super::landmark::Sight;
+use super::super::link::{Information, Link};
+use super::super::matrix::Square;
+use crate::navigation::camera::Undistorted;
+use crate::navigation::noise::Noise;
+use crate::navigation::{
+    Camera, FixedLagSmoother, Kernel, LandmarkParams, NAVIGATION, POSITION, ROTATION, SmootherParams, Start,
+};
+
+type Plain = FixedLagSmoother;
+const N: usize = NAVIGATION;
+
+fn square(matrix: &SMatrix<f64, N, N>) -> Square<N> {
+    core::array::from_fn(|i| core::array::from_fn(|j| matrix[(i, j)]))
+}
+
+fn random(noise: &mut Noise) -> SMatrix<f64, N, N> {
+    SMatrix::from_fn(|_, _| noise.next())
+}
+
+/// A smoother whose window holds a random problem, and the same as one dense system: keyframes first, then landmarks.
+struct Problem {
+    smoother: Plain,
+    matrix: DMatrix<f64>,
+    vector: DVector<f64>,
+    keyframes: usize,
+}
+
+impl Problem {
+    fn new(seed: u64, keyframes: usize, landmarks: usize) -> Self {
+        let mut noise = Noise::new(seed);
+        let params = SmootherParams { window: keyframes.max(2), ..SmootherParams::default() };
+        let mut smoother = Plain::new(params).unwrap();
+        let camera = Camera::pinhole((500.0, 500.0), (400.0, 300.0), (800.0, 600.0));
+        let of_landmarks = LandmarkParams { kernel: Kernel::Squares, landmarks, ..LandmarkParams::default() };
+        smoother.set_camera(camera, of_landmarks).unwrap();
+        let level = (UnitQuaternion::identity(), 1.0);
+        smoother.start(0, &Start::at(0, (Vector3::zeros(), 1.0), (Vector3::zeros(), 1.0), level)).unwrap();
+        let size = keyframes * N + 3 * landmarks;
+        let mut problem =
+            Self { smoother, matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), keyframes };
+        for k in 0..keyframes {
+            problem.keyframe(&mut noise, k);
+        }
+        for landmark in 0..landmarks {
+            problem.landmark(&mut noise, landmark);
+        }
+        problem.smoother.dirty = 0;
+        problem
+    }
+
+    fn keyframe(&mut self, noise: &mut Noise, k: usize) {
+        let root = random(noise);
+        let of_rank = SMatrix::<f64, N, N>::from_fn(|i, j| if k == 0 || i < k % 3 { root[(i, j)] } else { 0.0 });
+        let known = of_rank.transpose() * of_rank + SMatrix::identity() * if k == 0 { 0.5 } else { 0.0 };
+        let vector = known * SVector::<f64, N>::from_fn(|_, _| noise.next());
+        if k > 0 {
+            let mut keyframe = self.smoother.spare.pop().unwrap();
+            let point = self.smoother.window[0].point;
+            let motion = self.smoother.motion;
+            keyframe.renew(k as u64, point, &motion);
+            let len = self.smoother.window.len();
+            self.smoother.landmarks.as_mut().unwrap().coupling.append(len);
+            self.smoother.window.push_back(keyframe);
+            let back = random(noise) * 0.3 + SMatrix::identity();
+            let offset = SVector::<f64, N>::from_fn(|_, _| noise.next());
+            let root = random(noise);
+            let covariance = root * root.transpose() + SMatrix::identity() * 0.1;
+            self.smoother.window[k].link = Link {
+                back: square(&back),
+                offset: offset.into(),
+                noise: square(&covariance),
+                information: Information::none(),
+            };
+            let mut rows = DMatrix::zeros(N, 2 * N);
+            rows.view_mut((0, 0), (N, N)).fill_with_identity();
+            rows.view_mut((0, N), (N, N)).copy_from(&-back);
+            let weighted = rows.transpose() * covariance.try_inverse().unwrap();
+            let at = (k - 1) * N;
+            let mut view = self.matrix.view_mut((at, at), (2 * N, 2 * N));
+            view += &weighted * &rows;
+            let mut view = self.vector.rows_mut(at, 2 * N);
+            view += &weighted * offset;
+        }
+        self.smoother.window[k].prior = None;
+        self.smoother.window[k].own = Information { matrix: square(&known), vector: vector.into() };
+        let mut view = self.matrix.view_mut((k * N, k * N), (N, N));
+        view += known;
+        let mut view = self.vector.rows_mut(k * N, N);
+        view += vector;
+    }
+
+    /// A landmark with a prior that some of the keyframes see, added one by one, at once, or taken away in between.
+    fn landmark(&mut self, noise: &mut Noise, number: usize) {
+        let at = self.keyframes * N + 3 * number;
+        let mean = noise.vector(1.0);
+        let landmarks = self.smoother.landmarks.as_mut().unwrap();
+        let index = landmarks.begin(number as u64, Some((mean, 2.0))).unwrap();
+        let weight = 0.25;
+        for i in 0..3 {
+            self.matrix[(at + i, at + i)] += weight;
+        }
+        let landmark = &mut landmarks.all[index];
+        let mut order: Vec<usize> = (0..self.keyframes).filter(|_| noise.next() > -0.5).collect();
+        if noise.next() > 0.0 {
+            order.reverse();
+        }
+        let mut rows = [landmarks.coupling.row(), landmarks.coupling.row(), landmarks.coupling.row()];
+        for (turn, k) in order.into_iter().enumerate() {
+            let jacobian = Matrix2x3::from_fn(|_, _| noise.next());
+            let seen = Undistorted { direction: Vector2::zeros(), jacobian: Matrix2::identity() };
+            let sight = Sight {
+                serial: k as u64,
+                version: self.smoother.window[k].version,
+                seen,
+                precision: 1.0,
+                weight: 0.2 + noise.next().abs(),
+                jacobian,
+                residual: Vector2::from_fn(|_, _| noise.next()),
+                arm: noise.vector(2.0),
+            };
+            landmark.add_one(&sight, &mut landmarks.coupling, &mut rows, 1.0);
+            if turn % 3 == 2 {
+                landmark.add_one(&sight, &mut landmarks.coupling, &mut rows, -1.0);
+                landmark.add_one(&sight, &mut landmarks.coupling, &mut rows, 1.0);
+            }
+            landmark.insert(sight);
+            assert!(landmark.sum());
+            if turn % 2 == 1 {
+                landmark.add_to(&mut landmarks.coupling, &mut rows, -1.0);
+                landmark.add_to(&mut landmarks.coupling, &mut rows, 1.0);
+            }
+            // The same rows, of keyframe and landmark.
+            let mut dense = DMatrix::zeros(2, self.matrix.ncols());
+            dense.view_mut((0, k * N + POSITION), (2, 3)).copy_from(&-jacobian);
+            dense.view_mut((0, k * N + ROTATION), (2, 3)).copy_from(&(jacobian * sight.arm.cross_matrix()));
+            dense.view_mut((0, at), (2, 3)).copy_from(&jacobian);
+            self.matrix += dense.transpose() * &dense * sight.weight;
+            self.vector += dense.transpose() * sight.residual * sight.weight;
+        }
+    }
+}
+
+fn agrees(numbers: impl Iterator<Item = (f64, f64)>, what: &str) -> Result<(), TestCaseError> {
+    let pairs: Vec<_> = numbers.collect();
+    let scale = pairs.iter().map(|(_, batch)| batch.abs()).fold(0.0, f64::max);
+    for (here, batch) in pairs {
+        prop_assert!((here - batch).abs() <= 1e-9 * scale, "{what}: {here}, not {batch} (of {scale})");
+    }
+    Ok(())
+}
+
+/// Every correction and covariance of the window, and every landmark.
+fn compare(
+    smoother: &mut Plain,
+    left: usize,
+    covariance: &DMatrix<f64>,
+    solution: &DVector<f64>,
+    keyframes: usize,
+) -> Result<(), TestCaseError> {
+    smoother.eliminate(usize::MAX);
+    smoother.solve_all();
+    for index in 0..smoother.window.len() {
+        let at = (index + left) * N;
+        let mean = smoother.window[index].correction;
+        agrees((0..N).map(|i| (mean[i], solution[at + i])), "mean")?;
+        let known = smoother.covariance_now(index).unwrap();
+        let entries = (0..N * N).map(|e| (e / N, e % N));
+        agrees(entries.map(|(i, j)| (known[i][j], covariance[(at + i, at + j)])), "covariance")?;
+    }
+    let landmarks = smoother.landmarks.as_ref().unwrap();
+    for landmark in landmarks.all.iter().filter(|landmark| !landmark.sights.is_empty()) {
+        let at = keyframes * N + 3 * landmark.id as usize;
+        let correction = landmark.correction(&smoother.window, landmarks.coupling.first);
+        agrees((0..3).map(|i| (correction[i], solution[at + i])), "landmark")?;
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn it_is_the_batch(seed in any::<u64>(), keyframes in 1_usize..8, landmarks in 1_usize..9) {
+        let mut problem = Problem::new(seed, keyframes, landmarks);
+        let covariance = problem.matrix.clone().cholesky().unwrap().inverse();
+        let solution = &covariance * &problem.vector;
+        compare(&mut problem.smoother, 0, &covariance, &solution, keyframes)?;
+    }
+
+    /// What leaves the window is not lost: the others are as with all of them.
+    #[test]
+    fn marginalised_is_the_batch(seed in any::<u64>(), keyframes in 3_usize..8, landmarks in 1_usize..9) {
+        let mut problem = Problem::new(seed, keyframes, landmarks);
+        let covariance = problem.matrix.clone().cholesky().unwrap().inverse();
+        let solution = &covariance * &problem.vector;
+        for left in 1..keyframes - 1 {
+            problem.smoother.marginalise();
+            compare(&mut problem.smoother, left, &covariance, &solution, keyframes)?;
+            // From scratch as well.
+            problem.smoother.dirty = 0;
+            compare(&mut problem.smoother, left, &covariance, &solution, keyframes)?;
+        }
+    }
+
+    /// A keyframe that comes after costs no elimination of all, and is as if all were.
+    #[test]
+    fn the_newest_alone_is_as_all(seed in any::<u64>(), landmarks in 1_usize..6) {
+        let mut problem = Problem::new(seed, 5, landmarks);
+        problem.smoother.eliminate(usize::MAX);
+        problem.smoother.window[4].own.vector[2] += 1.0;
+        problem.smoother.window[4].own.matrix[2][2] += 1.0;
+        problem.vector[4 * N + 2] += 1.0;
+        problem.matrix[(4 * N + 2, 4 * N + 2)] += 1.0;
+        problem.smoother.dirty = 4;
+        prop_assert_eq!(problem.smoother.eliminate(usize::MAX), 1);
+        let covariance = problem.matrix.clone().cholesky().unwrap().inverse();
+        let solution = &covariance * &problem.vector;
+        problem.smoother.solve_all();
+        let mean = problem.smoother.window[0].correction;
+        agrees((0..N).map(|i| (mean[i], solution[i])), "mean")?;
+    }
+}
+
+#[test]
+fn rows_have_a_place_for_each_error_of_a_pose() {
+    let places: Vec<usize> = (0..POSE).map(super::super::coupling::place).collect();
+    assert_eq!(places, [POSITION, POSITION + 1, POSITION + 2, ROTATION, ROTATION + 1, ROTATION + 2]);
+}
