@@ -17,6 +17,7 @@
 
 mod alignment;
 mod bank;
+mod bounds;
 #[cfg(feature = "smoother")]
 mod camera;
 pub mod chi_square;

@@ -15,12 +15,6 @@ const LEAST_NOISE: f64 = 1e-10;
 /// better than its terms, rounding would take the rest.
 const LEAST_REST: f64 = 1e-13;
 
-/// The largest variance of a position or a velocity that says anything: 10,000 km, or as much a second.
-pub(in crate::navigation) const MOST_VARIANCE: f64 = 1e14;
-
-/// The largest variance of a rotation error, rad²: a hundred turns are as good as one.
-pub(in crate::navigation) const MOST_ROTATION: f64 = 4e5;
-
 /// Where an update leaves less than this ratio of a variance, rounding may take the rest: the covariance is checked at once.
 const RISKY: f64 = 1e-8;
 

@@ -1,6 +1,6 @@
 //! What the errors of a filter are, beside their order.
 
-use super::covariance::{MOST_ROTATION, MOST_VARIANCE};
+use super::bounds::{MOST_ROTATION, MOST_VARIANCE};
 use super::state::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY,
 };
@@ -9,20 +9,8 @@ use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 /// A variance above this part of the largest is that of a filter that is lost, whose covariance rounding may break.
 const LOST: f64 = 1e-4;
 
-/// No position or velocity of anything on the Earth has a larger component, m or m/s.
-const FARTHEST: f64 = 1e9;
-
 /// No correction is larger than so many of the largest deviations.
 const MOST_DEVIATIONS: f64 = 100.0;
-
-/// Whether something on the Earth may be at such a position, or have such a velocity, m or m/s. Not if it is not a number.
-pub(in crate::navigation) fn is_on_earth<'a>(components: impl IntoIterator<Item = &'a f64>) -> bool {
-    is_within(components, FARTHEST)
-}
-
-pub(in crate::navigation) fn is_within<'a>(components: impl IntoIterator<Item = &'a f64>, most: f64) -> bool {
-    components.into_iter().all(|x| x.abs() <= most)
-}
 
 /// Which errors are one quantity, and the largest variance of each that says anything.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::filter::Eskf;
+use crate::navigation::bounds::is_on_earth;
 use crate::navigation::covariance::Covariance;
-use crate::navigation::layout::is_on_earth;
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{

@@ -131,19 +131,12 @@ impl<S: States, const N: usize> Filter<S, N> {
         let own = (estimate.velocity, block(VELOCITY));
         let velocity = found.new_velocity(&own.0, &own.1);
         let (speed, of_speed) = velocity.unwrap_or(own);
-        let turned = found.turned(&own.0, &own.1);
-        let (rotation, of_rotation) = orientation.unwrap_or_else(|| {
-            let about_up = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, turned));
-            (estimate.world_from_body, block(ROTATION) + about_up)
-        });
+        let (rotation, of_rotation) = orientation.unwrap_or((estimate.world_from_body, block(ROTATION)));
         let (position, covariance) = found.at(estimate.time_ns, &speed, &of_speed);
         let arm = rotation * lever_arm;
         let by_rotation = skew(&arm);
         let covariance = covariance + by_rotation * of_rotation * by_rotation.transpose();
         self.eskf.relocate((position - arm, covariance), velocity, orientation)?;
-        if orientation.is_none() {
-            self.eskf.inflate(ROTATION + 2, turned)?;
-        }
         for sensor in [GNSS, POSE] {
             self.streams[sensor].forgive();
         }
@@ -186,6 +179,3 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -11,9 +11,6 @@ use nalgebra::{Matrix3, Vector3};
 /// A filter's velocity is kept unless it is off by so many standard deviations from that of the positions.
 const SIGMAS: f64 = 5.0;
 
-/// A course is off if it differs by so many standard deviations.
-const TURNED_SIGMAS: f64 = 4.0;
-
 /// What a velocity that is a mean over seconds is off by, m/s.
 const CHANGE: f64 = 1.0;
 
@@ -70,7 +67,7 @@ impl Refuted {
 }
 
 impl Found {
-    /// The velocity that a filter has to take; none if its own, with that covariance, agrees in size and direction.
+    /// The velocity that a filter has to take; none if its own, with that covariance, agrees.
     pub(in crate::navigation) fn new_velocity(
         &self,
         own: &Vector3<f64>,
@@ -79,20 +76,8 @@ impl Found {
         let (velocity, deviation) = self.velocity?;
         let variance = deviation * deviation + CHANGE * CHANGE;
         let most = SIGMAS * (covariance.trace() + variance).sqrt();
-        let agrees = (velocity - own).norm() <= most && self.turned(own, covariance) == 0.0;
+        let agrees = (velocity - own).norm() <= most;
         (!agrees).then(|| (velocity, Matrix3::identity() * variance))
-    }
-
-    /// The square of the angle that the direction of motion is off by, rad²; 0 if it agrees. The heading of a robot whose velocity is
-    /// known in its own axes, from wheels, is off by as much. Of one that hardly moves, directions say nothing.
-    pub(in crate::navigation) fn turned(&self, own: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
-        let Some((velocity, deviation)) = self.velocity else { return 0.0 };
-        let (own, velocity) = (own.xy(), velocity.xy());
-        let slower = own.norm().min(velocity.norm());
-        let variance = deviation * deviation + covariance.fixed_view::<2, 2>(0, 0).trace() / 2.0;
-        let angle = own.perp(&velocity).atan2(own.dot(&velocity));
-        let is_clear = slower > CHANGE && angle.abs() * slower > TURNED_SIGMAS * variance.sqrt();
-        if is_clear { angle * angle } else { 0.0 }
     }
 
     /// Where the sensor is at `now_ns`, with its covariance, for a robot that moves with `velocity`.

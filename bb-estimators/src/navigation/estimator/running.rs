@@ -66,8 +66,6 @@ struct Running<S: States, const N: usize> {
     /// Fixes, and poses.
     fixes: Refuted,
     poses: Refuted,
-    /// How far the robot has turned about up, rad: of a track on a curve, velocities need that.
-    yaw: f64,
     /// How the last pose was turned.
     orientation: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
 }
@@ -120,7 +118,6 @@ fn running<S: States + Send + 'static, const N: usize>(
         watch: Watch::new(limits),
         fixes: Refuted::default(),
         poses: Refuted::default(),
-        yaw: 0.0,
         orientation: None,
     }))
 }
@@ -182,19 +179,12 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
         options: &NavigationOptions,
         mounting: &Mounting,
     ) -> Result<(), Refusal> {
-        let before_ns = self.past.now().estimate().map(|estimate| estimate.time_ns);
         self.past.propagate(sample)?;
-        if let Some((estimate, before_ns)) = self.past.now().estimate().zip(before_ns) {
-            let turning = estimate.world_from_body * estimate.angular_velocity;
-            self.yaw += turning.z * (estimate.time_ns - before_ns) as f64 * 1e-9;
-        }
         if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
             && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
         {
             let time_ns = fix.monotonic_time.as_nanos();
-            if let Some(point) = self.world.point(time_ns, &fix.payload, options) {
-                self.fixes.see(TrackPoint { yaw: self.yaw, ..point });
-            }
+            self.world.point(time_ns, &fix.payload, options).into_iter().for_each(|point| self.fixes.see(point));
             self.fuse(time_ns, Measured::Gnss(measured));
         }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
@@ -211,7 +201,7 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
             let measured = self.world.pose(&pose.payload, options, mounting);
             let time_ns = pose.monotonic_time.as_nanos();
             let AbsolutePose { position, position_covariance: covariance, .. } = measured;
-            self.poses.see(TrackPoint { time_ns, position, covariance, yaw: self.yaw });
+            self.poses.see(TrackPoint { time_ns, position, covariance, yaw: 0.0 });
             self.orientation = Some((measured.world_from_body, measured.rotation_covariance));
             self.fuse(time_ns, Measured::Pose(measured));
         }

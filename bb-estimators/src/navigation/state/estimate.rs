@@ -6,7 +6,7 @@ use super::states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
-use crate::navigation::layout::{is_on_earth, is_within};
+use crate::navigation::bounds::{is_on_earth, is_within};
 use crate::navigation::math::{renormalised, rotation, rotation_vector};
 
 /// Pose at an earlier time that relative poses refer to.

@@ -111,11 +111,7 @@ impl Filter {
         let of_own = in_world(&covariance.fixed_view::<2, 2>(VELOCITY, VELOCITY).into_owned());
         let velocity = found.new_velocity(&own, &of_own);
         let (speed, of_speed) = velocity.unwrap_or((own, of_own));
-        // Without a heading that is measured, it may be off by as much as the velocity is.
-        let off = found.turned(&own, &of_own);
-        let variance = covariance[(HEADING, HEADING)] + off;
-        let heading = heading.or((off > 0.0).then_some((estimate.heading, variance)));
-        let (turned, variance) = heading.unwrap_or((estimate.heading, variance));
+        let (turned, variance) = heading.unwrap_or((estimate.heading, covariance[(HEADING, HEADING)]));
         let (position, own) = found.at(estimate.time_ns, &speed, &of_speed);
         let arm = Rotation2::new(turned) * lever_arm;
         let across = left(&arm);

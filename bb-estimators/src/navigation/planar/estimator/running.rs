@@ -37,8 +37,6 @@ pub(super) struct Running {
     /// Fixes, and poses.
     fixes: Refuted,
     poses: Refuted,
-    /// How far the robot has turned, rad: of a track on a curve, velocities need that.
-    yaw: f64,
     /// Of the last pose, with its variance, rad.
     heading: Option<(f64, f64)>,
 }
@@ -55,7 +53,7 @@ impl Running {
         let past = Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let (fixes, poses) = (Refuted::default(), Refuted::default());
         let watch = Watch::new(limits);
-        Ok(Box::new(Self { past, frame, is_confirmed: false, watch, fixes, poses, yaw: 0.0, heading: None }))
+        Ok(Box::new(Self { past, frame, is_confirmed: false, watch, fixes, poses, heading: None }))
     }
 
     /// The world on the Earth; none without satellites.
@@ -75,17 +73,13 @@ impl Running {
         options: &PlanarOptions,
         mounting: &Mounting,
     ) -> Result<(), Refusal> {
-        let before_ns = self.past.now().ekf().estimate().map(|estimate| estimate.time_ns);
         self.past.propagate(sample)?;
-        if let Some((estimate, before_ns)) = self.past.now().ekf().estimate().zip(before_ns) {
-            self.yaw += estimate.yaw_rate * (estimate.time_ns - before_ns) as f64 * 1e-9;
-        }
         if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
             && let Some(frame) = &self.frame
             && let Some(point) = point(fix.monotonic_time.as_nanos(), &fix.payload, frame, options.gnss_deviation)
         {
             let measured = mounting.position(&point.position, &point.covariance);
-            self.fixes.see(TrackPoint { yaw: self.yaw, ..point });
+            self.fixes.see(point);
             self.fuse(point.time_ns, Measured::Gnss(measured));
         }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
@@ -101,12 +95,7 @@ impl Running {
             self.heading = Some((measured.heading, covariance[(2, 2)]));
             // Its third component is the heading's; the height does not matter here.
             covariance[(2, 2)] = 1.0;
-            self.poses.see(TrackPoint {
-                time_ns,
-                position: measured.position.push(0.0),
-                covariance,
-                yaw: self.yaw,
-            });
+            self.poses.see(TrackPoint { time_ns, position: measured.position.push(0.0), covariance, yaw: 0.0 });
             self.fuse(time_ns, Measured::Pose(measured));
         }
         if let Some(orientation) = inputs.orientation.filter(|orientation| orientation.is_new()) {

@@ -1,0 +1,20 @@
+//! How large numbers are that say anything.
+
+/// The largest variance of a position or a velocity that says anything: 10,000 km, or as much a second.
+pub(in crate::navigation) const MOST_VARIANCE: f64 = 1e14;
+
+/// The largest variance of a rotation error, rad²: a hundred turns are as good as one.
+pub(in crate::navigation) const MOST_ROTATION: f64 = 4e5;
+
+/// No position or velocity of anything on the Earth has a larger component, m or m/s.
+const FARTHEST: f64 = 1e9;
+
+/// Whether something on the Earth may be at such a position, or have such a velocity, m or m/s. Not if it is not a number.
+pub(in crate::navigation) fn is_on_earth<'a>(components: impl IntoIterator<Item = &'a f64>) -> bool {
+    is_within(components, FARTHEST)
+}
+
+/// Whether no component is larger, whatever its sign. Not if one is not a number.
+pub(in crate::navigation) fn is_within<'a>(components: impl IntoIterator<Item = &'a f64>, most: f64) -> bool {
+    components.into_iter().all(|x| x.abs() <= most)
+}
