@@ -273,6 +273,9 @@ fn expect_the_same(
     Ok(())
 }
 
+/// What was published, the last report, and the journal.
+type Day = (Heard, Report, Lines);
+
 /// That much went wrong, and was noticed.
 fn much_went_wrong(first: &Heard, report: &Report, broken: u64) {
     assert!(broken > 20, "{broken}");
@@ -285,13 +288,10 @@ fn much_went_wrong(first: &Heard, report: &Report, broken: u64) {
     assert!(first["fault"].iter().all(|fault| fault.contains("its output panicked: glass breaks")));
 }
 
-/// What subscribers heard in a run, its report and its journal.
-type Ran = (Heard, Report, Lines);
-
 fn days(
     panics: Panics,
     again: [Panics; 3],
-    run: fn(u64) -> Result<Ran, Box<dyn Error>>,
+    run: fn(u64) -> Result<Day, Box<dyn Error>>,
     count: u64,
 ) -> Result<(), Box<dyn Error>> {
     let _alone = alone();
@@ -308,7 +308,7 @@ fn days(
     Ok(())
 }
 
-fn on_virtual_time(day: u64) -> Result<Ran, Box<dyn Error>> {
+fn on_virtual_time(day: u64) -> Result<Day, Box<dyn Error>> {
     let (builder, lines) = journaled(day * 10, 500);
     let all = builder.subscribe_any(Select::All, None, overflow());
     let _typed = builder.subscribe_with(glazier::sensor::base::sand::blown, overflow());
@@ -325,7 +325,7 @@ fn on_virtual_time(day: u64) -> Result<Ran, Box<dyn Error>> {
     Ok((first, report, lines))
 }
 
-fn on_many_threads(day: u64) -> Result<Ran, Box<dyn Error>> {
+fn on_many_threads(day: u64) -> Result<Day, Box<dyn Error>> {
     let (builder, lines) = journaled(day * 100, 400);
     let all = builder.subscribe_any(Select::All, None, overflow());
     let _typed = builder.subscribe_with(glazier::sensor::base::sand::blown, overflow());
