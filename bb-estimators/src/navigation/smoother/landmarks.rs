@@ -1,5 +1,7 @@
 //! The landmarks of a window: which are used, how well they fit, and what becomes of them when a keyframe leaves.
 
+#![allow(clippy::vec_box, reason = "landmarks move between the two lists")]
+
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
@@ -269,7 +271,7 @@ fn meeting<F, S: States, const N: usize>(
         matrix += across;
         vector += across * centre;
     }
-    if !(widest < crate::navigation::math::cos(parallax)) {
+    if widest.is_nan() || widest >= crate::navigation::math::cos(parallax) {
         return None;
     }
     matrix.cholesky().map(|root| root.solve(&vector)).filter(|point| point.iter().all(|x| x.is_finite()))
