@@ -126,7 +126,8 @@ impl Camera {
         for _ in 0..STEPS {
             let (expected, jacobian) = self.distorted(&direction);
             // Beyond the fold of the distortion, where it turns back, two directions have one pixel.
-            if !(jacobian.determinant() > 0.0) {
+            let determinant = jacobian.determinant();
+            if determinant.is_nan() || determinant <= 0.0 {
                 break;
             }
             let off = pixel - expected;
@@ -176,7 +177,7 @@ impl Camera {
 /// Normalised coordinates of a point, and their derivatives by it; none of one that is not in front.
 pub(in crate::navigation) fn normalised(point: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
     const NEAREST_M: f64 = 1e-3;
-    if !(point.z > NEAREST_M) {
+    if point.z.is_nan() || point.z <= NEAREST_M {
         return None;
     }
     let inverse = 1.0 / point.z;

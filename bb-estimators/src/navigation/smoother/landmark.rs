@@ -6,6 +6,8 @@
 //! leaves `Σ Dᵢᵀ Nᵢ Dᵢ - Yᵀ Y` with `Yᵢ = V^-½ Nᵢ Dᵢ`. One more observation adds two rows to that:
 //! `(I + B V⁻¹ Bᵀ)^-½ [-B V⁻¹ Nᵢ Dᵢ … B D]`. Moving and turning all of the world changes none of it but by the prior.
 
+#![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
 use alloc::vec::Vec;
 
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};

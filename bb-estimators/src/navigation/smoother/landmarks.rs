@@ -1,5 +1,7 @@
 //! The landmarks of a window: which are used, how well they fit, and what becomes of them when a keyframe leaves.
 
+#![allow(clippy::vec_box, reason = "landmarks move between the two lists")]
+
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
@@ -105,7 +107,7 @@ impl<const N: usize> Landmarks<N> {
     pub(super) fn add<F, S: States>(&mut self, index: usize, sight: Sight, window: &Window<F, N>) {
         let first = self.coupling.first;
         let Some(landmark) = self.all.get(index) else { return };
-        let must_move = landmark.sights.is_empty() || self.is_stale::<F, S>(landmark, window);
+        let must_move = landmark.sights.is_empty() || self.is_stale(landmark, window);
         let Some(landmark) = self.all.get_mut(index) else { return };
         landmark.last = landmark.last.max(sight.serial);
         landmark.refused_in_a_row = 0;
@@ -168,7 +170,7 @@ impl<const N: usize> Landmarks<N> {
     }
 
     /// Whether a landmark has to be linearised again: a keyframe or the landmark itself moved, or a kernel says otherwise.
-    fn is_stale<F, S: States>(&self, landmark: &Landmark, window: &Window<F, N>) -> bool {
+    fn is_stale<F>(&self, landmark: &Landmark, window: &Window<F, N>) -> bool {
         let first = self.coupling.first;
         let correction = landmark.correction(window, first);
         let kernel = self.params.kernel;
@@ -191,7 +193,7 @@ impl<const N: usize> Landmarks<N> {
         let mut count = 0;
         for index in 0..self.all.len() {
             let Some(landmark) = self.all.get(index) else { break };
-            if !landmark.is_used || landmark.sights.is_empty() || !self.is_stale::<F, S>(landmark, window) {
+            if !landmark.is_used || landmark.sights.is_empty() || !self.is_stale(landmark, window) {
                 continue;
             }
             let point = self.estimate(landmark, window);
@@ -269,7 +271,7 @@ fn meeting<F, S: States, const N: usize>(
         matrix += across;
         vector += across * centre;
     }
-    if !(widest < crate::navigation::math::cos(parallax)) {
+    if widest.is_nan() || widest >= crate::navigation::math::cos(parallax) {
         return None;
     }
     matrix.cholesky().map(|root| root.solve(&vector)).filter(|point| point.iter().all(|x| x.is_finite()))

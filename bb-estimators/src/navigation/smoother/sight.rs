@@ -1,6 +1,6 @@
 //! Landmarks as a camera sees them: observations arrive, are judged, and are added to the window.
 
-use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
 use super::coupling::POSE;
 use super::factor::Factor;
@@ -216,16 +216,17 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if at > 0 {
             let seconds = keyframe.motion.seconds();
             step = pose_block(&keyframe.link.noise);
-            for (i, (place, rate)) in
-                [(VELOCITY, seconds), (GYROSCOPE_BIAS, seconds), (ACCELEROMETER_BIAS, 0.5 * seconds * seconds)]
-                    .into_iter()
-                    .enumerate()
-            {
-                let first = if i == 1 { 3 } else { 0 };
-                for j in 0..3 {
-                    step[(first + j, first + j)] += covariance[place + j][place + j] * rate * rate;
-                }
-            }
+            // In the world's axes, as the pose is.
+            let to_world = keyframe.point.rotation();
+            let block = |first: usize| Matrix3::from_fn(|i, j| covariance[first + i][first + j]);
+            let turned = |first: usize| to_world * block(first) * to_world.transpose();
+            let fallen = 0.5 * seconds * seconds;
+            let position = block(VELOCITY) * (seconds * seconds) + turned(ACCELEROMETER_BIAS) * (fallen * fallen);
+            let rotation = turned(GYROSCOPE_BIAS) * (seconds * seconds);
+            let mut sum = step.fixed_view_mut::<3, 3>(0, 0);
+            sum += position;
+            let mut sum = step.fixed_view_mut::<3, 3>(3, 3);
+            sum += rotation;
         }
         let judging = Judging { pose: pose_block(&covariance), step };
         if let Some(landmarks) = &mut self.landmarks {

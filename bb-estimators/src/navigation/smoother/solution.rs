@@ -193,10 +193,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
             is_next = is_off;
         }
-        if let Some(landmarks) = &mut self.landmarks {
-            if landmarks.relinearise::<F, S>(&self.window) > 0 {
-                self.dirty = 0;
-            }
+        let landmarks = self.landmarks.as_mut();
+        if landmarks.is_some_and(|landmarks| landmarks.relinearise::<F, S>(&self.window) > 0) {
+            self.dirty = 0;
         }
         moved
     }

