@@ -273,9 +273,8 @@ fn an_id_is_reused() {
     // From keyframe 12 on, two landmarks have each other's ids.
     let ids: Vec<u64> = scenery.seen[12].iter().map(|seen| seen.landmark).take(2).collect();
     for seen in scenery.seen.iter_mut().skip(12).flatten() {
-        match ids.iter().position(|id| *id == seen.landmark) {
-            Some(which) => seen.landmark = ids[1 - which],
-            None => {}
+        if let Some(which) = ids.iter().position(|id| *id == seen.landmark) {
+            seen.landmark = ids[1 - which];
         }
     }
     let mut smoother = Smoother::new(SmootherParams { sensors: sensors(), ..SmootherParams::default() }).unwrap();
