@@ -87,8 +87,18 @@ fn an_estimator_that_gives_something_else_is_named_at_its_first_difference() -> 
     let outputs: Vec<_> =
         lines.iter().filter(|line| matches!(line.event, Event::Output { .. })).map(|line| line.number).collect();
     assert_eq!(outputs.len(), 10);
-    let error = left_first::Rig::builder().replay()?.play(lines).expect_err("it gives something else");
+    let builder = left_first::Rig::builder();
+    let numbers = builder.subscribe(left_first::rig::sensor::base::left::dice);
+    let mut replay = builder.replay()?;
+    let error = replay.play(lines.clone()).expect_err("it gives something else");
     assert_eq!(error.line, outputs[4], "the third of the first of the two");
+    // Nothing is played after it, and the report says so.
+    let heard = numbers.drain().count();
+    assert_eq!(replay.play(lines), Err(error.clone()));
+    let report = replay.stop();
+    assert_eq!(numbers.drain().count(), 0, "after {heard}");
+    let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
+    assert_eq!(faults, [format!("journal failed: {error}")]);
     assert_eq!(
         error.message,
         "`sensor/base/left/dice` emits another message than it did: the algorithm is not deterministic"

@@ -2,6 +2,7 @@
 
 use super::codec::{decode, encode};
 use super::{Payload, Stamped};
+use crate::fault::discard;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -17,7 +18,11 @@ pub(crate) fn copy_to<T: Payload>(kept: &mut Option<Stamped<T>>, message: &Stamp
         Some(kept) => kept.clone_from(message),
         none => *none = Some(message.clone()),
     }));
-    cloned.inspect_err(|_| *kept = by_encoding(message))
+    cloned.inspect_err(|_| {
+        // What was there may be half-written, and panic when it is dropped.
+        discard(kept.take());
+        *kept = by_encoding(message);
+    })
 }
 
 /// The same as a new message; the first panic is kept in `panic`.
@@ -27,7 +32,7 @@ pub(crate) fn copied<T: Payload>(message: &Stamped<T>, panic: &mut Option<Panic>
     if let Err(another) = copy_to(&mut copy, message) {
         match panic {
             None => *panic = Some(another),
-            Some(_) => drop_panic(another),
+            Some(_) => discard(another),
         }
     }
     copy
@@ -40,16 +45,8 @@ fn by_encoding<T: Payload>(message: &Stamped<T>) -> Option<Stamped<T>> {
         encode(&message.payload, &mut bytes);
         decode(&bytes).ok()
     }));
-    let payload = copied.map_err(drop_panic).ok().flatten()?;
+    let payload = copied.map_err(discard).ok().flatten()?;
     Some(message.stamp().message(payload))
-}
-
-/// What a panic carries may panic when it is dropped. That second panic's payload is leaked.
-#[cold]
-fn drop_panic(panic: Panic) {
-    if let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(panic))) {
-        std::mem::forget(second);
-    }
 }
 
 #[cfg(test)]

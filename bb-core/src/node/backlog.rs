@@ -1,5 +1,6 @@
 //! Messages that wait for an estimator to be restarted.
 
+use crate::fault::discard;
 use std::collections::VecDeque;
 
 /// Deliveries in the order in which they came, each with the number of the input that it is for.
@@ -22,7 +23,7 @@ impl<D> Backlog<D> {
     pub(super) fn push(&mut self, input: usize, delivery: D) -> Option<usize> {
         let dropped = if self.0.len() == CAPACITY { self.0.pop_front() } else { None };
         self.0.push_back((input, delivery));
-        dropped.map(|(input, _)| input)
+        dropped.map(dropped_for)
     }
 
     /// Takes the oldest delivery.
@@ -32,6 +33,36 @@ impl<D> Backlog<D> {
 
     /// Drops all; returns the input of each.
     pub(super) fn clear(&mut self) -> impl Iterator<Item = usize> + '_ {
-        self.0.drain(..).map(|(input, _)| input)
+        self.0.drain(..).map(dropped_for)
+    }
+}
+
+/// Drops a delivery, whose message may panic at that; returns the input that it was for.
+fn dropped_for<D>((input, delivery): (usize, D)) -> usize {
+    discard(delivery);
+    input
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Panics when it is dropped.
+    struct Glass;
+
+    impl Drop for Glass {
+        fn drop(&mut self) {
+            panic!("glass breaks");
+        }
+    }
+
+    #[test]
+    fn all_are_dropped_and_told_though_each_panics() {
+        let mut backlog = Backlog::new();
+        for input in 0..CAPACITY + 3 {
+            assert_eq!(backlog.push(input, Glass), input.checked_sub(CAPACITY));
+        }
+        assert!(backlog.clear().eq(3..CAPACITY + 3));
+        assert!(backlog.is_empty());
     }
 }

@@ -98,7 +98,7 @@ pub(super) fn copy_failed(environment: &Environment, path: &'static str, panic: 
     charge(environment, path, &of_panic(panic));
 }
 
-/// Whether an estimator publishes at `path`.
+/// The number of the estimator that publishes at `path`, if there is one.
 pub(super) fn emitter(environment: &Environment, path: &'static str) -> Option<usize> {
     let emits = |node: &&SharedNode| node.declaration().outputs.contains(&path);
     environment.nodes().iter().find(emits).map(SharedNode::number)

@@ -255,14 +255,17 @@ impl<E: Estimator> Node<E> {
             }
             Ok(Handled::Stored) => None,
             Ok(Handled::Refused(reason)) => {
+                turn.timing().interrupt();
                 self.refuse(declared, reason, message.monotonic_time.as_nanos());
                 None
             }
             Ok(Handled::Missed(miss)) => {
+                turn.timing().interrupt();
                 self.miss(miss, turn);
                 None
             }
             Ok(Handled::Unplaced(unplaced)) => {
+                turn.timing().interrupt();
                 self.note_unplaced(&unplaced, turn);
                 None
             }
@@ -367,6 +370,7 @@ impl<E: Estimator> Node<E> {
             self.schedule();
         }
         if bad.is_some() || diverged.is_some() || self.health.state != HealthState::Healthy {
+            turn.timing().interrupt();
             self.assess(bad, diverged, source, turn.now());
         } else if source.is_some() {
             self.was_good = true;
@@ -432,6 +436,7 @@ impl<E: Estimator> Node<E> {
             let duration = std::time::Duration::from_nanos(nanos.max(0) as u64);
             let event = TelemetryEvent::Latency { estimator: self.declaration.path, duration };
             telemetry.tell(self.environment.origin().robot, &event);
+            turn.timing().interrupt();
         }
         let budget = budget?;
         turn.keep(self.shared.number(), nanos);
@@ -480,6 +485,7 @@ impl<E: Estimator> Node<E> {
         {
             let event = TelemetryEvent::Input { estimator: self.declaration.path, input: input.name, stamp };
             telemetry.tell(self.environment.origin().robot, &event);
+            turn.timing().interrupt();
         }
     }
 

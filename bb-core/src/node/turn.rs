@@ -85,6 +85,12 @@ impl<'a> Turn<'a> {
         self.running.store(estimator, Ordering::Relaxed);
     }
 
+    /// Another island was entered in this turn: the callback that runs next is not charged with that.
+    #[inline]
+    pub fn left_for_another_island(&self) {
+        self.timing.interrupt();
+    }
+
     #[inline]
     pub(super) fn timing(&self) -> &Timing {
         &self.timing
@@ -170,14 +176,17 @@ impl<'a> Turn<'a> {
         if self.environment.journal().is_some() {
             let is_answer = self.unrecorded.get().is_some_and(|estimator| estimator.outputs.contains(&path));
             let event = if is_answer {
-                let is_first = !self.has_emitted.replace(true);
-                let Some(message) = copied_of(self.environment, path, message) else { return };
-                let message = Recorded::Message(DynamicMessage::of(path, message));
-                Event::Emission { publisher, is_first, message }
+                copied_of(self.environment, path, message).map(|message| {
+                    let is_first = !self.has_emitted.replace(true);
+                    let message = Recorded::Message(DynamicMessage::of(path, message));
+                    Event::Emission { publisher, is_first, message }
+                })
             } else {
-                Event::Output { island: self.island, publisher, checksum: checksum(message) }
+                Some(Event::Output { island: self.island, publisher, checksum: checksum(message) })
             };
-            self.write(|_| event);
+            if let Some(event) = event {
+                self.write(|_| event);
+            }
         }
         if self.environment.mode() == Mode::Replay {
             self.environment.replayed().add(self.island, publisher, checksum(message));

@@ -104,7 +104,7 @@ impl<T: Payload> AnyTopic for Topic<T> {
 
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError> {
         let message: Stamped<T> = crate::message::codec::decode(bytes)?;
-        Ok(DynamicMessage::new(self.path, &message))
+        Ok(DynamicMessage::of(self.path, message))
     }
 
     fn publish_dynamic(&self, message: &DynamicMessage) -> bool {

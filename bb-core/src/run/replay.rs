@@ -32,6 +32,8 @@ pub struct Replay<R: Robot> {
     unrecorded: HashMap<usize, (u64, String)>,
     /// Turns that had not ended when the journal did.
     cut: Vec<ReplayError>,
+    /// Why nothing more is played.
+    refused: Option<ReplayError>,
 }
 
 /// Why a journal cannot be replayed.
@@ -55,6 +57,7 @@ impl<R: Robot> Replay<R> {
             is_virtual: false,
             unrecorded: HashMap::new(),
             cut: Vec::new(),
+            refused: None,
         }
     }
 
@@ -63,8 +66,18 @@ impl<R: Robot> Replay<R> {
     ///
     /// # Errors
     /// The first line that does not fit: the journal is of another robot, lines are missing, or an algorithm is not
-    /// deterministic.
-    pub fn play(&mut self, mut entries: Vec<Entry>) -> Result<(), ReplayError> {
+    /// deterministic. Nothing is played after it: later calls return the same error, and it is among the faults of the last report.
+    pub fn play(&mut self, entries: Vec<Entry>) -> Result<(), ReplayError> {
+        if let Some(refused) = &self.refused {
+            return Err(refused.clone());
+        }
+        self.play_on(entries).inspect_err(|error| {
+            self.refused = Some(error.clone());
+            self.waiting.clear();
+        })
+    }
+
+    fn play_on(&mut self, mut entries: Vec<Entry>) -> Result<(), ReplayError> {
         entries.sort_by_key(|entry| entry.number);
         for entry in entries {
             let line = entry.number;
@@ -106,8 +119,8 @@ impl<R: Robot> Replay<R> {
     /// Plays what waits, stops the robot, and gives the last report. What does not fit is among its faults, and so is a line at
     /// which the journal is cut: the turn that it begins had not ended, and is replayed as far as the journal tells.
     pub fn stop(mut self) -> Report {
-        let played = self.advance(true).err();
-        for error in self.cut.drain(..).chain(played) {
+        let refused = self.refused.take().or_else(|| self.advance(true).err());
+        for error in self.cut.drain(..).chain(refused) {
             self.live.0.fault("journal", error.to_string());
         }
         let machine = &self.live.0;
@@ -229,10 +242,16 @@ impl<R: Robot> Replay<R> {
         self.play_event(number, time, event)?;
         match self.live.0.environment.replayed().take_missing() {
             None => Ok(()),
-            Some(Missing { estimator, what }) if is_whole => Err(format!(
-                "`{estimator}` asks {what}, and did not then: the algorithm is not deterministic{}",
-                island.map_or_else(String::new, |island| self.hint(island))
-            )),
+            Some(Missing { estimator, what }) if is_whole => {
+                // An estimator before it may have emitted something else, which is the cause.
+                if let Some(island) = island {
+                    self.compare_outputs_of(island)?;
+                }
+                Err(format!(
+                    "`{estimator}` asks {what}, and did not then: the algorithm is not deterministic{}",
+                    island.map_or_else(String::new, |island| self.hint(island))
+                ))
+            }
             Some(Missing { estimator, what }) => {
                 let message = format!("the journal is cut here: it does not say {what} for `{estimator}`");
                 self.cut.push(ReplayError { line: number, message });
@@ -345,12 +364,9 @@ impl<R: Robot> Replay<R> {
     }
 
     fn island(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
-        let machine = &self.live.0;
         // A message may be dropped while a turn lasts, before its outputs.
-        let is_turn = !matches!(entry, Replayed::Drop(_));
-        if is_turn && let Some((publisher, _)) = machine.environment.replayed().take(number) {
-            let path = self.path_of(publisher);
-            return Err(format!("`{path}` emits a message more than it did{}", self.hint(number)));
+        if !matches!(entry, Replayed::Drop(_)) {
+            self.no_more_outputs_of(number)?;
         }
         self.go_on(number, time, entry)
     }
@@ -417,6 +433,23 @@ impl<R: Robot> Replay<R> {
             }
             None => Err(format!("`{path}` emitted a message then, and does not now{}", self.hint(island))),
         }
+    }
+
+    /// Compares the outputs of the last turn with those in the lines that follow.
+    fn compare_outputs_of(&self, island: usize) -> Result<(), String> {
+        let mut next = self.next_of(island, 0);
+        while let Some(index) = next
+            && let Event::Output { publisher, checksum, .. } = self.waiting[index].event
+        {
+            self.compare(island, publisher, checksum)?;
+            next = self.next_of(island, index + 1);
+        }
+        self.no_more_outputs_of(island)
+    }
+
+    fn no_more_outputs_of(&self, island: usize) -> Result<(), String> {
+        let Some((publisher, _)) = self.live.0.environment.replayed().take(island) else { return Ok(()) };
+        Err(format!("`{}` emits a message more than it did{}", self.path_of(publisher), self.hint(island)))
     }
 
     /// What may explain a difference.

@@ -397,7 +397,8 @@ impl<'a> Wiring<'a> {
                     visit.consumers.iter().map(|consumer| self.receive(&payload, consumer, &quote!(island)));
                 return quote!(#(#receives)*);
             }
-            self.enter(publisher, &visit, quote!(wiring), quote!(turn.now()), quote!(0))
+            let enter = self.enter(publisher, &visit, quote!(wiring), quote!(turn.now()), quote!(0));
+            quote!(#enter turn.left_for_another_island();)
         });
         quote! {
             if let __private::Some(payload) =

@@ -103,6 +103,8 @@ pub(crate) fn publish<M: Member>(
 ) {
     let emitting = Emitting::new(M::NUMBER);
     M::publish(wiring, island, emitted, stamp, turn);
+    // Other islands may have run, and the message was dropped: no callback that follows is charged with that.
+    turn.timing().interrupt();
     emitting.done();
 }
 

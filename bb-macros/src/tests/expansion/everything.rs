@@ -980,6 +980,7 @@ const _: () = {
                     __Island_estimator_base_pose::sensor_base_imu_tilt__kept,
                     __Message_estimator_base_pose::sensor_base_imu_tilt__kept,
                 );
+                turn.left_for_another_island();
             }
         }
     }
