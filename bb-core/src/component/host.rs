@@ -43,6 +43,8 @@ pub(crate) trait Host: Guardian {
     fn note_publisher(&self, path: &'static str, payload: &'static str);
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage);
+    /// The code of a message at `path`, a path of one's own, has failed.
+    fn message_failed(&self, path: &'static str, fault: Fault);
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
     fn actuators(&self) -> Vec<&'static str>;

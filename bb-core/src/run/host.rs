@@ -12,7 +12,7 @@ use crate::fault::Fault;
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::message::Origin;
-use crate::node::NodeEntry;
+use crate::node::{NodeEntry, Overseer};
 use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::schedule::Door;
 use crate::time::{Clock, MonotonicTime};
@@ -142,6 +142,10 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn note_own(&self, message: DynamicMessage) {
         self.note(|| Event::Own { path: message.path(), message: Recorded::Message(message) });
+    }
+
+    fn message_failed(&self, path: &'static str, fault: Fault) {
+        Overseer::message_failed(&self.control, path, format!("its message {fault}"));
     }
 
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {

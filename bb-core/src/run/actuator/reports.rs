@@ -88,5 +88,6 @@ fn publish<T: Payload>(
         let offset = environment.clock().wall_offset_nanos();
         journal.write(message.monotonic_time, offset, Event::Own { path, message: recorded });
     }
-    topic.publish_deferred(message, wakers);
+    // Payloads of this crate, whose `clone` does not panic.
+    topic.publish_deferred(message, wakers, &mut None);
 }
