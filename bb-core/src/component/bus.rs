@@ -72,12 +72,7 @@ impl Bus {
     /// malformed, too many are in use, the robot has stopped, or the command that this bus belongs to has ended.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
         self.check_permit()?;
-        // Two threads may both find it new, which does no harm.
-        let is_new = self.host.is_journaled() && !self.host.registry().has(path);
-        let topic = self.host.registry().topic::<T>(path)?;
-        if is_new {
-            self.host.note_publisher(topic.path(), T::NAME);
-        }
+        let topic = self.host.registry().topic_noted::<T>(path, &mut |change| self.host.note_path(change))?;
         Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), permit: self.permit.clone() })))
     }
 

@@ -13,7 +13,7 @@ use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::message::Origin;
 use crate::node::{NodeEntry, Overseer};
-use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
+use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::schedule::Door;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::Topology;
@@ -136,8 +136,11 @@ impl<R: Robot> Host for RobotHost<R> {
         }
     }
 
-    fn note_publisher(&self, path: &'static str, payload: &'static str) {
-        self.note(|| Event::OwnPublisher { path, payload });
+    fn note_path(&self, change: PathChange) {
+        self.note(|| match change {
+            PathChange::Made { path, payload } => Event::OwnPublisher { path, payload },
+            PathChange::Evicted { path } => Event::OwnPublisher { path, payload: "" },
+        });
     }
 
     fn note_own(&self, message: DynamicMessage) {
