@@ -21,7 +21,7 @@ pub use dynamic::{DynamicSubscription, RecvDynamic};
 pub(crate) use publisher::Gate;
 pub use publisher::Publisher;
 pub use queue::Overflow;
-pub(crate) use registry::Registry;
+pub(crate) use registry::{PathChange, Registry};
 pub use select::{Payloads, Select};
 pub use statistics::{SubscriberStatistics, TopicStatistics};
 pub use subscription::{RecvAsync, Subscription};

@@ -277,3 +277,125 @@ fn a_robot_of_which_everything_hangs_as_it_closes_is_back_and_says_what_it_left(
         }
     });
 }
+
+/// Panics when it is dropped, unless something panics already.
+struct Bomb;
+
+impl Drop for Bomb {
+    fn drop(&mut self) {
+        assert!(std::thread::panicking(), "the bomb goes off");
+    }
+}
+
+/// Whether [`Fused`] panics when it is dropped.
+static IS_LIT: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
+
+/// Options that panic when they are dropped.
+#[derive(Clone, Debug, Options)]
+pub(crate) struct Fused {
+    #[option(default = 1.0, range = 0.0..=2.0)]
+    gain: f64,
+}
+
+impl Drop for Fused {
+    fn drop(&mut self) {
+        assert!(!IS_LIT.load(Ordering::SeqCst) || std::thread::panicking(), "the fuse burns down");
+    }
+}
+
+/// Has these options.
+#[derive(Debug)]
+pub(crate) struct Cannon;
+
+impl Estimator for Cannon {
+    type Options = Fused;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: Fused, _: &bb_core::Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(number.0)))
+    }
+}
+
+/// Has options that may be wrong.
+#[derive(Debug)]
+pub(crate) struct Fire;
+
+impl Command for Fire {
+    type Options = Fused;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: Fused, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Armoury;
+    commands { fire: Fire; }
+    link base { sensor number: External<Number>() { estimator cannon: Cannon(); } }
+}
+
+fn with_bomb() -> bb_core::Builder<Armoury> {
+    let mut builder = Armoury::builder();
+    let bomb = Bomb;
+    builder.telemetry(move |_, _| {
+        let _ = &bomb;
+    });
+    builder
+}
+
+#[test]
+fn a_handler_or_options_that_panic_when_they_are_dropped_do_not_reach_whoever_stops_the_robot() {
+    within(60, || {
+        let _alone = ALONE.lock();
+        let simulation = with_bomb().simulate().expect("it starts");
+        let live = simulation.live();
+        IS_LIT.store(true, Ordering::SeqCst);
+        simulation.stop().ok().expect("nothing is wrong");
+        // Another handle is the last.
+        drop(live);
+        IS_LIT.store(false, Ordering::SeqCst);
+
+        let simulation = with_bomb().simulate().expect("it starts");
+        IS_LIT.store(true, Ordering::SeqCst);
+        drop(simulation);
+        IS_LIT.store(false, Ordering::SeqCst);
+
+        let replay = with_bomb().replay().expect("it starts");
+        IS_LIT.store(true, Ordering::SeqCst);
+        replay.stop().ok().expect("nothing is wrong");
+        IS_LIT.store(false, Ordering::SeqCst);
+    });
+}
+
+#[test]
+fn a_handler_that_hangs_or_panics_when_it_is_dropped_does_not_keep_a_start_from_being_refused() {
+    within(60, || {
+        let _alone = ALONE.lock();
+        let refused = |error: StartError| assert!(error.to_string().contains("command/fire"), "{error}");
+        let mut builder = with_bomb();
+        builder.options(armoury::command::fire).gain = 7.0;
+        refused(builder.simulate().map(drop).expect_err("the gain is out of range"));
+
+        let (tell, told) = mpsc::channel();
+        let slow = Slow(tell);
+        let mut builder = with_bomb();
+        builder.telemetry(move |_, _| {
+            let _ = &slow;
+        });
+        builder.options(armoury::command::fire).gain = 7.0;
+        GONE.close("gone");
+        let start = std::time::Instant::now();
+        refused(builder.start().map(drop).expect_err("the gain is out of range"));
+        assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
+        let dropped = told.recv_timeout(Duration::from_secs(20)).expect("it is dropped");
+        assert_eq!(dropped.as_deref(), Some("drop"), "on a thread of its own");
+        GONE.open();
+    });
+}

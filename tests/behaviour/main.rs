@@ -23,6 +23,7 @@ mod fan_in;
 mod faults;
 mod flight_logs;
 mod flights;
+mod fragile_copies;
 mod fragile_messages;
 mod frames;
 mod gate;

@@ -225,3 +225,50 @@ fn a_replay_reports_paths_at_which_nothing_was_published_too() -> Result<(), Box
     assert_eq!(rows(&replay.stop()), first);
     Ok(())
 }
+
+/// More paths than a robot may have at once, those that nobody uses make room. A replay reports the same ones, with the same counts,
+/// whether somebody uses them there or not.
+#[test]
+fn a_replay_reports_the_paths_that_made_room_no_more() -> Result<(), Box<dyn std::error::Error>> {
+    let lines = Arc::new(std::sync::Mutex::new(Vec::new()));
+    let sink = Arc::clone(&lines);
+    let mut builder = Missionary::builder();
+    builder.journal(move |line| sink.lock().expect("it does not panic").push(line));
+    let simulation = builder.simulate()?;
+    let bus = simulation.bus();
+    let _silent = bus.publisher::<Progress>("own/silent")?;
+    let back = bus.publisher::<Number>("own/back")?;
+    (0..3).for_each(|_| back.publish(Number(1.0)));
+    drop(back);
+    let heard = bus.publisher::<Number>("own/heard")?;
+    let _heard = bus.subscribe::<Number>("own/heard", Overflow::default())?;
+    drop(heard);
+    for number in 0..3000 {
+        let publisher = bus.publisher::<Progress>(&format!("many/{number}"))?;
+        if number % 2 == 0 {
+            publisher.publish(Progress { done: 0.5 });
+        }
+    }
+    bus.publisher::<Number>("own/back")?.publish(Number(2.0));
+    bus.publisher::<Number>("many/7")?.publish(Number(3.0));
+    let report = simulation.stop();
+    let first = rows(&report);
+    for row in [("own/silent", "Progress", 0), ("own/back", "Number", 1), ("own/heard", "Number", 0)] {
+        assert!(first.contains(&row), "{row:?}");
+    }
+    assert!(first.contains(&("many/7", "Number", 1)) && first.contains(&("many/2999", "Progress", 0)));
+    assert!(!first.iter().any(|(path, ..)| *path == "many/0"));
+    let lines = std::mem::take(&mut *lines.lock().expect("it does not panic"));
+    for is_used in [false, true] {
+        let mut replay = Missionary::builder().replay()?;
+        let used = is_used.then(|| replay.bus().publisher::<Number>("own/back")).transpose()?;
+        let all = replay.subscribe_any(Select::Path("own/back"), None, Overflow::default());
+        replay.play(lines.clone())?;
+        let again = rows(&replay.stop());
+        let differing: Vec<_> = first.iter().filter(|row| !again.contains(row)).collect();
+        assert!(differing.is_empty() && again == first, "{is_used}: {} and {differing:?}", again.len());
+        assert_eq!(all.drain().count(), 4);
+        drop(used);
+    }
+    Ok(())
+}

@@ -4,9 +4,10 @@ use super::host::Host;
 use super::{Accepts, ActuatorLink, CommandInfo, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
+use crate::fault::of_panic;
 use crate::joints::Joints;
 use crate::message::nearest::nearest_path;
-use crate::message::{Payload, Stamp};
+use crate::message::{Panic, Payload, Stamp};
 use crate::pubsub::{
     AnyTopic, DynamicMessage, DynamicSubscription, Gate, Overflow, Payloads, Publisher, Select,
     SubscriberStatistics, Subscription, Topic, unmatched_at,
@@ -71,12 +72,7 @@ impl Bus {
     /// malformed, too many are in use, the robot has stopped, or the command that this bus belongs to has ended.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
         self.check_permit()?;
-        // Two threads may both find it new, which does no harm.
-        let is_new = self.host.is_journaled() && !self.host.registry().has(path);
-        let topic = self.host.registry().topic::<T>(path)?;
-        if is_new {
-            self.host.note_publisher(topic.path(), T::NAME);
-        }
+        let topic = self.host.registry().topic_noted::<T>(path, &mut |change| self.host.note_path(change))?;
         Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), permit: self.permit.clone() })))
     }
 
@@ -211,14 +207,19 @@ struct OwnPath {
 }
 
 impl Gate for OwnPath {
-    fn pass(&self, publish: &mut dyn FnMut(Stamp)) {
+    fn pass(&self, path: &'static str, publish: &mut dyn FnMut(Stamp) -> Option<Panic>) {
         self.host.while_open(&mut || {
             // After what had to be waited for. Until the message is out, the command is not gone.
-            let Some(_acting) = self.permit.act() else { return };
+            let Some(acting) = self.permit.act() else { return };
             let clock = self.host.clock();
             let monotonic_time = clock.now();
             let wall_time = clock.wall_at(monotonic_time);
-            publish(Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() });
+            let stamp = Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() };
+            let panic = publish(stamp);
+            drop(acting);
+            if let Some(panic) = panic {
+                self.host.message_failed(path, of_panic(panic));
+            }
         });
     }
 

@@ -8,7 +8,7 @@ use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::joints::Joints;
 use crate::message::Origin;
-use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
+use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::time::Clock;
 use crate::topology::Topology;
 use std::any::Any;
@@ -39,10 +39,12 @@ pub(crate) trait Host: Guardian {
     fn is_journaled(&self) -> bool;
     /// Has something published, unless the robot has stopped; waits first while too much waits for the journal's sink.
     fn while_open(&self, publish: &mut dyn FnMut());
-    /// There is a publisher at a path of one's own.
-    fn note_publisher(&self, path: &'static str, payload: &'static str);
+    /// Something may be published at a path of one's own, or no more.
+    fn note_path(&self, change: PathChange);
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage);
+    /// The code of a message at `path`, a path of one's own, has failed.
+    fn message_failed(&self, path: &'static str, fault: Fault);
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
     fn actuators(&self) -> Vec<&'static str>;

@@ -259,7 +259,7 @@ pub enum Event {
     OwnPublisher {
         /// The path.
         path: &'static str,
-        /// The name of the payload's type.
+        /// The name of the payload's type; empty if nobody has used the path any more, and it has made room for another one.
         payload: &'static str,
     },
 }

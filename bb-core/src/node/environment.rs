@@ -16,6 +16,7 @@ use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime, Stopwatch};
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
@@ -446,7 +447,14 @@ impl Environment {
                 journal.wait_for_room();
                 let recorded = Recorded::Message(DynamicMessage::new(topic.path(), message));
                 let event = Event::Message { publisher, message: recorded };
-                topic.publish_as_written(message, || journal.write(now, self.0.clock.wall_offset_nanos(), event))
+                let mut panic = None;
+                let line = topic.publish_as_written(message, &mut panic, || {
+                    journal.write(now, self.0.clock.wall_offset_nanos(), event)
+                });
+                if let Some(panic) = panic {
+                    resume_unwind(panic);
+                }
+                line
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Publishing at a path that the robot does not declare.
 
 use super::{AnyTopic as _, DynamicMessage, Topic};
-use crate::message::{Payload, Stamp, Stamped};
+use crate::message::{Panic, Payload, Stamp, Stamped, copied};
 use std::fmt;
 use std::sync::Arc;
 
@@ -14,8 +14,9 @@ pub struct Publisher<T> {
 
 /// What a publisher passes on its way to its topic.
 pub(crate) trait Gate: Send + Sync {
-    /// Has `publish` called with the stamp of a payload that is published now; not once the publisher may not act any more.
-    fn pass(&self, publish: &mut dyn FnMut(Stamp));
+    /// Has `publish` called with the stamp of a payload that is published at `path` now; not once the publisher may not act any
+    /// more. A panic of the payload's `Clone` that it returns is a fault at `path`.
+    fn pass(&self, path: &'static str, publish: &mut dyn FnMut(Stamp) -> Option<Panic>);
     /// Whether messages are to be shown to [`Self::note`].
     fn is_noted(&self) -> bool;
     /// A message is about to be published.
@@ -29,27 +30,29 @@ impl<T: Payload> Publisher<T> {
 
     /// Publishes a payload measured now, in no frame. Once the command that made this publisher has ended, or the robot has
     /// stopped, nothing is published any more.
+    ///
+    /// If the payload's `Clone` panics, subscribers and the journal get it through its encoded form, and the panic is a fault at
+    /// the path.
     pub fn publish(&self, payload: T) {
         let mut payload = Some(payload);
-        self.gate.pass(&mut |stamp| {
-            if let Some(payload) = payload.take() {
-                self.hand_out(&stamp.message(payload));
-            }
-        });
+        self.gate.pass(self.path(), &mut |stamp| self.hand_out(&stamp.message(payload.take()?)));
     }
 
     /// Publishes a message with the stamp that it has: one that comes from elsewhere and is passed on.
     pub fn forward(&self, message: &Stamped<T>) {
-        self.gate.pass(&mut |_| self.hand_out(message));
+        self.gate.pass(self.path(), &mut |_| self.hand_out(message));
     }
 
-    fn hand_out(&self, message: &Stamped<T>) {
-        if self.gate.is_noted() {
-            let noted = DynamicMessage::new(self.topic.path(), message);
-            self.topic.publish_as_written(message, || self.gate.note(noted));
-        } else {
-            self.topic.publish(message);
+    fn hand_out(&self, message: &Stamped<T>) -> Option<Panic> {
+        let mut panic = None;
+        if !self.gate.is_noted() {
+            self.topic.publish_contained(message, &mut panic);
+        } else if let Some(noted) = copied(message, &mut panic) {
+            // One that a journal cannot hold is not published: a replay could not publish it either.
+            let noted = DynamicMessage::of(self.path(), noted);
+            self.topic.publish_as_written(message, &mut panic, || self.gate.note(noted));
         }
+        panic
     }
 
     /// Its path.

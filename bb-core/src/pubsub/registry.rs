@@ -26,9 +26,9 @@ pub(crate) struct Registry {
 #[derive(Default)]
 struct State {
     topics: BTreeMap<&'static str, Made>,
-    /// In a replay: paths that had a publisher, with the name of its payload, whose type is not known before the first message.
-    expected: BTreeMap<&'static str, &'static str>,
-    /// Topics that were made so far.
+    /// In a replay: paths that had a publisher, whose payload's type is not known before the first message.
+    expected: BTreeMap<&'static str, Expected>,
+    /// Topics that were made or expected so far.
     made: u64,
     selections: Selections,
     is_closed: bool,
@@ -45,6 +45,26 @@ enum Room {
 struct Made {
     number: u64,
     topic: Arc<dyn AnyTopic>,
+    /// In a replay: in the run it has made room for another one. It is kept for those who use it in the replay, and because it
+    /// knows the type of the payload.
+    is_gone: bool,
+    /// What it had published and lost when it went.
+    before: (u64, u64),
+}
+
+/// A path that had a publisher: which one it is in that order, and the name of the payload.
+struct Expected {
+    number: u64,
+    payload: &'static str,
+}
+
+/// What happens to the paths of a registry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PathChange {
+    /// It has a topic now.
+    Made { path: &'static str, payload: &'static str },
+    /// Its topic, which nobody used, has made room for another.
+    Evicted { path: &'static str },
 }
 
 impl Registry {
@@ -82,16 +102,27 @@ impl Registry {
         subscription
     }
 
-    /// The topic at `path`, made if it is not there.
+    /// The same for tests, which no journal is told of.
+    #[cfg(test)]
     pub(crate) fn topic<T: Payload>(&self, path: &str) -> Result<Arc<Topic<T>>, PathError> {
-        let found = self.find_or_make(path, |path| Arc::new(Topic::<T>::new(path)))?;
+        self.topic_noted(path, &mut |_| ())
+    }
+
+    /// The topic at `path`, made if it is not there; `note` is told of what changes, in that order on all threads. It must not
+    /// wait.
+    pub(crate) fn topic_noted<T: Payload>(
+        &self,
+        path: &str,
+        note: &mut dyn FnMut(PathChange),
+    ) -> Result<Arc<Topic<T>>, PathError> {
+        let found = self.find_or_make(path, |path| Arc::new(Topic::<T>::new(path)), note)?;
         let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&found) as _;
         topic.downcast().map_err(|_| PathError::other_payload(&*found, T::NAME, type_name::<T>()))
     }
 
     /// The topic at the path of a message, made for its payload if it is not there.
     pub(crate) fn topic_of(&self, message: &DynamicMessage) -> Result<Arc<dyn AnyTopic>, PathError> {
-        let found = self.find_or_make(message.path(), |path| message.message().new_topic(path))?;
+        let found = self.find_or_make(message.path(), |path| message.message().new_topic(path), &mut |_| ())?;
         if !message.message().fits(&*found) {
             let name = message.payload_name();
             return Err(PathError::other_payload(&*found, name, message.message().type_name()));
@@ -103,6 +134,7 @@ impl Registry {
         &self,
         path: &str,
         make: impl FnOnce(&'static str) -> Arc<dyn AnyTopic>,
+        note: &mut dyn FnMut(PathChange),
     ) -> Result<Arc<dyn AnyTopic>, PathError> {
         if !is_path(path) {
             return Err(PathError::Malformed(path.into()));
@@ -114,7 +146,8 @@ impl Registry {
         if state.is_closed {
             return Err(PathError::Stopped(path.into()));
         }
-        if let Some(made) = state.topics.get(path) {
+        if let Some(made) = state.topics.get_mut(path) {
+            made.is_gone = false;
             return Ok(Arc::clone(&made.topic));
         }
         let room = state.room().ok_or_else(|| PathError::TooMany(path.into()))?;
@@ -122,36 +155,46 @@ impl Registry {
         let path = intern(path).ok_or_else(|| PathError::TooMany(path.into()))?;
         let evicted = match room {
             Room::Free => None,
-            Room::Of(unused) => state.topics.remove(unused),
+            Room::Of(unused) => {
+                note(PathChange::Evicted { path: unused });
+                state.topics.remove(unused)
+            }
         };
         let topic = make(path);
         state.selections.tap(&*topic);
-        let number = state.made;
-        state.made += 1;
-        state.topics.insert(path, Made { number, topic: Arc::clone(&topic) });
+        note(PathChange::Made { path, payload: topic.payload_name() });
+        let number = state.next_number();
+        state.topics.insert(path, Made { number, topic: Arc::clone(&topic), is_gone: false, before: (0, 0) });
         drop(state);
         drop(evicted);
         Ok(topic)
     }
 
-    /// Whether a topic was made at `path`.
-    pub(crate) fn has(&self, path: &str) -> bool {
-        self.lock().topics.contains_key(path)
-    }
-
-    /// In a replay: somebody could publish at `path`.
+    /// In a replay: somebody could publish at `path` from now on; no more if the name of the payload is empty.
     pub(crate) fn expect(&self, path: &'static str, payload: &'static str) {
-        self.lock().expected.insert(path, payload);
+        let mut state = self.lock();
+        let dropped = if payload.is_empty() { state.forget(path) } else { state.expect(path, payload) };
+        drop(state);
+        drop(dropped);
     }
 
     /// What all topics made here have counted, by path.
     pub(crate) fn statistics(&self) -> Vec<TopicStatistics> {
-        let expected = self.lock().expected.clone();
-        let silent =
-            |(path, payload)| (path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
-        let mut all: BTreeMap<_, _> = expected.into_iter().map(silent).collect();
+        let state = self.lock();
+        let silent = |(path, expected): (&&'static str, &Expected)| {
+            (*path, TopicStatistics { path, payload: expected.payload, published: 0, lost: 0, subscribers: 0 })
+        };
+        let mut all: BTreeMap<_, _> = state.expected.iter().map(silent).collect();
+        let made = state.topics.values().filter(|made| !made.is_gone);
+        let made: Vec<_> = made.map(|made| (Arc::clone(&made.topic), made.before)).collect();
+        drop(state);
         // Subscriptions are asked for what they have counted without the lock.
-        all.extend(self.topics().iter().map(|topic| (topic.path(), topic.statistics())));
+        all.extend(made.iter().map(|(topic, (published, lost))| {
+            let mut counted = topic.statistics();
+            counted.published = counted.published.saturating_sub(*published);
+            counted.lost = counted.lost.saturating_sub(*lost);
+            (topic.path(), counted)
+        }));
         all.into_values().collect()
     }
 
@@ -179,15 +222,61 @@ impl State {
     /// Room for another topic. An untyped subscription to a topic that makes room loses nothing: if it is made again, it is
     /// subscribed to again.
     fn room(&self) -> Option<Room> {
-        if self.topics.len() < Registry::MAX_TOPICS {
+        if self.topics.len() - self.gone().count() < Registry::MAX_TOPICS {
             return Some(Room::Free);
         }
-        // Publishers hold the topic, and so does a thread that is subscribing to it.
-        let is_used = |made: &Made| {
-            Arc::strong_count(&made.topic) > 1 || made.topic.subscribers().iter().any(|one| one.is_typed)
-        };
-        let unused = self.topics.iter().filter(|(_, made)| !is_used(made));
+        let unused = self.topics.iter().filter(|(_, made)| !made.is_used());
         unused.min_by_key(|(_, made)| made.number).map(|(path, _)| Room::Of(path))
+    }
+
+    fn gone(&self) -> impl Iterator<Item = (&&'static str, &Made)> {
+        self.topics.iter().filter(|(_, made)| made.is_gone)
+    }
+
+    fn next_number(&mut self) -> u64 {
+        self.made += 1;
+        self.made
+    }
+
+    /// A topic is returned that is to be dropped.
+    fn expect(&mut self, path: &'static str, payload: &'static str) -> Option<Made> {
+        let number = self.next_number();
+        self.expected.insert(path, Expected { number, payload });
+        // Of a journal that does not say which have made room, the oldest is forgotten.
+        if self.expected.len() > Registry::MAX_TOPICS
+            && let Some((oldest, _)) = self.expected.iter().min_by_key(|(_, expected)| expected.number)
+        {
+            let oldest = *oldest;
+            self.expected.remove(oldest);
+        }
+        let made = self.topics.get_mut(path)?;
+        if made.is_gone && made.topic.payload_name() != payload {
+            return self.topics.remove(path);
+        }
+        made.is_gone = false;
+        None
+    }
+
+    /// The same.
+    fn forget(&mut self, path: &'static str) -> Option<Made> {
+        self.expected.remove(path);
+        let made = self.topics.get_mut(path)?;
+        let counted = made.topic.statistics();
+        (made.is_gone, made.before) = (true, (counted.published, counted.lost));
+        if self.gone().count() <= Registry::MAX_TOPICS {
+            return None;
+        }
+        let unused = self.gone().filter(|(_, made)| !made.is_used());
+        let (oldest, _) = unused.min_by_key(|(_, made)| made.number)?;
+        let oldest = *oldest;
+        self.topics.remove(oldest)
+    }
+}
+
+impl Made {
+    /// Publishers hold the topic, and so does a thread that is subscribing to it.
+    fn is_used(&self) -> bool {
+        Arc::strong_count(&self.topic) > 1 || self.topic.subscribers().iter().any(|one| one.is_typed)
     }
 }
 
@@ -470,6 +559,61 @@ mod tests {
         assert!(refusal(&registry, "one/more").starts_with("cannot publish at `one/more`: 1024 other paths"));
         drop(taken);
         assert_eq!(refusal(&registry, "one/more"), "accepted");
+    }
+
+    /// What has a row, and how much was published there.
+    fn rows(registry: &Registry) -> Vec<(&'static str, &'static str, u64)> {
+        registry.statistics().iter().map(|row| (row.path, row.payload, row.published)).collect()
+    }
+
+    #[test]
+    fn changes_are_told_in_order_and_a_replay_that_is_told_of_them_counts_the_same() {
+        let (registry, replayed) = (registry(), registry());
+        let mut changes = Vec::new();
+        let mut make = |path: &str| {
+            let mut note = |change| changes.push(change);
+            registry.topic_noted::<JointState>(path, &mut note).expect("there is room")
+        };
+        make("first").publish(&state(1.0));
+        drop(make("first"));
+        (0..Registry::MAX_TOPICS).for_each(|number| drop(make(&format!("other/{number}"))));
+        make("first").publish(&state(2.0));
+        let evicted = |change: &&PathChange| matches!(change, PathChange::Evicted { .. });
+        let gone: Vec<_> = changes.iter().filter(evicted).copied().collect();
+        assert_eq!(gone, ["first", "other/0"].map(|path| PathChange::Evicted { path }));
+        assert_eq!(changes[0], PathChange::Made { path: "first", payload: "JointState" });
+        assert_eq!(changes.len(), Registry::MAX_TOPICS + 4);
+
+        let topic = replayed.topic::<JointState>("first").expect("it is free");
+        topic.publish(&state(1.0));
+        for change in changes {
+            match change {
+                PathChange::Made { path, payload } => replayed.expect(path, payload),
+                PathChange::Evicted { path } => replayed.expect(path, ""),
+            }
+        }
+        topic.publish(&state(2.0));
+        assert_eq!(rows(&replayed), rows(&registry));
+    }
+
+    #[test]
+    fn a_replay_keeps_a_bounded_number_of_paths_whatever_its_journal_says() {
+        let registry = registry();
+        let paths: Vec<&'static str> =
+            (0..3 * Registry::MAX_TOPICS).filter_map(|number| intern(&format!("bounded/{number}"))).collect();
+        for path in &paths {
+            registry.expect(path, "JointState");
+        }
+        assert_eq!(rows(&registry).len(), Registry::MAX_TOPICS);
+        for path in &paths {
+            registry.topic::<JointState>(path).map(drop).expect("those that are gone take no room");
+            registry.expect(path, "");
+        }
+        assert_eq!((rows(&registry).len(), registry.topics().len()), (0, Registry::MAX_TOPICS));
+        registry.topic::<JointState>(paths[0]).map(drop).expect("there is room");
+        registry.expect(paths[0], "");
+        registry.expect(paths[0], "Imu");
+        assert_eq!(rows(&registry), [(paths[0], "Imu", 0)]);
     }
 
     #[test]

@@ -75,6 +75,13 @@ impl<T: Payload> Topic<T> {
         self.hand_out(message);
     }
 
+    /// The same; a panic of the payload's `Clone` is kept in `panic`, unless there is one already.
+    pub(crate) fn publish_contained(&self, message: &Stamped<T>, panic: &mut Option<Panic>) {
+        let mut wakers = Wakers::dropping_at_once();
+        self.publish_deferred(message, &mut wakers, panic);
+        wakers.run();
+    }
+
     /// The same for a publisher that is alone, as an estimator is in its island: it need not fear that somebody else counts
     /// at the same time.
     #[inline]
@@ -96,8 +103,14 @@ impl<T: Payload> Topic<T> {
     }
 
     /// The same for one of several publishers, of a message that `write` writes into a journal: subscribers receive messages
-    /// in the order of their lines. What `write` gives is returned.
-    pub(crate) fn publish_as_written<L>(&self, message: &Stamped<T>, write: impl FnOnce() -> L) -> L {
+    /// in the order of their lines. What `write` gives is returned. A panic of the payload's `Clone` is kept in `panic`, unless
+    /// there is one already.
+    pub(crate) fn publish_as_written<L>(
+        &self,
+        message: &Stamped<T>,
+        panic: &mut Option<Panic>,
+        write: impl FnOnce() -> L,
+    ) -> L {
         if self.listening.load(Ordering::Acquire) == 0 {
             let line = write();
             // A subscription that begins meanwhile does not get it: it might already have got one with a later line.
@@ -106,12 +119,12 @@ impl<T: Payload> Topic<T> {
         }
         let mut wakers = Wakers::default();
         // Copies are made before: the payload's `clone` is user code, and another publisher must not wait for it.
-        let mut copies = self.copies(message);
+        let mut copies = self.copies(message, panic);
         loop {
             let order = self.order.lock().unwrap_or_else(PoisonError::into_inner);
             if !self.has_still(&copies.listeners) {
                 drop(order);
-                copies = self.copies(message);
+                copies = self.copies(message, panic);
                 continue;
             }
             let line = write();
@@ -124,14 +137,13 @@ impl<T: Payload> Topic<T> {
     }
 
     /// Only enqueues `message`: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's
-    /// code runs here but the payload's `clone`, and that only if somebody listens.
+    /// code runs here but the payload's `clone`, and that only if somebody listens; its panic is kept in `panic`, unless there is
+    /// one already.
     #[inline]
-    pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers) {
+    pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers, panic: &mut Option<Panic>) {
         self.published.fetch_add(1, Ordering::Relaxed);
-        if self.listening.load(Ordering::Acquire) > 0
-            && let Some(panic) = self.deliver(message, wakers)
-        {
-            resume_unwind(panic);
+        if self.listening.load(Ordering::Acquire) > 0 {
+            self.deliver(message, wakers, panic);
         }
     }
 
@@ -145,29 +157,28 @@ impl<T: Payload> Topic<T> {
     #[cold]
     fn deliver_and_wake(&self, message: &Stamped<T>) {
         let mut wakers = Wakers::dropping_at_once();
-        let panic = self.deliver(message, &mut wakers);
+        let mut panic = None;
+        self.deliver(message, &mut wakers, &mut panic);
         wakers.run();
         if let Some(panic) = panic {
             resume_unwind(panic);
         }
     }
 
-    /// Returns a panic of the payload's `Clone`; the message is handed to everybody all the same.
+    /// Keeps a panic of the payload's `Clone`, if there is none yet; the message is handed to everybody all the same.
     #[cold]
-    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) -> Option<Panic> {
+    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers, panic: &mut Option<Panic>) {
         let Listeners { queues, taps } = self.listeners();
         let bytes = counted_bytes(message);
-        let mut panic = None;
         let mut lost: u64 = queues
             .iter()
-            .map(|queue| copied(message, &mut panic).map_or(1, |copy| queue.push(copy, bytes, wakers)))
+            .map(|queue| copied(message, panic).map_or(1, |copy| queue.push(copy, bytes, wakers)))
             .sum();
         if !taps.is_empty() {
-            let copy = copied(message, &mut panic).map(|copy| DynamicMessage::of(self.path, copy));
+            let copy = copied(message, panic).map(|copy| DynamicMessage::of(self.path, copy));
             lost += copy.map_or(taps.len() as u64, |copy| tap_all(&taps, copy, bytes, wakers));
         }
         self.count_lost(lost);
-        panic
     }
 
     /// Those who listen now.
@@ -186,22 +197,24 @@ impl<T: Payload> Topic<T> {
         Arc::ptr_eq(&listeners.queues, &subscribers.queues) && Arc::ptr_eq(&listeners.taps, &subscribers.taps)
     }
 
-    fn copies(&self, message: &Stamped<T>) -> Copies<T> {
+    fn copies(&self, message: &Stamped<T>, panic: &mut Option<Panic>) -> Copies<T> {
         let listeners = self.listeners();
-        let mut typed = listeners.queues.iter().map(|_| message.clone());
-        let (first, more) = (typed.next(), typed.collect());
-        let untyped = (!listeners.taps.is_empty()).then(|| DynamicMessage::new(self.path, message));
+        let mut typed = listeners.queues.iter().map(|_| copied(message, panic));
+        let (first, more) = (typed.next().flatten(), typed.collect());
+        let untyped = if listeners.taps.is_empty() { None } else { copied(message, panic) };
+        let untyped = untyped.map(|copy| DynamicMessage::of(self.path, copy));
         Copies { bytes: counted_bytes(message), first, more, untyped, listeners }
     }
 
     /// Hands out copies; no code of the payload runs.
     fn enqueue(&self, copies: Copies<T>, wakers: &mut Wakers) {
         let Copies { listeners, first, more, untyped, bytes } = copies;
-        let typed = listeners.queues.iter().zip(first.into_iter().chain(more));
-        let mut lost: u64 = typed.map(|(queue, message)| queue.push(message, bytes, wakers)).sum();
-        if let Some(message) = untyped {
-            lost += tap_all(&listeners.taps, message, bytes, wakers);
-        }
+        let typed = listeners.queues.iter().zip(std::iter::once(first).chain(more));
+        let mut lost: u64 = typed.map(|(queue, copy)| copy.map_or(1, |copy| queue.push(copy, bytes, wakers))).sum();
+        lost += match untyped {
+            Some(copy) => tap_all(&listeners.taps, copy, bytes, wakers),
+            None => listeners.taps.len() as u64,
+        };
         self.count_lost(lost);
     }
 
@@ -221,9 +234,9 @@ struct Listeners<T> {
 /// A message for each of them.
 struct Copies<T> {
     listeners: Listeners<T>,
-    /// One subscriber alone needs no allocation.
+    /// One subscriber alone needs no allocation. None of a message that cannot be copied.
     first: Option<Stamped<T>>,
-    more: Vec<Stamped<T>>,
+    more: Vec<Option<Stamped<T>>>,
     untyped: Option<DynamicMessage>,
     bytes: usize,
 }

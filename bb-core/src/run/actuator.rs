@@ -14,10 +14,10 @@ use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Bindin
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
 use crate::event::Safety;
-use crate::fault::{Failed, Fault, caught};
+use crate::fault::{Failed, Fault, caught, of_panic};
 use crate::journal::{Event, Recorded};
 use crate::lifecycle::{AfterFault, AsActuator, HostHandle, Recipe, Slot};
-use crate::message::{Finite, Frame, Payload, Stamp};
+use crate::message::{Finite, Frame, Payload, Stamp, copied};
 use crate::node::{BindTarget, Environment, Mode};
 use crate::pubsub::{AnyTopic, DynamicMessage, Topic, Wakers};
 use crate::schedule::Lane;
@@ -70,6 +70,7 @@ struct State<A: Actuator> {
 enum Told {
     Failed { message: String, panicked: bool },
     Unsafe(String),
+    MessageFailed(String),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -275,12 +276,19 @@ impl<A: Actuator> Inner<A> {
         }
         state.moved_by = permit.clone();
         self.counts.carried_out();
-        if let Some(journal) = self.environment.journal() {
-            let message = Recorded::Message(DynamicMessage::new(self.declaration.path, &message));
+        let mut panic = None;
+        if let Some(journal) = self.environment.journal()
+            && let Some(copy) = copied(&message, &mut panic)
+        {
+            let message = Recorded::Message(DynamicMessage::of(self.declaration.path, copy));
             journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
         }
         // Under the lock, in the order in which commands are carried out.
-        self.topic.publish_deferred(&message, wakers);
+        self.topic.publish_deferred(&message, wakers, &mut panic);
+        if let Some(panic) = panic {
+            // It has moved: neither it nor its sender fails.
+            self.tell_control(state, Told::MessageFailed(format!("its message {}", of_panic(panic))));
+        }
         Ok(())
     }
 
@@ -396,6 +404,7 @@ impl<A: Actuator> Inner<A> {
                 self.control.component_failed(path, supervisor, message, panicked)
             }
             Told::Unsafe(message) => self.control.note_hardware_error(path, message),
+            Told::MessageFailed(message) => self.control.note_fault(path, message),
         }
     }
 

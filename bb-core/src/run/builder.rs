@@ -248,11 +248,18 @@ impl<R: Robot> Builder<R> {
             telemetry: telemetry.clone(),
         });
         if let Err((path, message)) = control.check_commands() {
+            _remains = Remains::of(mode, (control.clone(), telemetry));
             return Err(StartError::component(path, Fault::new(message)));
         }
         let start = clock.now();
         let joints = known_joints::<R>(&self.topics, self.joints, clock.clone());
-        let joints: Joints = joints.map_err(|error| StartError::component(R::NAME, Fault::from(error)))?;
+        let joints: Joints = match joints {
+            Ok(joints) => joints,
+            Err(error) => {
+                _remains = Remains::of(mode, (control.clone(), telemetry));
+                return Err(StartError::component(R::NAME, Fault::from(error)));
+            }
+        };
         let parts = EnvironmentParts {
             mode,
             joints: joints.clone(),
@@ -321,19 +328,28 @@ impl<R: Robot> Builder<R> {
         });
         if let Some(refusal) = environment.take_refusal() {
             let error = abandon(refusal.path, refusal.fault);
-            if mode == Mode::Real {
-                _remains = Remains::of((wired.map(|(wiring, _)| wiring).ok(), environment, control.clone()));
-            }
+            _remains = Remains::of(mode, (wired.map(|(wiring, _)| wiring).ok(), environment, control.clone()));
             return Err(error);
         }
         // Each component's code is guarded separately, with its path. This is for anything else.
-        let (wiring, sources) = wired.map_err(|failed| abandon(R::NAME, failed.fault))?;
+        let (wiring, sources) = match wired {
+            Ok(wired) => wired,
+            Err(failed) => {
+                let error = abandon(R::NAME, failed.fault);
+                _remains = Remains::of(mode, (environment, control.clone()));
+                return Err(error);
+            }
+        };
         if let Some(journal) = &journal {
             let declaration = facts.iter().cloned().chain(environment.facts()).collect();
             let begin = Event::Begin { declaration, wall_offset_nanos, is_virtual: mode == Mode::Virtual };
             journal.begin(start, begin);
-            if mode == Mode::Real {
-                journal.start().map_err(|error| abandon("journal", Fault::from(error)))?;
+            if mode == Mode::Real
+                && let Err(error) = journal.start()
+            {
+                let error = abandon("journal", Fault::from(error));
+                _remains = Remains::of(mode, (wiring, environment, control.clone()));
+                return Err(error);
             }
         }
         for fact in facts {

@@ -12,8 +12,8 @@ use crate::fault::Fault;
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::message::Origin;
-use crate::node::NodeEntry;
-use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
+use crate::node::{NodeEntry, Overseer};
+use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::schedule::Door;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::Topology;
@@ -136,12 +136,19 @@ impl<R: Robot> Host for RobotHost<R> {
         }
     }
 
-    fn note_publisher(&self, path: &'static str, payload: &'static str) {
-        self.note(|| Event::OwnPublisher { path, payload });
+    fn note_path(&self, change: PathChange) {
+        self.note(|| match change {
+            PathChange::Made { path, payload } => Event::OwnPublisher { path, payload },
+            PathChange::Evicted { path } => Event::OwnPublisher { path, payload: "" },
+        });
     }
 
     fn note_own(&self, message: DynamicMessage) {
         self.note(|| Event::Own { path: message.path(), message: Recorded::Message(message) });
+    }
+
+    fn message_failed(&self, path: &'static str, fault: Fault) {
+        Overseer::message_failed(&self.control, path, format!("its message {fault}"));
     }
 
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {

@@ -233,11 +233,8 @@ impl<R: Robot> Machine<R> {
 }
 
 impl<R: Robot> Drop for Machine<R> {
-    /// On virtual time all user code runs on the caller's thread.
     fn drop(&mut self) {
-        if !self.control.is_virtual() {
-            let shared = (Arc::clone(&self.wiring), self.environment.clone(), self.control.clone());
-            self.remains = Remains::of((shared, Arc::clone(&self.host)));
-        }
+        let shared = (Arc::clone(&self.wiring), self.environment.clone(), self.control.clone());
+        self.remains = Remains::of(self.environment.mode(), (shared, Arc::clone(&self.host)));
     }
 }

@@ -2,6 +2,7 @@
 //! `Drop` is user code, and may block.
 
 use crate::fault::discard;
+use crate::node::Mode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -9,17 +10,24 @@ use std::time::Duration;
 /// How long the thread that drops the last handle waits.
 const DROPPED_WITHIN: Duration = Duration::from_millis(200);
 
-/// Drops a value on a thread of its own once this is dropped, which waits for that, but not forever.
-#[derive(Debug)]
-pub(super) struct Remains {
-    begin: Option<Sender<()>>,
-    /// A lock that nobody contends: a receiver alone cannot be shared.
-    dropped: Mutex<Receiver<()>>,
+/// Drops a value once this is dropped. A panic in its `Drop` is logged.
+pub(super) enum Remains {
+    /// On virtual time all user code runs on the caller's thread.
+    Here(Option<Box<dyn Send + Sync>>),
+    /// On a thread of its own, which is waited for, but not forever.
+    Apart {
+        begin: Option<Sender<()>>,
+        /// A lock that nobody contends: a receiver alone cannot be shared.
+        dropped: Mutex<Receiver<()>>,
+    },
 }
 
 impl Remains {
     /// `value` is dropped no later than here if there is no thread to be had.
-    pub(super) fn of(value: impl Send + 'static) -> Option<Self> {
+    pub(super) fn of(mode: Mode, value: impl Send + Sync + 'static) -> Option<Self> {
+        if mode != Mode::Real {
+            return Some(Self::Here(Some(Box::new(value))));
+        }
         let (begin, begun) = channel();
         let (done, dropped) = channel::<()>();
         let drop_it = move || {
@@ -29,14 +37,18 @@ impl Remains {
             drop(done);
         };
         std::thread::Builder::new().name("drop".into()).spawn(drop_it).ok()?;
-        Some(Self { begin: Some(begin), dropped: Mutex::new(dropped) })
+        Some(Self::Apart { begin: Some(begin), dropped: Mutex::new(dropped) })
     }
 }
 
 impl Drop for Remains {
     fn drop(&mut self) {
-        self.begin = None;
-        let dropped = self.dropped.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let (begin, dropped) = match self {
+            Self::Here(value) => return discard(value.take()),
+            Self::Apart { begin, dropped } => (begin, dropped),
+        };
+        *begin = None;
+        let dropped = dropped.get_mut().unwrap_or_else(PoisonError::into_inner);
         // Nothing is sent: the other end is dropped.
         if dropped.recv_timeout(DROPPED_WITHIN) == Err(RecvTimeoutError::Timeout) {
             tracing::warn!("what the robot owned was not dropped in time");

@@ -3,6 +3,7 @@
 
 use super::{Island, IslandState, IslandWiring as _, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, Outputs, TakenAt};
+use crate::fault::of_panic;
 use crate::message::{Payload, Stamp, Stamped, copied};
 use crate::node::emission::{copy_failed, emitter};
 use crate::node::{AnyIsland, Emitting, Mode, Next, Node, NodeEntry, Turn};
@@ -47,9 +48,14 @@ pub trait Member {
     }
 }
 
-/// Emits `message` alone at the output `F`.
+/// Emits `message` alone at the output `F`. Nobody is charged if the payload's `Clone` panics: the message is a recorded one.
 pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
-    message.downcast::<F::Payload>().map(|message| F::alone(message.payload.clone()))
+    let mut panic = None;
+    let copy = copied(message.downcast::<F::Payload>()?, &mut panic);
+    if let Some(fault) = panic.map(of_panic) {
+        tracing::error!(%fault, "a recorded message failed where it was copied");
+    }
+    copy.map(|message| F::alone(message.payload))
 }
 
 /// What an island does with one of its estimators, other than delivering messages.

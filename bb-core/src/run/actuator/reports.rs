@@ -66,7 +66,7 @@ impl Reports {
 
 fn topic<T: Payload>(context: &ActuatorContext, host: &dyn Host, name: &str) -> Option<Arc<Topic<T>>> {
     let path = format!("{}/{name}", context.path());
-    match host.registry().topic(&path) {
+    match host.registry().topic_noted(&path, &mut |change| host.note_path(change)) {
         Ok(topic) => Some(topic),
         Err(error) => {
             tracing::warn!(component = context.path(), %error, "its motions are not published");
@@ -88,5 +88,6 @@ fn publish<T: Payload>(
         let offset = environment.clock().wall_offset_nanos();
         journal.write(message.monotonic_time, offset, Event::Own { path, message: recorded });
     }
-    topic.publish_deferred(message, wakers);
+    // Payloads of this crate, whose `clone` does not panic.
+    topic.publish_deferred(message, wakers, &mut None);
 }
