@@ -343,6 +343,31 @@ fn the_open_loop_position_follows_the_true_one() -> Result<(), Failure> {
 }
 
 #[test]
+fn a_velocity_of_zero_is_no_motion_to_the_end_of_the_range() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let servo = crane::actuator::base::slew::boom::reach::trolley::jaw::servo;
+    let below = Select::Below("actuator/base/slew/boom/reach/trolley/jaw/servo");
+    simulation.actuate(servo, PositionCommand { position: 0.4, ..Default::default() }.into())?;
+    simulation.run_for(Duration::from_secs(2));
+    let begins = simulation.subscribe_any(below, "BeginMotion", Overflow::default());
+    let ends = ends(&simulation.bus());
+    let velocity = |velocity: f64| ActuatorCommand::from(VelocityCommand { velocity, effort: None });
+    simulation.actuate(servo, velocity(0.0))?;
+    simulation.run_for(Duration::from_secs(1));
+    assert_eq!((begins.drain().count(), next_end(&ends)), (0, None));
+    let status = simulation.joints().status("jaw").ok_or("declared")?;
+    assert!((status.position[0] - 0.4).abs() < 1e-6, "{status:?}");
+    // It ends a motion, as `Hold` does.
+    simulation.actuate(servo, velocity(0.5))?;
+    simulation.run_for(Duration::from_millis(100));
+    simulation.actuate(servo, velocity(-0.0))?;
+    simulation.run_for(Duration::from_secs(1));
+    assert_eq!(begins.drain().count(), 1);
+    assert_eq!(next_end(&ends), Some(("jaw".to_owned(), MotionEnd::Stopped)));
+    Ok(())
+}
+
+#[test]
 fn joints_move_through_points_and_arrive_together() -> Result<(), Failure> {
     let mut simulation = ready()?;
     let progress = simulation.subscribe_any(Select::Below("command/go"), "MotionProgress", Overflow::default());

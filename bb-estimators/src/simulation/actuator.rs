@@ -16,7 +16,7 @@ use std::time::Duration;
 /// It takes all standard commands; as `SimulatedActuator<VelocityCommand>` it takes the place of a driver that takes only some. It
 /// reports its motions: a position or a trajectory ends when the joint rests at the target (`Reached`), a velocity at the end of the
 /// joint's range (`Limit`); either ends when something else is commanded (`Replaced`), when it has come to rest after
-/// `Hold`, `Stop` or a disarming (`Stopped`), or when something holds it for `stall_after` (`Stalled`, or `Limit` at the end of
+/// `Hold`, `Stop`, a velocity of zero or a disarming (`Stopped`), or when something holds it for `stall_after` (`Stalled`, or `Limit` at the end of
 /// its range).
 pub struct SimulatedActuator<C = ActuatorCommand> {
     options: SimulatedActuatorOptions,
@@ -141,6 +141,8 @@ impl<C> SimulatedActuator<C> {
                 let speed = command.velocity.map(f64::abs).filter(|speed| *speed > 0.0);
                 Goal::Position { target: command.position, speed: speed.unwrap_or(self.drivetrain.velocity) }
             }
+            // A velocity of zero leads nowhere: it is no motion with a target.
+            ActuatorCommand::Velocity(command) if command.velocity == 0.0 => Goal::Hold,
             ActuatorCommand::Velocity(command) => Goal::Velocity(command.velocity),
             ActuatorCommand::Effort(command) => Goal::Effort(command.effort),
             ActuatorCommand::Trajectory(trajectory) => {
@@ -167,7 +169,7 @@ impl<C> SimulatedActuator<C> {
             Goal::Path { path, .. } => (path.target(), path.speed(), arrival(path.duration_s())),
             Goal::Velocity(velocity) => {
                 let end = if *velocity < 0.0 { self.drivetrain.lower } else { self.drivetrain.upper };
-                (end, velocity.abs(), None)
+                (end, velocity.abs().min(self.drivetrain.velocity), None)
             }
             Goal::Free | Goal::Effort(_) | Goal::Hold | Goal::Stop => return,
         };
