@@ -455,6 +455,23 @@ fn a_command_that_preempts_another_takes_over_its_joints() -> Result<(), Failure
     Ok(())
 }
 
+/// It fails at the first joint that it loses; by then the other one is somebody else's too.
+#[test]
+fn a_command_that_loses_its_joints_leaves_them_to_whoever_moves_them() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
+    simulation.run_for(Duration::from_secs(1));
+    let there = |position| ActuatorCommand::from(PositionCommand { position, ..Default::default() });
+    simulation.actuate(crane::actuator::base::slew::motor, there(-0.5))?;
+    simulation.actuate(crane::actuator::base::slew::boom::reach::motor, there(0.1))?;
+    simulation.run_for(Duration::from_secs(10));
+    let error = execution.try_result().ok_or("it has ended")?.expect_err("it was replaced").to_string();
+    assert!(error.contains("another command has taken over the joint `slew`"), "{error}");
+    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    assert!((slew + 0.5).abs() < 1e-6 && (reach - 0.1).abs() < 1e-6, "{slew} {reach}");
+    Ok(())
+}
+
 #[test]
 fn a_joint_that_is_held_fails_the_command_and_stops_the_others() -> Result<(), Failure> {
     let mut simulation = ready()?;

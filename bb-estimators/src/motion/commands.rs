@@ -18,8 +18,8 @@ use std::time::Duration;
 ///
 /// The trajectory is [planned](plan) from where the joints are, and each actuator, which takes [`ActuatorCommand`], follows its part of it. It
 /// publishes a [`MotionProgress`] ten times a second at `progress` below its path. It succeeds when all actuators have
-/// reported that they have reached their target. If one reports anything else, the others are told to hold, and it fails
-/// with the reason. If it is cancelled or times out, its actuators come to rest and hold.
+/// reported that they have reached their target. If one reports anything else, those that it still moves are told to hold, and it
+/// fails with the reason. If it is cancelled or times out, its actuators come to rest and hold.
 #[derive(Debug)]
 pub struct MoveJoints;
 
@@ -121,7 +121,7 @@ impl MoveJoints {
                 return Ok(());
             }
             if now >= deadline {
-                return Err(motion.fail("the joints have not arrived in time".to_owned(), None));
+                return Err(motion.fail("the joints have not arrived in time".to_owned()));
             }
         }
     }
@@ -184,7 +184,7 @@ impl Motion {
             self.links.iter().try_for_each(|link| link.send(trajectory.clone().into()));
         // What they replaced has ended before.
         self.reports.drain().for_each(drop);
-        sent.map_err(|error| self.fail(error.to_string(), None))
+        sent.map_err(|error| self.fail(error.to_string()))
     }
 
     /// An actuator has reported the end of a motion.
@@ -202,16 +202,12 @@ impl Motion {
             MotionEnd::Stopped => format!("the joint `{joint}` was stopped"),
             MotionEnd::Failed(reason) => format!("the actuator of the joint `{joint}` has failed: {reason}"),
         };
-        // What another command moves now is that one's.
-        Err(self.fail(reason, (end.end == MotionEnd::Replaced).then_some(index)))
+        Err(self.fail(reason))
     }
 
-    /// The fault, after all joints but one were told to hold.
-    fn fail(&self, reason: String, except: Option<usize>) -> Fault {
-        for (_, link) in self.links.iter().enumerate().filter(|(index, _)| Some(*index) != except) {
-            // One that does not take it has been stopped otherwise, or has failed and was made safe.
-            let _ = link.send(ActuatorCommand::Hold);
-        }
+    /// The fault, after all joints were told to hold but those that somebody else moves by now.
+    fn fail(&self, reason: String) -> Fault {
+        self.links.iter().for_each(ActuatorLink::stop);
         Fault::new(reason)
     }
 
