@@ -263,6 +263,19 @@ fn a_trajectory_beyond_a_limit_is_refused() -> Result<(), Failure> {
     let fast = trajectory(vec![point(0.0, 0.0, 0), point(0.5, -1.5, 500), point(1.0, 0.0, 5000)]);
     let error = simulation.actuate(motor, fast.into()).expect_err("it is too fast").to_string();
     assert_eq!(error, "the velocity -1.5 is beyond the limit -1 of the joint");
+    // Nor is there a way around the limits.
+    let jump = trajectory(vec![point(0.0, 0.0, 0), point(1.0, 0.0, 500)]);
+    let error = simulation.actuate(motor, jump.into()).expect_err("it is too fast between its points").to_string();
+    assert_eq!(error, "the velocity 2 is beyond the limit 1 of the joint");
+    let mut twice = trajectory(vec![point(0.0, 0.0, 0), point(0.5, 0.0, 5000)]);
+    twice.joint_names = ["slew".to_owned(), "slew".to_owned()].into();
+    twice.points = twice
+        .points
+        .iter()
+        .map(|point| bb_core::payload::TrajectoryPoint { positions: vec![0.0, -2.0], ..point.clone() })
+        .collect();
+    let error = simulation.actuate(motor, twice.into()).expect_err("its second column is beyond").to_string();
+    assert_eq!(error, format!("the position -2 is beyond the limit {} of the joint", -90_f64.to_radians()));
     let other =
         JointTrajectory { joint_names: ["reach".to_owned()].into(), ..trajectory(vec![point(0.0, 0.0, 0)]) };
     let error = simulation.actuate(motor, other.into()).expect_err("it is not named").to_string();
@@ -270,7 +283,7 @@ fn a_trajectory_beyond_a_limit_is_refused() -> Result<(), Failure> {
     let report = simulation.report();
     let counts = report.actuator(motor.path()).ok_or("it is declared")?;
     let refused = LimitedQuantity::ALL.iter().map(|quantity| counts.refused(*quantity));
-    assert_eq!((counts.commands, refused.collect::<Vec<_>>()), (0, vec![1, 1, 0]));
+    assert_eq!((counts.commands, refused.collect::<Vec<_>>()), (0, vec![2, 2, 0]));
     Ok(())
 }
 
