@@ -10,7 +10,7 @@ use bb_core::nalgebra::{Isometry3, Vector3};
 use bb_core::payload::{ActuatorCommand, EndMotion, MotionEnd};
 use bb_core::prelude::*;
 use bb_core::run::{Bus, Execution};
-use bb_core::{DynamicSubscription, LimitedQuantity};
+use bb_core::{DynamicMessage, DynamicSubscription, LimitedQuantity};
 use bb_estimators::motion::{
     Drive, Easing, JointTarget, JointTargets, MotionProgress, MoveJoints, OpenLoopPosition, PidController,
 };
@@ -511,6 +511,31 @@ fn a_controller_holds_its_setpoint_which_is_a_parameter() -> Result<(), Failure>
     let report = simulation.report();
     let counts = report.actuator("actuator/base/spin/motor").ok_or("it is declared")?;
     assert!(counts.limited(LimitedQuantity::Velocity) > 100);
+    Ok(())
+}
+
+#[test]
+fn a_controller_that_is_blind_holds_its_joint() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    simulation.set_parameter(crane::param::gains::setpoint, -20.0)?;
+    simulation.run_for(Duration::from_millis(1500));
+    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
+    let velocity = |simulation: &Simulation<Crane>| -> Result<f64, Failure> {
+        Ok(world.joint("spin", simulation.clock().now())?.point.velocity)
+    };
+    let commands = simulation.subscribe_any(Select::Path("actuator/base/spin/motor"), None, Overflow::default());
+    assert!((velocity(&simulation)? + 3.0).abs() < 1e-9);
+    world.set_unplugged("sensor/base/spin/encoder", true);
+    // 0.1 s until the measurement is stale, and 3 rad/s at 10 rad/s².
+    simulation.run_for(Duration::from_millis(600));
+    assert_eq!(velocity(&simulation)?, 0.0);
+    let holds = |message: DynamicMessage| {
+        message.downcast::<ActuatorCommand>().is_some_and(|command| command.payload == ActuatorCommand::Hold)
+    };
+    assert_eq!(commands.drain().filter(|message| holds(message.clone())).count(), 1, "once");
+    world.set_unplugged("sensor/base/spin/encoder", false);
+    simulation.run_for(Duration::from_secs(1));
+    assert!(velocity(&simulation)? < -1.0, "it goes on");
     Ok(())
 }
 
