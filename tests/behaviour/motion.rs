@@ -13,6 +13,7 @@ use bb_core::run::{Bus, Execution};
 use bb_core::{DynamicMessage, DynamicSubscription, LimitedQuantity};
 use bb_estimators::motion::{
     Drive, Easing, JointTarget, JointTargets, MotionProgress, MoveJoints, OpenLoopPosition, PidController,
+    ThresholdController,
 };
 use bb_estimators::simulation::{GRAVITY, SimulatedActuatorOptions, SimulatedEncoderOptions, SimulatedWorld};
 use bb_estimators::{SimulatedActuator, SimulatedEncoder, SimulatedLinkImu};
@@ -684,5 +685,57 @@ fn an_imu_on_a_moving_link_measures_how_that_moves() -> Result<(), Failure> {
     // Rounding of a position, 1e-16 m, over the square of 0.1 ms; and its fourth derivative.
     assert!(worst_force < 1e-6, "{worst_force}");
     assert!(worst_rate < 1e-6, "{worst_rate}");
+    Ok(())
+}
+
+robot! {
+    robot Sump;
+    controllers {
+        controller level: ThresholdController(
+            measurement = "sensor/base/float/level",
+            actuator = "actuator/base/pump/motor",
+            on_at = 0.8,
+            off_at = 0.2,
+            on_velocity = 2.0,
+        ) { rate: 100 Hz; }
+    }
+    link base {
+        joint float: prismatic {
+            axis: z;
+            limit: { lower: 0 m, upper: 1 m, velocity: 1 m/s, effort: 1 N };
+            sensor level: External<JointState>();
+            link ball;
+        }
+        joint pump: continuous {
+            axis: z;
+            limit: { velocity: 3 rad/s, effort: 2 N*m };
+            actuator motor: SimulatedActuator();
+            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+            link rotor;
+        }
+    }
+}
+
+#[test]
+fn a_threshold_switches_its_actuator_on_again_after_a_disarming() -> Result<(), Failure> {
+    let mut simulation = Sump::builder().simulate()?;
+    let states = simulation.subscribe_any(Select::All, "ThresholdState", Overflow::default());
+    let rise = |simulation: &mut Simulation<Sump>, level: f64| -> Result<f64, Failure> {
+        for _ in 0..50 {
+            simulation.run_for(Duration::from_millis(20));
+            let state = JointState { position: level, velocity: None, effort: None };
+            simulation.publish(sump::sensor::base::float::level, simulation.clock().now(), state);
+        }
+        let world = simulation.shared(|| SimulatedWorld::new(Sump::TOPOLOGY));
+        Ok(world.joint("pump", simulation.clock().now())?.point.velocity)
+    };
+    assert_eq!(simulation.arm(), Ok(()));
+    assert_eq!((rise(&mut simulation, 0.5)?, rise(&mut simulation, 0.9)?), (0.0, 2.0));
+    assert_eq!(simulation.disarm(), Ok(()));
+    assert_eq!(rise(&mut simulation, 0.5)?, 0.0);
+    assert_eq!(simulation.arm(), Ok(()));
+    assert_eq!((rise(&mut simulation, 0.5)?, rise(&mut simulation, 0.1)?), (2.0, 0.0));
+    // Off, on, off: it says what has changed.
+    assert_eq!(states.drain().count(), 3);
     Ok(())
 }

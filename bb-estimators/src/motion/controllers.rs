@@ -190,13 +190,14 @@ fn sent(result: Result<(), ActuatorError>) -> Result<bool, Fault> {
 }
 
 /// Switches an actuator between two velocities by the position of a joint, with hysteresis: a float that starts a pump,
-/// say.
+/// say. It commands with each measurement, and publishes when it has switched.
 #[derive(Debug)]
 pub struct ThresholdController {
     options: ThresholdControllerOptions,
     threshold: Threshold,
     measurement: Subscription<JointState>,
     actuator: ActuatorLink<ActuatorCommand>,
+    /// What was carried out last.
     commanded: Option<bool>,
 }
 
@@ -260,13 +261,13 @@ impl Service for ThresholdController {
             return Ok(Reading::nothing());
         };
         let is_on = self.threshold.update(measurement);
-        if self.commanded == Some(is_on) {
+        let velocity = if is_on { self.options.on_velocity } else { self.options.off_velocity };
+        // Each time: a joint that was disarmed since, or whose actuator was restarted, rests.
+        let is_sent = sent(self.actuator.send(VelocityCommand { velocity, effort: None }.into()))?;
+        if !is_sent || self.commanded == Some(is_on) {
             return Ok(Reading::nothing());
         }
-        let velocity = if is_on { self.options.on_velocity } else { self.options.off_velocity };
-        let is_sent = sent(self.actuator.send(VelocityCommand { velocity, effort: None }.into()))?;
-        // What was not carried out is sent again.
-        self.commanded = is_sent.then_some(is_on);
-        Ok(if is_sent { Reading::now(ThresholdState { measurement, is_on }) } else { Reading::nothing() })
+        self.commanded = Some(is_on);
+        Ok(Reading::now(ThresholdState { measurement, is_on }))
     }
 }
