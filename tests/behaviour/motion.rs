@@ -739,3 +739,58 @@ fn a_threshold_switches_its_actuator_on_again_after_a_disarming() -> Result<(), 
     assert_eq!(states.drain().count(), 3);
     Ok(())
 }
+
+/// A motor that says at once that it is stuck.
+#[derive(Debug)]
+struct Jammed(ActuatorContext);
+
+impl Actuator for Jammed {
+    type Options = NoOptions;
+    type Command = ActuatorCommand;
+
+    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self(context.clone()))
+    }
+
+    fn handle_command(&mut self, command: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
+        if matches!(command.payload, ActuatorCommand::Trajectory(_)) {
+            self.0.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stalled });
+        }
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+robot! {
+    robot Vice;
+    commands { close: MoveJoints(); }
+    link base {
+        joint screw: revolute {
+            axis: z;
+            limit: { lower: -1 rad, upper: 1 rad, velocity: 1 rad/s, effort: 1 N*m };
+            actuator motor: Jammed();
+            sensor encoder: External<JointState>();
+            link jaws;
+        }
+    }
+}
+
+#[test]
+fn a_joint_that_is_stuck_from_the_start_fails_the_command() -> Result<(), Failure> {
+    let mut simulation = Vice::builder().simulate()?;
+    simulation.run_until(at(10));
+    let state = JointState { position: 0.0, velocity: None, effort: None };
+    simulation.publish(vice::sensor::base::screw::encoder, simulation.clock().now(), state);
+    simulation.run_until(at(20));
+    assert_eq!(simulation.arm(), Ok(()));
+    let there = JointTarget { positions: vec![0.5] };
+    let targets = JointTargets { joints: vec!["screw".into()], points: vec![there] };
+    let execution = simulation.command(vice::command::close, targets)?;
+    simulation.run_for(Duration::from_secs(10));
+    let error = execution.try_result().ok_or("it has ended")?.expect_err("it is stuck").to_string();
+    assert!(error.contains("the joint `screw` has stalled at 0"), "{error}");
+    Ok(())
+}

@@ -1,7 +1,7 @@
 //! Commands that move joints.
 
 use super::{JointMotionLimits, JointPoint, plan};
-use bb_core::component::{ActuatorError, ActuatorLink};
+use bb_core::component::ActuatorLink;
 use bb_core::payload::{ActuatorCommand, EndMotion, JointTrajectory, MotionEnd};
 use bb_core::pubsub::Select;
 use bb_core::{
@@ -180,11 +180,26 @@ impl Motion {
     }
 
     fn start(&mut self, trajectory: &JointTrajectory) -> Result<(), Fault> {
-        let sent: Result<(), ActuatorError> =
-            self.links.iter().try_for_each(|link| link.send(trajectory.clone().into()));
-        // What they replaced has ended before.
-        self.reports.drain().for_each(drop);
-        sent.map_err(|error| self.fail(error.to_string()))
+        for index in 0..self.links.len() {
+            // What a joint reports before it is told is the end of another motion.
+            self.note_ends_of_first(index)?;
+            let sent = self.links[index].send(trajectory.clone().into());
+            sent.map_err(|error| self.fail(error.to_string()))?;
+        }
+        self.note_ends_of_first(self.links.len())
+    }
+
+    /// Notes what the first `count` joints, which have been told, have reported; the others' is of no concern. What they replaced has
+    /// ended with that, anything else is an end of this motion.
+    fn note_ends_of_first(&mut self, count: usize) -> Result<(), Fault> {
+        let reports: Vec<_> = self.reports.drain().collect();
+        for end in reports.iter().filter_map(|report| report.downcast::<EndMotion>()) {
+            let is_told = self.joints[..count].iter().any(|joint| joint == end.frame.name());
+            if is_told && end.end != MotionEnd::Replaced {
+                self.note(end)?;
+            }
+        }
+        Ok(())
     }
 
     /// An actuator has reported the end of a motion.
