@@ -500,6 +500,36 @@ fn a_joint_that_is_held_fails_the_command_and_stops_the_others() -> Result<(), F
 }
 
 #[test]
+fn an_effort_presses_until_something_else_is_commanded() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
+    world.obstruct("slew", -0.3, 0.3, simulation.clock().now())?;
+    let motor = crane::actuator::base::slew::motor;
+    simulation.actuate(motor, EffortCommand { effort: 5.0 }.into())?;
+    simulation.run_for(Duration::from_secs(3));
+    assert_eq!(true_position(&simulation, "slew")?, 0.3);
+    world.obstruct("slew", -9.0, 9.0, simulation.clock().now())?;
+    simulation.run_for(Duration::from_secs(1));
+    assert!(true_position(&simulation, "slew")? > 1.0, "what held it is gone");
+    simulation.actuate(motor, ActuatorCommand::Hold)?;
+    Ok(())
+}
+
+#[test]
+fn a_joint_that_nothing_holds_is_not_stalled_however_short_it_may_be_held() -> Result<(), Failure> {
+    let mut builder = simulated()?;
+    builder.options(crane::actuator::base::slew::motor).stall_after = Duration::ZERO;
+    let mut simulation = builder.simulate()?;
+    assert_eq!(simulation.arm(), Ok(()));
+    let ends = ends(&simulation.bus());
+    let motor = crane::actuator::base::slew::motor;
+    simulation.actuate(motor, PositionCommand { position: 0.2, ..Default::default() }.into())?;
+    simulation.run_for(Duration::from_secs(2));
+    assert_eq!(next_end(&ends), Some(("slew".to_owned(), MotionEnd::Reached)));
+    Ok(())
+}
+
+#[test]
 fn a_controller_holds_its_setpoint_which_is_a_parameter() -> Result<(), Failure> {
     let mut simulation = ready()?;
     simulation.run_for(Duration::from_secs(5));
