@@ -49,6 +49,8 @@ pub(crate) struct Outcome {
     pub(crate) worst_error: f64,
     /// How many estimates were compared.
     pub(crate) compared: u32,
+    /// In real time, where no estimate is of just now, so that none need be compared.
+    pub(crate) is_real_time: bool,
 }
 
 impl Outcome {
@@ -68,6 +70,7 @@ impl Outcome {
             (self.speed_when_unplugged > MOVES, "an arm that moves when its IMU is unplugged"),
             (self.speed_while_held < RESTS, "an arm that rests while it is held"),
             (self.distance_from_end < NEAR, "an arm at the end of its path"),
+            (self.is_real_time || self.compared > 0, "estimates of the tip that were compared"),
             (self.worst_error < RIGHT, "estimates of the tip that are right"),
         ];
         missing.extend(facts.iter().filter(|(is_so, _)| !is_so).map(|(_, fact)| (*fact).to_owned()));

@@ -64,7 +64,8 @@ pub(crate) fn run(arguments: &Arguments, out: &mut dyn Write) -> Result<Outcome,
     let robot = if arguments.real_time { Run::Real(builder.start()?) } else { Run::Virtual(builder.simulate()?) };
     let truth = Truth::new(&robot)?;
     writeln!(out, "{}", Line::header())?;
-    let mut story = Story { robot, events, tips, recorder, truth, outcome: Outcome::default(), out };
+    let outcome = Outcome { is_real_time: arguments.real_time, ..Outcome::default() };
+    let mut story = Story { robot, events, tips, recorder, truth, outcome, out };
     for (time, deed) in script::STEPS {
         story.go_on(time)?;
         story.take_place(time, deed)?;

@@ -59,5 +59,7 @@ fn what_has_not_happened_is_missing() -> Result<(), Box<dyn Error>> {
     assert_eq!(without.missing(), ["command stop started"]);
     let moving = Outcome { speed_while_held: 0.1, distance_from_end: 0.1, ..without };
     assert_eq!(moving.missing().len(), 3);
+    let unseen = Outcome { compared: 0, ..moving };
+    assert_eq!(unseen.missing().last().map(String::as_str), Some("estimates of the tip that were compared"));
     Ok(())
 }

@@ -29,6 +29,13 @@ impl<T: Payload> ActuatorLink<T> {
     pub fn send(&self, command: T) -> Result<(), ActuatorError> {
         self.accepts.accept(command, &self.permit)
     }
+
+    /// Stops the joint with [`JointCommand::stop`](crate::JointCommand::stop), if there is such a command and the last one that
+    /// the actuator carried out was sent by the [`Command`](crate::Command) that obtained this link. What somebody else moves, or
+    /// what a link obtained outside of commands has sent, goes on.
+    pub fn stop(&self) {
+        self.accepts.stop_motion_of(&self.permit);
+    }
 }
 
 impl<T: Payload> Drop for ActuatorLink<T> {

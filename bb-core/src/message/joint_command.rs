@@ -95,6 +95,10 @@ pub trait JointCommand: Sized {
 
     /// The command that stops the joint, if there is one: sent when a [`Command`](crate::Command) that moves the joint is
     /// cancelled.
+    ///
+    /// [`ActuatorCommand`](crate::payload::ActuatorCommand), [`VelocityCommand`](crate::payload::VelocityCommand) and
+    /// [`EffortCommand`](crate::payload::EffortCommand) have one. [`PositionCommand`](crate::payload::PositionCommand) and
+    /// [`JointTrajectory`](crate::payload::JointTrajectory) have none: the joint goes on to the last target, and rests there.
     fn stop() -> Option<Self> {
         None
     }

@@ -139,6 +139,11 @@ impl JointCommand for EffortCommand {
         bounds.hold_effort(&mut self.effort, &mut exceeded);
         Ok(exceeded)
     }
+
+    /// No effort: the joint is left to itself, which is safer than the last effort for ever.
+    fn stop() -> Option<Self> {
+        Some(Self::default())
+    }
 }
 
 impl From<PositionCommand> for ActuatorCommand {
@@ -162,5 +167,18 @@ impl From<EffortCommand> for ActuatorCommand {
 impl From<JointTrajectory> for ActuatorCommand {
     fn from(command: JointTrajectory) -> Self {
         Self::Trajectory(command)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_that_would_go_on_for_ever_have_one_that_stops() {
+        assert_eq!(ActuatorCommand::stop(), Some(ActuatorCommand::Hold));
+        assert_eq!(VelocityCommand::stop(), Some(VelocityCommand { velocity: 0.0, effort: None }));
+        assert_eq!(EffortCommand::stop(), Some(EffortCommand { effort: 0.0 }));
+        assert_eq!(PositionCommand::stop(), None);
     }
 }

@@ -31,18 +31,41 @@ pub struct TrajectoryPoint {
     pub time_from_start: Duration,
 }
 
+/// What a position of a trajectory is rounded to, rad or m: points that are close in time are not too fast for it.
+const ROUNDING: f64 = 1e-9;
+
 /// A trajectory that leads one joint beyond its limits is refused as a whole: brought back to them, it would be another one,
 /// and this joint would no longer keep step with the others.
+///
+/// The position, velocity and effort of each point are checked, of each column with the name of the joint, and the mean velocity
+/// between each point and the next. How a joint moves between two points is up to its actuator, which may be faster there than at
+/// both of them.
 impl JointCommand for JointTrajectory {
     fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
-        let Some(joint) = self.joint_names.iter().position(|name| name == bounds.joint) else {
-            return Ok(Exceeded::default());
-        };
-        for point in self.points.iter() {
-            point.positions.get(joint).map_or(Ok(()), |position| bounds.check_position(*position))?;
-            point.velocities.get(joint).map_or(Ok(()), |velocity| bounds.check_velocity(*velocity))?;
-            point.efforts.get(joint).map_or(Ok(()), |effort| bounds.check_effort(*effort))?;
+        let names = self.joint_names.iter().enumerate();
+        for (column, _) in names.filter(|(_, name)| *name == bounds.joint) {
+            check_column(&self.points, column, bounds)?;
         }
         Ok(Exceeded::default())
     }
+}
+
+fn check_column(points: &[TrajectoryPoint], column: usize, bounds: &JointBounds) -> Result<(), OutOfBounds> {
+    for point in points {
+        point.positions.get(column).map_or(Ok(()), |position| bounds.check_position(*position))?;
+        point.velocities.get(column).map_or(Ok(()), |velocity| bounds.check_velocity(*velocity))?;
+        point.efforts.get(column).map_or(Ok(()), |effort| bounds.check_effort(*effort))?;
+    }
+    let positions = points.iter().filter_map(|point| Some((point.time_from_start, *point.positions.get(column)?)));
+    let mut last: Option<(Duration, f64)> = None;
+    for (time, position) in positions {
+        if let Some((before, from)) = last {
+            let (step_s, way) = (time.saturating_sub(before).as_secs_f64(), position - from);
+            if way.abs() > bounds.velocity * step_s + ROUNDING {
+                bounds.check_velocity(way / step_s)?;
+            }
+        }
+        last = Some((time, position));
+    }
+    Ok(())
 }

@@ -122,7 +122,8 @@ impl<A: Actuator> ActuatorNode<A> {
                 told: Vec::new(),
             }),
         });
-        if A::Command::COMMANDS_JOINT && inner.environment.mode() != Mode::Replay {
+        // In a replay as well: what is read from a file is decoded by the topic.
+        if A::Command::COMMANDS_JOINT {
             inner.reports.announce(&inner.context, &*inner.host.0);
         }
         // It may have something to do from the start.
@@ -462,6 +463,9 @@ pub trait AnyActuator {
     /// In a replay: publishes a command that it carried out; false if that is of another type.
     #[doc(hidden)]
     fn replay(&self, message: &DynamicMessage) -> bool;
+    /// In a replay: makes the topic of its reports at `path`, if that is one of them.
+    #[doc(hidden)]
+    fn announce(&self, path: &str);
     /// Stops it once it is free; false if it is still busy after `timeout`.
     #[doc(hidden)]
     fn terminate(&self, timeout: Duration) -> bool;
@@ -493,6 +497,10 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
 
     fn replay(&self, message: &DynamicMessage) -> bool {
         message.downcast::<A::Command>().map(|message| self.0.topic.publish(message)).is_some()
+    }
+
+    fn announce(&self, path: &str) {
+        self.0.reports.announce_at(path, &self.0.context, &*self.0.host.0);
     }
 
     fn terminate(&self, timeout: Duration) -> bool {

@@ -485,6 +485,9 @@ impl<R: Robot> Replay<R> {
 
     fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
         let registry = &self.live.0.control.topics().registry;
+        if !registry.has(path) {
+            R::all_actuators(&self.live.0.wiring).iter().for_each(|actuator| actuator.announce(path));
+        }
         let topics = registry.topics();
         let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
             (Some(topic), _) => Arc::clone(topic),

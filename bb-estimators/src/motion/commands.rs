@@ -1,7 +1,7 @@
 //! Commands that move joints.
 
 use super::{JointMotionLimits, JointPoint, plan};
-use bb_core::component::{ActuatorError, ActuatorLink};
+use bb_core::component::ActuatorLink;
 use bb_core::payload::{ActuatorCommand, EndMotion, JointTrajectory, MotionEnd};
 use bb_core::pubsub::Select;
 use bb_core::{
@@ -18,8 +18,8 @@ use std::time::Duration;
 ///
 /// The trajectory is [planned](plan) from where the joints are, and each actuator, which takes [`ActuatorCommand`], follows its part of it. It
 /// publishes a [`MotionProgress`] ten times a second at `progress` below its path. It succeeds when all actuators have
-/// reported that they have reached their target. If one reports anything else, the others are told to hold, and it fails
-/// with the reason. If it is cancelled or times out, its actuators come to rest and hold.
+/// reported that they have reached their target. If one reports anything else, those that it still moves are told to hold, and it
+/// fails with the reason. If it is cancelled or times out, its actuators come to rest and hold.
 #[derive(Debug)]
 pub struct MoveJoints;
 
@@ -121,7 +121,7 @@ impl MoveJoints {
                 return Ok(());
             }
             if now >= deadline {
-                return Err(motion.fail("the joints have not arrived in time".to_owned(), None));
+                return Err(motion.fail("the joints have not arrived in time".to_owned()));
             }
         }
     }
@@ -180,11 +180,26 @@ impl Motion {
     }
 
     fn start(&mut self, trajectory: &JointTrajectory) -> Result<(), Fault> {
-        let sent: Result<(), ActuatorError> =
-            self.links.iter().try_for_each(|link| link.send(trajectory.clone().into()));
-        // What they replaced has ended before.
-        self.reports.drain().for_each(drop);
-        sent.map_err(|error| self.fail(error.to_string(), None))
+        for index in 0..self.links.len() {
+            // What a joint reports before it is told is the end of another motion.
+            self.note_ends_of_first(index)?;
+            let sent = self.links[index].send(trajectory.clone().into());
+            sent.map_err(|error| self.fail(error.to_string()))?;
+        }
+        self.note_ends_of_first(self.links.len())
+    }
+
+    /// Notes what the first `count` joints, which have been told, have reported; the others' is of no concern. What they replaced has
+    /// ended with that, anything else is an end of this motion.
+    fn note_ends_of_first(&mut self, count: usize) -> Result<(), Fault> {
+        let reports: Vec<_> = self.reports.drain().collect();
+        for end in reports.iter().filter_map(|report| report.downcast::<EndMotion>()) {
+            let is_told = self.joints[..count].iter().any(|joint| joint == end.frame.name());
+            if is_told && end.end != MotionEnd::Replaced {
+                self.note(end)?;
+            }
+        }
+        Ok(())
     }
 
     /// An actuator has reported the end of a motion.
@@ -202,16 +217,12 @@ impl Motion {
             MotionEnd::Stopped => format!("the joint `{joint}` was stopped"),
             MotionEnd::Failed(reason) => format!("the actuator of the joint `{joint}` has failed: {reason}"),
         };
-        // What another command moves now is that one's.
-        Err(self.fail(reason, (end.end == MotionEnd::Replaced).then_some(index)))
+        Err(self.fail(reason))
     }
 
-    /// The fault, after all joints but one were told to hold.
-    fn fail(&self, reason: String, except: Option<usize>) -> Fault {
-        for (_, link) in self.links.iter().enumerate().filter(|(index, _)| Some(*index) != except) {
-            // One that does not take it has been stopped otherwise, or has failed and was made safe.
-            let _ = link.send(ActuatorCommand::Hold);
-        }
+    /// The fault, after all joints were told to hold but those that somebody else moves by now.
+    fn fail(&self, reason: String) -> Fault {
+        self.links.iter().for_each(ActuatorLink::stop);
         Fault::new(reason)
     }
 

@@ -21,7 +21,8 @@ pub enum Drive {
 ///
 /// Gains and setpoint are options, to be bound to parameters: `PidController(kp = param::gains::kp, …)`. A new gain
 /// takes effect with the next step; what is integrated is kept. While the robot is not armed, or the measurement is older than `stale_after`, it
-/// commands nothing and forgets what it has integrated.
+/// commands nothing and forgets what it has integrated. When it ceases to command, it tells the actuator once to hold: the joint does
+/// not go on with the last velocity or effort.
 #[derive(Debug)]
 pub struct PidController {
     options: PidControllerOptions,
@@ -30,6 +31,8 @@ pub struct PidController {
     actuator: ActuatorLink<ActuatorCommand>,
     latest: Option<(MonotonicTime, f64)>,
     last_step: Option<MonotonicTime>,
+    /// Whether the actuator does what it was told here.
+    is_driving: bool,
 }
 
 /// Options of [`PidController`].
@@ -115,7 +118,7 @@ impl Service for PidController {
         let measurement = bus.subscribe(options.measurement, Overflow::KeepLatest)?;
         let actuator = bus.actuator(options.actuator)?;
         let pid = Pid::new(options.params());
-        Ok(Self { options, pid, measurement, actuator, latest: None, last_step: None })
+        Ok(Self { options, pid, measurement, actuator, latest: None, last_step: None, is_driving: false })
     }
 
     fn update(&mut self, now: MonotonicTime) -> Result<Reading<PidState>, Fault> {
@@ -123,7 +126,7 @@ impl Service for PidController {
             self.latest = Some((state.monotonic_time, state.position));
         }
         let fresh = self.latest.filter(|(time, _)| now.duration_since(*time) <= self.options.stale_after);
-        let Some((_, measurement)) = fresh else { return Ok(self.pause()) };
+        let Some((_, measurement)) = fresh else { return self.pause() };
         // The first step has no step before it.
         let step_s = self.last_step.map_or(0.0, |last| now.seconds_since(last));
         self.last_step = Some(now);
@@ -133,6 +136,7 @@ impl Service for PidController {
             Drive::Effort => EffortCommand { effort: terms.output }.into(),
         };
         if sent(self.actuator.send(command))? {
+            self.is_driving = true;
             return Ok(Reading::now(PidState {
                 setpoint: self.options.setpoint,
                 measurement,
@@ -143,11 +147,12 @@ impl Service for PidController {
                 output: terms.output,
             }));
         }
-        Ok(self.pause())
+        self.pause()
     }
 
     fn handle_options(&mut self, options: PidControllerOptions, context: &ServiceContext) -> Result<(), Fault> {
         if options.measurement != self.options.measurement || options.actuator != self.options.actuator {
+            self.hold()?;
             *self = Self::init(options, context)?;
             return Ok(());
         }
@@ -158,10 +163,19 @@ impl Service for PidController {
 }
 
 impl PidController {
-    fn pause(&mut self) -> Reading<PidState> {
+    fn pause(&mut self) -> Result<Reading<PidState>, Fault> {
         self.pid.reset();
         self.last_step = None;
-        Reading::nothing()
+        self.hold()?;
+        Ok(Reading::nothing())
+    }
+
+    /// Ends what it has commanded. An actuator that does not take that was made safe already.
+    fn hold(&mut self) -> Result<(), Fault> {
+        if std::mem::take(&mut self.is_driving) {
+            sent(self.actuator.send(ActuatorCommand::Hold))?;
+        }
+        Ok(())
     }
 }
 
@@ -176,13 +190,14 @@ fn sent(result: Result<(), ActuatorError>) -> Result<bool, Fault> {
 }
 
 /// Switches an actuator between two velocities by the position of a joint, with hysteresis: a float that starts a pump,
-/// say.
+/// say. It commands with each measurement, and publishes when it has switched.
 #[derive(Debug)]
 pub struct ThresholdController {
     options: ThresholdControllerOptions,
     threshold: Threshold,
     measurement: Subscription<JointState>,
     actuator: ActuatorLink<ActuatorCommand>,
+    /// What was carried out last.
     commanded: Option<bool>,
 }
 
@@ -246,13 +261,13 @@ impl Service for ThresholdController {
             return Ok(Reading::nothing());
         };
         let is_on = self.threshold.update(measurement);
-        if self.commanded == Some(is_on) {
+        let velocity = if is_on { self.options.on_velocity } else { self.options.off_velocity };
+        // Each time: a joint that was disarmed since, or whose actuator was restarted, rests.
+        let is_sent = sent(self.actuator.send(VelocityCommand { velocity, effort: None }.into()))?;
+        if !is_sent || self.commanded == Some(is_on) {
             return Ok(Reading::nothing());
         }
-        let velocity = if is_on { self.options.on_velocity } else { self.options.off_velocity };
-        let is_sent = sent(self.actuator.send(VelocityCommand { velocity, effort: None }.into()))?;
-        // What was not carried out is sent again.
-        self.commanded = is_sent.then_some(is_on);
-        Ok(if is_sent { Reading::now(ThresholdState { measurement, is_on }) } else { Reading::nothing() })
+        self.commanded = Some(is_on);
+        Ok(Reading::now(ThresholdState { measurement, is_on }))
     }
 }

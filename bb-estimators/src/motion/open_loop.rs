@@ -84,7 +84,8 @@ impl Current {
     /// An arrival that is known says more than a speed: it includes that the joint speeds up and slows down.
     fn of(begin: &BeginMotion, start: MonotonicTime, options: &OpenLoopOptions) -> Self {
         let duration = begin.expected_arrival.map(|arrival| Pace::Duration(arrival.seconds_since(start)));
-        let speed = begin.speed.map(|speed| Pace::Speed(speed.abs()));
+        // With a speed of zero it never arrives, which no profile says.
+        let speed = begin.speed.filter(|speed| *speed != 0.0).map(|speed| Pace::Speed(speed.abs()));
         let profile = match duration.or(speed) {
             Some(pace) => {
                 let (initial, target) = (begin.initial_position, begin.target_position);
@@ -100,5 +101,26 @@ impl Current {
 
     fn at_rest(position: f64, start: MonotonicTime) -> Self {
         Self { start, profile: Profile::new(Easing::Linear, position, position, Pace::Speed(1.0), None) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_without_a_speed_stays_where_it_begins() {
+        let begin = |speed| BeginMotion {
+            initial_position: 0.2,
+            target_position: 1.0,
+            speed: Some(speed),
+            expected_arrival: None,
+        };
+        let after = |speed| {
+            let current = Current::of(&begin(speed), MonotonicTime::ZERO, &OpenLoopOptions::defaults());
+            current.profile.at(0.1).position
+        };
+        assert_eq!([after(0.0), after(-0.0)], [0.2, 0.2]);
+        assert!(after(1.0) > 0.2 && after(1.0) < 1.0, "{}", after(1.0));
     }
 }

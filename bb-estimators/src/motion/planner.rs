@@ -129,6 +129,9 @@ fn check(
         return Err(PlanError::Invalid("the period is zero".into()));
     }
     for (index, (name, limit)) in names.iter().zip(limits).enumerate() {
+        if names[..index].contains(name) {
+            return Err(PlanError::Invalid(format!("`{name}` is named twice")));
+        }
         let JointMotionLimits { lower, upper, velocity, acceleration, jerk } = *limit;
         let is_positive = |value: f64| value > 0.0;
         if !(is_positive(velocity) && is_positive(acceleration) && is_positive(jerk)) {

@@ -16,8 +16,8 @@ use std::time::Duration;
 /// It takes all standard commands; as `SimulatedActuator<VelocityCommand>` it takes the place of a driver that takes only some. It
 /// reports its motions: a position or a trajectory ends when the joint rests at the target (`Reached`), a velocity at the end of the
 /// joint's range (`Limit`); either ends when something else is commanded (`Replaced`), when it has come to rest after
-/// `Hold`, `Stop` or a disarming (`Stopped`), or when something holds it for `stall_after` (`Stalled`, or `Limit` at the end of
-/// its range).
+/// `Hold`, `Stop`, a velocity of zero or a disarming (`Stopped`), or when something holds it for `stall_after` (`Stalled`, or `Limit` at the end of
+/// its range). An effort is no motion, and is given until something else is commanded, also against what holds the joint.
 pub struct SimulatedActuator<C = ActuatorCommand> {
     options: SimulatedActuatorOptions,
     context: ActuatorContext,
@@ -46,7 +46,7 @@ pub struct SimulatedActuatorOptions {
     /// Position at the start, rad or m; brought back to the joint's limits. Default: 0.
     #[option(default = 0.0)]
     pub initial: f64,
-    /// How long the joint may be held before that is reported. Unit: s. Default: 200 ms.
+    /// How long the joint may be held before that is reported; with 0, at the next look. Unit: s. Default: 200 ms.
     #[option(default = Duration::from_millis(200))]
     pub stall_after: Duration,
     /// How often it looks whether its motion has ended. Unit: s. Default: 5 ms.
@@ -101,8 +101,9 @@ impl<C: Payload + Into<ActuatorCommand>> Actuator for SimulatedActuator<C> {
             self.end(&state, MotionEnd::Replaced);
             self.begin(&goal, &state, now);
         }
+        // An effort presses for as long as it is asked for: there is nothing to end.
+        self.next = (!matches!(goal, Goal::Effort(_))).then(|| now + self.options.period);
         self.world.set_goal(self.joint, goal, now);
-        self.next = Some(now + self.options.period);
         Ok(())
     }
 
@@ -141,6 +142,8 @@ impl<C> SimulatedActuator<C> {
                 let speed = command.velocity.map(f64::abs).filter(|speed| *speed > 0.0);
                 Goal::Position { target: command.position, speed: speed.unwrap_or(self.drivetrain.velocity) }
             }
+            // A velocity of zero leads nowhere: it is no motion with a target.
+            ActuatorCommand::Velocity(command) if command.velocity == 0.0 => Goal::Hold,
             ActuatorCommand::Velocity(command) => Goal::Velocity(command.velocity),
             ActuatorCommand::Effort(command) => Goal::Effort(command.effort),
             ActuatorCommand::Trajectory(trajectory) => {
@@ -167,7 +170,7 @@ impl<C> SimulatedActuator<C> {
             Goal::Path { path, .. } => (path.target(), path.speed(), arrival(path.duration_s())),
             Goal::Velocity(velocity) => {
                 let end = if *velocity < 0.0 { self.drivetrain.lower } else { self.drivetrain.upper };
-                (end, velocity.abs(), None)
+                (end, velocity.abs().min(self.drivetrain.velocity), None)
             }
             Goal::Free | Goal::Effort(_) | Goal::Hold | Goal::Stop => return,
         };
@@ -203,7 +206,8 @@ impl<C> SimulatedActuator<C> {
             Goal::Hold | Goal::Stop | Goal::Free if rests => return Some(MotionEnd::Stopped),
             _ => {}
         }
-        let is_stalled = state.stalled_s >= self.options.stall_after.as_secs_f64();
+        let held_s = state.stalled_s;
+        let is_stalled = held_s > 0.0 && held_s >= self.options.stall_after.as_secs_f64();
         is_stalled.then_some(if is_at_limit { MotionEnd::Limit } else { MotionEnd::Stalled })
     }
 }

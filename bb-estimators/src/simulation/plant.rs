@@ -200,16 +200,18 @@ impl Plant {
             let along = if velocity == 0.0 { towards } else { velocity };
             if along == 0.0 { effort } else { effort - damping * velocity - friction * along.signum() }
         };
+        // Backward Euler: the friction is that of the velocity after the step, or a light joint would swing ever further.
+        let pushed = |effort: f64, towards: f64| drag(effort, towards) / (inertia + damping * STEP_S);
         let (effort, mut accelerated) = match self.wanted() {
             Ok(wanted) => {
                 let asked = ((wanted - velocity) / STEP_S).clamp(-acceleration, acceleration);
                 // The servo makes up for the friction that it knows, as far as the motor can.
                 let needed = inertia * asked - drag(0.0, asked);
                 let effort = needed.clamp(-most, most);
-                let accelerated = if effort == needed { asked } else { drag(effort, effort) / inertia };
+                let accelerated = if effort == needed { asked } else { pushed(effort, effort) };
                 (effort, accelerated)
             }
-            Err(effort) => (effort.clamp(-most, most), drag(effort.clamp(-most, most), effort) / inertia),
+            Err(effort) => (effort.clamp(-most, most), pushed(effort.clamp(-most, most), effort)),
         };
         // Dry friction holds what does not move, and stops what does; it never turns it round.
         let is_held = velocity == 0.0 && effort.abs() <= friction;

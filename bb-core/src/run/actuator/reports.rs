@@ -22,6 +22,15 @@ impl Reports {
         let _ = (self.begin(context, host), self.end(context, host));
     }
 
+    /// Makes the topic at `path`, if it is one of these.
+    pub(super) fn announce_at(&self, path: &str, context: &ActuatorContext, host: &dyn Host) {
+        match path.strip_prefix(context.path()) {
+            Some("/begin_motion") => drop(self.begin(context, host)),
+            Some("/end_motion") => drop(self.end(context, host)),
+            _ => {}
+        }
+    }
+
     /// Publishes what the actuator has reported, in its order. The caller holds the actuator's lock; `wakers` are for after.
     pub(super) fn publish(
         &self,

@@ -106,6 +106,9 @@ fn what_cannot_be_planned_is_an_error_that_says_why() {
     );
     let shape = plan(&names(2), &at_rest, &[vec![0.0]], &[limit], period).expect_err("it cannot be");
     assert_eq!(shape.to_string(), "2 joints need as many states, limits and target positions");
+    let twice: Arc<[String]> = ["one".to_owned(), "one".to_owned()].into();
+    let twice = plan(&twice, &[at_rest[0]; 2], &[vec![0.0, 0.5]], &[limit; 2], period).expect_err("it cannot be");
+    assert!(twice.to_string().contains("`one` is named twice"), "{twice}");
     let moving = [JointPoint { velocity: f64::NAN, ..JointPoint::default() }];
     assert!(plan(&names(1), &moving, &[vec![0.0]], &[limit], period).is_err());
 }

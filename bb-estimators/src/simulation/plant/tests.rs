@@ -197,3 +197,28 @@ fn a_trajectory_within_its_means_is_followed() {
     }
     assert_eq!(plant.at(at(3000)).point, JointPoint { position: 1.2, ..JointPoint::default() });
 }
+
+/// With an explicit step, friction would turn the velocity round each millisecond, tenfold.
+#[test]
+fn a_light_joint_in_thick_oil_comes_to_the_velocity_of_its_effort() {
+    let light = Drivetrain {
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+        velocity: f64::INFINITY,
+        inertia: 1e-5,
+        damping: 0.1,
+        friction: 0.0,
+        ..PLAIN
+    };
+    let mut plant = Plant::new(light, 0.0, at(0));
+    plant.set(Goal::Effort(0.5), at(0));
+    let mut before = 0.0;
+    for millis in 1..200 {
+        let velocity = plant.at(at(millis)).point.velocity;
+        assert!((before..=5.0 + 1e-9).contains(&velocity), "{before} {velocity}");
+        before = velocity;
+    }
+    assert!((before - 5.0).abs() < 1e-9, "{before}");
+    plant.set(Goal::Free, at(200));
+    assert!(plant.at(at(400)).point.velocity.abs() < 1e-9);
+}
