@@ -36,6 +36,10 @@ impl Agreement {
     /// Adds a position with its covariance; what it may do. As many as must be refused before, and one more, agree if it may
     /// overrule the estimate.
     pub(super) fn add(&mut self, time_ns: i64, position: &Geodetic, covariance: &Matrix3<f64>) -> Trust {
+        // Another provider may have spoken of the same moment: what is no part of the track is not confirmed by it.
+        if self.track.newest().is_some_and(|newest| time_ns <= newest.time_ns) {
+            return Trust::Doubted;
+        }
         let frame = self.frame.get_or_insert_with(|| LocalFrame::new(*position));
         let point = TrackPoint { time_ns, position: frame.position(position), covariance: *covariance, yaw: 0.0 };
         if !self.track.add(point) {

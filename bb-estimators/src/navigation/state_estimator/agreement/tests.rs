@@ -19,3 +19,15 @@ fn slow_anchors_and_a_fast_aircraft_are_believed() {
         assert_eq!(trust, [Doubted; 5], "{period_s} s, {speed} m/s");
     }
 }
+
+/// Of two providers with one stamp, the second is not believed because the first is.
+#[test]
+fn what_is_not_newer_is_doubted() {
+    let mut agreement = Agreement::default();
+    assert_eq!(trust_of_each(&mut agreement, 1, 20.0, 5).last(), Some(&Trust::Believed));
+    let elsewhere = Geodetic { latitude: 0.91, longitude: 0.2, height: 100.0 };
+    for time_ns in [4_000_000_000, 3_500_000_000] {
+        assert_eq!(agreement.add(time_ns, &elsewhere, &Matrix3::identity()), Trust::Doubted, "{time_ns}");
+    }
+    assert_eq!(agreement.track.count(), 5, "the track goes on");
+}

@@ -51,6 +51,8 @@ impl EskfStrategy {
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filter.start(start)?;
         self.begin(start.time_ns);
+        // What was refused did not fit another estimate.
+        self.streams.anchors.forgive();
         Ok(())
     }
 

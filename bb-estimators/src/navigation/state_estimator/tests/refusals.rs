@@ -1,10 +1,12 @@
 //! Each reason for which an input is not in the estimate is provoked, counted and told.
 
 use super::flight::{FRAME, SECOND, STEP};
+use super::strategy::{Measured, Strategy, Trust};
 use super::*;
+use crate::navigation::eskf::Start;
 use crate::navigation::smoother::{Factor, NavigationFactor, Rows};
-use crate::navigation::{Estimate, GnssPosition, Refusal, States};
-use nalgebra::{Matrix6, Vector3};
+use crate::navigation::{AbsolutePose, Estimate, GnssPosition, Refusal, States};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 #[expect(clippy::large_enum_variant, reason = "there are few of them")]
 /// A provider that sees nothing, or says where it is.
@@ -191,5 +193,28 @@ fn the_bias_of_the_odometry_is_what_a_start_begins_with() {
         assert!(with < 0.5 * without, "{}: {with} m, {without} m without", strategy.name());
         let absurd = ImuBias { accelerometer: Vector3::repeat(5.0), gyroscope };
         assert_eq!(end_m(Some(absurd)), without, "one that has lost itself says anything");
+    }
+}
+
+/// Anchors that did not fit the estimate of before do not help the next to overrule the new one.
+#[test]
+fn a_start_forgets_which_anchors_were_refused() {
+    for strategy in StrategyKind::ALL {
+        let mut strategy = Strategy::<Provided>::new(&config(*strategy)).unwrap();
+        let start =
+            Start::at(SECOND, (Vector3::zeros(), 1.0), (Vector3::zeros(), 0.1), (UnitQuaternion::identity(), 0.01));
+        strategy.start(&start).unwrap();
+        let far = AbsolutePose {
+            position: Vector3::repeat(900.0),
+            world_from_body: UnitQuaternion::identity(),
+            position_covariance: Matrix3::identity(),
+            rotation_covariance: Matrix3::identity(),
+        };
+        for _ in 0..3 {
+            assert!(strategy.measure(&Measured::Anchor(far, Trust::Doubted)).is_err());
+        }
+        assert_eq!(strategy.refused_positions(), 3);
+        strategy.start(&Start { time_ns: 2 * SECOND, ..start }).unwrap();
+        assert_eq!(strategy.refused_positions(), 0);
     }
 }
