@@ -9,10 +9,11 @@ use crate::navigation::{AbsolutePose, Estimate, GnssPosition, Refusal, States};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 #[expect(clippy::large_enum_variant, reason = "there are few of them")]
-/// A provider that sees nothing, or says where it is.
+/// A provider that sees nothing, cannot say anything of where it would be, or says where it is.
 #[derive(Clone, Copy, Debug)]
 enum Provided {
     Nothing,
+    Elsewhere,
     Place(NavigationFactor),
 }
 
@@ -25,6 +26,7 @@ impl<S: States, const N: usize> Factor<S, N> for Provided {
     ) -> Result<(), Refusal> {
         match self {
             Self::Nothing => Err(Refusal::NotObservable),
+            Self::Elsewhere => Err(Refusal::OutOfRange),
             Self::Place(factor) => Factor::<S, N>::linearise(factor, previous, at, rows),
         }
     }
@@ -78,6 +80,8 @@ fn every_refusal_that_a_user_can_see() {
         assert!(matches!(unknown, Refusal::NoKeyframe { .. }), "{unknown:?}");
         let blind = refused(estimator.add_factor(2 * SECOND - STEP, 0, Provided::Nothing));
         assert_eq!(blind, Refusal::NotObservable);
+        let elsewhere = refused(estimator.add_factor(2 * SECOND - STEP, 1, Provided::Elsewhere));
+        assert_eq!(elsewhere, Refusal::OutOfRange, "what a provider refuses is not the end of the estimate");
         let old = PoseAnchor { time_ns: -SECOND, ..anchor };
         assert_eq!(refused(estimator.add_pose_anchor(old)), Refusal::TooOld { time_ns: -SECOND });
         let ahead = PoseAnchor { time_ns: 3 * SECOND, ..anchor };
@@ -88,7 +92,7 @@ fn every_refusal_that_a_user_can_see() {
         let counts = *estimator.counts();
         let counted = [counts.invalid, counts.too_old, counts.in_the_future, counts.duplicates];
         assert_eq!(counted, [4, 1, 1, 1]);
-        assert_eq!(count(estimator.sink(), "degraded"), 10, "each is told: {:#?}", estimator.counts());
+        assert_eq!(count(estimator.sink(), "degraded"), 11, "each is told: {:#?}", estimator.counts());
     }
 }
 
