@@ -4,6 +4,7 @@ use super::flight::{FRAME, SECOND, STEP};
 use super::strategy::{Measured, Strategy, Trust};
 use super::*;
 use crate::navigation::eskf::Start;
+use crate::navigation::geodesy::Geodetic;
 use crate::navigation::smoother::{Factor, NavigationFactor, Rows};
 use crate::navigation::{AbsolutePose, Estimate, GnssPosition, Refusal, States};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
@@ -220,5 +221,39 @@ fn a_start_forgets_which_anchors_were_refused() {
         assert_eq!(strategy.refused_positions(), 3);
         strategy.start(&Start { time_ns: 2 * SECOND, ..start }).unwrap();
         assert_eq!(strategy.refused_positions(), 0);
+    }
+}
+
+/// A height that the IMU alone has drifted to is no reason to give up: the receiver tells the right one.
+#[test]
+fn a_height_that_drifted_away_is_corrected() {
+    let flight = Flight::new(12, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator: Estimator = estimator(*strategy);
+        let low = |position: Geodetic| Geodetic { height: position.height - 10_490.0, ..position };
+        let start = flight.warm_start(0);
+        estimator.warm_start(FlightControllerState { position: low(start.position), ..start }).unwrap();
+        let mut was_outside = false;
+        for sent in &flight.sent(false, false, true) {
+            match sent {
+                // It falls by some 50 m, or seems to.
+                Sent::Imu(sample) if sample.time_ns < 3 * SECOND => {
+                    let less = crate::navigation::ImuMean {
+                        specific_force: sample.specific_force - Vector3::z() * 12.0,
+                        ..*sample
+                    };
+                    estimator.add_imu(&less).unwrap();
+                }
+                Sent::Fix(fix) if fix.time_ns < 3 * SECOND => continue,
+                Sent::Fix(fix) => ignore(estimator.add_gnss(GnssReading { position: low(fix.position), ..*fix })),
+                sent => sent.to(&mut estimator).unwrap(),
+            }
+            assert_ne!(estimator.health().state, HealthState::Lost, "{} at {}", strategy.name(), sent.time_ns());
+            was_outside |= estimator.predicted(sent.time_ns()).is_none();
+        }
+        assert!(was_outside, "{}: nothing is said of where nothing flies", strategy.name());
+        let found = estimator.predicted(12 * SECOND).unwrap().position.height;
+        let truth = low(flight.frame.geodetic(&Flight::truth(12 * SECOND).position)).height;
+        assert!((found - truth).abs() < 20.0, "{}: {found} m, {truth} m", strategy.name());
     }
 }
