@@ -13,11 +13,11 @@ pub const CONFIRMED: u32 = 3;
 /// Standard deviations that two positions may differ by.
 const SIGMAS: f64 = 5.0;
 
-/// What no robot does, m/s and m/s².
+/// What few robots do, m/s, and none, m/s².
 const FASTEST: f64 = 150.0;
 const STRONGEST: f64 = 10.0;
 
-/// Positions that are farther apart in time tell nothing of each other, ns.
+/// Positions that are farther apart in time tell nothing of each other where nothing else is said, ns.
 const LONGEST_NS: i64 = 60_000_000_000;
 
 /// The time between two positions that show a velocity, ns. A car turns into the next street within more.
@@ -63,8 +63,12 @@ impl TrackPoint {
 /// assert_eq!(track.count(), CONFIRMED);
 /// assert!(track.velocity().is_some_and(|(velocity, _)| (velocity.x - 10.0).abs() < 1e-9));
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Track {
+    /// No robot is faster, m/s.
+    fastest: f64,
+    /// Positions that are farther apart in time tell nothing of each other, ns.
+    longest_ns: i64,
     count: u32,
     newest: Option<TrackPoint>,
     before: Option<TrackPoint>,
@@ -72,7 +76,19 @@ pub struct Track {
     older: Option<TrackPoint>,
 }
 
+impl Default for Track {
+    /// Of a robot that is slower than 150 m/s; positions more than a minute apart do not agree.
+    fn default() -> Self {
+        Self::with(FASTEST, LONGEST_NS)
+    }
+}
+
 impl Track {
+    /// Of a robot that is slower than `fastest`, m/s; positions more than `longest_ns` apart do not agree.
+    pub fn with(fastest: f64, longest_ns: i64) -> Self {
+        Self { fastest, longest_ns, count: 0, newest: None, before: None, older: None }
+    }
+
     /// Adds a position; `false` if it does not agree with those before, and begins a new track. One that is not newer is left out.
     pub fn add(&mut self, point: TrackPoint) -> bool {
         let Some(newest) = self.newest else {
@@ -97,18 +113,18 @@ impl Track {
     }
 
     fn begin(&mut self, point: TrackPoint) {
-        *self = Self { count: 1, newest: Some(point), before: None, older: Some(point) };
+        *self = Self { count: 1, newest: Some(point), before: None, older: Some(point), ..*self };
     }
 
     fn leads_to(&self, newest: &TrackPoint, point: &TrackPoint) -> bool {
         let since_ns = point.time_ns.saturating_sub(newest.time_ns);
-        if since_ns > LONGEST_NS {
+        if since_ns > self.longest_ns {
             return false;
         }
         let since_s = since_ns as f64 * 1e-9;
         let apart = point.position - newest.position;
         let (off, covariance, slack) = match &self.before {
-            None => (apart, point.covariance + newest.covariance, FASTEST * since_s),
+            None => (apart, point.covariance + newest.covariance, self.fastest * since_s),
             Some(before) => {
                 let between_s = newest.time_ns.saturating_sub(before.time_ns) as f64 * 1e-9;
                 let ratio = since_s / between_s;
@@ -116,7 +132,7 @@ impl Track {
                 let bent = 0.5 * STRONGEST * since_s * (since_s + between_s);
                 let ahead = (newest.position - before.position) * ratio;
                 // A velocity from two positions that are close in time is no more than a guess.
-                let slack = bent.min(2.0 * FASTEST * since_s);
+                let slack = bent.min(2.0 * self.fastest * since_s);
                 (apart - ahead, own + before.covariance * (ratio * ratio), slack)
             }
         };

@@ -97,8 +97,8 @@ impl Landmark {
         self.prior.map_or(Matrix3::zeros(), |(_, weight)| self.inverse * weight)
     }
 
-    /// Sums up prior and observations; whether that determines where it is.
-    pub(super) fn sum(&mut self) -> bool {
+    /// Sums up prior and observations. Where that does not determine where it is, it is not used until something does.
+    pub(super) fn sum(&mut self) {
         let mut matrix = Matrix3::zeros();
         let mut vector = Vector3::zeros();
         if let Some((mean, weight)) = self.prior {
@@ -110,9 +110,10 @@ impl Landmark {
             vector += sight.jacobian.transpose() * sight.residual * sight.weight;
         }
         let inverse = matrix.cholesky().map(|root| root.inverse());
+        let inverse = inverse.filter(|inverse| inverse.iter().all(|x| x.is_finite()));
+        self.is_used &= inverse.is_some();
         self.inverse = inverse.unwrap_or_else(Matrix3::zeros);
         self.mean = self.inverse * vector;
-        inverse.is_some_and(|inverse| inverse.iter().all(|x| x.is_finite()))
     }
 
     /// How far it is estimated to be from where it is linearised.

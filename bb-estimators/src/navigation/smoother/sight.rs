@@ -8,6 +8,7 @@ use super::filter::FixedLagSmoother;
 use super::landmark::{Landmark, Sight, pose_block};
 use super::landmarks::{Judging, Landmarks, projected};
 use super::params::LandmarkParams;
+use crate::navigation::bounds::is_on_earth;
 use crate::navigation::camera::Camera;
 use crate::navigation::fused::Fused;
 use crate::navigation::math::{ln, sqrt};
@@ -89,7 +90,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// # Errors
     ///
     /// [`Refusal`], which the stream has counted; nothing is added then. [`Refusal::OutOfRange`] if the pixel is not in the
-    /// image, [`Refusal::NotObservable`] if the landmark is behind the camera, [`Refusal::Repeated`] if the keyframe has
+    /// image, or the guess not on the Earth, [`Refusal::NotObservable`] if the landmark is behind the camera, [`Refusal::Repeated`] if the keyframe has
     /// seen it already, [`Refusal::Full`] if there is no room for another, [`Refusal::NotStarted`] also without a camera.
     pub fn observe(&mut self, stream: &mut Stream, id: u64, seen: &Observation) -> Result<Sighted, Refusal> {
         let result = self.sight(stream, id, seen);
@@ -113,7 +114,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         };
         let serial = landmarks.coupling.first + at as u64;
         let mut sight = sighted(&landmarks.camera, seen, serial, stream.noise_factor())?;
-        let (mut index, is_new) = match landmarks.find(seen.landmark) {
+        let (index, is_new) = match landmarks.find(seen.landmark) {
             Some(index) => (index, false),
             None => (landmarks.begin(seen.landmark, seen.guess).ok_or(Refusal::Full { id })?, true),
         };
@@ -126,10 +127,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
         // A landmark is judged where it is linearised, but for its correction.
         if !sight.linearise(&landmarks.camera, keyframe, &landmark.point) {
-            if is_new {
-                landmarks.remove(index);
-            }
-            return Err(Refusal::NotObservable);
+            return self.refuse(index, is_new, sight, Refusal::NotObservable);
         }
         let off = landmark.correction(&self.window, landmarks.coupling.first) + sight.moved(&keyframe.correction);
         let innovation = sight.residual - sight.jacobian * off;
@@ -145,24 +143,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         });
         let (judged, verdict) = match verdict {
             Ok(verdict) => verdict,
-            Err(refusal) => {
-                if is_new {
-                    landmarks.remove(index);
-                    return Err(refusal);
-                }
-                let Some(landmark) = landmarks.all.get_mut(index) else { return Err(refusal) };
-                landmark.refused_in_a_row += 1;
-                if landmark.refused_in_a_row < landmarks.params.patience {
-                    return Err(refusal);
-                }
-                // It is another landmark by now. What the old one said stays.
-                landmark.is_open = false;
-                if landmark.sights.is_empty() {
-                    landmarks.remove(index);
-                }
-                index = landmarks.begin(seen.landmark, None).ok_or(refusal)?;
-                return self.wait(index, sight);
-            }
+            Err(refusal) => return self.refuse(index, is_new, sight, refusal),
         };
         sight.precision *= sqrt(verdict.weight);
         sight.jacobian *= sqrt(verdict.weight);
@@ -179,6 +160,28 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             log_likelihood: verdict.log_likelihood,
             whitened: judged.whitened,
         }))
+    }
+
+    /// Refuses an observation of a landmark that it does not fit, or begins the landmark again with it once too many did not.
+    fn refuse(&mut self, index: usize, is_new: bool, sight: Sight, refusal: Refusal) -> Result<Sighted, Refusal> {
+        let Some(landmarks) = &mut self.landmarks else { return Err(refusal) };
+        if is_new {
+            landmarks.remove(index);
+            return Err(refusal);
+        }
+        let Some(landmark) = landmarks.all.get_mut(index) else { return Err(refusal) };
+        landmark.refused_in_a_row += 1;
+        if landmark.refused_in_a_row < landmarks.params.patience {
+            return Err(refusal);
+        }
+        // It is another landmark by now. What the old one said stays.
+        let id = landmark.id;
+        landmark.is_open = false;
+        if landmark.sights.is_empty() {
+            landmarks.remove(index);
+        }
+        let index = landmarks.begin(id, None).ok_or(refusal)?;
+        self.wait(index, sight)
     }
 
     /// Keeps an observation of a landmark that is not used yet, and uses all of them if that makes it known.
@@ -241,6 +244,9 @@ fn sighted(camera: &Camera, seen: &Observation, serial: u64, factor: f64) -> Res
     if let Some((position, deviation)) = seen.guess {
         if !position.iter().all(|x| x.is_finite()) || deviation.is_nan() {
             return Err(Refusal::NonFinite);
+        }
+        if !is_on_earth(&position) {
+            return Err(Refusal::OutOfRange);
         }
         if !(1e-6..=1e9).contains(&deviation) {
             return Err(Refusal::Noise);

@@ -282,7 +282,7 @@ impl<F: ProvidedFactor> Engine<F> {
                     self.distrust(sample.time_ns);
                 }
                 match result {
-                    Ok(()) if !self.is_plausible() => {
+                    Ok(()) if !self.is_bounded() => {
                         self.phase = Phase::Lost;
                         return Err(Refusal::OutOfRange.into());
                     }
@@ -439,18 +439,23 @@ impl<F: ProvidedFactor> Engine<F> {
         if !matches!(measured, Measured::Gnss(..)) {
             self.independent_ns = self.now_ns;
         }
-        if !self.is_plausible() {
+        if !self.is_bounded() || (!is_relative && !self.is_height_plausible()) {
             return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
         }
         Ok(fused)
     }
 
-    /// Whether an aircraft may be there. What was led away by broken samples is finite, but nowhere on the Earth, or too fast for
-    /// anything to correct it.
-    fn is_plausible(&self) -> bool {
+    /// Whether it is on the Earth and slow enough to be corrected: what was led away by broken samples is finite, but neither.
+    fn is_bounded(&self) -> bool {
         let Some((position, velocity)) = self.strategy.motion() else { return false };
-        let Some(world) = &self.world else { return false };
-        position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY && HEIGHTS.contains(&world.height(&position))
+        position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY
+    }
+
+    /// Whether an aircraft may be so high. The IMU alone may drift away from there, until a position corrects it; after that it may
+    /// not be anywhere else.
+    fn is_height_plausible(&self) -> bool {
+        let (Some((position, _)), Some(world)) = (self.strategy.motion(), &self.world) else { return false };
+        HEIGHTS.contains(&world.height(&position))
     }
 
     /// What a position says of the estimate itself.

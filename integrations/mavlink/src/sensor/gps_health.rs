@@ -94,8 +94,11 @@ const NOT: [&str; 4] = ["no", "not", "none", "without"];
 const BETWEEN: [&str; 6] = ["gps", "gnss", "gps1", "gps2", "longer", "more"];
 
 /// What says after the word that it has ended, or is not so.
-const ENDED: [&str; 11] =
-    ["cleared", "clear", "ended", "over", "gone", "stopped", "resolved", "recovered", "none", "ok", "inactive"];
+const ENDED: [&str; 10] =
+    ["cleared", "clear", "ended", "gone", "stopped", "resolved", "recovered", "none", "ok", "inactive"];
+
+/// What says beside the word that it is so, unless it is denied.
+const FOUND: [&str; 4] = ["detect", "detects", "detected", "indicated"];
 
 /// Whether a text says that there is spoofing, or that there is none; none if it is about something else. In doubt there is.
 fn spoofing(text: &STATUSTEXT_DATA) -> Option<bool> {
@@ -109,7 +112,13 @@ fn spoofing(text: &STATUSTEXT_DATA) -> Option<bool> {
         let last = before.iter().rev().find(|word| !BETWEEN.contains(word));
         last.is_some_and(|word| NOT.contains(word))
     };
-    let has_ended = after.iter().enumerate().any(|(i, word)| ENDED.contains(word) && !is_denied(&after[..i]));
+    // What else is said then is about something else, as in "spoofing detected, IMU ok".
+    let beside = at.saturating_sub(1)..words.len();
+    let mut found = beside.filter(|i| FOUND.contains(&words[*i])).map(|i| !is_denied(&words[..i])).peekable();
+    let has_ended = match found.peek() {
+        Some(_) => !found.any(|is_found| is_found),
+        None => after.iter().enumerate().any(|(i, word)| ENDED.contains(word) && !is_denied(&after[..i])),
+    };
     Some(!has_ended && !is_denied(before))
 }
 
@@ -166,6 +175,11 @@ mod tests {
             "GPS 1 not trusted: spoofed",
             "GPS lost, no fix, spoofing detected",
             "Spoofing not cleared",
+            "Spoofing detected, IMU ok",
+            "spoofing detected, RTK none",
+            "spoofing detected over 3 satellites",
+            "Spoofing over 3 satellites",
+            "Detected spoofing, IMU ok",
             "SPOOFING!",
         ] {
             assert_eq!(said(text), Some(true), "{text}");
@@ -178,6 +192,9 @@ mod tests {
             "GPS spoofing state: none",
             "Spoofing OK",
             "GPS not spoofed",
+            "Spoofing: none detected",
+            "Spoofing not detected",
+            "Spoofing no longer indicated",
         ] {
             assert_eq!(said(text), Some(false), "{text}");
         }

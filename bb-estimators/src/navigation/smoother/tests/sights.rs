@@ -245,12 +245,13 @@ fn refusals_are_named_and_counted() {
     assert_eq!(refused(new), Err(Refusal::NotObservable), "behind the camera");
     assert_eq!(refused(Observation { guess: Some((above, 0.0)), ..new }), Err(Refusal::Noise));
     assert_eq!(refused(Observation { guess: Some((above * f64::NAN, 1.0)), ..new }), Err(Refusal::NonFinite));
+    assert_eq!(refused(Observation { guess: Some((above * 1e6, 1.0)), ..new }), Err(Refusal::OutOfRange));
     assert!(matches!(refused(with((5.0, 5.0), 1.0)), Err(Refusal::Gate { .. })), "a wrong match");
     assert!(matches!(refused(good), Ok(Sighted::Used(_))));
     assert_eq!(refused(good), Err(Refusal::Repeated { landmark: good.landmark }));
     assert_eq!(smoother.observe(&mut stream, 500, &good), Err(Refusal::NoKeyframe { id: 500 }));
     let counts = stream.counts();
-    assert_eq!((counts.invalid, counts.gate, counts.not_applicable, counts.fused), (7, 1, 3, 1));
+    assert_eq!((counts.invalid, counts.gate, counts.not_applicable, counts.fused), (8, 1, 3, 1));
     smoother.update().unwrap();
     assert!(apart(&before, &smoother.estimate().unwrap()) < 0.01);
     // Full: ids that are new each, and are never seen again.
@@ -263,6 +264,38 @@ fn refusals_are_named_and_counted() {
     assert!(full > 0);
     let mut blind = Smoother::new(linear(5)).unwrap();
     assert_eq!(blind.observe(&mut stream, 0, &good), Err(Refusal::NotStarted));
+}
+
+/// One that was taken for known above the camera does not stay so until it leaves the window.
+#[test]
+fn a_landmark_behind_the_camera_begins_again() {
+    let (_, scenery, mut smoother) = flown();
+    let good = scenery.seen[11][0];
+    let landmarks = smoother.landmarks.as_mut().unwrap();
+    landmarks.begin(9999, Some((Vector3::new(0.0, 0.0, 1e4), 1.0))).unwrap();
+    let patience = landmarks.params.patience;
+    let mut stream = Stream::default();
+    for _ in 1..patience {
+        let seen = Observation { landmark: 9999, ..good };
+        assert_eq!(smoother.observe(&mut stream, 11, &seen), Err(Refusal::NotObservable));
+    }
+    assert_eq!(smoother.observe(&mut stream, 11, &Observation { landmark: 9999, ..good }), Ok(Sighted::Waiting));
+    assert_eq!(smoother.landmark(9999), None);
+}
+
+/// What nothing determines is not known exactly: it waits until something does.
+#[test]
+fn an_indeterminate_landmark_waits() {
+    let (_, scenery, mut smoother) = flown();
+    let good = scenery.seen[11][0];
+    let place = scenery.places[good.landmark as usize];
+    let landmarks = smoother.landmarks.as_mut().unwrap();
+    let index = landmarks.begin(9999, Some((place, 1.0))).unwrap();
+    landmarks.all[index].prior = None;
+    landmarks.all[index].sum();
+    let mut stream = Stream::default();
+    assert_eq!(smoother.landmark(9999), None);
+    assert_eq!(smoother.observe(&mut stream, 11, &Observation { landmark: 9999, ..good }), Ok(Sighted::Waiting));
 }
 
 /// An id that is another landmark by now begins again, and what it was stays used.

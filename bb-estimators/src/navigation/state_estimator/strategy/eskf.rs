@@ -51,6 +51,8 @@ impl EskfStrategy {
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filter.start(start)?;
         self.begin(start.time_ns);
+        // What was refused did not fit another estimate.
+        self.streams.anchors.forgive();
         Ok(())
     }
 
@@ -111,9 +113,7 @@ impl EskfStrategy {
                 }
                 fused
             }
-            Measured::Provided(factor) => {
-                update(&mut self.filter, &mut streams.provided, *factor).map_err(absurd)?
-            }
+            Measured::Provided(factor) => update(&mut self.filter, &mut streams.provided, *factor)?,
         };
         let pose = self.pose().filter(Pose::is_finite).ok_or(Failure::Fatal(Refusal::NonFinite))?;
         // What was measured at a keyframe belongs to it.
@@ -210,9 +210,9 @@ fn update<F: ProvidedFactor>(
     filter: &mut Eskf<Navigated, NAVIGATED>,
     stream: &mut Stream,
     factor: &F,
-) -> Result<Fused, Refusal> {
+) -> Result<Fused, Failure> {
     if let Some(id) = Factor::<Navigated, NAVIGATED>::previous(factor) {
-        return Err(Refusal::NoKeyframe { id });
+        return Err(Refusal::NoKeyframe { id }.into());
     }
     let at = filter.estimate().ok_or(Refusal::NotStarted)?;
     let mut rows = Rows::new();
@@ -221,8 +221,10 @@ fn update<F: ProvidedFactor>(
     macro_rules! of_dimension {
         ($($dimension:literal)*) => {
             match residual.len() {
-                $($dimension => filter.update(stream, &Whitened::<$dimension>::new(residual, jacobian)),)*
-                _ => Err(Refusal::NotObservable),
+                $($dimension => {
+                    filter.update(stream, &Whitened::<$dimension>::new(residual, jacobian)).map_err(absurd)
+                })*
+                _ => Err(Refusal::NotObservable.into()),
             }
         };
     }

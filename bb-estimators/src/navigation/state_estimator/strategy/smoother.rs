@@ -83,6 +83,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.smoother.start(id_of(start.time_ns), start)?;
         self.cadence.begin(start.time_ns);
+        // What was refused did not fit another estimate.
+        self.streams.anchors.forgive();
         Ok(())
     }
 

@@ -1,16 +1,20 @@
 //! Each reason for which an input is not in the estimate is provoked, counted and told.
 
 use super::flight::{FRAME, SECOND, STEP};
+use super::strategy::{Measured, Strategy, Trust};
 use super::*;
+use crate::navigation::eskf::Start;
+use crate::navigation::geodesy::Geodetic;
 use crate::navigation::smoother::{Factor, NavigationFactor, Rows};
-use crate::navigation::{Estimate, GnssPosition, Refusal, States};
-use nalgebra::{Matrix6, Vector3};
+use crate::navigation::{AbsolutePose, Estimate, GnssPosition, Refusal, States};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 #[expect(clippy::large_enum_variant, reason = "there are few of them")]
-/// A provider that sees nothing, or says where it is.
+/// A provider that sees nothing, cannot say anything of where it would be, or says where it is.
 #[derive(Clone, Copy, Debug)]
 enum Provided {
     Nothing,
+    Elsewhere,
     Place(NavigationFactor),
 }
 
@@ -23,6 +27,7 @@ impl<S: States, const N: usize> Factor<S, N> for Provided {
     ) -> Result<(), Refusal> {
         match self {
             Self::Nothing => Err(Refusal::NotObservable),
+            Self::Elsewhere => Err(Refusal::OutOfRange),
             Self::Place(factor) => Factor::<S, N>::linearise(factor, previous, at, rows),
         }
     }
@@ -76,6 +81,8 @@ fn every_refusal_that_a_user_can_see() {
         assert!(matches!(unknown, Refusal::NoKeyframe { .. }), "{unknown:?}");
         let blind = refused(estimator.add_factor(2 * SECOND - STEP, 0, Provided::Nothing));
         assert_eq!(blind, Refusal::NotObservable);
+        let elsewhere = refused(estimator.add_factor(2 * SECOND - STEP, 1, Provided::Elsewhere));
+        assert_eq!(elsewhere, Refusal::OutOfRange, "what a provider refuses is not the end of the estimate");
         let old = PoseAnchor { time_ns: -SECOND, ..anchor };
         assert_eq!(refused(estimator.add_pose_anchor(old)), Refusal::TooOld { time_ns: -SECOND });
         let ahead = PoseAnchor { time_ns: 3 * SECOND, ..anchor };
@@ -86,7 +93,7 @@ fn every_refusal_that_a_user_can_see() {
         let counts = *estimator.counts();
         let counted = [counts.invalid, counts.too_old, counts.in_the_future, counts.duplicates];
         assert_eq!(counted, [4, 1, 1, 1]);
-        assert_eq!(count(estimator.sink(), "degraded"), 10, "each is told: {:#?}", estimator.counts());
+        assert_eq!(count(estimator.sink(), "degraded"), 11, "each is told: {:#?}", estimator.counts());
     }
 }
 
@@ -191,5 +198,62 @@ fn the_bias_of_the_odometry_is_what_a_start_begins_with() {
         assert!(with < 0.5 * without, "{}: {with} m, {without} m without", strategy.name());
         let absurd = ImuBias { accelerometer: Vector3::repeat(5.0), gyroscope };
         assert_eq!(end_m(Some(absurd)), without, "one that has lost itself says anything");
+    }
+}
+
+/// Anchors that did not fit the estimate of before do not help the next to overrule the new one.
+#[test]
+fn a_start_forgets_which_anchors_were_refused() {
+    for strategy in StrategyKind::ALL {
+        let mut strategy = Strategy::<Provided>::new(&config(*strategy)).unwrap();
+        let start =
+            Start::at(SECOND, (Vector3::zeros(), 1.0), (Vector3::zeros(), 0.1), (UnitQuaternion::identity(), 0.01));
+        strategy.start(&start).unwrap();
+        let far = AbsolutePose {
+            position: Vector3::repeat(900.0),
+            world_from_body: UnitQuaternion::identity(),
+            position_covariance: Matrix3::identity(),
+            rotation_covariance: Matrix3::identity(),
+        };
+        for _ in 0..3 {
+            assert!(strategy.measure(&Measured::Anchor(far, Trust::Doubted)).is_err());
+        }
+        assert_eq!(strategy.refused_positions(), 3);
+        strategy.start(&Start { time_ns: 2 * SECOND, ..start }).unwrap();
+        assert_eq!(strategy.refused_positions(), 0);
+    }
+}
+
+/// A height that the IMU alone has drifted to is no reason to give up: the receiver tells the right one.
+#[test]
+fn a_height_that_drifted_away_is_corrected() {
+    let flight = Flight::new(12, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator: Estimator = estimator(*strategy);
+        let low = |position: Geodetic| Geodetic { height: position.height - 10_490.0, ..position };
+        let start = flight.warm_start(0);
+        estimator.warm_start(FlightControllerState { position: low(start.position), ..start }).unwrap();
+        let mut was_outside = false;
+        for sent in &flight.sent(false, false, true) {
+            match sent {
+                // It falls by some 50 m, or seems to.
+                Sent::Imu(sample) if sample.time_ns < 3 * SECOND => {
+                    let less = crate::navigation::ImuMean {
+                        specific_force: sample.specific_force - Vector3::z() * 12.0,
+                        ..*sample
+                    };
+                    estimator.add_imu(&less).unwrap();
+                }
+                Sent::Fix(fix) if fix.time_ns < 3 * SECOND => continue,
+                Sent::Fix(fix) => ignore(estimator.add_gnss(GnssReading { position: low(fix.position), ..*fix })),
+                sent => sent.to(&mut estimator).unwrap(),
+            }
+            assert_ne!(estimator.health().state, HealthState::Lost, "{} at {}", strategy.name(), sent.time_ns());
+            was_outside |= estimator.predicted(sent.time_ns()).is_none();
+        }
+        assert!(was_outside, "{}: nothing is said of where nothing flies", strategy.name());
+        let found = estimator.predicted(12 * SECOND).unwrap().position.height;
+        let truth = low(flight.frame.geodetic(&Flight::truth(12 * SECOND).position)).height;
+        assert!((found - truth).abs() < 20.0, "{}: {found} m, {truth} m", strategy.name());
     }
 }
