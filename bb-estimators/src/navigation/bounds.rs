@@ -18,3 +18,14 @@ pub(in crate::navigation) fn is_on_earth<'a>(components: impl IntoIterator<Item 
 pub(in crate::navigation) fn is_within<'a>(components: impl IntoIterator<Item = &'a f64>, most: f64) -> bool {
     components.into_iter().all(|x| x.abs() <= most)
 }
+
+/// What a sample adds to a variance at least, relatively: far above rounding, which is 1e-16 of the largest term of each sum.
+const REST: f64 = 1e-13;
+
+/// The process noise of a variance, or what rounding may have taken from that if it is more: a position that is known to
+/// nanometres is soon one of a velocity that is not known at all, and of what they share nothing else would be left.
+#[inline]
+pub(in crate::navigation) fn above_rounding(noise: f64, variance: f64) -> f64 {
+    let least = REST * variance;
+    if noise > least { noise } else { least }
+}

@@ -21,8 +21,8 @@ const RISKY: f64 = 1e-8;
 /// Updates between two checks by a Cholesky decomposition.
 const CHECK_EVERY: u32 = 1024;
 
-/// What a check wants to be left of a variance once all others are known: far above rounding.
-const MARGIN: f64 = 1e-13;
+/// What a check wants the smallest eigenvalue of the correlations to be: above rounding, and below what a sample adds.
+const LEAST: f64 = 1e-14;
 
 /// What a variance is raised by, relatively, where a check fails.
 const REPAIR: f64 = 1e-12;
@@ -372,23 +372,30 @@ impl<const N: usize> Covariance<N> {
         self.is_regular(0.0)
     }
 
-    /// Whether a Cholesky decomposition leaves more than this part of each variance.
+    /// Whether no eigenvalue of the correlations is smaller: whether a Cholesky decomposition exists of what is left once that part
+    /// is taken off each variance.
+    ///
+    /// The factors alone do not tell: of three positions whose sum is known, and a fourth state that is that sum, each leaves a
+    /// small part of the one before, and the smallest eigenvalue is the product.
     fn is_regular(&self, margin: f64) -> bool {
         let mut lower = self.matrix;
         for i in 0..N {
-            for j in 0..=i {
+            for j in 0..i {
                 let mut sum = lower[(i, j)];
                 for k in 0..j {
                     sum -= lower[(i, k)] * lower[(j, k)];
                 }
-                if i != j {
-                    lower[(i, j)] = sum / lower[(j, j)];
-                } else if sum > margin * self.matrix[(i, i)] && sum.is_finite() {
-                    lower[(i, i)] = sqrt(sum);
-                } else {
-                    return false;
-                }
+                lower[(i, j)] = sum / lower[(j, j)];
             }
+            let mut pivot = self.matrix[(i, i)] * (1.0 - margin);
+            for k in 0..i {
+                pivot -= lower[(i, k)] * lower[(i, k)];
+            }
+            // Nor if it is not a number.
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return false;
+            }
+            lower[(i, i)] = sqrt(pivot);
         }
         true
     }
@@ -398,7 +405,7 @@ impl<const N: usize> Covariance<N> {
     pub(in crate::navigation) fn enforce(&mut self) {
         self.updates = 0;
         let mut fraction = REPAIR;
-        while !self.is_regular(MARGIN) {
+        while !self.is_regular(LEAST) {
             self.repairs += 1;
             if fraction > 1.0 {
                 // All but the variances is rounding.

@@ -24,6 +24,7 @@ use nalgebra::SMatrix;
 use nalgebra::{Matrix3, Vector3};
 
 use super::params::ImuDensities;
+use crate::navigation::bounds::above_rounding;
 use crate::navigation::math::{Integrals, renormalised, rotation, skew};
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY,
@@ -156,16 +157,18 @@ impl Transition {
         }
     }
 
-    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on position and velocity.
+    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on position and velocity. At least what rounding
+    /// may have taken.
     #[inline]
     fn add_noise<const N: usize>(&self, p: &mut [[f64; N]; N], densities: &ImuDensities) {
         let dt = self.dt;
         let velocity = densities.accelerometer * dt;
         for i in 0..3 {
-            p[POSITION + i][POSITION + i] += velocity * dt * dt / 3.0;
+            let add = |variance: &mut f64, noise: f64| *variance += above_rounding(noise, *variance);
+            add(&mut p[POSITION + i][POSITION + i], velocity * dt * dt / 3.0);
             p[POSITION + i][VELOCITY + i] += velocity * dt * 0.5;
-            p[VELOCITY + i][VELOCITY + i] += velocity;
-            p[ROTATION + i][ROTATION + i] += densities.gyroscope * dt;
+            add(&mut p[VELOCITY + i][VELOCITY + i], velocity);
+            add(&mut p[ROTATION + i][ROTATION + i], densities.gyroscope * dt);
             p[ACCELEROMETER_BIAS + i][ACCELEROMETER_BIAS + i] += densities.accelerometer_bias * dt;
             p[GYROSCOPE_BIAS + i][GYROSCOPE_BIAS + i] += densities.gyroscope_bias * dt;
         }

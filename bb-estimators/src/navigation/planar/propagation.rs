@@ -20,6 +20,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, left};
 use super::params::Densities;
+use crate::navigation::bounds::above_rounding;
 use crate::navigation::math::{cos, sin, wrapped};
 
 /// Below this angle, rad, the integral over an arc is a series.
@@ -90,7 +91,8 @@ impl Transition {
         }
     }
 
-    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on what integrates it. The upper triangle alone.
+    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on what integrates it. The upper triangle alone. At
+    /// least what rounding may have taken.
     #[inline]
     fn add_noise(&self, p: &mut [[f64; STATES]; STATES], densities: &Densities) {
         let dt = self.dt;
@@ -102,15 +104,16 @@ impl Transition {
         for i in 0..2 {
             for j in i..2 {
                 let turned = forward[i] * forward[j] * acceleration[0] + left[i] * left[j] * acceleration[1];
-                p[POSITION + i][POSITION + j] +=
-                    turned * (dt * dt / 3.0) + sideways[i] * sideways[j] * (heading / 3.0);
+                let noise = turned * (dt * dt / 3.0) + sideways[i] * sideways[j] * (heading / 3.0);
+                let entry = &mut p[POSITION + i][POSITION + j];
+                *entry += if i == j { above_rounding(noise, *entry) } else { noise };
             }
             p[POSITION + i][HEADING] += sideways[i] * (0.5 * heading);
             p[POSITION + i][VELOCITY] += forward[i] * acceleration[0] * (0.5 * dt);
             p[POSITION + i][VELOCITY + 1] += left[i] * acceleration[1] * (0.5 * dt);
             p[VELOCITY + i][VELOCITY + i] += acceleration[i];
         }
-        p[HEADING][HEADING] += heading;
+        p[HEADING][HEADING] += above_rounding(heading, p[HEADING][HEADING]);
         p[GYROSCOPE_BIAS][GYROSCOPE_BIAS] += densities.bias * dt;
     }
 

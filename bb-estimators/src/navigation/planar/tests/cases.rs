@@ -51,6 +51,26 @@ fn a_gap_grows_the_covariance_and_is_counted() {
     assert!(after[(0, 0)] > 4.0 * before[(0, 0)] && after[(2, 2)] > 1.0, "{after}");
 }
 
+/// After one sample all that the position is, is the way at that velocity.
+#[test]
+fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
+    for (exact, unknown) in [(1e-8, 10.0), (1e-8, 1e3), (1e-7, 1e5), (1e-12, 10.0)] {
+        let quiet = PlanarParams {
+            forward_acceleration: 1e-6,
+            lateral_acceleration: 1e-6,
+            gyroscope_noise: 1e-8,
+            ..PlanarParams::default()
+        };
+        let mut filter = PlanarEkf::new(quiet).unwrap();
+        let start = PlanarStart::at(0, (Vector2::zeros(), exact), (0.3, 1e-6), (Vector2::zeros(), unknown));
+        filter.start(&start).unwrap();
+        for i in 1..300 {
+            filter.propagate(&sample(i)).unwrap();
+            assert!(filter.is_consistent(), "{exact} {unknown}: after {i}");
+        }
+    }
+}
+
 /// What `robot_localization` takes for zero: a gyroscope with a bias, and wheels that are larger than they are said to be.
 #[test]
 fn the_bias_and_the_wheels_scale_are_found() {
