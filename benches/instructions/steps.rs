@@ -24,11 +24,11 @@ pub(crate) struct Step {
 
 /// In `f64`. Those of `Eskf` have 15 states, those of the attitude filters read the orientation too.
 pub(crate) const STEPS: &[Step] = &[
-    Step { name: "eskf/sample", on: None, stored: 4903.0, run: |steps| eskf(steps, |_, _, _| Ok(())) },
+    Step { name: "eskf/sample", on: None, stored: 4993.0, run: |steps| eskf(steps, |_, _, _| Ok(())) },
     Step {
         name: "eskf/update_3_with_gate",
         on: Some("eskf/sample"),
-        stored: 6697.0,
+        stored: 6236.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let fix = GnssPosition::new(reading.position, 1.0, 1.0);
@@ -39,7 +39,7 @@ pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "eskf/update_1_with_gate",
         on: Some("eskf/sample"),
-        stored: 3121.0,
+        stored: 2990.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let height = Height { height: reading.position.z, deviation: 1.0 };
@@ -47,11 +47,11 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
-    Step { name: "planar/sample", on: None, stored: 1084.0, run: |steps| planar(steps, |_, _, _| Ok(())) },
+    Step { name: "planar/sample", on: None, stored: 1074.0, run: |steps| planar(steps, |_, _, _| Ok(())) },
     Step {
         name: "planar/position_with_gate",
         on: Some("planar/sample"),
-        stored: 1857.0,
+        stored: 1866.0,
         run: |steps| {
             planar(steps, |filter, stream, reading| {
                 let fix = PlanarPosition::new(reading.position.xy(), 1.0);
@@ -59,8 +59,8 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
-    Step { name: "mekf/nine", on: None, stored: 1998.0, run: attitude::<MekfFilter> },
-    Step { name: "vqf/nine", on: None, stored: 1809.0, run: attitude::<VqfFilter> },
+    Step { name: "mekf/nine", on: None, stored: 2054.0, run: attitude::<MekfFilter> },
+    Step { name: "vqf/nine", on: None, stored: 1879.0, run: attitude::<VqfFilter> },
 ];
 
 /// The filter takes a sample and is corrected.

@@ -32,6 +32,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Whether a covariance is one: symmetric, and positive semi-definite up to rounding. One of zeros is, which is that of what is
 /// known exactly.
+#[allow(clippy::neg_cmp_op_on_partial_ord, reason = "what is not a number is refused")]
 #[inline]
 pub(in crate::navigation) fn is_covariance<const D: usize>(noise: &SMatrix<f64, D, D>) -> bool {
     let mut lower = [[0.0; D]; D];

@@ -1,6 +1,6 @@
 //! Bad and extreme input: each case broke the covariance, or moved what it says nothing about, before it was met.
 
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, SMatrix, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::super::*;
@@ -150,15 +150,15 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
     }
 }
 
-/// The height and the barometer's bias are known together, the horizontal position to 20 km: about other axes all positions are, and
-/// the bias is known by a sum of them alone.
+/// The height and the barometer's bias are known together, the horizontal position to 60 km: about other axes all positions are, and
+/// the bias is known by a sum of them alone. That is kept as far as rounding lets it, and no farther.
 #[test]
 fn a_world_that_tilts_keeps_the_covariance_regular() {
     for tilt in [0.3, 1.0, 2.5] {
-        for height in [1.0, 0.1, 1e-2, 1e-3] {
+        for height in [1e-2, 1e-3, 1e-4, 1e-5] {
             let mut filter = Eskf::<All, ALL>::new(EskfParams::default()).unwrap();
             let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
-            let position_covariance = Matrix3::from_diagonal(&Vector3::new(4e8, 1e8, 6.0));
+            let position_covariance = Matrix3::from_diagonal(&Vector3::new(4e9, 1e9, 6.0));
             let start = Start::at(0, (origin, 1.0), (origin, 1.0), (level, 0.1));
             filter.start(&Start { position_covariance, ..start }).unwrap();
             let mut stream = open();
@@ -166,6 +166,9 @@ fn a_world_that_tilts_keeps_the_covariance_regular() {
             let axis = nalgebra::Unit::new_normalize(Vector3::new(1.0, 2.0, 0.5));
             let turned = UnitQuaternion::from_axis_angle(&axis, tilt);
             filter.move_world(&Isometry3::from_parts(Translation3::identity(), turned)).unwrap();
+            let covariance = filter.covariance();
+            let less = covariance - SMatrix::<f64, ALL, ALL>::from_diagonal(&(covariance.diagonal() * 5e-15));
+            assert!(less.cholesky().is_some(), "{tilt} {height}");
             for i in 1..50 {
                 filter.propagate(&sample(i)).unwrap();
                 filter.update(&mut stream, &ZeroVelocity { deviation: 0.3 }).unwrap();

@@ -198,7 +198,7 @@ fn the_covariance_stays_positive_definite() {
 
 /// Fixes of a millimetre and of a metre in turn.
 #[test]
-#[ignore = "takes a minute in release: cargo test --release -p bb-estimators --lib -- --ignored hundred_million"]
+#[ignore = "takes three minutes in release: cargo test --release -p bb-estimators --lib -- --ignored hundred_million"]
 fn the_covariance_stays_positive_definite_through_a_hundred_million_updates() {
     let mut filter: Plain = started();
     let mut stream = Stream::default();
