@@ -1,5 +1,5 @@
-//! What a robot owns until the last handle of it is dropped: options, handlers of telemetry, what its estimators have kept. Their
-//! `Drop` is user code, and may block.
+//! Values that a robot owns until its last handle is dropped: options, telemetry handlers, state kept by estimators.
+//! Their `Drop` is user code, and may block.
 
 use crate::fault::discard;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -9,16 +9,16 @@ use std::time::Duration;
 /// How long the thread that drops the last handle waits.
 const DROPPED_WITHIN: Duration = Duration::from_millis(200);
 
-/// Drops a value on a thread of its own once this is dropped, which waits for that, but not forever.
+/// Drops a value on its own thread once this is dropped. Waits for that, but not forever.
 #[derive(Debug)]
 pub(super) struct Remains {
     begin: Option<Sender<()>>,
-    /// A lock that nobody contends: a receiver alone cannot be shared.
+    /// An uncontended lock: a receiver alone cannot be shared.
     dropped: Mutex<Receiver<()>>,
 }
 
 impl Remains {
-    /// `value` is dropped no later than here if there is no thread to be had.
+    /// If no thread can be started, `value` is dropped here.
     pub(super) fn of(value: impl Send + 'static) -> Option<Self> {
         let (begin, begun) = channel();
         let (done, dropped) = channel::<()>();
