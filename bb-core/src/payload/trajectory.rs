@@ -15,7 +15,7 @@ pub struct JointTrajectory {
     pub points: Arc<[TrajectoryPoint]>,
 }
 
-/// Where the joints of a trajectory are at one time. Each list is as long as the names of the joints, or empty where its
+/// The state of a trajectory's joints at one time. Each list is as long as the names of the joints, or empty if its
 /// quantity is free.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub struct TrajectoryPoint {
@@ -31,8 +31,8 @@ pub struct TrajectoryPoint {
     pub time_from_start: Duration,
 }
 
-/// A trajectory that leads one joint beyond its limits is refused as a whole: brought back to them, it would be another one,
-/// and this joint would no longer keep step with the others.
+/// A trajectory that leads one joint beyond its limits is refused as a whole: clamping would change it, and this
+/// joint would lose step with the others.
 impl JointCommand for JointTrajectory {
     fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
         let Some(joint) = self.joint_names.iter().position(|name| name == bounds.joint) else {
