@@ -12,11 +12,11 @@ pub struct Publisher<T> {
     gate: Arc<dyn Gate>,
 }
 
-/// What a publisher passes on its way to its topic.
+/// The checks that a publisher passes on its way to its topic.
 pub(crate) trait Gate: Send + Sync {
-    /// Has `publish` called with the stamp of a payload that is published now; not once the publisher may not act any more.
+    /// Calls `publish` with the stamp of a payload that is published now, unless the publisher may no longer act.
     fn pass(&self, publish: &mut dyn FnMut(Stamp));
-    /// Whether messages are to be shown to [`Self::note`].
+    /// Whether messages must be shown to [`Self::note`].
     fn is_noted(&self) -> bool;
     /// A message is about to be published.
     fn note(&self, message: DynamicMessage);
@@ -27,8 +27,8 @@ impl<T: Payload> Publisher<T> {
         Self { topic, gate }
     }
 
-    /// Publishes a payload measured now, in no frame. Once the command that made this publisher has ended, or the robot has
-    /// stopped, nothing is published any more.
+    /// Publishes a payload measured now, in no frame. Does nothing once the command that created this publisher has
+    /// ended, or the robot has stopped.
     pub fn publish(&self, payload: T) {
         let mut payload = Some(payload);
         self.gate.pass(&mut |stamp| {
@@ -38,7 +38,7 @@ impl<T: Payload> Publisher<T> {
         });
     }
 
-    /// Publishes a message with the stamp that it has: one that comes from elsewhere and is passed on.
+    /// Publishes a message with its own stamp, for messages forwarded from elsewhere.
     pub fn forward(&self, message: &Stamped<T>) {
         self.gate.pass(&mut |_| self.hand_out(message));
     }

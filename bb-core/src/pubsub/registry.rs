@@ -1,4 +1,4 @@
-//! Topics that are made while the robot runs, and the subscriptions that are waiting for them.
+//! Topics created while the robot runs, and subscriptions waiting for them.
 
 use super::any::{AnyTopic, DynamicMessage, Tap};
 use super::queue::Queue;
@@ -12,10 +12,10 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::task::Waker;
 
-/// The topics of one robot that it does not declare. A topic that is made here is subscribed to by those whose selection
-/// includes it, whether they subscribed before or after.
+/// The topics of one robot that it does not declare. A topic created here is subscribed to by every subscription
+/// whose selection includes it, whether made before or after.
 ///
-/// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics, and of subscriptions only those that live.
+/// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics, and only live subscriptions.
 #[derive(Default)]
 pub(crate) struct Registry {
     /// The paths of all other topics of the robot.
@@ -26,29 +26,31 @@ pub(crate) struct Registry {
 #[derive(Default)]
 struct State {
     topics: BTreeMap<&'static str, Made>,
-    /// In a replay: paths that had a publisher, with the name of its payload, whose type is not known before the first message.
+    /// In a replay: paths that had a publisher, with the name of its payload. Its type is unknown before the first
+    /// message.
     expected: BTreeMap<&'static str, &'static str>,
-    /// Topics that were made so far.
+    /// Topics created so far.
     made: u64,
     selections: Selections,
     is_closed: bool,
 }
 
-/// Where another topic has room.
+/// The place for another topic.
 enum Room {
     Free,
-    /// The path of a topic that nobody uses.
+    /// The path of an unused topic.
     Of(&'static str),
 }
 
-/// A topic, and which one it is in the order in which they were made.
+/// A topic, and its index in the order of creation.
 struct Made {
     number: u64,
     topic: Arc<dyn AnyTopic>,
 }
 
 impl Registry {
-    /// The largest number of paths. Beyond it, a topic without a publisher and without a typed subscription makes room.
+    /// The largest number of paths. Beyond it, a topic without a publisher and without a typed subscription is
+    /// removed.
     pub(crate) const MAX_TOPICS: usize = 1024;
 
     /// For a robot that declares these paths.
@@ -61,7 +63,7 @@ impl Registry {
         &self.declared
     }
 
-    /// Subscribes to what is selected of `topics`, of the topics made here, and of those that will be.
+    /// Subscribes to the selected ones of `topics`, of the topics created here, and of those created later.
     pub(crate) fn subscribe(
         &self,
         topics: &[&dyn AnyTopic],
@@ -72,7 +74,7 @@ impl Registry {
         let mut state = self.lock();
         let made: Vec<_> = state.topics.values().map(|made| Arc::clone(&made.topic)).collect();
         let topics: Vec<&dyn AnyTopic> = topics.iter().copied().chain(made.iter().map(|made| &**made)).collect();
-        // Under the lock, so that a topic made meanwhile is subscribed to once.
+        // Under the lock, so that a topic created meanwhile is subscribed to once.
         let subscription = DynamicSubscription::among(&topics, &self.declared, select, payloads, overflow);
         if !state.is_closed {
             state.selections.add(Selection::new(select, payloads, subscription.tap()));
@@ -82,14 +84,14 @@ impl Registry {
         subscription
     }
 
-    /// The topic at `path`, made if it is not there.
+    /// The topic at `path`, created if it does not exist.
     pub(crate) fn topic<T: Payload>(&self, path: &str) -> Result<Arc<Topic<T>>, PathError> {
         let found = self.find_or_make(path, |path| Arc::new(Topic::<T>::new(path)))?;
         let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&found) as _;
         topic.downcast().map_err(|_| PathError::other_payload(&*found, T::NAME, type_name::<T>()))
     }
 
-    /// The topic at the path of a message, made for its payload if it is not there.
+    /// The topic at the path of a message, created for its payload if it does not exist.
     pub(crate) fn topic_of(&self, message: &DynamicMessage) -> Result<Arc<dyn AnyTopic>, PathError> {
         let found = self.find_or_make(message.path(), |path| message.message().new_topic(path))?;
         if !message.message().fits(&*found) {
@@ -118,7 +120,7 @@ impl Registry {
             return Ok(Arc::clone(&made.topic));
         }
         let room = state.room().ok_or_else(|| PathError::TooMany(path.into()))?;
-        // Last, since a name that is interned stays.
+        // Last, since an interned name stays.
         let path = intern(path).ok_or_else(|| PathError::TooMany(path.into()))?;
         let evicted = match room {
             Room::Free => None,
@@ -134,33 +136,33 @@ impl Registry {
         Ok(topic)
     }
 
-    /// Whether a topic was made at `path`.
+    /// Whether a topic was created at `path`.
     pub(crate) fn has(&self, path: &str) -> bool {
         self.lock().topics.contains_key(path)
     }
 
-    /// In a replay: somebody could publish at `path`.
+    /// In a replay: a publisher existed at `path`.
     pub(crate) fn expect(&self, path: &'static str, payload: &'static str) {
         self.lock().expected.insert(path, payload);
     }
 
-    /// What all topics made here have counted, by path.
+    /// The counts of all topics created here, by path.
     pub(crate) fn statistics(&self) -> Vec<TopicStatistics> {
         let expected = self.lock().expected.clone();
         let silent =
             |(path, payload)| (path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
         let mut all: BTreeMap<_, _> = expected.into_iter().map(silent).collect();
-        // Subscriptions are asked for what they have counted without the lock.
+        // Subscriptions are asked for their counts without the lock.
         all.extend(self.topics().iter().map(|topic| (topic.path(), topic.statistics())));
         all.into_values().collect()
     }
 
-    /// All topics made here, by path.
+    /// All topics created here, by path.
     pub(crate) fn topics(&self) -> Vec<Arc<dyn AnyTopic>> {
         self.lock().topics.values().map(|made| Arc::clone(&made.topic)).collect()
     }
 
-    /// Tells the subscribers that no more will come; the tasks to wake. No further topic is made.
+    /// Tells the subscribers that no more will come. Returns the tasks to wake. No further topic is created.
     #[must_use = "a task that waits for a message waits for ever unless it is woken"]
     pub(crate) fn close(&self) -> Vec<Waker> {
         let mut state = self.lock();
@@ -176,8 +178,8 @@ impl Registry {
 }
 
 impl State {
-    /// Room for another topic. An untyped subscription to a topic that makes room loses nothing: if it is made again, it is
-    /// subscribed to again.
+    /// Finds room for another topic. An untyped subscription to a removed topic loses nothing: if the topic is
+    /// created again, it is subscribed to again.
     fn room(&self) -> Option<Room> {
         if self.topics.len() < Registry::MAX_TOPICS {
             return Some(Room::Free);
@@ -201,7 +203,7 @@ impl fmt::Debug for Registry {
 #[derive(Default)]
 struct Selections {
     all: Vec<Selection>,
-    /// How many there may be before those that were dropped are removed: twice what was left the last time.
+    /// How many there may be before dropped ones are removed: twice the number left the last time.
     clean_at: usize,
 }
 
@@ -215,7 +217,7 @@ impl Selections {
         self.all.push(selection);
     }
 
-    /// Subscribes all that select it to a new topic.
+    /// Subscribes all whose selection includes it to a new topic.
     fn tap(&mut self, topic: &dyn AnyTopic) {
         self.clean();
         for selection in self.all.iter().filter(|selection| selection.includes(topic)) {
@@ -243,7 +245,7 @@ impl Selection {
         Self { select: select.into(), payloads, queue: Arc::downgrade(&tap.0) }
     }
 
-    /// A subscription that was dropped may still be on the lists of silent topics.
+    /// A dropped subscription may still be on the lists of silent topics.
     fn is_alive(&self) -> bool {
         self.queue.upgrade().is_some_and(|queue| !queue.is_abandoned())
     }
@@ -285,10 +287,10 @@ impl OwnedSelect {
     }
 }
 
-/// The longest path that is made at run time.
+/// The longest path created at run time.
 const MAX_PATH_BYTES: usize = 255;
 
-/// Names with `/` between them.
+/// Names separated by `/`.
 fn is_path(path: &str) -> bool {
     let is_name = |name: &str| {
         name.chars().any(char::is_alphanumeric)
@@ -297,7 +299,7 @@ fn is_path(path: &str) -> bool {
     path.len() <= MAX_PATH_BYTES && path.split('/').all(is_name)
 }
 
-/// Why nothing can be published at a path of one's own.
+/// Why nothing can be published at a path of the caller's choice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum PathError {
     Malformed(String),
@@ -462,7 +464,7 @@ mod tests {
         registry.topic("kept").expect("it is there").publish(&state(1.0));
         registry.topic("heard").expect("it is there").publish(&state(1.0));
         assert_eq!((kept.statistics().published, heard.drain().count()), (1, 1));
-        // One that was removed is heard again when it is made again.
+        // A topic that was removed is received again when it is created again.
         registry.topic(&path(0)).expect("an older one makes room").publish(&state(1.0));
         assert_eq!(all.drain().count(), 3);
 
