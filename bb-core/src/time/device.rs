@@ -14,10 +14,9 @@ use super::MonotonicTime;
 /// - The counter may wrap, also several times between two readings: the arrivals tell how often, as long as delays differ by
 ///   less than half a wrap.
 /// - A counter that jumps ahead of the arrivals by more than a second, or back, was restarted: the clock starts over
-/// at once.
+///   at once.
 /// - A counter that stood still looks the same as a late transport, and is treated as one until no reading of 10 to
-/// 20 s
-///   has been on time.
+///   20 s has been on time.
 /// - A reading that is overtaken by another gets its own, earlier time.
 /// - Without a rate that is positive and finite, the time of a reading is its arrival.
 ///
