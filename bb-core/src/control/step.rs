@@ -55,7 +55,7 @@ impl Step<'_> {
         topic.publish_deferred(&stamp.message(payload), &mut self.effects.wakers);
     }
 
-    /// Publishes what has changed of safety and state since the step began or since the last time.
+    /// Publishes changes of safety and state since the step began or since the last call.
     pub(super) fn publish_machine(&mut self, command: Option<&'static str>) {
         let before = std::mem::replace(&mut self.before, self.state.machine);
         let after = self.state.machine;
