@@ -16,10 +16,11 @@ use std::time::Duration;
 
 /// Moves joints through positions, and comes to rest at the last of them; all joints arrive together.
 ///
-/// The trajectory is [planned](plan) from where the joints are, and each actuator, which takes [`ActuatorCommand`], follows its part of it. It
-/// publishes a [`MotionProgress`] ten times a second at `progress` below its path. It succeeds when all actuators have
-/// reported that they have reached their target. If one reports anything else, the others are told to hold, and it fails
-/// with the reason. If it is cancelled or times out, its actuators come to rest and hold.
+/// The trajectory is [planned](plan) from the current positions, and each actuator, which takes [`ActuatorCommand`],
+/// follows its part of it. It publishes a [`MotionProgress`] ten times a second at `progress` below its path. It
+/// succeeds when all actuators have reported that they have reached their target. If one reports anything else, the
+/// others are told to hold, and it fails with the reason. If it is cancelled or times out, its actuators come to rest
+/// and hold.
 #[derive(Debug)]
 pub struct MoveJoints;
 
@@ -40,12 +41,12 @@ pub struct MoveJointsOptions {
     pub patience: Duration,
 }
 
-/// Where the joints are to go.
+/// The targets of the joints.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub struct JointTargets {
     /// The joints.
     pub joints: Vec<String>,
-    /// The positions that they pass through; at the last they come to rest.
+    /// The positions to pass through; the joints come to rest at the last one.
     pub points: Vec<JointTarget>,
 }
 
@@ -56,16 +57,16 @@ pub struct JointTarget {
     pub positions: Vec<f64>,
 }
 
-/// How far a motion has come.
+/// The progress of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct MotionProgress {
-    /// Share of the planned time that is over, 0 to 1.
+    /// Fraction of the planned time that has passed, 0 to 1.
     pub progress: f64,
     /// s
     pub elapsed: f64,
     /// s
     pub remaining: f64,
-    /// How many joints have reached their targets.
+    /// The number of joints that have reached their targets.
     pub reached: u32,
 }
 
@@ -92,7 +93,7 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 const POINT_PERIOD: Duration = Duration::from_millis(10);
 
 impl MoveJoints {
-    /// What the command does, for other commands: moves `joints` through `points`.
+    /// The command's motion, for other commands: moves `joints` through `points`.
     ///
     /// # Errors
     /// A joint is unknown, has no actuator or no known position, there is no trajectory, an actuator refuses its part, or a
@@ -127,7 +128,7 @@ impl MoveJoints {
     }
 }
 
-/// The trajectory from where the joints are.
+/// The trajectory from the current positions.
 fn planned(
     bus: &Bus,
     joints: &[String],
@@ -143,7 +144,7 @@ fn planned(
         let position = state.as_ref().and_then(|state| state.position.first().copied());
         let position =
             position.ok_or_else(|| Fault::new(format!("the position of the joint `{name}` is not known")))?;
-        // A joint that a sensor sees just beyond its limit may move back; the solver refuses a start outside.
+        // A joint measured just beyond its limit may move back; the solver refuses a start outside.
         let mut limit = JointMotionLimits::of(joint, f64::INFINITY, options.acceleration, options.jerk);
         if !limit.velocity.is_finite() {
             return Err(Fault::new(format!("the joint `{name}` declares no limit of its velocity")));
@@ -182,7 +183,7 @@ impl Motion {
     fn start(&mut self, trajectory: &JointTrajectory) -> Result<(), Fault> {
         let sent: Result<(), ActuatorError> =
             self.links.iter().try_for_each(|link| link.send(trajectory.clone().into()));
-        // What they replaced has ended before.
+        // Any motions they replaced have already ended.
         self.reports.drain().for_each(drop);
         sent.map_err(|error| self.fail(error.to_string(), None))
     }
@@ -202,14 +203,14 @@ impl Motion {
             MotionEnd::Stopped => format!("the joint `{joint}` was stopped"),
             MotionEnd::Failed(reason) => format!("the actuator of the joint `{joint}` has failed: {reason}"),
         };
-        // What another command moves now is that one's.
+        // Joints now moved by another command belong to that command.
         Err(self.fail(reason, (end.end == MotionEnd::Replaced).then_some(index)))
     }
 
-    /// The fault, after all joints but one were told to hold.
+    /// Returns the fault, after all joints but one were told to hold.
     fn fail(&self, reason: String, except: Option<usize>) -> Fault {
         for (_, link) in self.links.iter().enumerate().filter(|(index, _)| Some(*index) != except) {
-            // One that does not take it has been stopped otherwise, or has failed and was made safe.
+            // One that refuses it has been stopped otherwise, or has failed and was made safe.
             let _ = link.send(ActuatorCommand::Hold);
         }
         Fault::new(reason)

@@ -6,7 +6,7 @@ use bb_core::run::{ActuatorError, ActuatorLink};
 use bb_core::{Fault, MonotonicTime, Options, Overflow, Payload, Reading, Service, ServiceContext, Subscription};
 use std::time::Duration;
 
-/// What a [`PidController`] drives with its output.
+/// The quantity driven by the output of a [`PidController`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Drive {
     /// A velocity: rad/s or m/s.
@@ -20,8 +20,8 @@ pub enum Drive {
 /// `actuator`.
 ///
 /// Gains and setpoint are options, to be bound to parameters: `PidController(kp = param::gains::kp, …)`. A new gain
-/// takes effect with the next step; what is integrated is kept. While the robot is not armed, or the measurement is older than `stale_after`, it
-/// commands nothing and forgets what it has integrated.
+/// takes effect with the next step; the integral is kept. While the robot is not armed, or the measurement is older
+/// than `stale_after`, it commands nothing and resets the integral.
 #[derive(Debug)]
 pub struct PidController {
     options: PidControllerOptions,
@@ -73,9 +73,9 @@ pub struct PidControllerOptions {
 /// A step of a [`PidController`], after `control_msgs/PidState`: rad or m, and the unit of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct PidState {
-    /// Where the joint is to be.
+    /// The setpoint.
     pub setpoint: f64,
-    /// Where it is.
+    /// The measured position.
     pub measurement: f64,
     /// The difference.
     pub error: f64,
@@ -85,7 +85,7 @@ pub struct PidState {
     pub integral: f64,
     /// The derivative term.
     pub derivative: f64,
-    /// What was commanded.
+    /// The commanded value.
     pub output: f64,
 }
 
@@ -124,7 +124,7 @@ impl Service for PidController {
         }
         let fresh = self.latest.filter(|(time, _)| now.duration_since(*time) <= self.options.stale_after);
         let Some((_, measurement)) = fresh else { return Ok(self.pause()) };
-        // The first step has no step before it.
+        // The first step has no predecessor.
         let step_s = self.last_step.map_or(0.0, |last| now.seconds_since(last));
         self.last_step = Some(now);
         let terms = self.pid.update(self.options.setpoint, measurement, step_s);
@@ -175,8 +175,8 @@ fn sent(result: Result<(), ActuatorError>) -> Result<bool, Fault> {
     }
 }
 
-/// Switches an actuator between two velocities by the position of a joint, with hysteresis: a float that starts a pump,
-/// say.
+/// Switches an actuator between two velocities by the position of a joint, with hysteresis: for example, a float that
+/// starts a pump.
 #[derive(Debug)]
 pub struct ThresholdController {
     options: ThresholdControllerOptions,
@@ -212,7 +212,7 @@ pub struct ThresholdControllerOptions {
 /// A change of a [`ThresholdController`].
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct ThresholdState {
-    /// The position that it follows from, rad or m.
+    /// The position that caused it, rad or m.
     pub measurement: f64,
     /// Whether it is on.
     pub is_on: bool,
@@ -251,7 +251,7 @@ impl Service for ThresholdController {
         }
         let velocity = if is_on { self.options.on_velocity } else { self.options.off_velocity };
         let is_sent = sent(self.actuator.send(VelocityCommand { velocity, effort: None }.into()))?;
-        // What was not carried out is sent again.
+        // A command that was not carried out is sent again.
         self.commanded = is_sent.then_some(is_on);
         Ok(if is_sent { Reading::now(ThresholdState { measurement, is_on }) } else { Reading::nothing() })
     }
