@@ -275,7 +275,6 @@ impl AllanCurve {
 /// Correlation of the Allan variances over m and 2^lag m samples, under white noise (0), flicker noise (1) or a
 /// random walk (2): both are sums over one spectrum, whose windows `sin⁴x / x²⁺ⁿ` overlap; integrated numerically
 /// here.
-/// sums over one spectrum, whose windows `sin⁴x / x²⁺ⁿ` overlap; here integrated numerically.
 fn correlation(noise: usize, lag: i32) -> f64 {
     let (first, ratio) = match noise {
         0 => ([0.530, 0.188, 0.066, 0.023], 0.35),
@@ -288,7 +287,6 @@ fn correlation(noise: usize, lag: i32) -> f64 {
 
 /// Minimises `xᵀ A x - 2 bᵀ x` over non-negative x, always including white noise: the best feasible one of all
 /// subsets of the components.
-/// best that is.
 fn least_squares(normal: &Matrix3<f64>, right: &Vector3<f64>) -> Vector3<f64> {
     let mut best = Vector3::new(right[0] / normal[(0, 0)], 0.0, 0.0);
     let cost = |x: &Vector3<f64>| x.dot(&(normal * x)) - 2.0 * right.dot(x);

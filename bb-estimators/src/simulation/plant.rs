@@ -93,7 +93,6 @@ impl Plant {
 
     /// The state at `now`; for a time before the latest one, the latest state. Reading the state does not change how
     /// it moves.
-    /// how it moves.
     pub(super) fn at(&mut self, now: MonotonicTime) -> PlantState {
         while self.time + STEP <= now {
             self.state = self.after(STEP_S);

@@ -51,7 +51,6 @@
 //! still queued in the subscription. Such a file is truncated; [`Recording::open`] reads it up to the cut, and
 //! [`recover`] makes a complete file of that part. When the machine loses power, data not yet written by the
 //! operating system is lost too, unless [`sync`](RecorderOptions::sync) is set.
-//! [`sync`](RecorderOptions::sync) is set.
 //!
 //! # Memory and trust
 //!

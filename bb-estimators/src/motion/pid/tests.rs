@@ -44,7 +44,6 @@ fn the_derivative_is_filtered_with_its_time_constant() {
 
 /// A setpoint out of reach for a minute: without protection, the integral would then be 600, and the output would
 /// stay at its limit for many seconds after the setpoint is back in reach.
-/// many seconds after the setpoint is back in reach.
 #[test]
 fn it_does_not_wind_up() {
     let mut pid = Pid::new(PARAMS);
