@@ -219,7 +219,7 @@ impl Cells<'_> {
 
     fn time_ns(&self) -> Result<i64, String> {
         let cell = self.cell(0)?;
-        // A float of seconds since 1970 is too coarse for nanoseconds.
+        // A float of nanoseconds since 1970 cannot resolve single nanoseconds.
         let time_ns = match exact_ns(cell, self.quantity.factor) {
             Some(time_ns) => time_ns,
             None => match self.number(0)? {
