@@ -120,7 +120,7 @@ struct AttitudeArguments {
     plot: Option<PathBuf>,
 }
 
-/// What to do.
+/// The requested work.
 #[derive(Debug)]
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
@@ -141,7 +141,7 @@ pub(crate) struct Attitude {
     pub(crate) plot: Option<PathBuf>,
 }
 
-/// Parses the command line. The error contains what to print and the exit code, which is 0 for `--help`.
+/// Parses the command line. The error contains the text to print and the exit code, which is 0 for `--help`.
 pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job, clap::Error> {
     let what = match Bb::try_parse_from(arguments)?.command {
         Command::Eval { what } => what,
@@ -233,7 +233,7 @@ impl AttitudeArguments {
         }
         let all = named.iter().any(|name| name == "all");
         let is_chosen = |filter: &FilterParams| match all {
-            // Filters without a ninth axis are left out.
+            // Six-axis filters are left out when there are nine axes.
             true => self.axes.suit(filter),
             false => named.iter().any(|name| name == filter.name()),
         };

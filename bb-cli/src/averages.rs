@@ -5,16 +5,16 @@ use crate::score::Degrees;
 /// The mean and the worst of root mean squares over recordings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Averages {
-    /// How many recordings.
+    /// The number of recordings.
     pub count: usize,
-    /// Of each angle by itself.
+    /// Of each angle separately.
     pub mean: Degrees,
-    /// The largest of each angle by itself.
+    /// The largest of each angle separately.
     pub worst: Degrees,
 }
 
 impl Averages {
-    /// Of the recordings' root mean squares; none if there are none.
+    /// Of the recordings' root mean squares; `None` if there are none.
     pub fn of(scores: impl IntoIterator<Item = Degrees>) -> Option<Self> {
         let scores: Vec<_> = scores.into_iter().collect();
         let over = |fold: fn(&[f64]) -> f64| {
@@ -26,7 +26,7 @@ impl Averages {
             }
         };
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        // NaN is the worst.
+        // NaN counts as the worst.
         let worst = |values: &[f64]| values.iter().copied().fold(0.0, |a: f64, b| if a >= b { a } else { b });
         (!scores.is_empty()).then(|| Self { count: scores.len(), mean: over(mean), worst: over(worst) })
     }

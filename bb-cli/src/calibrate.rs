@@ -15,7 +15,7 @@ use bb_estimators::params::Params;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
-/// What is calibrated.
+/// The kind of calibration.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Calibrate {
     /// Finds offsets, scale and misalignment of gyroscope, accelerometer and magnetometer.
@@ -65,12 +65,12 @@ struct Calibration {
     rests: Vec<Rest>,
     gyroscope: Result<GyroscopeFit, CalibrationError>,
     accelerometer: Result<AccelerometerFit, CalibrationError>,
-    /// None if no field was recorded.
+    /// `None` if no field was recorded.
     magnetometer: Option<Result<MagnetometerFit, CalibrationError>>,
 }
 
 impl Calibrate {
-    /// Returns what to print, and whether any sensor was calibrated.
+    /// Returns the text to print, and whether any sensor was calibrated.
     pub(crate) fn run(&self) -> Result<(String, bool), String> {
         let Self::Imu(arguments) = self;
         arguments.run()

@@ -17,16 +17,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Samples per block: enough that reading the clock costs nothing, few enough to stay in the cache.
+/// Samples per block: enough to make the cost of reading the clock negligible, few enough to stay in the cache.
 const BLOCK: usize = 1024;
 
-/// Headings are compared with two sigma, and truths with other conventions, once per this many samples.
+/// Headings are checked against two sigma, and truths for other conventions, once per this many samples.
 const ASKED: usize = 64;
 
 /// The length of the progress bar for one recording.
 const BAR: u64 = 1000;
 
-/// How recordings are evaluated.
+/// The settings of an evaluation.
 #[derive(Clone, Debug)]
 pub struct Evaluator {
     /// The filters; all take the axes, see [`Chosen::all`].
@@ -50,11 +50,11 @@ pub struct Evaluation {
     pub file: PathBuf,
     /// The number of the variant, from 0; `None` if the recording is not modified.
     pub variant: Option<u32>,
-    /// The axes of the runs: six, where the magnetometer's topic holds no message.
+    /// The axes of the runs: six if the magnetometer's topic holds no message.
     pub axes: Axes,
-    /// One run per filter, in the order of the filters; or the reason why there is none.
+    /// One run per filter, in the order of the filters; or the reason for having none.
     pub runs: Result<Vec<Run>, String>,
-    /// Why the recording breaks off, if it does; the runs are of the part before.
+    /// Why the recording is cut off, if it is; the runs cover the part before.
     pub broken: Option<String>,
     /// Remarks on the runs.
     pub notes: Vec<String>,
@@ -67,12 +67,12 @@ pub struct Run {
     pub filter: &'static str,
     /// Its errors.
     pub score: Score,
-    /// For how many headings it reported a standard deviation, and how many of them were within two.
+    /// The number of headings with a reported standard deviation, and how many of them were within two.
     pub within_two_sigma: (u64, u64),
     /// Mean time per sample, including reading the orientation, in ns.
     pub ns_per_update: f64,
-    /// Error over time: seconds since the first sample, and degrees, `None` where the truth is unknown. The total error with
-    /// nine axes, else the inclination.
+    /// Error over time: seconds since the first sample, and degrees, `None` where the truth is unknown. The total
+    /// error with nine axes, otherwise the inclination.
     pub errors: Vec<(f64, Option<f64>)>,
 }
 
@@ -92,11 +92,11 @@ pub(crate) fn evaluate_all(files: &[(PathBuf, Result<(), String>)], evaluator: &
                     let Some((file, found)) = files.get(index / variants) else { break };
                     let evaluation = match found {
                         Ok(()) => evaluate_variant(file, variant, evaluator, &progress),
-                        // Once is enough.
+                        // Reporting it once is enough.
                         Err(_) if variant > 0 => continue,
                         Err(fault) => Evaluation::failed(file, fault.clone(), evaluator.axes),
                     };
-                    // A thread that panicked leaves the list whole.
+                    // A thread that panicked leaves the list intact.
                     done.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((index, evaluation));
                 }
             });
@@ -182,10 +182,10 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     if recording.axes != evaluator.axes {
         notes.push(format!("{magnetometer} holds no message, so six axes are scored"));
     }
-    // Of a recording, and not of each of its variants.
+    // For a recording, not for each of its variants.
     if index == 0 {
         let doubts = unit_doubts(&recording, &units);
-        // Of filters that were misled the errors tell nothing of the truth.
+        // If filters were disturbed on purpose, their errors say nothing about the truth.
         let is_misled = !doubts.is_empty() || evaluator.variants.changes_field();
         notes.extend(doubts);
         notes.extend(truth_doubt(&recording, &players).filter(|_| !is_misled));
@@ -258,8 +258,8 @@ impl Player {
         }
     }
 
-    /// Whether the heading after the last sample is within two standard deviations, and which convention the truth has,
-    /// where it counts.
+    /// Whether the heading after the last sample is within two standard deviations, and the truth's convention, if it
+    /// is relevant.
     fn ask(&mut self, samples: &[ImuSample], recording: &Recording) {
         let Some(sample) = samples.last() else { return };
         let Some(estimate) = self.estimates.last().copied().flatten() else { return };

@@ -1,4 +1,4 @@
-//! Finds the recordings that the paths on the command line name.
+//! Finds the recordings named by the paths on the command line.
 
 use std::fs;
 use std::io;
@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 /// The extension of recordings.
 pub(crate) const EXTENSION: &str = "mcap";
 
-/// Extensions of recordings that cannot be read, or only with another feature. In a folder they are collected too, so that
-/// an error says for each what to do.
+/// Extensions of recordings that cannot be read, or only with another feature. They are also collected from folders,
+/// so that an error says for each what to do.
 const OTHERS: [&str; 6] = [".db3", ".bag", ".mcap.zstd", ".mcap.zst", ".db3.zstd", ".mcap.gz"];
 
-/// The recordings in the order of the arguments, those of a folder sorted by name; or the reason why a path has none.
+/// The recordings in the order of the arguments, with those of a folder sorted by name; or the reason why a path has
+/// none.
 pub(crate) fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)> {
     let mut recordings = Vec::new();
     for path in paths {

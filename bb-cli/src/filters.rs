@@ -27,7 +27,7 @@ pub enum Axes {
 }
 
 impl Axes {
-    /// In words.
+    /// Its name in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Six => "six",
@@ -92,7 +92,7 @@ pub trait Running {
     /// Processes samples, and appends the orientation after each: `None` if there is none yet, or the sample was refused.
     fn run(&mut self, samples: &[ImuSample], estimates: &mut Vec<Option<UnitQuaternion<f64>>>) -> Refused;
 
-    /// Standard deviation of the heading in rad, if the filter reports it.
+    /// The standard deviation of the heading in rad, if the filter reports it.
     fn heading_deviation(&self) -> Option<f64> {
         None
     }
@@ -101,9 +101,9 @@ pub trait Running {
 /// The samples that a filter refused.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Refused {
-    /// How many.
+    /// The number of refused samples.
     pub count: u64,
-    /// Why the first was.
+    /// The reason for the first one.
     pub first: Option<SampleError>,
 }
 

@@ -1,5 +1,5 @@
-//! The command `bb`: inspects, plots and converts recordings, scores filters on them, and creates projects. The guide is
-//! `docs/command.md`.
+//! The command `bb`: inspects, plots and converts recordings, evaluates filters on them, and creates projects. The
+//! guide is `docs/command.md`.
 //!
 //! `bb eval attitude FILES…` runs the filters on each bag and prints their errors against the truth; the guide is
 //! `docs/evaluate.md`. It is also available as a library: [`Score`] and [`Averages`] define the
@@ -53,8 +53,8 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Runs the command with these arguments, the first of which is its name. The exit code is 2 for wrong arguments, and 1 for
-/// a recording that could not be evaluated to its end.
+/// Runs the command with these arguments, the first of which is its name. The exit code is 2 for wrong arguments, and
+/// 1 for a recording that could not be evaluated to its end.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let job = match arguments::parse(arguments) {
         Ok(job) => job,

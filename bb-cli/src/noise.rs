@@ -45,7 +45,7 @@ fn picture(file: &str) -> Result<PathBuf, String> {
     Ok(file)
 }
 
-/// The axes, as they are called.
+/// The names of the axes.
 const AXES: [&str; 6] =
     ["gyroscope x", "gyroscope y", "gyroscope z", "accelerometer x", "accelerometer y", "accelerometer z"];
 
@@ -63,7 +63,7 @@ impl Sample {
     }
 }
 
-/// What a recording gave.
+/// The noise found in a recording.
 #[derive(Debug)]
 struct Noise {
     file: PathBuf,
@@ -72,7 +72,7 @@ struct Noise {
 }
 
 impl NoiseArguments {
-    /// What to print, and whether all axes of all recordings gave their noise.
+    /// The text to print, and whether noise was found for all axes of all recordings.
     pub(crate) fn run(&self) -> Result<(String, bool), String> {
         let (mut found, mut is_whole) = (Vec::new(), true);
         for (file, there) in self.files() {
@@ -122,7 +122,7 @@ impl NoiseArguments {
 
     fn of_bag(&self, file: &Path, is_whole: &mut bool) -> Result<Vec<Sample>, String> {
         let topics = Topics { imu: self.imu_topic.clone(), ..Topics::default() };
-        // Whatever truth there is says nothing here.
+        // The truth, if any, is irrelevant here.
         let mut recording = Recording::inertial(file, &topics)?;
         let progress = Progress::new("reading", recording.expected);
         let (mut samples, mut block) = (Vec::new(), Vec::new());
@@ -155,7 +155,7 @@ fn is_csv(path: &Path) -> bool {
 }
 
 fn of_csv(file: &Path) -> Result<Vec<Sample>, String> {
-    // The error names the file by itself.
+    // The error already names the file.
     let name = format!("{}: ", file.display());
     let rows = inertial(file).map_err(|fault| fault.strip_prefix(&name).unwrap_or(&fault).to_owned())?;
     let sample = |(time_s, rate, force): &(f64, Vector3<f64>, Vector3<f64>)| {

@@ -11,15 +11,15 @@ pub(crate) struct Periods {
     /// The standard deviation.
     pub(crate) std_s: f64,
     pub(crate) median_s: f64,
-    /// Whether messages come at a rate; unknown of few.
+    /// Whether messages come at a rate; unknown if there are few.
     pub(crate) regular: Option<bool>,
-    /// Where messages are missing; known only if they come regularly.
+    /// Gaps in the messages; known only if they come regularly.
     #[serde(skip)]
     pub(crate) gaps: Vec<Gap>,
-    /// Where time goes backwards: indices of the messages after it.
+    /// Indices of the messages after which time goes backwards.
     #[serde(skip)]
     pub(crate) backward: Vec<usize>,
-    /// How many messages have the same time as the previous one.
+    /// The number of messages with the same time as the previous one.
     #[serde(skip)]
     pub(crate) repeated: usize,
 }
@@ -36,14 +36,14 @@ pub(crate) struct Gap {
 const GAP: f64 = 3.0;
 /// Messages are regular if nine of ten periods are at most this many medians,
 const REGULAR: f64 = 2.0;
-/// and nine of ten are not this many times shorter than the median, as those of a burst are;
+/// and nine of ten are not this many times shorter than the median, as in a burst;
 const BURST: f64 = 10.0;
-/// known only of at least this many periods.
+/// known only with at least this many periods.
 const FEWEST: usize = 8;
 
 impl Periods {
-    /// Of the times of messages in their order, nanoseconds; none of fewer than two. Times that go back count as no
-    /// period.
+    /// From the times of messages in order, nanoseconds; `None` if there are fewer than two. Times that go back do
+    /// not count as periods.
     pub(crate) fn of(times_ns: &[i64]) -> Option<Self> {
         let seconds = |ns: i64| ns as f64 * 1e-9;
         let steps = || times_ns.windows(2).map(|pair| seconds(pair[1].saturating_sub(pair[0])));
@@ -71,7 +71,7 @@ impl Periods {
         })
     }
 
-    /// The same for events: they come when something happens, so they have no gaps.
+    /// The same for events: they have no rate, and so no gaps.
     pub(crate) fn of_events(self) -> Self {
         Self { regular: Some(false), gaps: Vec::new(), ..self }
     }
@@ -81,7 +81,7 @@ impl Periods {
         (self.mean_s > 0.0 && self.regular != Some(false)).then(|| 1.0 / self.mean_s)
     }
 
-    /// The rate with so many decimals, for a table.
+    /// The rate with this many decimals, for a table.
     pub(crate) fn rate_in_words(&self, decimals: usize) -> String {
         match (self.rate_hz(), self.regular) {
             (Some(rate), _) => format!("{rate:.decimals$} Hz"),
@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(Periods::of(&[]), None);
     }
 
-    /// As health changes: twice within a millisecond, then nothing for a while.
+    /// Like health changes: twice within a millisecond, then nothing for a while.
     #[test]
     fn bursts_have_no_rate_and_no_gaps() {
         let bursts: Vec<i64> =

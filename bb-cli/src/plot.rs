@@ -22,16 +22,16 @@ use std::path::Path;
 /// Panels below one another, with a title.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// Above them.
+    /// The title above the panels.
     pub title: String,
-    /// From the top.
+    /// The panels, from the top.
     pub panels: Vec<Panel>,
     /// Width, and height of a panel, in pixels.
     pub panel_size: (u32, u32),
 }
 
 impl Picture {
-    /// Checks before a run whether a picture can be written there.
+    /// Checks before a run whether a picture can be written to this file.
     ///
     /// # Errors
     /// The file's name ends neither in `.svg` nor in `.png`, or its folder does not exist.
@@ -48,7 +48,7 @@ impl Picture {
         }
     }
 
-    /// Writes it, an SVG or a PNG by the file's name.
+    /// Writes it as an SVG or a PNG, depending on the file's name.
     ///
     /// # Errors
     /// It cannot be written there.
@@ -58,10 +58,10 @@ impl Picture {
     }
 }
 
-/// Writes frames below one another, each as high as so many of `panel_size`.
+/// Writes frames below one another, each as high as its number of `panel_size`.
 fn write(file: &Path, title: &str, frames: &[Frame<'_>], panel_size: (u32, u32)) -> Result<(), String> {
     Picture::check(file, "a plot")?;
-    // The font comes along, so that a plot needs nothing of the machine.
+    // The font is included, so that a plot does not depend on the machine.
     register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
         .map_err(|_| "the plot's font cannot be read")?;
     let (width, height) = panel_size;
@@ -80,7 +80,7 @@ fn write(file: &Path, title: &str, frames: &[Frame<'_>], panel_size: (u32, u32))
 fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, title: &str, frames: &[Frame<'_>]) -> Drawn<B> {
     root.fill(&WHITE)?;
     let mut rest = root.titled(title, ("sans-serif", 24))?;
-    // One for all, so that their time axes are as long.
+    // The same for all, so that their time axes have equal length.
     let legend = frames.iter().map(|frame| frame.legend_width(&rest)).max().unwrap_or(0);
     let height = rest.dim_in_pixel().1;
     let panels: u32 = frames.iter().map(|frame| frame.height).sum();
@@ -114,7 +114,7 @@ fn format(file: &Path) -> Option<Format> {
 mod tests {
     use super::*;
 
-    /// The numbers of an attribute of all elements of a kind.
+    /// The values of a numeric attribute for all elements of a kind.
     fn numbers(svg: &str, element: &str, attribute: &str) -> Vec<Vec<f64>> {
         let (element, attribute) = (format!("<{element} "), format!("{attribute}=\""));
         let elements = svg.split(&element).skip(1).filter_map(|element| {
@@ -140,7 +140,7 @@ mod tests {
         for label in ["roll (deg)", "pitch (deg)", "time (s)"] {
             assert!(svg.contains(label), "{label}");
         }
-        // Of the coordinates in pairs, those along.
+        // The x coordinates of the coordinate pairs.
         let data = numbers(&svg, "polyline", "points").into_iter().filter(|points| points.len() > 100);
         let right = data.flat_map(|points| points.into_iter().step_by(2)).fold(0.0, f64::max);
         assert!(right > 500.0, "the data take most of the room: {right}");

@@ -1,12 +1,12 @@
-//! A progress bar on the terminal, redrawn a few times a second; where the errors do not go to one, there is none.
+//! A progress bar on the terminal, redrawn a few times a second; omitted if the error stream is not a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::time::Duration;
 
-/// How often a spinner moves; what is faster shows none.
+/// How often a spinner moves; work that finishes sooner shows none.
 const TICK: Duration = Duration::from_millis(200);
 
-/// How far a run has come.
+/// The progress of a run.
 #[derive(Debug)]
 pub struct Progress(ProgressBar);
 
@@ -21,24 +21,24 @@ impl Progress {
         Self(bar)
     }
 
-    /// Something that moves as long as nobody knows how far it is.
+    /// A spinner for work of unknown length.
     pub fn spinner(what: &'static str) -> Self {
         let bar = ProgressBar::new_spinner().with_message(what);
         bar.enable_steady_tick(TICK);
         Self(bar)
     }
 
-    /// Moves it there.
+    /// Sets the position.
     pub fn set(&self, position: u64) {
         self.0.set_position(position);
     }
 
-    /// Moves it on.
+    /// Advances the position.
     pub fn add(&self, more: u64) {
         self.0.inc(more);
     }
 
-    /// Takes it away.
+    /// Removes it.
     pub fn finish(&self) {
         self.0.finish_and_clear();
     }

@@ -1,4 +1,4 @@
-//! A recording, opened: its samples, its truth, and what is to be said of it.
+//! An opened recording: its samples, its truth, and remarks on it.
 
 use bb_estimators::attitude::ImuSample;
 use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Topic, Truth};
@@ -6,20 +6,20 @@ use std::path::Path;
 
 use crate::filters::Axes;
 
-/// The topics to take, where a recording has several that fit.
+/// The topics to use if several in a recording match.
 #[derive(Clone, Debug, Default)]
 pub struct Topics {
-    /// The IMU; else the only topic of its type.
+    /// The IMU; by default the only topic of its type.
     pub imu: Option<String>,
-    /// The magnetometer; else the one that was recorded with the IMU, or the only topic of its type.
+    /// The magnetometer; by default the one recorded with the IMU, or the only topic of its type.
     pub magnetometer: Option<String>,
-    /// The true orientation; else the only topic of poses, if there is one.
+    /// The true orientation; by default the only topic of poses, if there is one.
     pub truth: Option<String>,
-    /// What says when the body moves.
+    /// The topic that says when the body moves.
     pub moving: MovingTopic,
 }
 
-/// What says when the body moves.
+/// The topic that says when the body moves.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum MovingTopic {
     /// The only topic of its type, if there is one.
@@ -27,35 +27,35 @@ pub enum MovingTopic {
     ByType,
     /// This one.
     Named(String),
-    /// Nothing: the body counts as moving all the time.
+    /// None: the body counts as moving all the time.
     None,
 }
 
-/// A recording, opened up to its first sample.
+/// A recording, opened at its first sample.
 #[derive(Debug)]
 pub struct Recording {
-    /// What is known of the true orientation; nothing, if nothing is.
+    /// The known true orientation; empty if none is known.
     pub truth: Truth,
-    /// What to say of the truth, where it gives no score.
+    /// A remark on the truth, if it gives no score.
     pub(crate) note: Option<String>,
-    /// Those there are: six, where the topic of the magnetometer holds no message.
+    /// The available axes: six if the topic of the magnetometer holds no message.
     pub(crate) axes: Axes,
-    /// The names of the topics, where there is one.
+    /// The names of the topics, if present.
     pub(crate) imu_topic: String,
     pub(crate) magnetometer_topic: Option<String>,
     pub(crate) truth_topic: Option<String>,
     samples: MargSamples,
-    /// When the first sample to take was measured at the earliest.
+    /// Samples before this time are skipped.
     start_ns: i64,
-    /// How many samples there are about; 0 if unknown.
+    /// The approximate number of samples; 0 if unknown.
     pub(crate) expected: u64,
 }
 
 impl Recording {
-    /// Opens a recording. With `before_motion_s` it starts so many seconds before the first motion.
+    /// Opens a recording. With `before_motion_s` it starts this many seconds before the first motion.
     ///
     /// # Errors
-    /// It is no recording, or has not the topics, or not one of each; in words.
+    /// It is not a recording, lacks a topic, or has several matching ones; in words.
     pub fn open(file: &Path, topics: &Topics, axes: Axes, before_motion_s: Option<f64>) -> Result<Self, String> {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
         let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
@@ -108,10 +108,10 @@ impl Recording {
         })
     }
 
-    /// Opens a recording of which the IMU alone counts.
+    /// Opens a recording for its IMU alone.
     ///
     /// # Errors
-    /// It is no recording, or has not the topic, or not one; in words.
+    /// It is not a recording, lacks the topic, or has several matching ones; in words.
     pub(crate) fn inertial(file: &Path, topics: &Topics) -> Result<Self, String> {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
         let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
@@ -134,8 +134,8 @@ impl Recording {
         self.start_ns = self.start_ns.max(time_ns);
     }
 
-    /// Adds the next samples, as many as there are, until there are `most`. A recorder that was stopped is an end like
-    /// any other, but for what is said of it.
+    /// Appends the next samples, until there are `most` or the recording ends. A recorder that was killed counts as
+    /// an end, with a remark.
     ///
     /// # Errors
     /// The recording is damaged; in words.
@@ -164,18 +164,18 @@ impl Recording {
     }
 }
 
-/// How far reading has come.
+/// The state of reading.
 #[derive(Debug)]
 pub enum End {
     /// There may be more.
     NotYet,
-    /// All is read.
+    /// Everything is read.
     Whole,
-    /// All before the break is read; what broke it.
+    /// Everything before the damage is read; describes the damage.
     Broken(String),
 }
 
-/// Whether a topic holds no message; as a driver leaves it that only announces what its chip does not have.
+/// Whether a topic holds no message, as when a driver announces measurements that its chip does not have.
 fn is_silent(bag: &Bag, topic: &Topic) -> bool {
     match topic.messages {
         Some(count) => count == 0,
@@ -183,7 +183,7 @@ fn is_silent(bag: &Bag, topic: &Topic) -> bool {
     }
 }
 
-/// The topic of poses, or why there is none. One that was named must be there.
+/// The topic of poses, or why there is none. An explicitly named one must exist.
 fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String> {
     let error = match bag.choose(POSE, name) {
         Ok(topic) if name.is_none() && topic.is_own => {
@@ -205,7 +205,7 @@ fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String
     }
 }
 
-/// The topic that says when the body moves, if there is one. One that was named must be there.
+/// The topic that says when the body moves, if there is one. An explicitly named one must exist.
 fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
     let name = match topic {
         MovingTopic::None => return Ok(None),
@@ -224,13 +224,13 @@ fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
     }
 }
 
-/// Reads the truth, up to where the recording breaks off.
+/// Reads the truth, up to where the recording is cut off.
 fn truth(bag: &Bag, topics: &[Option<&str>]) -> Result<Truth, String> {
     let topics: Vec<_> = topics.iter().copied().flatten().collect();
     let mut truth = Truth::default();
     let end = bag.messages(&topics).and_then(|messages| truth.extend(messages));
     match end {
-        // The samples meet the same break, and report it.
+        // Reading the samples meets the same damage, and reports it.
         Err(error) if !is_break(&error) => Err(error.kind().to_string()),
         _ => Ok(truth),
     }
@@ -240,7 +240,7 @@ fn is_break(error: &RecordingError) -> bool {
     matches!(error.kind(), RecordingErrorKind::Truncated { .. })
 }
 
-/// What is wrong, with the option that chooses another topic.
+/// The error, with the option that chooses another topic.
 pub(crate) fn said(error: &RecordingError, option: &str) -> String {
     let kind = error.kind();
     match kind {

@@ -1,4 +1,4 @@
-//! What is printed.
+//! The printed results.
 
 use crate::averages::Averages;
 use crate::evaluate::{Evaluation, Run};
@@ -8,26 +8,26 @@ use crate::table::aligned;
 use serde::Serialize;
 use std::path::Path;
 
-/// One object of `--json`. What is unknown is null: every error without truth, and with six axes, of which only the
-/// inclination counts, total and heading.
+/// One object of `--json`. Unknown values are null: every error without truth, and with six axes, where only the
+/// inclination is scored, total and heading.
 #[derive(Serialize)]
 struct Row {
     file: String,
-    /// From 0; null if the recording is not changed.
+    /// From 0; null if the recording is not modified.
     variant: Option<u32>,
     filter: &'static str,
     axes: &'static str,
     total_deg: Option<f64>,
     heading_deg: Option<f64>,
     inclination_deg: Option<f64>,
-    /// Which part of the headings was within two of the standard deviations that the filter told.
+    /// The fraction of headings within two of the standard deviations that the filter reported.
     heading_within_two_sigma: Option<f64>,
-    /// How many samples were scored.
+    /// The number of scored samples.
     samples: u64,
     ns_per_update: f64,
 }
 
-/// One object a recording and filter.
+/// One object per recording and filter.
 pub(crate) fn json(evaluations: &[Evaluation]) -> Result<String, String> {
     let row = |evaluation: &Evaluation, run: &Run| {
         let (rms, axes) = (run.score.rms(), evaluation.axes);
@@ -50,10 +50,10 @@ pub(crate) fn json(evaluations: &[Evaluation]) -> Result<String, String> {
     Ok(text + "\n")
 }
 
-/// A line a recording and filter, then the averages of each filter.
+/// One line per recording and filter, then the averages of each filter.
 pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
     let is_asked = |evaluation: &Evaluation| evaluation.axes == axes;
-    // Six, where no recording has nine.
+    // Six, if no recording has nine.
     let axes = if runs(evaluations).any(|(evaluation, _)| is_asked(evaluation)) { axes } else { Axes::Six };
     let mut lines: Vec<[String; 8]> = Vec::new();
     for (evaluation, run) in runs(evaluations) {
@@ -87,7 +87,7 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
         let all: Vec<_> = of_filter.clone().map(|(_, run)| run).collect();
         let share = percent(within(&all, axes));
         let Some(averages) = Averages::of(of_filter.filter_map(|(_, run)| run.score.rms())) else { continue };
-        // An average of one says nothing new.
+        // The average of a single recording adds nothing.
         if averages.count < 2 {
             continue;
         }
@@ -105,7 +105,7 @@ pub(crate) fn table(evaluations: &[Evaluation], axes: Axes) -> String {
     text
 }
 
-/// Says on the error stream what to know about the runs, then what was wrong; whether nothing was.
+/// Prints remarks on the runs, then errors, to the error stream; returns whether there were no errors.
 pub(crate) fn complain(evaluations: &[Evaluation]) -> bool {
     for evaluation in evaluations {
         for note in &evaluation.notes {
@@ -128,7 +128,7 @@ pub(crate) fn complain(evaluations: &[Evaluation]) -> bool {
     bad == 0
 }
 
-/// Which part of the headings is within two standard deviations; none where no filter tells them.
+/// The fraction of headings within two standard deviations; `None` if no filter reports them.
 fn within(runs: &[&Run], axes: Axes) -> Option<f64> {
     let (told, within) =
         runs.iter().fold((0, 0), |sum, run| (sum.0 + run.within_two_sigma.0, sum.1 + run.within_two_sigma.1));
@@ -143,7 +143,7 @@ fn runs(evaluations: &[Evaluation]) -> impl Clone + Iterator<Item = (&Evaluation
     evaluations.iter().flat_map(|evaluation| evaluation.runs.iter().flatten().map(move |run| (evaluation, run)))
 }
 
-/// A recording in a table or a picture: without folder and ending, where that is only one.
+/// The name of a recording in a table or a picture: without folder and extension if that is unambiguous.
 pub(crate) fn name(evaluation: &Evaluation, evaluations: &[Evaluation]) -> String {
     let file: &Path = &evaluation.file;
     // Variants of one recording are named by their number.
@@ -155,7 +155,7 @@ pub(crate) fn name(evaluation: &Evaluation, evaluations: &[Evaluation]) -> Strin
     evaluation.variant.map_or_else(|| name.clone().into_owned(), |variant| format!("{name} #{variant}"))
 }
 
-/// With six axes the heading starts anywhere, so only the inclination is a result.
+/// With six axes the initial heading is arbitrary, so only the inclination is a result.
 fn angles(rms: Option<Degrees>, axes: Axes) -> [String; 3] {
     let angle = |angle: f64| format!("{angle:.2}");
     let none = || "-".to_owned();

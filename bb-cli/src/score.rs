@@ -4,7 +4,7 @@ use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::{ErrorStatistics, OrientationError};
 use bb_mcap::Truth;
 
-/// The errors of an estimate against the truth, gathered one sample at a time.
+/// The errors of an estimate against the truth, collected one sample at a time.
 ///
 /// A sample counts while the body moves and where the truth is known at its stamp, as in D. Laidig, M. Caruso,
 /// A. Cereatti, T. Seel, "BROAD – A Benchmark for Robust Inertial Orientation Estimation", Data 6(7):72, 2021. Nothing
@@ -14,7 +14,7 @@ pub struct Score {
     statistics: ErrorStatistics,
 }
 
-/// Root mean squares of the three angles that [`OrientationError`] defines, degrees.
+/// Root mean squares of the three angles defined by [`OrientationError`], degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Degrees {
     /// The whole rotation.
@@ -26,8 +26,8 @@ pub struct Degrees {
 }
 
 impl Score {
-    /// Adds an estimate at a time in nanoseconds, beside the truth of a recording. Gives the error where the truth is
-    /// known, whether or not it counts.
+    /// Adds an estimate at a time in nanoseconds, compared with the truth of a recording. Returns the error if the
+    /// truth is known, whether or not the sample counts.
     pub fn add_at(
         &mut self,
         truth: &Truth,
@@ -38,7 +38,7 @@ impl Score {
         self.add(estimate, truth.as_ref(), moving)
     }
 
-    /// Adds an estimate beside a truth from elsewhere, none where it is unknown.
+    /// Adds an estimate compared with a truth from elsewhere, `None` if it is unknown.
     pub fn add(
         &mut self,
         estimate: &UnitQuaternion<f64>,
@@ -52,12 +52,12 @@ impl Score {
         error
     }
 
-    /// How many samples counted.
+    /// The number of counted samples.
     pub fn count(&self) -> u64 {
         self.statistics.count()
     }
 
-    /// The root mean squares; none if no sample counted.
+    /// The root mean squares; `None` if no sample counted.
     pub fn rms(&self) -> Option<Degrees> {
         self.statistics.rms().map(|OrientationError { total, heading, inclination }| Degrees {
             total: total.to_degrees(),

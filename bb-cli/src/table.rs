@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-/// Rows with columns as wide as their widest cell: the first `words` are words, the others numbers. An empty line comes
-/// before row `gap`.
+/// Rows with columns as wide as their widest cell: the first `words` columns are words, the others numbers. An empty
+/// line precedes row `gap`.
 pub(crate) fn aligned<const N: usize>(rows: &[[String; N]], words: usize, gap: usize) -> String {
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);

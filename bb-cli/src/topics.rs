@@ -1,4 +1,4 @@
-//! Topics of a bag by the names on the command line, and their messages, whatever they are.
+//! Topics of a bag by the names on the command line, and their messages of any type.
 
 use crate::filters::near;
 use crate::values::FromJson;
@@ -15,7 +15,7 @@ pub(crate) fn open(file: &Path) -> Result<Bag, String> {
     Bag::open(file).map_err(|error| error.to_string())
 }
 
-/// The topic of this name, with or without the slash at its beginning.
+/// The topic of this name, with or without a leading slash.
 pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
     let found = bag.topics().iter().find(|topic| is_named(topic, name));
     found.ok_or_else(|| {
@@ -29,12 +29,12 @@ pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
     })
 }
 
-/// Whether a topic has this name, with or without the slash at its beginning.
+/// Whether a topic has this name, with or without a leading slash.
 pub(crate) fn is_named(topic: &Topic, name: &str) -> bool {
     *topic.name == *name || topic.name.strip_prefix('/') == Some(name.trim_start_matches('/'))
 }
 
-/// Whether a topic has what happens to a robot, when it happens: no rate is expected of it.
+/// Whether a topic reports events of a robot: no rate is expected of it.
 pub(crate) fn is_of_events(topic: &Topic) -> bool {
     const EVENTS: [&str; 7] = ["health", "fault", "state_machine", "safety", "command", "param", "journal"];
     let first = topic.name.trim_start_matches('/').split('/').next();
@@ -71,12 +71,12 @@ impl TopicReader {
         }
     }
 
-    /// The time in the header of a message, nanoseconds; none if it has no header, or the header has no time.
+    /// The time in the header of a message, nanoseconds; `None` if it has no header, or the header has no time.
     pub(crate) fn stamp_ns(&self, message: &BagMessage) -> Option<i64> {
         match self {
             Self::Cdr(definition) if definition.has_header() => {
                 let stamp_ns = message.header().ok()?.stamp.wall_time().as_unix_nanos();
-                // Zero is what nobody has set, but for a clock that begins with the recording.
+                // Zero means not set, except for a clock that begins with the recording.
                 (stamp_ns != 0 || message.log_time_ns < SECOND_NS).then_some(stamp_ns)
             }
             _ => None,

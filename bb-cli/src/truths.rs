@@ -1,4 +1,4 @@
-//! Whether a truth that no filter agrees with is one in another convention.
+//! Checks whether a truth that no filter agrees with uses another convention.
 
 use bb_core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use bb_estimators::attitude::{ErrorStatistics, OrientationError};
@@ -6,16 +6,16 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
 use crate::filters::Axes;
 
-/// An error above it, rad, makes the convention doubtful,
+/// A larger error, rad, makes the convention doubtful,
 const DOUBTFUL: f64 = 20.0 * PI / 180.0;
-/// and another convention is named if its error is below that, and so many times smaller.
+/// and another convention is named if its error is smaller than that, and smaller by this factor.
 const CLEARER: f64 = 3.0;
-/// Conventions whose errors differ by less than this, rad, are not told apart.
+/// Conventions whose errors differ by less than this, rad, cannot be distinguished.
 const ALIKE: f64 = 0.5 * PI / 180.0;
-/// A verdict needs so many samples.
+/// A verdict needs this many samples.
 const FEWEST: u64 = 3;
 
-/// A convention by which `world_from_body` may have been written instead, and how that is turned back.
+/// A convention in which `world_from_body` may have been written instead, and its conversion back.
 struct Convention {
     name: &'static str,
     enu_from_body: fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>,
@@ -67,25 +67,25 @@ fn frd_from_flu() -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI)
 }
 
-/// The errors of one filter against the truth as it is read, and in each other convention.
+/// The errors of one filter against the truth as read, and in each other convention.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Truths {
     as_read: ErrorStatistics,
     others: [ErrorStatistics; CONVENTIONS.len()],
 }
 
-/// A convention that fits much better than the one that the truth is read by.
+/// A convention that fits much better than the one assumed for the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Verdict {
     pub(crate) name: &'static str,
-    /// The root mean square error as the truth is read, rad.
+    /// The root mean square error against the truth as read, rad.
     pub(crate) as_read: f64,
-    /// And in the other convention, rad.
+    /// The error in the other convention, rad.
     pub(crate) otherwise: f64,
 }
 
 impl Truths {
-    /// Takes in an estimate beside the truth as it is read.
+    /// Adds an estimate and the truth as read.
     pub(crate) fn add(&mut self, estimate: &UnitQuaternion<f64>, truth: &UnitQuaternion<f64>) {
         self.as_read.add(OrientationError::between(estimate, truth));
         for (errors, convention) in self.others.iter_mut().zip(&CONVENTIONS) {
@@ -93,7 +93,7 @@ impl Truths {
         }
     }
 
-    /// The convention that fits best, if the truth as it is read does not fit; with six axes by the inclination alone.
+    /// The convention that fits best, if the truth as read does not fit; with six axes, only by the inclination.
     pub(crate) fn verdict(&self, axes: Axes) -> Option<Verdict> {
         let rms = |errors: &ErrorStatistics| {
             errors.rms().map(|rms| if axes == Axes::Six { rms.inclination } else { rms.total })
@@ -104,7 +104,7 @@ impl Truths {
         });
         let others: Vec<Verdict> = others.collect();
         let least = others.iter().map(|other| other.otherwise).reduce(f64::min)?;
-        // With six axes, or little motion, some are alike but for noise: the first of those is the likeliest.
+        // With six axes, or little motion, some differ only by noise: the first of those is the likeliest.
         let best = others.into_iter().find(|other| other.otherwise <= least + ALIKE)?;
         (best.otherwise < DOUBTFUL && best.otherwise * CLEARER < as_read).then_some(best)
     }
@@ -114,7 +114,7 @@ impl Truths {
 mod tests {
     use super::*;
 
-    /// What is said of a truth that was written by `write`, beside estimates that are right within a degree or two.
+    /// The verdict on a truth written by `write`, with estimates that are right within a degree or two.
     fn said(write: impl Fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>, axes: Axes) -> Option<&'static str> {
         let mut truths = Truths::default();
         for index in 0..200 {

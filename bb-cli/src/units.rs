@@ -1,13 +1,13 @@
-//! Units that look wrong, by what the quantities are on this planet.
+//! Detects units that look wrong, from the usual range of the quantities on Earth.
 
 mod gyroscope;
 
 use bb_core::nalgebra::Vector3;
 
-/// Samples kept for the verdict: minutes of a fast IMU, and not the memory of a machine.
+/// Samples kept for the verdict: minutes of a fast IMU, with bounded memory.
 const MOST: usize = 200_000;
 
-/// What the messages of a topic say.
+/// Values collected from the messages of a topic.
 #[derive(Debug, Default)]
 pub(crate) struct Units {
     /// Time in seconds, angular velocity, specific force.
@@ -15,16 +15,16 @@ pub(crate) struct Units {
     /// Norms of magnetic fields.
     fields: Vec<f64>,
     pressures: Vec<f64>,
-    /// How many messages hold what is no number.
+    /// The number of messages with values that are not finite.
     not_finite: usize,
 }
 
-/// Where a quantity is with a unit that is not SI: from, to, and what it looks like.
+/// The range of a quantity in a unit that is not SI: from, to, and the unit it looks like.
 type Guess = (f64, f64, &'static str);
 
 const FORCES: [Guess; 3] =
     [(0.8, 1.2, "in g"), (800.0, 1200.0, "in mg"), (0.0, 0.5, "free of gravity, which the filters need")];
-/// What counts as m/s².
+/// The range plausible as m/s².
 const FORCE: (f64, f64) = (8.8, 11.5);
 
 /// The Earth's field is 22 to 67 µT; with disturbances 10 to 150 µT.
@@ -42,12 +42,12 @@ const PRESSURES: [Guess; 2] = [(300.0, 1100.0, "in hPa"), (30.0, 110.0, "in kPa"
 const PRESSURE_PA: (f64, f64) = (3e4, 2e5);
 
 impl Units {
-    /// Whether no more is taken in.
+    /// Whether enough is collected.
     pub(crate) fn is_full(&self) -> bool {
         [self.imu.len(), self.fields.len(), self.pressures.len()].contains(&MOST)
     }
 
-    /// Takes in a sample of an IMU: its time in nanoseconds, its angular velocity and its specific force.
+    /// Adds a sample of an IMU: its time in nanoseconds, its angular velocity and its specific force.
     pub(crate) fn take_imu(&mut self, time_ns: i64, rate: Vector3<f64>, force: Vector3<f64>) {
         if !rate.iter().chain(&force).all(|value| value.is_finite()) {
             self.not_finite += 1;
@@ -56,12 +56,12 @@ impl Units {
         }
     }
 
-    /// Takes in a reading of a magnetometer.
+    /// Adds a reading of a magnetometer.
     pub(crate) fn take_field(&mut self, field: &Vector3<f64>) {
         self.keep(field.norm(), |units| &mut units.fields);
     }
 
-    /// Takes in a reading of a barometer.
+    /// Adds a reading of a barometer.
     pub(crate) fn take_pressure(&mut self, pressure: f64) {
         self.keep(pressure, |units| &mut units.pressures);
     }
@@ -74,30 +74,30 @@ impl Units {
         }
     }
 
-    /// How many messages hold what is no number.
+    /// The number of messages with values that are not finite.
     pub(crate) fn not_finite(&self) -> usize {
         self.not_finite
     }
 
-    /// What looks wrong with the specific force and the angular velocity.
+    /// Remarks on the specific force and the angular velocity.
     pub(crate) fn of_imu(&self) -> Vec<String> {
         let forces: Vec<f64> = self.imu.iter().map(|(_, _, force)| force.norm()).collect();
         let force = guess("the specific force", calm(&forces), FORCE, &FORCES, "m/s²");
         force.into_iter().chain(gyroscope::verdict(&self.imu)).collect()
     }
 
-    /// What looks wrong with the magnetic field.
+    /// A remark on the magnetic field.
     pub(crate) fn of_field(&self) -> Option<String> {
         guess("the magnetic field", self.fields.clone(), FIELD, &FIELDS, "T")
     }
 
-    /// What looks wrong with the pressure.
+    /// A remark on the pressure.
     pub(crate) fn of_pressure(&self) -> Option<String> {
         guess("the pressure", self.pressures.clone(), PRESSURE_PA, &PRESSURES, "Pa")
     }
 }
 
-/// The means of the calmest tenth of short stretches: fast motion has other forces than gravity.
+/// The means of the calmest tenth of short stretches: in fast motion, the force differs from gravity.
 fn calm(norms: &[f64]) -> Vec<f64> {
     /// Samples: a fraction of a second.
     const STRETCH: usize = 50;
@@ -115,7 +115,7 @@ fn calm(norms: &[f64]) -> Vec<f64> {
     stretches.iter().take(stretches.len().div_ceil(10)).map(|(_, mean)| *mean).collect()
 }
 
-/// What the median of a quantity says of its unit; nothing, if it is as in SI.
+/// The unit suggested by the median of a quantity; `None` if it is plausible in SI.
 fn guess(what: &str, mut values: Vec<f64>, si: (f64, f64), guesses: &[Guess], unit: &str) -> Option<String> {
     values.sort_by(f64::total_cmp);
     let median = *values.get(values.len() / 2)?;

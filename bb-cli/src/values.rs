@@ -5,10 +5,10 @@ use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
 
-/// More elements of a list than this are not printed as text.
+/// Longer lists are not printed as text.
 const MOST_ELEMENTS: usize = 16;
 
-/// A value as JSON: fields in their order, and what is no number in JSON as a string.
+/// A value as JSON: fields in order, and values that JSON has no number for as strings.
 pub(crate) struct Json<'a>(pub(crate) &'a Value);
 
 impl Serialize for Json<'_> {
@@ -44,7 +44,7 @@ fn not_finite(value: f64) -> &'static str {
     }
 }
 
-/// A value that was read from JSON: objects are messages, and `null` is no value, NaN.
+/// A value read from JSON: objects are messages, and `null` is a missing value, NaN.
 pub(crate) struct FromJson(pub(crate) Value);
 
 impl<'de> Deserialize<'de> for FromJson {
@@ -127,7 +127,7 @@ fn write_fields(value: &Value, depth: usize, text: &mut String) {
                 for value in values.iter().take(MOST_ELEMENTS) {
                     let mut element = String::new();
                     write_fields(value, depth + 2, &mut element);
-                    // The dash takes the place of the indentation before the first field.
+                    // The dash replaces the indentation of the first field.
                     let indent = "  ".repeat(depth + 1);
                     *text += &format!("{indent}- {}", element.trim_start());
                 }

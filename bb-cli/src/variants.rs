@@ -1,7 +1,7 @@
-//! `--start`, `--offset`, `--magnet`, `--disturb`, `--drift`: a recording made harder, from a seed.
+//! `--start`, `--offset`, `--magnet`, `--disturb`, `--drift`: makes a recording harder, from a seed.
 //!
-//! Each variant of a recording is one evaluation. What it adds to the magnetometer is either fixed to the body, as a part
-//! of it that is magnetic, or fixed in the world, as iron that the body passes.
+//! Each variant of a recording is one evaluation. The field added to the magnetometer is either fixed to the body, as
+//! from a magnetic part of it, or fixed in the world, as from iron that the body passes.
 
 use crate::recording::Recording;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
@@ -10,41 +10,41 @@ use bb_mcap::Truth;
 use std::path::Path;
 use std::str::FromStr;
 
-/// A magnet is put on so long before the first motion, s.
+/// A magnet is attached this long before the first motion, s.
 const MAGNET_ON_S: f64 = 4.0;
 
-/// A magnet is taken off so long after the first motion, s.
+/// A magnet is removed this long after the first motion, s.
 const MAGNET_OFF_S: f64 = 55.0;
 
-/// A disturbance lasts from the first to the second, s.
+/// Shortest and longest duration of a disturbance, s.
 const PULSE_S: (f64, f64) = (1.0, 3.0);
 
-/// And is away for as long, s.
+/// Shortest and longest pause between disturbances, s.
 const PAUSE_S: (f64, f64) = (2.0, 8.0);
 
 /// The period of a drift, s.
 const DRIFT_S: (f64, f64) = (60.0, 120.0);
 
-/// Starts are in this part of the motion, so that there is motion left to score.
+/// Starts are within this part of the motion, so that there is motion left to score.
 const STARTS_WITHIN: f64 = 0.6;
 
 /// More variants of one recording are a mistake.
 const MOST: u32 = 1000;
 
-/// How the recordings are changed; each combination of a start and an offset is a variant.
+/// The modifications of recordings; each combination of a start and an offset is a variant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Variants {
-    /// So many random starts in motion.
+    /// This many random starts in motion.
     pub starts: Option<Starts>,
-    /// A constant offset of the magnetometer, in so many random directions.
+    /// A constant offset of the magnetometer, in this many random directions.
     pub offset: Option<Offset>,
-    /// A magnet on the body, put on before the motion and taken off again.
+    /// A magnet on the body, attached before the motion and removed again.
     pub magnet: Option<Field>,
     /// Disturbances that are fixed in the world and last for one to three seconds each.
     pub disturb: Option<Field>,
     /// A field that changes slowly, fixed in the world.
     pub drift: Option<Field>,
-    /// What all that is random comes from.
+    /// The seed of all random numbers.
     pub seed: u64,
 }
 
@@ -68,17 +68,17 @@ impl Field {
 }
 
 impl Variants {
-    /// How many there are of one recording; 1 if nothing is changed, too.
+    /// The number of variants of one recording; also 1 if nothing is changed.
     pub fn count(&self) -> u32 {
         self.starts.map_or(1, |starts| starts.0) * self.offset.map_or(1, |offset| offset.1)
     }
 
-    /// Whether the recording itself is not played.
+    /// Whether the recording is modified.
     pub(crate) fn is_changed(&self) -> bool {
         *self != Self { seed: self.seed, ..Self::default() }
     }
 
-    /// Whether the magnetometer reads something else.
+    /// Whether the magnetometer's readings are modified.
     pub(crate) fn changes_field(&self) -> bool {
         self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some()
     }
@@ -102,7 +102,7 @@ impl Variants {
 /// One variant of one recording.
 #[derive(Debug)]
 pub(crate) struct Variant {
-    /// Samples before are left out.
+    /// Samples before this time are left out.
     pub(crate) start_ns: Option<i64>,
     /// On the body, T.
     offset: Vector3<f64>,
@@ -110,7 +110,7 @@ pub(crate) struct Variant {
     magnet: Option<(Vector3<f64>, i64, i64)>,
     pulses: Option<Pulses>,
     drift: Option<Drift>,
-    /// The last field as it was read, and what it became: a driver that repeats one still does.
+    /// The last field as read, and as modified: a driver that repeats a reading still does.
     last: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
@@ -140,7 +140,7 @@ impl Variant {
         truth: &Truth,
     ) -> Result<Self, String> {
         let starts = variants.starts.map_or(1, |starts| starts.0);
-        // Each part has numbers of its own, so that one option does not change what another draws.
+        // Each part has its own random numbers, so that one option does not change those of another.
         let random = |part: u64, index: u32| Random::new([variants.seed, hash(file), part, index.into()]);
         let no_motion = || "it never moves, so it has no variant that depends on motion".to_owned();
         let start_ns = match variants.starts {
@@ -176,7 +176,7 @@ impl Variant {
         Ok(Self { start_ns, offset, magnet, pulses, drift, last: None })
     }
 
-    /// Changes samples, which come in the order of time.
+    /// Modifies samples, which come in the order of time.
     pub(crate) fn apply(&mut self, samples: &mut [ImuSample], truth: &Truth) {
         for sample in samples {
             let Some(field) = sample.magnetic_field else { continue };
@@ -189,7 +189,7 @@ impl Variant {
         }
     }
 
-    /// What is added to the magnetometer at a time, in the body frame, T.
+    /// The field added to the magnetometer at a time, in the body frame, T.
     fn added(&mut self, time_ns: i64, truth: &Truth) -> Vector3<f64> {
         let magnet = self.magnet.filter(|(_, on, off)| (*on..*off).contains(&time_ns));
         let on_body = self.offset + magnet.map_or_else(Vector3::zeros, |(magnet, ..)| magnet);
@@ -203,7 +203,7 @@ impl Variant {
         if in_world == Vector3::zeros() {
             return on_body;
         }
-        // Where the truth is lost there is no world to fix it to.
+        // Where the truth is unknown, a field cannot be fixed to the world.
         let body_from_world = truth.at(time_ns).0.map(|truth: UnitQuaternion<f64>| truth.inverse());
         on_body + body_from_world.map_or_else(Vector3::zeros, |body_from_world| body_from_world * in_world)
     }
@@ -293,15 +293,15 @@ fn count(text: &str) -> Result<u32, String> {
     }
 }
 
-/// FNV-1a of a file's name, so that a recording has its variants whatever others are evaluated.
+/// FNV-1a of a file's name, so that a recording has the same variants, whichever others are evaluated.
 fn hash(file: &Path) -> u64 {
     let name = file.file_name().unwrap_or(file.as_os_str());
     let bytes = name.as_encoded_bytes().iter();
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// SplitMix64. It is kept, where other code takes a crate's generator: the tables of `docs/attitude.md` were measured with its
-/// numbers, and a recording has the same variants in every version.
+/// SplitMix64. It is kept although other code uses a crate's generator: the tables of `docs/attitude.md` were
+/// measured with its numbers, and a recording has the same variants in every version.
 #[derive(Debug)]
 struct Random(u64);
 

@@ -1,7 +1,7 @@
 //! Checks of type facts at compile time: names, dimensions, ranges.
 //!
-//! The macro cannot see types. It emits constants that call these functions at the user's token; a fault is a panic
-//! while the constant is evaluated, which rustc reports there with the message made here.
+//! The macro cannot see types. It emits constants that call these functions at the user's token. A fault is a panic
+//! during evaluation of the constant; rustc reports it at that token with the message built here.
 
 mod estimator;
 mod find;

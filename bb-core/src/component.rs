@@ -1,5 +1,5 @@
-//! What a user implements: sensors, estimators, actuators, services and commands; their options, inputs and outputs, and
-//! what each is given when it starts.
+//! The traits that a user implements: sensors, estimators, actuators, services and commands; their options, inputs
+//! and outputs, and the context of each.
 
 mod actuator;
 mod actuator_link;

@@ -1,11 +1,11 @@
-//! The robot as a whole: commands, operational state, safety, parameters, supervision and health, and the topics on which
-//! they are seen.
+//! The robot as a whole: commands, operational state, safety, parameters, supervision and health, and the topics on
+//! which they are published.
 //!
-//! This state has a single writer of the same kind as an island: a thread with an entry takes the lock for some
-//! microseconds, writes the entry's line into the journal, changes the state and publishes the changes. No user code runs meanwhile.
-//! What follows from an entry and is user code (disarm callbacks, futures of commands, wakers, handlers, loggers) is collected
-//! as `Effects` and run without the lock, on threads of its own or of the pool: each may block forever,
-//! and harms only itself.
+//! This state has a single writer at a time, like an island: a thread with an entry takes the lock for some
+//! microseconds, writes the entry's line to the journal, changes the state and publishes the changes. No user code
+//! runs meanwhile. Effects that are user code (disarm callbacks, futures of commands, wakers, handlers, loggers) are
+//! collected as `Effects` and run without the lock, on their own threads or on those of the pool. Each may block
+//! forever without harming anything else.
 
 mod apart;
 mod arming;
@@ -69,7 +69,7 @@ use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
 use task::{Task, Value};
 
-/// What `robot!` declares of all this.
+/// The parts of the declaration used here.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Declared {
     pub(crate) topology: &'static Topology,
@@ -80,7 +80,7 @@ pub(crate) struct Declared {
     pub(crate) estimators: &'static [EstimatorDeclaration],
 }
 
-/// What [`Control::new`] takes.
+/// The arguments of [`Control::new`].
 pub(crate) struct Parts {
     pub(crate) declared: Declared,
     pub(crate) mode: Mode,
@@ -95,7 +95,7 @@ pub(crate) struct Parts {
     pub(crate) telemetry: Option<Telemetry>,
 }
 
-/// The robot as a whole. Clones are the same one.
+/// The robot as a whole. Clones share it.
 #[derive(Clone)]
 pub(crate) struct Control(Arc<Inner>);
 
@@ -112,11 +112,11 @@ struct Inner {
     state: StateMutex<State>,
     /// Notified of every entry, for threads that wait for the robot to be disarmed or for commands to be gone.
     changed: Condvar,
-    /// The safety state, for actuators, which ask before every command.
+    /// The safety state, for actuators, which check it before every command.
     safety: AtomicU8,
     bell: Bell,
     sleeper: Sleeper,
-    /// When estimators are lost unless a run has been completed.
+    /// When each estimator is lost unless a run has been completed.
     watch: Deadlines<usize>,
     limits: Deadlines<Limit>,
     pool: Pool,
@@ -127,10 +127,10 @@ struct Inner {
     ready: Mutex<VecDeque<Arc<Task>>>,
     /// Disarm callbacks to be run by the loop of a simulation.
     pending_hooks: Mutex<VecDeque<(u64, Vec<Arc<Callback>>)>>,
-    /// What islands reported in a replay, until the journal says that it was taken note of.
+    /// Reports of islands in a replay, until the journal says that they were processed.
     reports: Mutex<HashMap<usize, VecDeque<Report>>>,
     faults: Mutex<Faults>,
-    /// A sensor or a service was told something, on virtual time.
+    /// A sensor or a service got an order, on virtual time.
     has_orders: AtomicBool,
     /// Tells sensors and services to stop.
     stop: StopSignal,
@@ -139,19 +139,19 @@ struct Inner {
     host: OnceLock<Weak<dyn Host>>,
 }
 
-/// What the control state adds to a report.
+/// The control state's part of a report.
 pub(crate) struct Summary {
     pub(crate) commands: Vec<CommandStatistics>,
     pub(crate) state: &'static str,
     pub(crate) safety: Safety,
-    /// The newest.
+    /// The newest faults.
     pub(crate) faults: Vec<ComponentFault>,
     pub(crate) all_faults: u64,
 }
 
-/// Where entries for estimators go.
+/// The destination of entries for estimators.
 pub(crate) trait Islands: Send + Sync {
-    /// Adds an entry. What is returned is dropped without the lock: it may be the last owner of the wiring.
+    /// Adds an entry. Drop the returned value without the lock: it may be the last owner of the wiring.
     fn post(&self, estimator: usize, now: MonotonicTime, entry: NodeEntry) -> Option<Wired>;
 }
 
@@ -199,14 +199,15 @@ struct State {
     next_apart: u64,
     /// The outcome of the last disarming.
     last_disarm: Result<(), DisarmError>,
-    /// How often a disarming was requested. A caller that has been waiting to arm the robot since before gives up.
+    /// How often a disarming was requested. A caller that has been waiting to arm the robot since before then gives
+    /// up.
     disarms: u64,
     /// How often the robot was disarmed.
     generation: u64,
-    /// It has started: a thread keeps time.
+    /// The robot has started: a thread keeps time.
     has_begun: bool,
     is_stopping: bool,
-    /// The journal and the last report are made: entries that come later are neither written nor published.
+    /// The journal and the last report are complete: later entries are neither written nor published.
     has_ended: bool,
 }
 
@@ -218,17 +219,17 @@ struct RunningCommand {
     health: Option<HealthTransition>,
     slot: Arc<Slot>,
     permit: Permit,
-    /// None in a replay.
+    /// `None` in a replay.
     task: Option<Arc<Task>>,
     phase: Phase,
-    /// It was cancelled, and its code may have gone on after the disarm callbacks had run.
+    /// It was cancelled, and its code may have continued after the disarm callbacks had run.
     lingers_on: bool,
 }
 
-/// How far an execution is.
+/// The phase of an execution.
 enum Phase {
     Running,
-    /// Its code has succeeded; the robot is being disarmed by it.
+    /// Its code has succeeded; it is disarming the robot.
     Disarming(Option<Value>, Option<&'static str>),
     /// Its code has succeeded; it arms the robot once cancelled commands are gone.
     Arming(Option<Value>, Option<&'static str>),
@@ -236,7 +237,7 @@ enum Phase {
     Lingering,
 }
 
-/// The health of an estimator as it was published, and how often it was lost.
+/// The published health of an estimator, and how often it was lost.
 #[derive(Clone, Copy, Debug, Default)]
 struct Health {
     state: HealthState,
@@ -251,7 +252,7 @@ struct Bound {
     target: BindTarget,
 }
 
-/// A sensor, a service or an actuator that a supervisor looks after.
+/// A sensor, a service or an actuator with its supervisor.
 struct Supervised {
     path: &'static str,
     supervisor: Supervisor,
@@ -271,13 +272,13 @@ pub(crate) enum ComponentOrder {
 struct Disarming {
     generation: u64,
     force: bool,
-    /// It ends in `error`, whatever the callbacks say.
+    /// It ends in `error`, whatever the callbacks return.
     to_error: bool,
     /// The execution that disarms it.
     by: Option<u64>,
-    /// The numbers and paths of callbacks that have not returned, as often as they are to run.
+    /// The numbers and paths of callbacks that have not returned, each as often as it is to run.
     left: Vec<(u64, &'static str)>,
-    /// Its outcome, for those who wait for it.
+    /// Its outcome, for callers that wait for it.
     outcome: Arc<OnceLock<Result<(), DisarmError>>>,
     errors: Vec<SafetyError>,
 }

@@ -1,19 +1,20 @@
-//! The journal of a run: every entry that the robot processed, in order, with what came from outside. A replay of it gives
-//! the same outputs, health, states, drops and counts.
+//! The journal of a run: every entry that the robot processed, in order, with the data that came from outside. A
+//! replay of it gives the same outputs, health, states, drops and counts.
 //!
 //! The robot's state has few writers: each island of estimators, and the control state (commands, operational state,
-//! safety, parameters, supervision). Each changes only while it processes an entry, and each processed entry is a line.
-//! Lines that come from outside hold what came: messages of sensors and services, parameters, what commands did and how
-//! they ended, which disarm callbacks failed, how long a measured callback took. So
-//! [`Builder::replay`](crate::Builder::replay) runs the robot again on virtual time, without its sensors, services,
-//! actuators and commands.
+//! safety, parameters, supervision). Each changes only while it processes an entry, and each processed entry is a
+//! line. Lines from outside hold the data: messages of sensors and services, parameters, effects and results of
+//! commands, failed disarm callbacks, the duration of a measured callback.
+//! [`Builder::replay`](crate::Builder::replay) can therefore run the robot again on virtual time, without its
+//! sensors, services, actuators and commands.
 //!
-//! The journal begins with a description of the robot; one of another robot is refused, naming the first difference. It holds
-//! a checksum of each output, so that an algorithm that is not deterministic is named at the first message that differs.
+//! The journal begins with a description of the robot; a journal of another robot is refused, naming the first
+//! difference. It holds a checksum of each output, so an algorithm that is not deterministic is named at the first
+//! message that differs.
 //!
-//! Requests ([`Live::call`](crate::Live::call), [`Live::cast`](crate::Live::cast)) are held if their type says how, see
-//! [`HandleCall::RECORD`](crate::HandleCall::RECORD). Of others the journal holds what they made the estimator emit; if such a
-//! request changed the estimator otherwise, the replay stops at the first output that differs.
+//! Requests ([`Live::call`](crate::Live::call), [`Live::cast`](crate::Live::cast)) are held if their type says how,
+//! see [`HandleCall::RECORD`](crate::HandleCall::RECORD). For other requests, the journal holds only the outputs they
+//! caused; if such a request changed the estimator otherwise, the replay stops at the first output that differs.
 
 mod checksum;
 mod entry;

@@ -1,6 +1,6 @@
 //! State estimation for robots that are *declared*.
 //!
-//! A robot is one [`robot!`]: links, joints, sensors, estimators. The macro checks what can be checked at compile
+//! A robot is one [`robot!`]: links, joints, sensors, estimators. The macro checks as much as possible at compile
 //! time and expands to typed static wiring over this crate, the runtime:
 //!
 //! | what | where |
@@ -9,20 +9,21 @@
 //! | time, real or virtual | [`time`] |
 //! | subscriptions | [`pubsub`] |
 //! | links, joints and the transforms between them | [`topology`] |
-//! | where the links of a moving robot are | [`kinematics`] |
-//! | what is known of the joints of a robot that runs, and of its frames at any time | [`joints`] |
-//! | what the runtime publishes about itself | [`event`] |
-//! | what `robot!` declares | [`declaration`] |
+//! | the poses and motions of a robot's links | [`kinematics`] |
+//! | the known states of a running robot's joints, and its frames at any time | [`joints`] |
+//! | events that the runtime publishes about itself | [`event`] |
+//! | the declarations of `robot!` | [`declaration`] |
 //! | the journal of a run, and its replay | [`journal`], [`Replay`] |
-//! | what a handler of telemetry is told | [`telemetry`] |
-//! | what a user implements: [`Sensor`], [`Estimator`], [`Actuator`], [`Service`], [`Command`], and the derives for options, inputs, outputs, payloads | [`component`] |
-//! | start, run, stop; the handles of what is declared; statistics and errors of a run | [`run`] |
+//! | the events for telemetry handlers | [`telemetry`] |
+//! | the traits that a user implements: [`Sensor`], [`Estimator`], [`Actuator`], [`Service`], [`Command`], and the
+//! derives for options, inputs, outputs, payloads | [`component`] |
+//! | start, run, stop; the handles of declared items; statistics and errors of a run | [`run`] |
 //!
 //! Each module uses only those above it in this table.
 //!
 //! All stored quantities are SI: metres, seconds, radians, kilograms, tesla.
 
-// A robot must not stop because a value was not what it was taken for.
+// A robot must not stop because a value was not what it was assumed to be.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 #![cfg_attr(loom, allow(dead_code, reason = "a model is of a part"))]
 
@@ -109,7 +110,7 @@ pub mod prelude {
     pub use std::time::Duration;
 }
 
-/// What the expansions of the macros name. Not for users: it changes without notice.
+/// Items used by the expansions of the macros. Not for users: they change without notice.
 #[doc(hidden)]
 pub mod __private {
     pub use crate::__stub_robot as stub_robot;
@@ -162,7 +163,7 @@ pub mod __private {
     };
     pub use std::convert::identity;
     pub use std::sync::Arc;
-    // Shorter to write, and to read, where they are written for every component.
+    // Aliases for code that is generated for every component.
     pub use std::boxed::Box;
     pub use std::clone::Clone;
     pub use std::default::Default;

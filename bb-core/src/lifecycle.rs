@@ -1,4 +1,4 @@
-//! The one lifecycle of a component: make, bind, run, fail, retire, restart.
+//! The lifecycle of every component: make, bind, run, fail, retire, restart.
 //!
 //! ```text
 //! vacant ── make ──▶ running ── fault, panic ──▶ waiting ── its backoff is over ──▶ make …
@@ -7,9 +7,9 @@
 //!                       └── restart from above, new options ──▶ retire, then make at once
 //! ```
 //!
-//! Only the caller differs: an estimator's slot is called by its island, a sensor's or service's by its thread, an actuator's
-//! by the senders of its commands. A component is always retired before the next one is made, so that a device is closed before
-//! it is opened again.
+//! Only the caller differs: an estimator's slot is called by its island, a sensor's or service's by its thread, an
+//! actuator's by the senders of its commands. A component is always retired before the next one is created, so a
+//! device is closed before it is opened again.
 
 mod adapter;
 mod backoff;

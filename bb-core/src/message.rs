@@ -15,7 +15,7 @@ pub use joint::{JointPositions, JointReading, JointSide};
 pub use joint_command::{Exceeded, JointBounds, JointCommand, LimitedQuantity, OutOfBounds};
 pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 
-/// What a message carries: plain data in SI units. Derive it:
+/// The content of a message: plain data in SI units. Derive it:
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -30,8 +30,8 @@ pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 /// assert!(!bb_core::Finite::is_finite(&WindingTemperature { temperature_k: f64::NAN }));
 /// ```
 ///
-/// A message with a NaN or an infinity is dropped before an estimator sees it. A field that holds those on purpose, such
-/// as the range of a beam that hit nothing, says so:
+/// A message with a NaN or an infinity is dropped before an estimator sees it. A field that holds such values on
+/// purpose, such as the range of a beam that hit nothing, says so:
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -50,11 +50,11 @@ pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
 /// assert!(!bb_core::Finite::is_finite(&Beam { angle: f64::NAN, range: 1.0 }));
 /// ```
 ///
-/// Payloads are handed on by reference; a clone is made only for a subscriber and for the cache of an input that is
-/// not the driver, so put large data behind an `Arc`.
+/// Payloads are passed by reference. A clone is made only for a subscriber and for the cache of an input that is not
+/// the driver, so put large data in an `Arc`.
 ///
-/// The derive also implements how it is recorded and read back, bit for bit: see [`codec`]. All its fields must be
-/// [`Field`]s. `#[payload(ros)]` records it as a message of ROS, which its [`RosMessage`] makes.
+/// The derive also implements recording and reading back, bit for bit: see [`codec`]. All its fields must be
+/// [`Field`]s. `#[payload(ros)]` records it as a ROS message, defined by its [`RosMessage`] implementation.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a payload",
     label = "cannot be the payload of a message",
@@ -69,25 +69,26 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     #[doc(hidden)]
     const ROS: Option<RosLayout<Self>> = None;
 
-    /// Whether it tells the position of the joint at which it is measured: `#[payload(joint_position)]` says so. Each joint
-    /// with an actuator needs a sensor, or an estimator in one, that publishes such a payload. It implements [`JointPositions`].
+    /// Whether it reports the position of the joint at which it is measured; set by `#[payload(joint_position)]`.
+    /// Each joint with an actuator needs a sensor, or an estimator in one, that publishes such a payload. It
+    /// implements [`JointPositions`].
     const TELLS_JOINT_POSITION: bool = false;
 
-    /// Whether what it tells is seen from a frame: not the state of a joint or of a battery. `#[payload(no_frame)]` says that
-    /// it does not. An input of such a payload may span moving joints.
+    /// Whether its values are relative to a frame, unlike the state of a joint or of a battery.
+    /// `#[payload(no_frame)]` says that they are not. An input of such a payload may span moving joints.
     const DEPENDS_ON_FRAME: bool = true;
 
-    /// Calls `listener` with what it tells of joints, see [`JointPositions`].
+    /// Calls `listener` with what it reports about joints, see [`JointPositions`].
     #[doc(hidden)]
     fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
         let _ = listener;
     }
 
-    /// Whether it commands a joint, and is held to the limits of that: `#[payload(joint_command)]` says so. It implements
+    /// Whether it commands a joint, whose limits are then applied; set by `#[payload(joint_command)]`. It implements
     /// [`JointCommand`].
     const COMMANDS_JOINT: bool = false;
 
-    /// Brings what exceeds the bounds of a joint back to them, see [`JointCommand`].
+    /// Clamps values that exceed the bounds of a joint, see [`JointCommand`].
     #[doc(hidden)]
     fn limit_command(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
         let _ = bounds;
@@ -100,7 +101,7 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
         None
     }
 
-    /// False for the stand-in of a payload that is not known, in a robot that does not compile.
+    /// False for the placeholder of an unknown payload, in a robot that does not compile.
     #[doc(hidden)]
     const KNOWN: bool = true;
 }

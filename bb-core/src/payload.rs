@@ -1,4 +1,4 @@
-//! The payloads that robots share; they mirror ROS where ROS has one. All SI.
+//! Common payloads of robots; they mirror ROS messages where these exist. All in SI units.
 //!
 //! | what | payloads |
 //! |---|---|

@@ -1,5 +1,5 @@
-//! A robot that runs: assembled by a [`Builder`], driven by real sensors in threads ([`Running`]), on virtual time by its
-//! caller ([`Simulation`]), or from a journal ([`Replay`]).
+//! A running robot: assembled by a [`Builder`], driven by real sensors in threads ([`Running`]), on virtual time by
+//! its caller ([`Simulation`]), or from a journal ([`Replay`]).
 
 pub(crate) mod actuator;
 mod bound;
@@ -90,7 +90,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// Where its islands are in the wiring.
     #[doc(hidden)]
     const ISLANDS: &'static [IslandOf<Self::Wiring>];
-    /// The options that are bound to a parameter: the number of the component in [`Robot::options_of`], the option's name,
+    /// The options bound to a parameter: the number of the component in [`Robot::options_of`], the option's name, and
     /// the number of the parameter.
     #[doc(hidden)]
     const BOUND_OPTIONS: &'static [(usize, &'static str, usize)];
@@ -110,25 +110,25 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn options() -> Self::Options;
     #[doc(hidden)]
     fn topics() -> Self::Topics;
-    /// Starts all estimators; what cannot start is kept in `assembly`.
+    /// Starts all estimators; errors are stored in `assembly`.
     #[doc(hidden)]
     fn wire(topics: Self::Topics, options: &Self::Options, assembly: &Assembly) -> Self::Wiring;
-    /// Starts all sensors; what cannot start is kept in `assembly`.
+    /// Starts all sensors; errors are stored in `assembly`.
     #[doc(hidden)]
     fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, assembly: &Assembly) -> Vec<Box<dyn Source>>;
     #[doc(hidden)]
     fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
-    /// The topic of that publisher; none beyond the last.
+    /// The topic of that publisher; `None` beyond the last.
     #[doc(hidden)]
     fn topic(topics: &Self::Topics, publisher: usize) -> Option<&dyn AnyTopic>;
-    /// The options of that component, an `S::Options`; none beyond the last.
+    /// The options of that component, an `S::Options`; `None` beyond the last.
     #[doc(hidden)]
     fn options_of(options: &mut Self::Options, component: usize) -> Option<&mut dyn AnyOptions>;
-    /// The actuator of that number; none beyond the last.
+    /// The actuator of that number; `None` beyond the last.
     #[doc(hidden)]
     fn actuator(wiring: &Self::Wiring, actuator: usize) -> Option<&dyn AnyActuator>;
-    /// Publishes a recorded message of a sensor or a service; false if that publisher is an estimator's, or has another
-    /// payload.
+    /// Publishes a recorded message of a sensor or a service. Returns false if that publisher is an estimator's, or
+    /// has another payload.
     #[doc(hidden)]
     fn feed(wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, now: MonotonicTime) -> bool;
     /// The commands with their options.
@@ -161,7 +161,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
         settings_schema::<Self>()
     }
 
-    /// Has rustc say how a robot is assembled where `new` is called.
+    /// Makes rustc explain how a robot is assembled where `new` is called.
     #[doc(hidden)]
     fn new() -> Builder<Self>
     where

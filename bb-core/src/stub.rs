@@ -1,9 +1,10 @@
-//! Stand-ins that keep one mistake to one message.
+//! Placeholders, so that one mistake gives one message.
 //!
-//! A type that is declared as a sensor but is not one would be reported at each use in the wiring. So the wiring names it
-//! through [`Known`], which replaces such a type by [`Unknown`], a type that fits everywhere. The mistake is reported once,
-//! where the options are set. An input or output that the algorithm does not have is `Unknown` as well, and is reported by its
-//! check (see `check`). None of this ever runs, since such a robot does not compile.
+//! A type that is declared as a sensor but is not one would be reported at each use in the wiring. So the wiring
+//! refers to it through [`Known`], which replaces such a type by [`Unknown`], a type that fits everywhere. The
+//! mistake is reported once, where the options are set. An input or output that the algorithm does not have is
+//! `Unknown` as well, and is reported by its check (see `check`). None of this ever runs, since such a robot does not
+//! compile.
 
 mod unknown;
 
@@ -15,7 +16,7 @@ use crate::message::Payload;
 use std::any::Any;
 use std::marker::PhantomData;
 
-/// Tells as a constant whether `T` is a sensor, an estimator, …: by its inherent constants if it is, else by those of
+/// Constants that tell whether `T` is a sensor, an estimator, …: its inherent constants if it is, otherwise those of
 /// [`NotProbed`], since inherent ones take precedence.
 #[derive(Debug)]
 pub struct Probe<T>(PhantomData<fn() -> T>);
@@ -78,7 +79,7 @@ pub trait NotProbed {
 
 impl<T> NotProbed for Probe<T> {}
 
-/// The type itself if it implements the trait it was declared with, else [`Unknown`].
+/// The type itself if it implements the trait it was declared with, otherwise [`Unknown`].
 pub trait Known<const KNOWN: bool> {
     /// `Self` or `Unknown`.
     type Type;
@@ -92,25 +93,25 @@ impl<T> Known<false> for T {
     type Type = Unknown;
 }
 
-/// Whether both payloads are known, and therefore must be equal.
+/// Whether both payloads are known, and must therefore be equal.
 pub const fn both_known<P: Payload, T: Payload>() -> bool {
     P::KNOWN && T::KNOWN
 }
 
-/// The options of a component as the wiring names their type: the same, except for a type that is not a component.
+/// The options of a component in the type that the wiring uses: unchanged, except for a type that is not a component.
 pub fn as_known<T: 'static, U: 'static>(options: U) -> T {
     let mut options = Some(options);
     let known = (&mut options as &mut dyn Any).downcast_mut::<Option<T>>();
     known.and_then(Option::take).unwrap_or_else(stub)
 }
 
-/// The value of anything that a stub must return.
+/// A value of any type that a stub must return.
 #[expect(clippy::panic, reason = "such a robot does not compile")]
 pub fn stub<T>() -> T {
     panic!("this robot did not verify")
 }
 
-/// An implementation of `Robot` with nothing in it, for a robot that failed to verify.
+/// An empty implementation of `Robot`, for a robot that failed to verify.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __stub_robot {

@@ -1,5 +1,4 @@
-//! Time: instants as integers of nanoseconds, the one [`Clock`] that everything reads, and the counters of
-//! devices.
+//! Time: instants as integers of nanoseconds, the one [`Clock`] that all code reads, and the counters of devices.
 
 mod clock;
 mod device;

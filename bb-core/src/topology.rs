@@ -1,4 +1,4 @@
-//! Links, joints and the transforms between them, as constant data; what they weigh and look like, as in URDF.
+//! Links, joints and the transforms between them, as constant data; their masses and appearance, as in URDF.
 
 mod body;
 mod transforms;
@@ -44,7 +44,7 @@ pub struct Link {
     pub collisions: &'static [Collision],
 }
 
-/// What connects two links.
+/// A connection between two links.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
     /// Its name.
@@ -92,16 +92,16 @@ pub struct Mimic {
 /// A gear between a motor and a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmission {
-    /// Turns of the motor for one of the joint.
+    /// Turns of the motor per turn of the joint.
     pub reduction: f64,
-    /// Where the joint is when the motor is at 0; rad or m.
+    /// The joint's position when the motor is at 0; rad or m.
     pub offset: f64,
     /// Whether the joint turns the other way than the motor.
     pub is_reversed: bool,
 }
 
 impl Transmission {
-    /// What the motor moves for one unit of the joint; negative if it is reversed.
+    /// The motor's motion per unit of the joint's; negative if it is reversed.
     fn ratio(&self) -> f64 {
         if self.is_reversed { -self.reduction } else { self.reduction }
     }
@@ -225,11 +225,11 @@ impl Topology {
         self.links.iter().find(|link| link.name == name)
     }
 
-    /// The joint that a joint follows in the end, and what it makes of its position, a multiplier and an offset: itself, 1 and
-    /// 0 if it mimics none.
+    /// The joint that a joint follows in the end, with the multiplier and the offset of its position: itself, 1 and 0
+    /// if it mimics none.
     pub fn followed(&self, joint: usize) -> (usize, f64, f64) {
         let (mut owner, mut multiplier, mut offset) = (joint, 1.0, 0.0);
-        // A circle, which `robot!` refuses, must end too.
+        // A cycle, which `robot!` rejects, must end too.
         for _ in self.joints {
             let Some(mimic) = self.joints.get(owner).and_then(|joint| joint.mimic) else { break };
             offset += multiplier * mimic.offset;

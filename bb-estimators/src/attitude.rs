@@ -3,7 +3,7 @@
 //! Conventions of every file below:
 //!
 //! * The world is ENU: x east, y north (magnetic north where a magnetometer gives it), z up.
-//! * An orientation is `world_from_body`: it takes coordinates in the sensor's frame to the world.
+//! * An orientation is `world_from_body`: it transforms coordinates in the sensor's frame to the world.
 //! * An accelerometer measures specific force: at rest it reads one g upwards.
 //! * Algorithms compute with a scalar [`Real`], `f64` where none is named: `MadgwickFilter` is `MadgwickFilter<f64>`, and
 //!   `MadgwickFilter<f32>` takes an `ImuSample<f32>`. Stamps are nanoseconds and parameters are `f64` with both.

@@ -1,16 +1,16 @@
-//! Calibration of inertial sensors from what they measured: offsets, scale and misalignment.
+//! Calibration of inertial sensors from their measurements: offsets, scale and misalignment.
 //!
 //! D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU calibration without external
 //! equipments", ICRA 2014, for the accelerometer from rests in several poses; M. Kok, T. B. Schön, "Magnetometer calibration
 //! using inertial sensors", IEEE Sensors Journal 16(14), 2016, section II, for the magnetometer's model.
 //!
-//! Both sensors measure a vector of constant norm `r`, gravity or the field of the earth, in many directions:
+//! Both sensors measure a vector of constant norm `r`, gravity or the Earth's field, in many directions:
 //!
 //! `‖M (x - b)‖ = r`
 //!
-//! with the measurements x, the offset b, and the matrix M of scale and misalignment. The norm does not depend on a rotation
-//! of all measurements, so that M has six numbers: it is upper triangular for the accelerometer, whose x axis is then the
-//! body's, and symmetric for the magnetometer.
+//! with the measurements x, the offset b, and the matrix M of scale and misalignment. The norm does not depend on a
+//! rotation of all measurements, so M has six numbers: it is upper triangular for the accelerometer, whose x axis is
+//! then the body's, and symmetric for the magnetometer.
 //!
 //! ```
 //! use bb_estimators::calibration::{Rests, RestParams, accelerometer};
@@ -38,9 +38,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`sensor_noise`] finds white noise, bias instability and random walk of a sensor at rest, by its Allan deviation.
+//! [`sensor_noise`] estimates white noise, bias instability and random walk of a sensor at rest, by its Allan
+//! deviation.
 //!
-//! It builds without the standard library and does not allocate; who gathers rests, fields and samples does.
+//! It builds without the standard library and does not allocate; code that collects rests, fields and samples does.
 
 mod allan;
 mod ellipsoid;

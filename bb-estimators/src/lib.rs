@@ -1,7 +1,8 @@
 //! Attitude filters and their fusion, and navigation.
 //!
-//! Each algorithm is a plain value, values in, values out, with no runtime in sight: the modules below [`attitude`], in
-//! `f64` or `f32`, and [`navigation`], in `f64`. They build without the feature `runtime` and without the standard library.
+//! Each algorithm is a plain value, values in, values out, without a runtime: the modules below [`attitude`], in
+//! `f64` or `f32`, and [`navigation`], in `f64`. They build without the feature `runtime` and without the standard
+//! library.
 //! The estimators at the top of this crate wrap attitude filters for `robot!`:
 //!
 //! | declared as | takes | emits |
@@ -18,13 +19,13 @@
 //! | `WheeledEskf(…)`, `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, and `input relative` and `input pressure` for [states](navigation::States) `S` that have them | as before |
 //! | `PlanarEkf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input orientation` | `Odometry` of the link, on a plane |
 //! | `PlanarEkf<PlanarOutputs>(…)` | as before | `output odometry`, and `output status`: bias, scale of the wheels, refusals |
-//! | `OpenLoopPosition(…)` as a sensor in a joint | what the joint's actuator reports | `JointState` |
+//! | `OpenLoopPosition(…)` as a sensor in a joint | the reports of the joint's actuator | `JointState` |
 //! | `StateEstimator(…)` on a link | `input imu`, driver, and any of `input vio`, `anchor`, `gnss`, `gps_health`, `attitude` and `warm_start` | `output estimate`, `output health` and `output events` |
 //!
 //! All quantities are SI; the world frame is ENU (x east, y north, z up).
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
-// What a sensor gives never panics; a test may.
+// Sensor input never causes a panic; a test may panic.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 #[cfg(any(feature = "smoother", feature = "eskf"))]
@@ -63,7 +64,7 @@ pub type Eskf<O = Odometry, S = navigation::Navigation, const N: usize = { navig
 pub type WheeledEskf<O = Odometry> =
     Eskf<O, navigation::Wheeled, { <navigation::Wheeled as navigation::States>::DIMENSION }>;
 
-/// The filter of a robot that drives on a plane as an estimator.
+/// The filter of a robot that drives on a plane, as an estimator.
 #[cfg(feature = "runtime")]
 pub type PlanarEkf<O = Odometry> = navigation::planar::PlanarEstimator<O>;
 

@@ -17,7 +17,8 @@ impl Moments {
         self.squares += before.component_mul(&(value - self.mean));
     }
 
-    /// Adds those of `others` further values to those of `count`; T. F. Chan, G. H. Golub, R. J. LeVeque, COMPSTAT 1982.
+    /// Adds those of `others` further values to those of `count`; T. F. Chan, G. H. Golub, R. J. LeVeque, COMPSTAT
+    /// 1982.
     pub(crate) fn merge(&mut self, count: f64, other: &Self, others: f64) {
         let difference = other.mean - self.mean;
         let part = others / (count + others);
@@ -55,7 +56,7 @@ mod tests {
             merged.merge(one.len() as f64, &moments(&other), other.len() as f64);
             prop_assert!((merged.mean - whole.mean).amax() <= 1e-9);
             prop_assert!((merged.squares - whole.squares).amax() <= 1e-9 * (1.0 + whole.squares.amax()));
-            // And the whole is what the definition says.
+            // And the whole agrees with the definition.
             let mean = all.iter().map(|value| Vector3::from(*value)).sum::<Vector3<f64>>() / all.len() as f64;
             let squares: Vector3<f64> = all.iter().map(|value| (Vector3::from(*value) - mean).map(|x| x * x)).sum();
             prop_assert!((whole.mean - mean).amax() <= 1e-9);

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | a motion from one position to another, with easing | [`Profile`] |
 //! | several joints that arrive together, time-optimal within limits | [`plan`] |
-//! | what a trajectory asks of one joint at a time | [`JointPath`] |
+//! | the part of a trajectory for one joint | [`JointPath`] |
 //! | PID, and a switch with hysteresis, as plain values | [`Pid`], [`Threshold`] |
 //! | the same to declare as `controller` | [`PidController`], [`ThresholdController`] |
 //! | a joint without an encoder | [`OpenLoopPosition`] |

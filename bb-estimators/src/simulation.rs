@@ -1,5 +1,5 @@
-//! Simulated components whose truth is known: sensors on a body that moves by [`Motion`], and joints, their actuators and their
-//! sensors in a [`SimulatedWorld`].
+//! Simulated components with known truth: sensors on a body that moves by [`Motion`], and joints, their actuators and
+//! their sensors in a [`SimulatedWorld`].
 
 mod actuator;
 mod encoder;

@@ -1,4 +1,4 @@
-//! The derives: what a user's structs tell the framework.
+//! The derives, which describe a user's structs to the framework.
 
 mod fields;
 mod inputs;

@@ -25,7 +25,7 @@ impl Place {
         Self { start, end }
     }
 
-    /// The error for these tokens, where reading fails.
+    /// The error for these tokens, while reading.
     pub(crate) fn syntax(self, message: impl std::fmt::Display) -> syn::Error {
         let Self { start, end } = self;
         let first = quote_spanned!(start=> _);
@@ -38,7 +38,7 @@ impl Place {
         self.start.start().line
     }
 
-    /// Whether `next` follows without a blank.
+    /// Whether `next` follows without whitespace.
     pub(crate) fn touches(self, next: Span) -> bool {
         let (end, start) = (self.end.end(), next.start());
         end.line == start.line && end.column == start.column
@@ -64,10 +64,10 @@ impl Diagnostics {
         self.0.push(Diagnostic { place: place.into(), message });
     }
 
-    /// Adds all errors that syn has found.
+    /// Adds all errors found by syn.
     pub(crate) fn syntax(&mut self, error: &syn::Error) {
         for error in error.clone() {
-            // Its own span is the first token's alone on a stable compiler.
+            // On a stable compiler, its own span is only the first token's.
             self.at(Place::of(&error.to_compile_error()), error.to_string());
         }
     }
@@ -85,7 +85,7 @@ impl Diagnostics {
         &self.0
     }
 
-    /// A `compile_error!` for each, that underlines its tokens.
+    /// A `compile_error!` for each, which underlines its tokens.
     pub(crate) fn into_tokens(self) -> TokenStream {
         let errors = self.0.into_iter().map(|Diagnostic { place: Place { start, end }, message }| {
             let head = quote_spanned!(start=> ::core::compile_error!);

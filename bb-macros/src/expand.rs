@@ -83,8 +83,9 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
 
 /// The robot's type, with the user's docs and attributes.
 ///
-/// It derives nothing: nothing in `bb_core` asks for it, and for each implementation of `Clone`, `Copy` or `Debug` rustc reads
-/// all implementations of that trait in all crates, which took 7 % of the time to compile a robot of twenty declarations.
+/// It derives nothing: `bb_core` does not need it. For each implementation of `Clone`, `Copy` or `Debug`, rustc reads
+/// all implementations of that trait in all crates, which took 7 % of the time to compile a robot of twenty
+/// declarations.
 fn definition(robot: &Robot, name: &Ident) -> TokenStream {
     let (attributes, visibility) = (&robot.attributes, &robot.visibility);
     let (module, this) = (naming::prefix(name), types::robot_type(name));
@@ -119,7 +120,7 @@ fn export(robot: &Robot, name: &Ident, module: Option<&str>) -> TokenStream {
     let path = match module {
         Some(module) => {
             let (module, this) = (literal::ident(module), literal::ident(types::ROBOT));
-            // Where the robot's name is, so that a second one is reported there.
+            // At the robot's name, so that a second one is reported there.
             literal::respan(quote!(#module::#this), name.span())
         }
         None => types::robot_type(name),

@@ -1,10 +1,11 @@
-//! The words of the language, each stated once: where it may be written, what number it takes, how often it may be
+//! The words of the language, each stated once: where it is allowed, what number it takes, how often it may be
 //! repeated, an example, and its documentation.
 //!
-//! Everything that depends on the words is derived from here: the parser (what belongs where, where it can resume,
-//! "did you mean"), the rules on dimensions, bounds and repetition, and the tables of the reference on `bb_core::robot`.
+//! Everything that depends on the words is derived from here: the parser (the words of each place, where it can
+//! resume, "did you mean"), the rules on dimensions, bounds and repetition, and the tables of the reference on
+//! `bb_core::robot`.
 //!
-//! To add a setting such as `deadline: 5 ms;` of an estimator: state the word in `language/words.rs`, name it in
+//! To add a setting such as `deadline: 5 ms;` of an estimator: state the word in `language/words.rs`, list it in
 //! `EstimatorSetting` below, and give it its meaning in the model, whose `match` is exhaustive.
 
 mod foreign;
@@ -25,7 +26,7 @@ pub(crate) struct Word {
     pub(crate) text: &'static str,
     pub(crate) value: Value,
     pub(crate) occurs: Occurs,
-    /// What follows the word, up to the end of its item.
+    /// The syntax after the word, up to the end of its item.
     pub(crate) example: &'static str,
     /// For the reference, which a test compares.
     #[cfg_attr(not(test), allow(dead_code, reason = "read by the test of the reference"))]
@@ -40,10 +41,10 @@ impl Word {
     }
 }
 
-/// What a word sets.
+/// The value that a word sets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Value {
-    /// A number with a unit, or without one where it has no dimension.
+    /// A number with a unit, or without one if it has no dimension.
     Number(Measure, Bounds),
     /// A whole number, both ends included.
     Count { lowest: u32, highest: u32 },
@@ -60,11 +61,11 @@ pub(crate) enum Occurs {
 
 /// The words of one place.
 pub(crate) trait Words: Copy + PartialEq + 'static {
-    /// The place, with its article where it has one: `an estimator`.
+    /// The place, with its article if it has one: `an estimator`.
     const PLACE: &'static str;
     const ALL: &'static [(&'static Word, Self)];
 
-    /// The one that is written so.
+    /// The word with this spelling.
     fn of(text: &str) -> Option<(&'static Word, Self)> {
         Self::ALL.iter().find(|(word, _)| word.text == text).copied()
     }
@@ -112,7 +113,7 @@ macro_rules! language {
 
 language! {
     items {
-        /// What a robot holds.
+        /// The contents of a robot.
         RobotItem in "a robot" {
             Topology = TOPOLOGY,
             Parameters = PARAMETERS,
@@ -167,7 +168,7 @@ language! {
         ActuatorItem in "an actuator" {}
         ControllerItem in "a controller" {}
         BridgeItem in "a bridge" {}
-        /// What controllers and bridges hold.
+        /// The contents of controllers and bridges.
         ServiceSetting in "a controller or bridge" {
             Rate = RATE,
         }
@@ -185,7 +186,7 @@ language! {
             LostAfter = LOST_AFTER,
             RecoverAfter = RECOVER_AFTER,
         }
-        /// What starts with no name in `commands`.
+        /// Items in `commands` that have no name.
         CommandsItem in "`commands`" {
             Category = CATEGORY,
         }
@@ -201,7 +202,7 @@ language! {
         CommandSetting in "a command" {
             Timeout = TIMEOUT,
         }
-        /// A place without words of this sort.
+        /// A place without words of this kind.
         Nothing in "" {}
     }
     fields {
@@ -259,7 +260,7 @@ language! {
             Mesh = MESH,
             Material = MATERIAL,
         }
-        /// A collision is not to be seen.
+        /// A collision shape is not visible.
         CollisionField in "`collision`" {
             Origin = ORIGIN_OF_BODY,
             Box = BOX,
@@ -298,7 +299,7 @@ pub(crate) fn item_words() -> impl Iterator<Item = &'static str> {
     ITEMS.iter().flat_map(|(_, words)| words.iter()).map(|word| word.text)
 }
 
-/// The error for a word that does not belong in a place that holds the words of `I` and `S`.
+/// The error for a word that does not belong in a place with the words of `I` and `S`.
 pub(crate) fn unexpected<I: Words, S: Words>(word: &Ident) -> syn::Error {
     let name = word.to_string();
     let place = I::PLACE;

@@ -2,11 +2,11 @@
 //!
 //! A robot goes through four phases, each in the folder of its name:
 //!
-//! 1. `parse`: tokens to a tree. Never fails: what it cannot read it reports and skips.
+//! 1. `parse`: tokens to a tree. Never fails: anything it cannot read is reported and skipped.
 //! 2. `urdf`: links and joints of a URDF file, if the robot names one, put under the tree. `model`: the tree to plain data
 //!    in which paths are resolved to what they name.
-//! 3. `verify`: the rules of the language, one a file. Gives a `verify::Verified` only if all hold.
-//! 4. `expand`: a verified robot to its wiring; one that failed to stubs, so that one mistake gives one message.
+//! 3. `verify`: the rules of the language, one per file. Returns a `verify::Verified` only if all hold.
+//! 4. `expand`: a verified robot to its wiring, a rejected one to stubs, so that one mistake gives one message.
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,4 +1,4 @@
-//! What a robot is once its names are resolved: plain data in lists, with ids for references and spans kept.
+//! A robot with resolved names: plain data in lists, with ids for references, and with spans.
 
 mod commands;
 mod frames;
@@ -48,18 +48,18 @@ pub(crate) struct Robot {
     pub(crate) parameter_groups: Table<ParameterGroupId, ParameterGroup>,
     /// The number of the parameter at each path, with `::` between the names.
     parameter_paths: HashMap<String, ParameterId>,
-    /// Beside the built-in ones.
+    /// In addition to the built-in ones.
     pub(crate) states: Vec<State>,
-    /// The default one, then those that are declared.
+    /// The default one, then the declared ones.
     pub(crate) categories: Table<CategoryId, Category>,
     pub(crate) commands: Table<CommandId, Command>,
-    /// Whatever can be subscribed to, sensors first.
+    /// Everything that can be subscribed to, sensors first.
     pub(crate) publishers: Table<PublisherId, Publisher>,
-    /// All numbers that are given to words of the language.
+    /// All numbers given to words of the language.
     pub(crate) given: Vec<Given>,
-    /// All words that are written more often than they may.
+    /// All words that are written too often.
     pub(crate) repeated: Vec<Ident>,
-    /// Whether everything could be read; if not, what is missing may have been declared.
+    /// Whether everything could be read; if not, a missing item may have been declared.
     pub(crate) complete: bool,
 }
 
@@ -69,7 +69,7 @@ pub(crate) struct Link {
     pub(crate) name: Ident,
     /// Its name at run time; differs from the identifier only where a URDF's name is not an identifier.
     pub(crate) label: String,
-    /// The joint that carries it; none for a root.
+    /// The joint that carries it; `None` for a root.
     pub(crate) joint: Option<JointId>,
     pub(crate) body: LinkBody,
 }
@@ -80,7 +80,7 @@ pub(crate) struct Joint {
     pub(crate) name: Ident,
     /// Its name at run time, as a link's.
     pub(crate) label: String,
-    /// Whether it comes from a URDF, whose reader has checked it and where a limit may be a single position.
+    /// Whether it comes from a URDF, which its reader has checked, and where a limit may be a single position.
     pub(crate) from_urdf: bool,
     pub(crate) kind: JointKind,
     pub(crate) kind_word: Ident,
@@ -105,7 +105,7 @@ pub(crate) struct Sensor {
     pub(crate) name: Ident,
     pub(crate) mount: Mount,
     pub(crate) component: Component,
-    /// The time between two calls of `read`, in s; none if it does not say.
+    /// The time between two calls of `read`, in s; `None` without a rate.
     pub(crate) period_s: Option<f64>,
     pub(crate) publisher: PublisherId,
 }
@@ -127,7 +127,7 @@ pub(crate) struct Service {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     pub(crate) component: Component,
-    /// The time between two calls of `update`, in s; none if it does not say.
+    /// The time between two calls of `update`, in s; `None` without a rate.
     pub(crate) period_s: Option<f64>,
     pub(crate) publisher: PublisherId,
     pub(crate) path: Vec<String>,
@@ -153,7 +153,7 @@ pub(crate) struct Estimator {
     pub(crate) timing: Timing,
     pub(crate) reactions: Reactions,
     pub(crate) health: Health,
-    /// None where its input's thread runs it.
+    /// `None` if it runs on its input's thread.
     pub(crate) worker: Option<Worker>,
     /// Its own path.
     pub(crate) path: Vec<String>,
@@ -169,9 +169,9 @@ pub(crate) struct Input {
     pub(crate) driver: Option<Ident>,
     pub(crate) optional: Option<Ident>,
     pub(crate) within: Option<Quantity>,
-    /// None if no publisher has that path, or several end in it.
+    /// `None` if no publisher has that path, or several end in it.
     pub(crate) source: Option<PublisherId>,
-    /// The publishers whose paths end in it, if they are several.
+    /// The publishers whose paths end in it, if there are several.
     pub(crate) candidates: Vec<PublisherId>,
 }
 
@@ -201,7 +201,7 @@ impl Robot {
         }
     }
 
-    /// All that is declared by a type of the user's.
+    /// Everything declared with a type of the user's.
     pub(crate) fn components(&self) -> impl Iterator<Item = &Component> {
         let sensors = self.sensors.iter().map(|sensor| &sensor.component);
         let estimators = self.estimators.iter().map(|estimator| &estimator.component);

@@ -1,4 +1,4 @@
-//! Names: the nearest one to a misspelt one, and the case of identifiers.
+//! Names: suggestions for misspelt ones, and the case of identifiers.
 
 use proc_macro2::Ident;
 use syn::ext::IdentExt;
@@ -11,7 +11,7 @@ pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a s
         let longest = name.chars().count().max(candidate.chars().count());
         (distance <= limit && distance < longest).then_some((distance, candidate))
     });
-    // Of two that are equally near, the one that differs in case alone.
+    // Of two that are equally near, prefers one that differs only in case.
     near.min_by_key(|(distance, candidate)| (*distance, !candidate.eq_ignore_ascii_case(name)))
         .map(|(_, candidate)| candidate)
 }
@@ -21,8 +21,8 @@ pub(crate) fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = 
     nearest(name, candidates).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 
-/// The path whose names are all near to those of `path`; else, of those with the same last name, the one that has most of
-/// its names: links may have been left out.
+/// The path whose names are all near to those of `path`; otherwise, among those with the same last name, the one that
+/// shares most names: links may have been left out.
 pub(crate) fn nearest_path<'a>(path: &str, known: &'a [String]) -> Option<&'a str> {
     let names: Vec<&str> = path.split("::").collect();
     let known = || known.iter().map(String::as_str);
@@ -34,11 +34,11 @@ pub(crate) fn nearest_path<'a>(path: &str, known: &'a [String]) -> Option<&'a st
     };
     let near = nearest(path, known().filter(is_near));
     let same_end = known().filter(|candidate| candidate.rsplit("::").next() == names.last().copied());
-    // The first of those that are equally good.
+    // The first of equally good ones.
     near.or_else(|| same_end.rev().max_by_key(|candidate| in_order(&names, candidate)))
 }
 
-/// How many of the last names of a path are those of `candidate`, in the same order.
+/// How many of the last names of a path occur in `candidate`, in the same order.
 fn in_order(names: &[&str], candidate: &str) -> usize {
     let mut candidate = candidate.rsplit("::");
     names.iter().rev().take_while(|name| candidate.any(|other| other == **name)).count()
@@ -83,7 +83,7 @@ pub(crate) fn snake_case(name: &str) -> String {
     snake
 }
 
-/// The name of the module with a robot's handles; none if the type's name leaves none that can be used.
+/// The name of the module with a robot's handles; `None` if the type's name gives no usable one.
 pub(crate) fn module_name(name: &Ident) -> Option<String> {
     let (name, module) = (name.to_string(), snake_case(&name.to_string()));
     let is_keyword = syn::parse_str::<Ident>(&module).is_err();
@@ -95,7 +95,7 @@ pub(crate) fn text(ident: &Ident) -> String {
     ident.unraw().to_string()
 }
 
-/// The way out for a name that is not declared: the nearest one that is, else to declare it in `block`.
+/// The suggestion for an undeclared name: the nearest declared one, otherwise to declare it in `block`.
 pub(crate) fn way_out<'a>(name: &str, declared: impl IntoIterator<Item = &'a str>, block: &str) -> String {
     let declared: Vec<&str> = declared.into_iter().collect();
     match nearest(name, declared.iter().copied()) {
@@ -118,7 +118,7 @@ pub(crate) fn some_of(names: &[&str]) -> String {
     format!("{}{more}", shown.join(", "))
 }
 
-/// Puts words into a sentence: `` `a`, `b` or `c` ``.
+/// Joins words for a sentence: `` `a`, `b` or `c` ``.
 pub(crate) fn one_of(words: &[&str]) -> String {
     let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
     match quoted.split_last() {

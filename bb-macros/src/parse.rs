@@ -1,4 +1,5 @@
-//! Tokens to a tree. Parsing never fails: what cannot be read is reported, skipped, and leaves the tree incomplete.
+//! Tokens to a tree. Parsing never fails: anything that cannot be read is reported, skipped, and leaves the tree
+//! incomplete.
 
 mod actuator;
 mod block;
@@ -70,7 +71,7 @@ pub(crate) fn robot(tokens: TokenStream, diagnostics: &mut Diagnostics) -> Robot
         robot.parse(&block::opened(input)?, &mut notes);
         Ok(())
     };
-    // syn reports what is left unread in brackets; where reading it has failed is reported already.
+    // syn reports unread tokens in brackets; if reading has failed, that is already reported.
     let result = parser.parse2(TokenTree::from(whole).into());
     (robot.given, robot.repeated) = notes.into_given();
     if let Err(error) = result

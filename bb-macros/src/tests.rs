@@ -1,4 +1,4 @@
-//! Floor one: diagnostics as data. Each is a pair of the text that it points at and its message.
+//! Level one: diagnostics as data. Each is a pair of the text that it points at and its message.
 
 mod commands;
 mod expansion;

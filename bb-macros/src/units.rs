@@ -1,4 +1,4 @@
-//! Units and their dimensions. Everything inside is SI; a unit is a factor to it.
+//! Units and their dimensions. All stored values are SI; a unit is a factor to it.
 
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{ToTokens, quote};
@@ -8,7 +8,7 @@ use syn::{LitInt, Token};
 
 /// Exponents of metre, kilogram, second, ampere, kelvin and radian.
 ///
-/// An angle counts as a dimension, so that degrees are refused for a plain number or a length.
+/// An angle counts as a dimension, so degrees are refused for a plain number or a length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dimension(pub(crate) [i8; 6]);
 
@@ -92,7 +92,7 @@ const NAMED: &[([i8; 6], &str)] = &[
     ([0, 1, -2, -1, 0, 0], "a magnetic field"),
 ];
 
-/// Units that products of base units do not show well.
+/// Units for which products of base units are hard to read.
 const SI: &[(Dimension, &str)] = &[
     (Dimension::FREQUENCY, "Hz"),
     (Dimension::VELOCITY, "m/s"),
@@ -111,7 +111,7 @@ const SI: &[(Dimension, &str)] = &[
 
 use std::f64::consts::PI;
 
-/// All units that stand by themselves.
+/// All units with their own symbol.
 #[cfg(test)]
 pub(crate) fn symbols() -> impl Iterator<Item = &'static str> {
     UNITS.iter().map(|(symbol, _, _)| *symbol)
@@ -163,7 +163,7 @@ const UNITS: &[(&str, [i8; 6], f64)] = &[
     ("bar", [-1, 1, -2, 0, 0, 0], 1e5),
 ];
 
-/// The tables as constants, for the runtime: a unit in a settings file is one of those in `robot!`.
+/// The tables as constants, for the runtime: units in a settings file are those of `robot!`.
 pub(crate) fn tables() -> TokenStream {
     let units = UNITS
         .iter()
@@ -176,12 +176,12 @@ pub(crate) fn tables() -> TokenStream {
         const UNITS: &[(&str, [i8; 6], f64)] = &[#(#units),*];
         /// Dimensions with their names, for messages.
         const NAMED: &[([i8; 6], &str)] = &[#(#named),*];
-        /// Dimensions with the SI unit that they are shown in.
+        /// Dimensions with their SI unit for display.
         const SI: &[([i8; 6], &str)] = &[#(#si),*];
     }
 }
 
-/// A time for messages: `250 ms`. Rounded up, so that it is enough where it is said to be.
+/// A time for messages: `250 ms`. Rounded up, so that a suggested value is sufficient.
 pub(crate) fn time_text(seconds: f64) -> String {
     let (factor, unit) = match seconds {
         s if s >= 1.0 => (1.0, "s"),
@@ -189,7 +189,7 @@ pub(crate) fn time_text(seconds: f64) -> String {
         s if s >= 1e-6 => (1e6, "us"),
         _ => (1e9, "ns"),
     };
-    // Three decimals, without trailing zeros: that hides an error in the last place of the double.
+    // Three decimals, without trailing zeros: hides an error in the last digit of the double.
     let number = format!("{:.3}", (seconds * factor * 1e3 - 1e-6).ceil() / 1e3);
     let number = number.trim_end_matches('0').trim_end_matches('.');
     format!("{number} {unit}")
@@ -206,13 +206,13 @@ impl Unit {
     const ONE: Self = Self { dimension: Dimension::NONE, factor: 1.0 };
     pub(crate) const SECOND: Self = Self { dimension: Dimension::TIME, factor: 1.0 };
 
-    /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` applies to the next symbol alone.
+    /// Parses `deg/s`, `N*m`, `m/s^2`. A `/` applies only to the next symbol.
     pub(crate) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let first = power(input)?;
         Self::ONE.times(first, 1).rest(input)
     }
 
-    /// The unit glued to a literal as its suffix, and what follows it: `60deg/s`.
+    /// The unit attached to a literal as its suffix, and the tokens after it: `60deg/s`.
     pub(crate) fn with_suffix(suffix: &str, place: Span, input: ParseStream<'_>) -> syn::Result<Self> {
         Self::ONE.times(factor(input, suffix, place)?, 1).rest(input)
     }
@@ -248,7 +248,7 @@ fn power(input: ParseStream<'_>) -> syn::Result<Unit> {
     factor(input, &symbol.to_string(), symbol.span())
 }
 
-/// The two units that are written as one word, `Nm`. Newtons alone: other first letters may be prefixes.
+/// The two units in a product written as one word, `Nm`. Only for newtons: other first letters may be prefixes.
 fn product(name: &str) -> Option<(&str, &str)> {
     let is_unit = |text: &str| UNITS.iter().any(|(unit, ..)| *unit == text);
     let (first, second) = name.split_at_checked(1)?;

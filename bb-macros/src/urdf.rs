@@ -1,4 +1,4 @@
-//! Links and joints from a URDF file: read, and put under the tree of the robot that names it.
+//! Links and joints from a URDF file, read and merged into the tree of the robot that names it.
 //!
 //! A fault of the file is reported at the `urdf(…)` token with its line and column. The file is tracked, so that a
 //! change rebuilds.
@@ -16,13 +16,14 @@ use crate::diagnostics::Diagnostics;
 use crate::parse::Robot;
 use proc_macro2::TokenStream;
 
-/// The tree with the links and joints of its URDF, if it names one, and what makes the compiler track the file.
+/// The tree with the links and joints of its URDF, if it names one, and the tokens that make the compiler track the
+/// file.
 #[cfg(feature = "urdf")]
 pub(crate) fn graft(tree: Robot, diagnostics: &mut Diagnostics) -> (Robot, TokenStream) {
     graft::graft(tree, diagnostics)
 }
 
-/// Without the feature: an error where a robot names a URDF.
+/// Without the feature: an error if a robot names a URDF.
 #[cfg(not(feature = "urdf"))]
 pub(crate) fn graft(mut tree: Robot, diagnostics: &mut Diagnostics) -> (Robot, TokenStream) {
     for topology in &tree.topologies {
@@ -36,7 +37,7 @@ pub(crate) fn graft(mut tree: Robot, diagnostics: &mut Diagnostics) -> (Robot, T
     (tree, TokenStream::new())
 }
 
-/// Joints are named at the robot's level only where they come from a URDF.
+/// Joints are named at the robot's level only if they come from a URDF.
 fn refuse_joints(tree: &Robot, diagnostics: &mut Diagnostics) {
     for joint in &tree.joints {
         let message = "a joint is declared in the link that it is mounted on; only joints of a URDF are named here";

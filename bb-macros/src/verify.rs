@@ -1,6 +1,6 @@
-//! The law: what must hold of a robot before it is expanded.
+//! The rules that a robot must satisfy before it is expanded.
 //!
-//! One rule is one file, and a folder of the same name in `tests/ui`. All rules run, so that all faults are reported
+//! One rule is one file, and a folder of the same name in `tests/ui`. All rules run, so all faults are reported
 //! together; each fault is reported by one rule. Facts about types are left to rustc (see `expand::checks`).
 
 mod actuated_joints;
@@ -61,7 +61,7 @@ const RULES: &[Rule] = &[
     single_settings::check,
 ];
 
-/// A robot for which all rules hold.
+/// A robot that satisfies all rules.
 #[derive(Debug)]
 pub(crate) struct Verified<'a> {
     pub(crate) robot: &'a Robot,
@@ -74,7 +74,7 @@ pub(crate) struct Verified<'a> {
     pub(crate) children: Table<JointId, LinkId>,
 }
 
-/// Checks all rules; none if one does not hold, or if something could not be read.
+/// Checks all rules; `None` if one does not hold, or if something could not be read.
 pub(crate) fn verify<'a>(robot: &'a Robot, diagnostics: &mut Diagnostics) -> Option<Verified<'a>> {
     for rule in RULES {
         rule(robot, diagnostics);

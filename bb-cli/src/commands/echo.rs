@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
             }
             false => text(&value) + "---\n",
         };
-        // The reader of a pipe may have read enough.
+        // The reader of a pipe may stop early.
         if !crate::say(&printed)? {
             break;
         }

@@ -1,4 +1,4 @@
-//! `bb info`: what is in recordings, and what looks wrong with them.
+//! `bb info`: the contents of recordings, and anything that looks wrong in them.
 
 mod date;
 mod quantities;

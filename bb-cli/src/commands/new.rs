@@ -16,7 +16,7 @@ pub(crate) struct Arguments {
     path: Option<PathBuf>,
 }
 
-/// What is written where.
+/// The files to write, and their contents.
 const FILES: [(&str, &str); 6] = [
     ("Cargo.toml", include_str!("../../templates/project/Cargo.toml.template")),
     ("README.md", include_str!("../../templates/project/README.md.template")),
@@ -108,7 +108,7 @@ fn dependencies(path: Option<&Path>) -> Result<String, String> {
         .transpose()?;
     let lines = CRATES.map(|(name, folder, features)| {
         let from = match &checkout {
-            // A string of TOML between single quotes has no escapes, which paths of Windows need.
+            // A TOML string in single quotes has no escapes, as needed for Windows paths.
             Some(checkout) => format!("path = '{}'", checkout.join(folder).display()),
             None => format!("version = \"{}\"", env!("CARGO_PKG_VERSION")),
         };

@@ -41,7 +41,7 @@ fn picture(file: &str) -> Result<PathBuf, String> {
     Picture::check(&file, "--out").map(|()| file)
 }
 
-/// A topic and what is plotted of it.
+/// A topic and its selected fields.
 struct Chosen<'a> {
     topic: &'a Topic,
     reader: TopicReader,
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     }
 }
 
-/// The topic and the path of a field in it. The name of a topic may have dots: the longest that fits is taken.
+/// The topic and the path of a field in it. The name of a topic may contain dots: the longest match is used.
 fn topic_and_field<'a, 'b>(bag: &'a Bag, field: &'b str) -> Result<(&'a Topic, &'b str), String> {
     let dots = field.match_indices('.').map(|(at, _)| at).chain([field.len()]);
     let is_topic = |end: &usize| bag.topics().iter().any(|topic| is_named(topic, &field[..*end]));
@@ -87,7 +87,7 @@ fn topic_and_field<'a, 'b>(bag: &'a Bag, field: &'b str) -> Result<(&'a Topic, &
     Ok((find(bag, name)?, path))
 }
 
-/// Finds the topic, and by its first message the fields.
+/// Finds the topic, and the fields from its first message.
 fn choose<'a>(bag: &'a Bag, field: &str) -> Result<Chosen<'a>, String> {
     let in_file = |fault: String| format!("{}: {fault}", bag.path().display());
     let (topic, path) = topic_and_field(bag, field)?;
@@ -101,7 +101,7 @@ fn choose<'a>(bag: &'a Bag, field: &str) -> Result<Chosen<'a>, String> {
     Ok(Chosen { topic, reader, groups, times_ns: Vec::new(), values })
 }
 
-/// Reads the values; what broke the file off, if anything did.
+/// Reads the values; returns the damage that cut the file off, if any.
 fn read(bag: &Bag, chosen: &mut [Chosen<'_>]) -> Result<Option<String>, String> {
     let mut names: Vec<Arc<str>> = chosen.iter().map(|chosen| Arc::clone(&chosen.topic.name)).collect();
     names.sort_unstable();

@@ -1,11 +1,11 @@
-//! What looks wrong with a recording, so that its errors are not those of the filters.
+//! Signs that a recording is wrong, so that the errors are not those of the filters.
 
 use super::Player;
 use crate::recording::Recording;
 use crate::units::Units;
 use bb_estimators::attitude::ImuSample;
 
-/// Takes samples in.
+/// Adds samples.
 pub(super) fn take_units(units: &mut Units, samples: &[ImuSample]) {
     if units.is_full() {
         return;
@@ -25,7 +25,7 @@ pub(super) fn unit_doubts(recording: &Recording, units: &Units) -> Vec<String> {
     imu.chain(units.of_field().map(|fault| format!("{magnetometer}: {fault}"))).collect()
 }
 
-/// The convention that the truth seems to have, if it is another, by the filter that fits it best.
+/// The convention that the truth seems to use, if it is another one, judged by the filter that fits it best.
 pub(super) fn truth_doubt(recording: &Recording, players: &[Player]) -> Option<String> {
     let verdicts = players.iter().filter_map(|player| Some((player.name, player.truths.verdict(recording.axes)?)));
     let best = verdicts.reduce(|best, other| if other.1.otherwise < best.1.otherwise { other } else { best });

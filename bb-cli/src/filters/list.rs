@@ -5,7 +5,7 @@ use bb_estimators::attitude::FilterParams;
 use bb_estimators::params::{Kind, Params};
 use std::fmt::Write;
 
-/// Each filter with what it is for, for `--help`.
+/// Each filter with its purpose, for `--help`.
 pub(crate) fn described() -> String {
     let mut text = String::from("The filters, or `all`: several with commas. --list prints their parameters.\n");
     for params in FilterParams::ALL.iter().map(|default| default()) {
@@ -14,7 +14,7 @@ pub(crate) fn described() -> String {
     text
 }
 
-/// The parameters of filters, for `--list`: name, default, range and unit, and what each is.
+/// The parameters of filters, for `--list`: name, default, range, unit and description.
 pub(crate) fn listed(filters: &[FilterParams]) -> String {
     let mut text = String::new();
     for filter in filters {
@@ -26,7 +26,7 @@ pub(crate) fn listed(filters: &[FilterParams]) -> String {
     text
 }
 
-/// The parameters of one algorithm whose names are asked for.
+/// The parameters of one algorithm whose names are requested.
 pub(crate) fn parameters(params: &dyn Params, is_asked: impl Fn(&str) -> bool) -> String {
     let mut text = String::new();
     let rows = params.parameters().iter().filter(|row| is_asked(row.name));

@@ -56,7 +56,7 @@ impl Chosen {
     /// The filter of this name with these settings.
     ///
     /// # Errors
-    /// An unknown name, or what [`all`](Self::all) refuses.
+    /// An unknown name, or a setting refused by [`all`](Self::all).
     pub fn named(name: &str, axes: Axes, settings: &[Setting]) -> Result<Self, String> {
         let names: Vec<_> = FilterParams::ALL.iter().map(|default| default().name()).collect();
         let filter = FilterParams::named(name);

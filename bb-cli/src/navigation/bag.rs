@@ -23,10 +23,10 @@ use notes::Notes;
 use std::path::{Path, PathBuf};
 use topics::Topics;
 
-/// A bag that was read: what `bb eval navigation` plays.
+/// The messages of a bag that `bb eval navigation` plays.
 ///
-/// Measurements are taken at the time in their headers, in that order, whatever order they came in. A message of the IMU holds
-/// since the one before it.
+/// Measurements are ordered by the time in their headers, regardless of the order of arrival. A message of the IMU
+/// covers the time since the previous one.
 #[derive(Debug)]
 pub struct NavigationBag {
     file: PathBuf,
@@ -36,23 +36,23 @@ pub struct NavigationBag {
     options: BagOptions,
 }
 
-/// A data set, and what to know about it.
+/// A data set, with remarks on it.
 #[derive(Debug)]
 pub struct FromBag {
-    /// What the filters are given.
+    /// The inputs of the filters.
     pub data: DataSet,
     /// What was left out or assumed.
     pub notes: Vec<String>,
-    /// So much was left out that figures of the rest mislead: why.
+    /// Why figures of the rest are misleading, if too much was left out.
     pub doubts: Vec<String>,
 }
 
 impl NavigationBag {
-    /// Reads the messages of the chosen topics, up to where the bag breaks off.
+    /// Reads the messages of the chosen topics, up to where the bag is cut off.
     ///
     /// # Errors
     ///
-    /// It is no bag, has not the topics, or not one of each; in words.
+    /// It is not a bag, lacks a topic, or has several matching ones; in words.
     pub fn read(file: &Path, options: &BagOptions) -> Result<Self, String> {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
         let topics = Topics::choose(&bag, options)?;
@@ -64,20 +64,20 @@ impl NavigationBag {
         Ok(Self { file: file.to_owned(), topics, messages, frames, options: options.clone() })
     }
 
-    /// What broke the bag off, if something did.
+    /// The damage that cut the bag off, if any.
     pub fn broken(&self) -> Option<&str> {
         self.messages.broken.as_deref()
     }
 
     /// The bag as a data set for filters, or for smoothers.
     ///
-    /// The keyframes are the instants at which something was measured, and those of the truth, of which at most ten a second
-    /// are scored. Those of a smoother with relative poses are the messages of that odometry; other measurements move to the
-    /// nearest.
+    /// The keyframes are the times of measurements and of the truth; at most ten of the truth a second are scored.
+    /// For a smoother with relative poses, they are the messages of that odometry, and other measurements move to the
+    /// nearest one.
     ///
     /// # Errors
     ///
-    /// A frame that is not connected, nothing to start from, or no sample left; in words.
+    /// A frame that is not connected, no start, or no samples left; in words.
     pub fn data_set(&self, settings: &[NavigationSetting], is_smoother: bool) -> Result<FromBag, String> {
         let (params, sensors) = bag_params(settings)?;
         let mut notes = Notes::default();

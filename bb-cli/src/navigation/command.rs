@@ -74,13 +74,13 @@ fn picture(file: &str) -> Result<PathBuf, String> {
     Ok(file)
 }
 
-/// What a path leads to.
+/// What a path refers to.
 enum Source {
     Set(Box<DataSet>),
     Bag(Box<NavigationBag>),
 }
 
-/// What was evaluated, and what was wrong.
+/// The results, and the faults.
 #[derive(Default)]
 struct Done {
     scores: Vec<Scored>,
@@ -90,7 +90,8 @@ struct Done {
 }
 
 impl NavigationArguments {
-    /// What to print, and whether every data set could be evaluated to its end. Notes and faults go to the error stream.
+    /// Returns the text to print, and whether every data set could be evaluated to its end. Notes and faults go to
+    /// the error stream.
     pub(crate) fn run(&self) -> Result<(String, bool), String> {
         if self.list {
             return Ok((listed(), true));
@@ -160,7 +161,7 @@ impl NavigationArguments {
                         done.notes.push(note);
                     }
                 }
-                // Of several filters each has the same.
+                // It is the same for all filters.
                 for doubt in &made.doubts {
                     let doubt = format!("{}: {doubt}", file.display());
                     if !done.faults.contains(&doubt) {
@@ -184,7 +185,7 @@ impl NavigationArguments {
     }
 }
 
-/// Whether a path is the prefix of CSV files, and no recording.
+/// Whether a path is the prefix of CSV files, not a recording.
 fn is_prefix(path: &Path) -> bool {
     let mut samples = path.as_os_str().to_owned();
     samples.push("_imu.csv");

@@ -1,5 +1,5 @@
-//! A data set as CSV files with one prefix: `_imu`, `_keyframes`, `_truth`, `_init`, `_noise`, and whichever there are of
-//! `_vio`, `_anchor`, `_gps`, `_obs` with `_landmarks`, and `_camera`.
+//! A data set as CSV files with one prefix: `_imu`, `_keyframes`, `_truth`, `_init`, `_noise`, and any of `_vio`,
+//! `_anchor`, `_gps`, `_obs` with `_landmarks`, and `_camera`.
 
 use super::data::{DEVIATIONS, DataSet, Keyframe, Noise, Sample, Truth, nanoseconds};
 use bb_core::nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector2, Vector3};
@@ -13,7 +13,7 @@ impl DataSet {
     ///
     /// # Errors
     ///
-    /// Which file cannot be read, or in which line what is wrong.
+    /// The file that cannot be read, or the error with its line.
     pub fn read(prefix: &Path) -> Result<Self, String> {
         let samples = Rows::read(prefix, "imu", 8)?;
         let keyframes = Rows::read(prefix, "keyframes", 5)?;
@@ -102,7 +102,7 @@ impl DataSet {
     }
 }
 
-/// What the camera sees, by keyframe; a landmark comes with what is known of it beforehand where it is seen first.
+/// The camera's observations, by keyframe. A landmark's prior comes with its first observation.
 fn seen(prefix: &Path) -> Result<HashMap<u64, Vec<Observation>>, String> {
     let known = Rows::read_if_there(prefix, "landmarks", 8)?.map(|row| {
         let (place, deviation) = (row.position(4)?, row.deviation(7)?);
@@ -123,8 +123,8 @@ fn seen(prefix: &Path) -> Result<HashMap<u64, Vec<Observation>>, String> {
     Ok(seen)
 }
 
-/// The camera of a file `_camera`: focal lengths, principal point, size, distortion k1, k2, k3, p1, p2, and its pose on the body
-/// as a quaternion and a position. Without one, that of the simulated flights.
+/// The camera of a file `_camera`: focal lengths, principal point, size, distortion k1, k2, k3, p1, p2, and its pose
+/// on the body as a quaternion and a position. Without the file, the camera of the simulated flights.
 fn camera(prefix: &Path) -> Result<Camera, String> {
     let rows = Rows::read_if_there(prefix, "camera", 18)?;
     if rows.rows.is_empty() {
@@ -153,7 +153,7 @@ pub(crate) type Inertial = (f64, Vector3<f64>, Vector3<f64>);
 ///
 /// # Errors
 ///
-/// It cannot be read, or in which line what is wrong.
+/// The file cannot be read, or the error with its line.
 pub(crate) fn inertial(file: &Path) -> Result<Vec<Inertial>, String> {
     let rows = Rows::of_file(file.to_owned(), 7)?;
     if rows.rows.is_empty() {
@@ -162,10 +162,10 @@ pub(crate) fn inertial(file: &Path) -> Result<Vec<Inertial>, String> {
     rows.map(|row| Ok((row.0[0], row.vector(1), row.vector(4))))
 }
 
-/// Farther from the origin of its world nothing is, m.
+/// The largest distance from the origin of the world, m.
 const FARTHEST: f64 = 1e8;
 
-/// The numbers of a file, a header row left out.
+/// The numbers of a file, without a header row.
 struct Rows {
     file: PathBuf,
     rows: Vec<Row>,
@@ -233,7 +233,7 @@ impl Row {
         UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
     }
 
-    /// Whether it has a rotation there: 1 is the norm of one.
+    /// The rotation at these columns, if it has one: its norm is 1.
     fn rotation(&self, first: usize) -> Result<UnitQuaternion<f64>, &'static str> {
         let norm = self.0.iter().skip(first).take(4).map(|x| x * x).sum::<f64>().sqrt();
         (norm - 1.0).abs().lt(&0.1).then(|| self.orientation(first)).ok_or("columns qw to qz are no rotation")

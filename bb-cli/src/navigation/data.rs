@@ -1,4 +1,4 @@
-//! A drive or a flight: what was measured, and the truth.
+//! A drive or a flight: measurements and truth.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::navigation::{
@@ -7,10 +7,10 @@ use bb_estimators::navigation::{
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// What may be known so well or so badly, in m, rad, m/s², rad/s: the square of less is no number that can be divided by.
+/// The range of standard deviations, in m, rad, m/s², rad/s: the square of a smaller one cannot be a divisor.
 pub(crate) const DEVIATIONS: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
-/// A drive or a flight: what was measured, and the truth at keyframes. The world is ENU, the body the IMU's.
+/// A drive or a flight: measurements, and the truth at keyframes. The world is ENU, the body frame is the IMU's.
 #[derive(Clone, Debug)]
 pub struct DataSet {
     /// The prefix of its files, or the bag.
@@ -19,18 +19,18 @@ pub struct DataSet {
     pub(crate) keyframes: Vec<Keyframe>,
     /// What is known of the first keyframe.
     pub(crate) start: Start,
-    /// What the data set says of the IMU; none if it says nothing.
+    /// The IMU's noise according to the data set; `None` if unknown.
     pub(crate) noise: Option<Noise>,
-    /// What was measured at keyframes, by their number.
+    /// The measurements at keyframes, by their number.
     pub(crate) relative: HashMap<u64, RelativePose>,
     pub(crate) anchors: HashMap<u64, AbsolutePose>,
     pub(crate) fixes: HashMap<u64, GnssPosition>,
     pub(crate) velocities: HashMap<u64, BodyVelocity>,
-    /// What sees landmarks, if there are any.
+    /// The camera that sees landmarks, if there are any.
     pub(crate) camera: Option<Camera>,
-    /// The landmarks that each keyframe sees; smoothers alone use them.
+    /// The landmarks seen at each keyframe; used only by smoothers.
     pub(crate) seen: HashMap<u64, Vec<Observation>>,
-    /// Whether filters, too, use fixes where there are relative poses; smoothers always do.
+    /// Whether filters also use fixes when there are relative poses; smoothers always do.
     pub(crate) fixes_beside_relative: bool,
     /// The point of the body whose position the truth without an orientation tells, m.
     pub(crate) antenna: Vector3<f64>,
@@ -44,7 +44,7 @@ pub(crate) struct Sample {
     pub(crate) dt: f64,
 }
 
-/// An instant at which something was measured besides the IMU, or there is truth.
+/// A time with a measurement other than the IMU's, or with truth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Keyframe {
     pub(crate) time_s: f64,
@@ -75,7 +75,7 @@ pub(crate) struct Noise {
 }
 
 impl DataSet {
-    /// Notes which keyframes relative poses refer to.
+    /// Records the keyframes that relative poses refer to.
     pub(crate) fn referred(mut self) -> Self {
         for relative in self.relative.values() {
             let keyframe = usize::try_from(relative.keyframe).ok();

@@ -1,4 +1,4 @@
-//! When figures are those of something else: most of what a filter needs was left out.
+//! Detects misleading figures: most of the input that a filter needs was left out.
 
 /// Whether a part is more than half of all.
 pub(super) fn is_most(part: u64, all: u64) -> bool {

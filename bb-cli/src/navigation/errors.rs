@@ -1,22 +1,22 @@
-//! How far an estimate is from the truth.
+//! The error of an estimate.
 
 use super::data::Truth;
 use super::step::Known;
 use bb_core::nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use bb_estimators::navigation::nees;
 
-/// How far an estimate is from the truth, and what it says of that.
+/// The error of an estimate, and its reported covariance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Errors {
     /// In the world, m.
     pub(crate) position: Vector3<f64>,
-    /// Rotation vector in the world, rad; none where the truth has no orientation.
+    /// Rotation vector in the world, rad; `None` if the truth has no orientation.
     pub(crate) rotation: Option<Vector3<f64>>,
     pub(crate) covariance: Matrix6<f64>,
 }
 
 impl Errors {
-    /// Without a true orientation the position is that of the antenna, a point of the body.
+    /// Without a true orientation, the true position is that of the antenna, a point of the body.
     pub(crate) fn between(truth: &Truth, antenna: &Vector3<f64>, estimate: &Known) -> Self {
         let Known { position, world_from_body, covariance, .. } = estimate;
         if let Some(orientation) = truth.world_from_body {
@@ -32,7 +32,7 @@ impl Errors {
         Self { position: truth.position - position - arm, rotation: None, covariance }
     }
 
-    /// Normalised estimation error squared; none if the covariance is not positive definite.
+    /// Normalised estimation error squared; `None` if the covariance is not positive definite.
     pub(crate) fn nees(&self) -> Option<f64> {
         match &self.rotation {
             Some(rotation) => {

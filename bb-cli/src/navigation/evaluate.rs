@@ -9,7 +9,7 @@ use super::trace::Trace;
 use super::verdicts::Verdicts;
 use bb_core::nalgebra::Vector3;
 
-/// Keyframes at the start that are not scored: a tenth of all, but not more than these.
+/// Keyframes at the start that are not scored: a tenth of all, but at most this many.
 const MOST_LEFT_OUT: usize = 50;
 
 /// The errors of one filter on one data set, root mean squares over scored keyframes. The estimate is that of the forward
@@ -18,31 +18,31 @@ const MOST_LEFT_OUT: usize = 50;
 pub struct NavigationScore {
     /// m; NaN without truth.
     pub position_rmse_m: f64,
-    /// Angle of the whole rotation, degrees; none where the truth has no orientation.
+    /// Angle of the whole rotation, degrees; `None` if the truth has no orientation.
     pub orientation_rmse_deg: Option<f64>,
-    /// m/s; none where the truth has no velocity.
+    /// m/s; `None` if the truth has no velocity.
     pub velocity_rmse_mps: Option<f64>,
-    /// Normalised estimation error squared, on average: 6 is consistent where the truth has an orientation, otherwise 3; NaN
+    /// Mean normalised estimation error squared: 6 is consistent if the truth has an orientation, otherwise 3; NaN
     /// without truth.
     pub nees: f64,
     /// How many keyframes were scored.
     pub keyframes: usize,
-    /// Of the oldest keyframe in the window, m; none of a filter.
+    /// Of the oldest keyframe in the window, m; `None` for a filter.
     pub position_smoothed_rmse_m: Option<f64>,
     /// Of the same, degrees.
     pub orientation_smoothed_rmse_deg: Option<f64>,
-    /// Time to take in one sample of the IMU, µs, on average.
+    /// Mean time to process one sample of the IMU, µs.
     pub us_per_imu_sample: f64,
-    /// Median time of a keyframe, ms: of a filter from one to the next, with all samples, measurements and the estimate; of a
-    /// smoother that of measurements, update, estimate and covariance of the pose.
+    /// Median time of a keyframe, ms. For a filter, from one keyframe to the next, with all samples, measurements and
+    /// the estimate; for a smoother, that of measurements, update, estimate and covariance of the pose.
     pub ms_per_keyframe_p50: f64,
     /// The same, 99th percentile.
     pub ms_per_keyframe_p99: f64,
     /// How many measurements were refused.
     pub refused: u64,
-    /// How often a smoother took memory at a scored keyframe; none of a filter.
+    /// How often a smoother allocated memory at a scored keyframe; `None` for a filter.
     pub allocations: Option<u64>,
-    /// Memory of the process afterwards, MB; none where the system does not tell.
+    /// Memory of the process afterwards, MB; `None` if the system does not report it.
     pub rss_mb: Option<f64>,
 }
 
@@ -57,13 +57,13 @@ struct Sums {
     velocities: usize,
 }
 
-/// Plays a data set through a filter; a smoother holds `window` keyframes. `progress` is told of each keyframe.
+/// Plays a data set through a filter; a smoother holds `window` keyframes. `progress` is called for each keyframe.
 ///
-/// Positions from satellites are used where there are no relative poses.
+/// Satellite positions are used if there are no relative poses.
 ///
 /// # Errors
 ///
-/// Why the filter cannot be made, or stopped.
+/// Why the filter cannot be created, or stopped.
 pub fn evaluate_navigation(
     data: &DataSet,
     filter: &NavigationFilter,
@@ -74,14 +74,14 @@ pub fn evaluate_navigation(
     play(data, filter, settings, window, None, progress).map(|played| played.score)
 }
 
-/// What playing a data set gave.
+/// The result of playing a data set.
 pub(crate) struct Played {
     pub(crate) score: NavigationScore,
-    /// Why its figures mislead: most of what the filter needs was refused.
+    /// Why its figures mislead: most of the filter's input was refused.
     pub(crate) doubts: Vec<String>,
 }
 
-/// The same; what happens on the way goes into the trace, if there is one.
+/// The same; each step is recorded in the trace, if there is one.
 pub(crate) fn play(
     data: &DataSet,
     filter: &NavigationFilter,
@@ -149,7 +149,7 @@ pub(crate) fn play(
     Ok(Played { score, doubts: verdicts.doubts() })
 }
 
-/// Memory of this process that is in use, MB, where Linux tells.
+/// Memory in use by this process, MB, if Linux reports it.
 fn resident_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

@@ -10,14 +10,14 @@ use std::str::FromStr;
 /// A filter that can be chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NavigationFilter {
-    /// What `--filter` calls it.
+    /// Its name for `--filter`.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// A description in one line.
     pub about: &'static str,
     pub(crate) kind: Kind,
 }
 
-/// What a filter is made of.
+/// The kind of a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bank,
@@ -27,7 +27,7 @@ pub(crate) enum Kind {
     State(StrategyKind),
 }
 
-/// All there are; the first is the default.
+/// All filters; the first is the default.
 pub const NAVIGATION_FILTERS: [NavigationFilter; 6] = [
     NavigationFilter {
         name: "eskf",
@@ -84,7 +84,7 @@ impl FromStr for NavigationSetting {
 /// Whether smoothers use landmarks.
 const LANDMARKS: &str = "landmarks";
 
-/// What is set of bags alone: where filters start, and the noise of what tells none.
+/// Settings for bags only: where filters start, and the noise of topics that report none.
 const OF_BAGS: [&str; 6] = [
     "heading",
     "heading_deviation",
@@ -105,7 +105,7 @@ impl NavigationSetting {
     }
 }
 
-/// Whether smoothers use landmarks: unless the last that is set says otherwise.
+/// Whether smoothers use landmarks: yes, unless the last setting says otherwise.
 pub(crate) fn uses_landmarks(settings: &[NavigationSetting]) -> bool {
     settings.iter().rfind(|setting| setting.name == LANDMARKS).is_none_or(|setting| setting.value == "true")
 }
@@ -126,7 +126,7 @@ impl NavigationFilter {
     }
 }
 
-/// The noise of a data set, but for what `settings` say.
+/// The noise of a data set, overridden by `settings`.
 ///
 /// # Errors
 ///
@@ -150,7 +150,7 @@ pub(crate) fn params(data: &DataSet, settings: &[NavigationSetting]) -> Result<E
     Ok(params)
 }
 
-/// The parameters of a filter on a bag, and those of what the bag does not tell.
+/// The parameters of a filter on a bag, and those for values missing in the bag.
 ///
 /// # Errors
 ///
@@ -163,7 +163,7 @@ pub(crate) fn bag_params(settings: &[NavigationSetting]) -> Result<(EskfParams, 
     Ok((params, options))
 }
 
-/// What a data set has besides the IMU.
+/// The sensors of a data set besides the IMU.
 pub(crate) fn aiding(data: &DataSet) -> Aiding {
     if data.relative.is_empty() { Aiding::Gnss } else { Aiding::RelativePoses }
 }

@@ -1,4 +1,4 @@
-//! The state estimator on a data set: it is given what a flight gives it, with stamps and places on the Earth.
+//! Runs the state estimator on a data set as in a flight, with stamps and places on the Earth.
 
 use super::data::{DataSet, Keyframe, nanoseconds};
 use super::measured::Measured;
@@ -12,14 +12,14 @@ use bb_estimators::navigation::state_estimator::{
 use bb_estimators::navigation::{AbsolutePose, EskfParams, Geodetic, ImuMean, LocalFrame, RelativePose, Start};
 use std::time::Instant;
 
-/// A state estimator, and where the world of the data set is on the Earth.
+/// A state estimator, and the place of the data set's world on the Earth.
 pub(crate) struct Flown {
     estimator: StateEstimator,
     frame: LocalFrame,
-    /// Of each keyframe so far, the end of the last sample before it, ns.
+    /// For each keyframe so far, the end of the last sample before it, ns.
     stamps_ns: Vec<i64>,
     window: usize,
-    /// Whether it uses fixes beside relative poses.
+    /// Whether it uses fixes in addition to relative poses.
     takes_fixes: bool,
 }
 
@@ -35,7 +35,7 @@ impl Flown {
         let params = StateEstimatorParams {
             window: u32::try_from(window).unwrap_or(u32::MAX),
             imu_rate: (1.0 / shortest).clamp(100.0, 10_000.0),
-            // What is known of the start is known as well as the data set says.
+            // The start is known as well as the data set says.
             warm_inflation: 1.0,
             accelerometer_bias: data.start.accelerometer_bias_deviation,
             gyroscope_bias: data.start.gyroscope_bias_deviation,
@@ -44,7 +44,7 @@ impl Flown {
         };
         let config = StateEstimatorConfig { strategy, params, sensors, flight: 0 };
         let estimator = StateEstimator::new(config, ()).map_err(|error| error.to_string())?;
-        // Anywhere: the data set's world is a tangent frame, and so is the estimator's.
+        // Any place will do: the data set's world is a tangent frame, and so is the estimator's.
         let frame = LocalFrame::new(Geodetic::from_degrees(48.0, 11.0, 500.0));
         Ok(Self { estimator, frame, stamps_ns: Vec::new(), window, takes_fixes })
     }
@@ -69,13 +69,13 @@ impl Flown {
         self.estimator.warm_start(state).map(drop).map_err(|error| error.to_string())
     }
 
-    /// A position of the data set on the Earth, and what takes vectors of its world to the tangent frame there.
+    /// A position of the data set on the Earth, and the rotation from its world to the tangent frame there.
     fn local(&self, position: &Vector3<f64>) -> (Geodetic, UnitQuaternion<f64>) {
         let position = self.frame.geodetic(position);
         (position, self.frame.other_from_self(&LocalFrame::new(position)).rotation)
     }
 
-    /// From the keyframe before to keyframe `k`.
+    /// From the previous keyframe to keyframe `k`.
     pub(crate) fn play(
         &mut self,
         data: &DataSet,
@@ -110,7 +110,7 @@ impl Flown {
         Ok(())
     }
 
-    /// All that is done at a keyframe.
+    /// All processing at a keyframe.
     fn measure(&mut self, measured: &Measured, now_ns: i64) -> [Option<Result<Added, EstimatorError>>; 3] {
         let vio = measured.relative.and_then(|relative| self.vio(&relative, now_ns));
         let anchor = measured.anchor.map(|anchor| self.anchor(&anchor, now_ns));
@@ -126,7 +126,7 @@ impl Flown {
         });
         let estimator = &mut self.estimator;
         if fix.is_some() {
-            // Data sets hold what was let in. What is told late would be computed again.
+            // Data sets contain only accepted measurements. Delayed ones would be recomputed.
             let _ = estimator.add_gps_health(GpsHealthReading { time_ns: now_ns, health: GpsHealth::Stable });
         }
         let added = [
@@ -177,12 +177,12 @@ impl Flown {
         }
     }
 
-    /// What leaves at the newest keyframe.
+    /// The estimate at the newest keyframe.
     pub(crate) fn newest(&self) -> Option<Known> {
         self.estimator.predicted(*self.stamps_ns.last()?).map(|output| self.known(&output))
     }
 
-    /// The oldest keyframe of a full window, by its number, if it is smoothed.
+    /// The oldest keyframe of a full window, by its number, if smoothed.
     pub(crate) fn oldest(&mut self) -> Option<(usize, Known)> {
         let history = self.estimator.smoothed_history(self.window);
         let oldest = history.last().filter(|oldest| oldest.smoothed && history.len() + 1 == self.window)?;
@@ -191,7 +191,8 @@ impl Flown {
     }
 }
 
-/// Whether an input is in the estimate, or why not. One that was taken in although it did not fit, and a gap that was bridged, are.
+/// Whether an input is in the estimate, or why not. An input accepted despite a mismatch, and a bridged gap, count as
+/// included.
 fn taken<T>(added: Result<T, EstimatorError>) -> Result<(), String> {
     match added {
         Ok(_) | Err(EstimatorError::Degraded(Reason::Raised { .. } | Reason::Bridged)) => Ok(()),

@@ -1,11 +1,11 @@
-//! What a data set has measured at a keyframe.
+//! The measurements of a data set at a keyframe.
 
 use super::data::DataSet;
 use bb_estimators::navigation::{
     AbsolutePose, BodyVelocity, Fused, GnssPosition, Navigator, Observation, Refusal, RelativePose,
 };
 
-/// Whatever there is, in the order in which it is fused.
+/// All available measurements, in the order in which they are fused.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Measured<'a> {
     pub(crate) relative: Option<RelativePose>,
@@ -47,7 +47,7 @@ impl Sensor {
     }
 }
 
-/// What became of the measurements at a keyframe, in the order of [`Sensor::ALL`].
+/// The results of the measurements at a keyframe, in the order of [`Sensor::ALL`].
 pub(crate) type Answers = [Option<Result<Fused, Refusal>>; 4];
 
 impl<'a> Measured<'a> {
@@ -62,13 +62,13 @@ impl<'a> Measured<'a> {
         }
     }
 
-    /// Gives it to a filter, positions from satellites only where it uses them.
+    /// Passes them to a filter, satellite positions only if it uses them.
     pub(crate) fn filter(&self, navigator: &mut Navigator) -> Answers {
         let fix = self.fix.filter(|_| self.filters_take_fixes);
         Self { fix, ..*self }.all(navigator)
     }
 
-    /// Gives all of it to a filter.
+    /// Passes all of them to a filter.
     pub(crate) fn all(&self, navigator: &mut Navigator) -> Answers {
         [
             self.relative.map(|relative| navigator.relative_pose(&relative)),

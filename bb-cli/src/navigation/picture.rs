@@ -6,7 +6,7 @@ use crate::plot::{Line, PALETTE, Panel, Part, Plane, Point, Scale, Sheet};
 use bb_estimators::navigation::chi_square::limit;
 use std::path::Path;
 
-/// A picture of more is larger than most viewers open.
+/// Most viewers cannot open a picture with more panels.
 const MOST_PANELS: usize = 120;
 
 /// Of what is expected, and of what was refused.
@@ -14,10 +14,10 @@ const BOUND: (u8, u8, u8) = (150, 150, 150);
 const TRUTH: (u8, u8, u8) = (110, 110, 110);
 const REFUSED: (u8, u8, u8) = (213, 0, 0);
 
-/// Which part of good innovations is within their bound.
+/// The fraction of good innovations within their bound.
 const WITHIN: f64 = 0.95;
 
-/// In so many steps the errors by the age of the anchor are averaged.
+/// The number of bins for errors by the age of the anchor.
 const AGES: usize = 20;
 
 /// A filter on a data set.
@@ -94,14 +94,14 @@ fn track(run: &Drawn) -> Plane {
     }
 }
 
-/// An error and what it keeps within.
+/// An error and its bound.
 fn bounded(
     rows: &[Row],
     error: &dyn Fn(&Row) -> Option<f64>,
     deviation: &dyn Fn(&Row) -> Option<f64>,
 ) -> Vec<Line> {
     let line = |value: &dyn Fn(&Row) -> Option<f64>| -> Vec<Point> {
-        // Between instants of the truth nothing is missing.
+        // The line is not interrupted between samples of the truth.
         rows.iter().filter(|row| row.errors.is_some()).map(|row| (row.time_s, value(row))).collect()
     };
     vec![

@@ -1,4 +1,4 @@
-//! A filter while a data set is played: what all of them are asked for.
+//! The common interface to filters while a data set is played.
 
 use super::data::{DataSet, Keyframe, nanoseconds};
 use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params, uses_landmarks};
@@ -12,7 +12,7 @@ use bb_estimators::navigation::{
 };
 use std::time::Instant;
 
-/// States of the smoother: the scale of relative poses besides those of navigation.
+/// State of the smoother: navigation and the scale of relative poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scaled;
 
@@ -22,7 +22,7 @@ impl States for Scaled {
 
 type Smoother = FixedLagSmoother<Scaled, { Scaled::DIMENSION }>;
 
-/// A filter that was made for a data set.
+/// A filter created for a data set.
 pub(crate) enum Player {
     Filter(Box<Navigator>),
     Smoother(Box<Smoothed>),
@@ -54,7 +54,7 @@ impl Player {
         let sensors = params(data, settings)?;
         let navigator = |is_bank: bool| {
             let made = if is_bank { Navigator::new(sensors, aiding(data)) } else { Navigator::single(sensors) };
-            // It is large: the sooner it is on the heap, the better.
+            // It is large: move it to the heap early.
             made.map(Box::new).map_err(|error| error.to_string())
         };
         let smoothed = |is_bank: bool| {
@@ -63,7 +63,7 @@ impl Player {
             let mut smoother = Smoother::new(params).map_err(|error| error.to_string())?;
             let camera = data.camera.filter(|_| uses_landmarks(settings));
             if let Some(camera) = camera {
-                // So many that a data set of any density fits.
+                // Enough for a data set of any density.
                 let params = LandmarkParams { landmarks: 2000, ..LandmarkParams::default() };
                 smoother.set_camera(camera, params).map_err(|error| error.to_string())?;
             }
@@ -121,7 +121,7 @@ impl Player {
         Ok(())
     }
 
-    /// From the keyframe before to keyframe `k`.
+    /// From the previous keyframe to keyframe `k`.
     pub(crate) fn play(
         &mut self,
         data: &DataSet,
@@ -135,7 +135,8 @@ impl Player {
             return Ok(step);
         }
         let began = Instant::now();
-        // Time is that of the keyframe and the lengths of the samples since, as the samples' own stamps may jitter.
+        // The time is that of the keyframe plus the lengths of the samples since, as the samples' own stamps may
+        // jitter.
         let mut time_s = from.time_s;
         for sample in data.samples.get(from.sample..to.sample).unwrap_or_default() {
             time_s += sample.dt;
@@ -242,7 +243,7 @@ impl Smoothed {
         Ok(())
     }
 
-    /// All that is done at a keyframe.
+    /// All processing at a keyframe.
     fn keyframe(&mut self, measured: &Measured, k: u64) -> Result<Answers, Refusal> {
         let smoother = &mut self.smoother;
         smoother.add_keyframe(k)?;
@@ -263,8 +264,8 @@ impl Smoothed {
         Ok(answers)
     }
 
-    /// Takes the noise that the filters have found, if what it has is implausible beside that. Then it takes their estimate as
-    /// well: what was smoothed with the wrong noise is wrong.
+    /// Adopts the noise that the filters have found, if its own is implausible in comparison. It then adopts their
+    /// estimate as well: smoothing with the wrong noise gave wrong results.
     fn learn(&mut self, keyframe: Option<u64>) {
         let Some(twin) = &self.twin else { return };
         let (learnt, plausibility) = twin.learnt();
@@ -272,18 +273,18 @@ impl Smoothed {
             return;
         }
         self.learnt = Some(learnt);
-        // They were made with it, so it is accepted.
+        // They were created with it, so it is accepted.
         let _ = self.smoother.set_sensors(learnt.sensors);
         self.gnss.set_variance_factor(learnt.gnss_variance_factor);
         if let (Some(k), Some((estimate, covariance))) = (keyframe, twin.estimate()) {
-            // What cannot be adopted leaves the smoother as it is.
+            // Noise that cannot be adopted leaves the smoother unchanged.
             let _ = self.smoother.adopt::<Navigated, NAVIGATED>(k, &estimate, &covariance);
         }
     }
 }
 
-/// Odds against the noise that a smoother has at which it takes another: strong evidence, in the words of R. E. Kass,
-/// A. E. Raftery, "Bayes factors", Journal of the American Statistical Association 90(430), 1995.
+/// Odds against the smoother's noise at which it adopts another: strong evidence according to R. E. Kass, A. E.
+/// Raftery, "Bayes factors", Journal of the American Statistical Association 90(430), 1995.
 const IMPLAUSIBLE: f64 = 10.0;
 
 const _: () = assert!(Scaled::DIMENSION == NAVIGATION + 1);

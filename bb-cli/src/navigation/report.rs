@@ -1,4 +1,4 @@
-//! What `bb eval navigation` prints.
+//! The output of `bb eval navigation`.
 
 use super::evaluate::NavigationScore;
 use serde::Serialize;
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// A data set, a filter's name, and its score.
 pub(crate) type Scored = (PathBuf, &'static str, NavigationScore);
 
-/// One object of `--json`; what the truth does not hold is null.
+/// One object of `--json`; values missing in the truth are null.
 #[derive(Serialize)]
 struct Object {
     file: String,

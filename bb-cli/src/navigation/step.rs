@@ -1,10 +1,10 @@
-//! What a filter says of a keyframe, and how it came there.
+//! The estimate at a keyframe, and how it was reached.
 
 use super::measured::Answers;
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::Estimate;
 
-/// What a filter says of a keyframe.
+/// The estimate at a keyframe.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Known {
     pub(crate) position: Vector3<f64>,
@@ -21,28 +21,28 @@ impl Known {
     }
 }
 
-/// What became of the measurements of each sensor at a keyframe, and why one was refused, in the order of
+/// The results of each sensor's measurements at a keyframe, with the reason for a refusal, in the order of
 /// [`Sensor::ALL`](super::measured::Sensor::ALL).
 pub(crate) type Taken = [Option<Result<(), String>>; 4];
 
-/// How it went from one keyframe to the next.
+/// The step from one keyframe to the next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Step {
     pub(crate) refused: u64,
-    /// Samples of the IMU among them, and why the first was.
+    /// The number of refused IMU samples, and why the first was.
     pub(crate) samples: (u64, Option<String>),
-    /// With the samples for a filter; without for a smoother, whose samples are integrated as they come.
+    /// Includes the samples for a filter; not for a smoother, whose samples are integrated as they arrive.
     pub(crate) keyframe_s: f64,
     pub(crate) propagation_s: f64,
     /// Of the heap, at the keyframe.
     pub(crate) allocations: u64,
-    /// Innovations, of a filter or smoother that tells them.
+    /// Innovations, if the filter or smoother reports them.
     pub(crate) answers: Answers,
     pub(crate) taken: Taken,
 }
 
 impl Step {
-    /// Notes what a filter or smoother answered.
+    /// Records the answers of a filter or smoother.
     pub(crate) fn answer(&mut self, answers: Answers) {
         self.answers = answers;
         self.take(
@@ -50,7 +50,7 @@ impl Step {
         );
     }
 
-    /// Notes what became of the measurements.
+    /// Records the results of the measurements.
     pub(crate) fn take(&mut self, taken: Taken) {
         self.refused += taken.iter().flatten().map(|taken| u64::from(taken.is_err())).sum::<u64>();
         self.taken = taken;

@@ -1,4 +1,4 @@
-//! What happens while a data set is played, for a plot.
+//! A record of playing a data set, for a plot.
 
 use super::data::{DataSet, Keyframe, Truth};
 use super::errors::Errors;
@@ -12,7 +12,7 @@ use bb_estimators::navigation::Refusal;
 pub(crate) struct Trace {
     pub(crate) rows: Vec<Row>,
     pub(crate) innovations: Vec<Innovation>,
-    /// Where the fixes were.
+    /// The positions of the fixes.
     pub(crate) fixes: Vec<Vector3<f64>>,
     last_anchor_s: Option<f64>,
 }
@@ -24,18 +24,18 @@ pub(crate) struct Row {
     pub(crate) position: Vector3<f64>,
     pub(crate) truth: Option<Truth>,
     pub(crate) errors: Option<Errors>,
-    /// Since the last absolute pose that was fused, s.
+    /// Time since the last fused absolute pose, s.
     pub(crate) anchor_age_s: Option<f64>,
 }
 
-/// A measurement that was compared with what was expected.
+/// A measurement compared with its prediction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Innovation {
     pub(crate) time_s: f64,
     pub(crate) sensor: Sensor,
     /// Normalised innovation squared.
     pub(crate) nis: f64,
-    /// Whether the gate let it pass.
+    /// Whether it passed the gate.
     pub(crate) is_fused: bool,
 }
 

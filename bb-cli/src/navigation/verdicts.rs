@@ -1,4 +1,4 @@
-//! Whether a filter has taken what it was given.
+//! Whether a filter has accepted its input.
 
 use super::doubt::{distrusted, is_most};
 use super::measured::Sensor;
@@ -12,7 +12,7 @@ struct Verdict {
     first: Option<String>,
 }
 
-/// What became of the samples of the IMU and of the measurements.
+/// The results of the IMU samples and of the measurements.
 #[derive(Debug, Default)]
 pub(crate) struct Verdicts {
     samples: Verdict,
@@ -20,7 +20,7 @@ pub(crate) struct Verdicts {
 }
 
 impl Verdicts {
-    /// Adds what happened on the way to a keyframe, over so many samples.
+    /// Adds the results of a step to a keyframe, over this many samples.
     pub(crate) fn add(&mut self, step: &Step, samples: usize) {
         let (refused, first) = &step.samples;
         self.samples.all += samples as u64;
@@ -38,7 +38,7 @@ impl Verdicts {
         }
     }
 
-    /// Of which more than half were refused, and why the first was.
+    /// The sensors with more than half refused, and why the first was.
     pub(crate) fn doubts(&self) -> Vec<String> {
         let names = Sensor::ALL.iter().map(|sensor| sensor.name());
         let all = std::iter::once(("samples of the IMU", &self.samples)).chain(names.zip(&self.measured));

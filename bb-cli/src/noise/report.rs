@@ -1,4 +1,4 @@
-//! What `bb eval noise` prints and draws.
+//! The output and the plot of `bb eval noise`.
 
 use super::{AXES, Noise};
 use crate::plot::{Line, PALETTE, Part, Plane, Scale, Sheet};
@@ -17,7 +17,7 @@ struct Axis {
     noise_density_deviation: f64,
     bias_instability: f64,
     bias_instability_time_s: f64,
-    /// Whether the curve rises again behind; else the bias instability is an upper limit.
+    /// Whether the curve rises again after its minimum; otherwise the bias instability is an upper limit.
     bias_instability_is_lowest: bool,
     random_walk: f64,
     random_walk_deviation: f64,
@@ -47,7 +47,7 @@ impl Axis {
     }
 }
 
-/// What each filter can be told; in rad/s, m/s² and roots of Hz or s.
+/// The options of each filter; in rad/s, m/s² and roots of Hz or s.
 const ESKF: [&str; 4] =
     ["gyroscope_noise", "accelerometer_noise", "gyroscope_bias_walk", "accelerometer_bias_walk"];
 const MEKF: [&str; 2] = ["gyroscope_noise", "bias_drift"];
@@ -56,7 +56,7 @@ const MEKF: [&str; 2] = ["gyroscope_noise", "bias_drift"];
 struct Options {
     gyroscope_noise: Option<f64>,
     accelerometer_noise: Option<f64>,
-    /// Where a random walk is seen; else what it is at most.
+    /// If a random walk is seen; otherwise its upper limit.
     gyroscope_walk: Option<f64>,
     accelerometer_walk: Option<f64>,
 }
@@ -166,7 +166,7 @@ pub(super) fn text(found: &[Noise]) -> String {
     text
 }
 
-/// Says on the error stream what is wrong; whether all axes gave their noise.
+/// Prints faults to the error stream; returns whether noise was found for all axes.
 pub(super) fn complain(noise: &Noise) -> bool {
     let file = noise.file.display();
     for warning in &noise.still.warnings {

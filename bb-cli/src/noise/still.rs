@@ -1,28 +1,28 @@
-//! The part of a recording in which the IMU is at rest and nothing is missing.
+//! The part of a recording in which the IMU is at rest and no samples are missing.
 
 use super::{AXES, Sample};
 use std::ops::Range;
 
-/// What is longer between two samples, in periods, is a gap.
+/// A longer time between two samples, in periods, is a gap.
 const GAP: f64 = 1.5;
 
-/// Motion is looked for in windows of this length, s.
+/// Motion is detected in windows of this length, s.
 const WINDOW_S: f64 = 1.0;
 
-/// A window whose samples vary so many times as much as usual is motion, and one whose mean differs from that of the one before by
-/// so many times what a sample usually varies by: no bias walks so fast.
+/// A window is motion if its samples vary this many times as much as usual, or if its mean differs from the previous
+/// one by this many times the usual variation of a sample: no bias drifts so fast.
 const MORE: f64 = 4.0;
 
-/// A gyroscope that reads more does not lie still, rad/s.
+/// A gyroscope at rest reads less, rad/s.
 const TURNING: f64 = 0.2;
 
-/// The least, s.
+/// The shortest usable part, s.
 const LEAST_S: f64 = 10.0;
 
-/// A sensor of fewer levels is not told from one that is saturated.
+/// With fewer levels, a sensor cannot be distinguished from a saturated one.
 const LEVELS: usize = 20;
 
-/// The part of the samples at one end of the range that only saturation explains.
+/// A larger fraction of samples at one end of the range means saturation.
 const AT_THE_END: f64 = 0.1;
 
 /// The longest part in which the IMU is at rest.
@@ -33,13 +33,13 @@ pub(super) struct Still {
     /// After the first sample of the recording, s.
     pub(super) from_s: f64,
     pub(super) seconds: f64,
-    /// What is not as it should be.
+    /// Remarks on the recording.
     pub(super) warnings: Vec<String>,
 }
 
 /// # Errors
 ///
-/// There is no such part that is long enough; in words.
+/// There is no long enough part at rest; in words.
 pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
     let (Some(first), true) = (samples.first(), samples.len() >= 2) else {
         return Err(format!("{} samples are too few", samples.len()));
@@ -78,7 +78,7 @@ pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
     Ok(Still { samples: longest, period_s, from_s, seconds, warnings })
 }
 
-/// Where a part ends and the next begins, as ranges of samples that belong to neither.
+/// The boundaries between parts, as ranges of samples that belong to neither.
 fn gaps(
     samples: &[Sample],
     usual: i64,
@@ -170,7 +170,7 @@ fn moments(samples: &[Sample], axis: usize) -> (f64, f64) {
     (mean, variance.sqrt())
 }
 
-/// The longest range that none of these overlaps.
+/// The longest range that overlaps none of these.
 fn longest(count: usize, breaks: &[Range<usize>]) -> Range<usize> {
     let (mut longest, mut from) = (0..0, 0);
     for part in breaks.iter().chain([&(count..count)]) {
@@ -192,7 +192,7 @@ fn turning(samples: &[Sample]) -> Result<(), String> {
     Ok(())
 }
 
-/// What is to be said of an axis that stays at the end of its range.
+/// A remark on an axis that stays at the end of its range.
 fn saturated(samples: &[Sample], axis: usize) -> Option<String> {
     let mut values: Vec<_> = samples.iter().map(|sample| sample.axes[axis]).collect();
     values.sort_by(f64::total_cmp);

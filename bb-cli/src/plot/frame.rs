@@ -1,4 +1,4 @@
-//! Lines over two axes, and what they are called beside them.
+//! Lines over two axes, with labels and a legend.
 
 use super::Drawn;
 use super::line::Line;
@@ -31,14 +31,14 @@ pub(super) struct Frame<'a> {
     pub(super) height: u32,
 }
 
-/// How numbers become places on both axes.
+/// The mapping from numbers to positions on both axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Alike everywhere, each axis by itself.
+    /// Linear, each axis by itself.
     Linear,
-    /// Alike on both axes: a map.
+    /// Linear, with the same scale on both axes: a map.
     Square,
-    /// By powers of ten; what is not positive is left out.
+    /// Logarithmic; values that are not positive are left out.
     Logarithmic,
 }
 
@@ -47,7 +47,7 @@ impl Frame<'_> {
         self.lines.iter().filter(|line| !line.runs.is_empty())
     }
 
-    /// A run of points as the axes have them.
+    /// A run of points in axis coordinates.
     fn placed<'p>(&self, run: &'p [(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + 'p {
         let is_logarithmic = self.scale == Scale::Logarithmic;
         run.iter().filter(move |(x, y)| !is_logarithmic || (*x > 0.0 && *y > 0.0)).map(move |(x, y)| {
@@ -58,12 +58,12 @@ impl Frame<'_> {
         })
     }
 
-    /// The room for the legend, in pixels.
+    /// The width of the legend, in pixels.
     pub(super) fn legend_width<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> u32 {
         let font = FONT.into_font().into_text_style(area);
         let width = |line: &Line| area.estimate_text_size(&line.label, &font).map_or(0, |(width, _)| width);
         let widest = self.shown().map(width).max().unwrap_or(0);
-        // The estimate is rough: a tenth more.
+        // The estimate is rough: add a tenth.
         widest + widest / 10 + (KEY + 3 * SPACE).unsigned_abs()
     }
 
@@ -152,7 +152,7 @@ fn stroke(line: &Line) -> ShapeStyle {
     RGBColor(red, green, blue).stroke_width(line.width)
 }
 
-/// A number at an axis of this span, with as many digits as tell it from its neighbours.
+/// A number at an axis of this span, with enough digits to distinguish neighbouring ticks.
 fn tick(value: f64, span: f64) -> String {
     let decimals = (1.0 - span.log10()).ceil();
     match decimals {

@@ -1,8 +1,8 @@
-//! Values over time, thinned to what a picture can show.
+//! Values over time, reduced to the resolution of a picture.
 
 use super::palette::Colour;
 
-/// More points than pixels show nothing more.
+/// More points than pixels show no more detail.
 const MOST_POINTS: usize = 4000;
 
 /// Seconds and a value; `None` where the value is missing.
@@ -33,7 +33,7 @@ impl Line {
         Self { label: label.into(), colour, width, runs: runs(&thinned, |_, _| false) }
     }
 
-    /// A line through angles in degrees, interrupted also where they jump from one end of the circle to the other.
+    /// A line through angles in degrees, also interrupted where they wrap around.
     pub fn degrees(label: impl Into<String>, colour: Colour, width: u32, points: &[Point]) -> Self {
         let thinned = thin(points, MOST_POINTS, |points, thinned| thinned.push(points[0]));
         Self {
@@ -44,7 +44,7 @@ impl Line {
         }
     }
 
-    /// A line from point to point, in their order; of points too many to show, one in so many stays.
+    /// A line from point to point, in order; if there are too many points to show, every n-th one is kept.
     pub fn path(label: impl Into<String>, colour: Colour, width: u32, points: &[(f64, f64)]) -> Self {
         let points: Vec<Point> =
             points.iter().map(|(x, y)| (*x, Some(*y).filter(|_| x.abs() <= LARGEST))).collect();
@@ -52,7 +52,7 @@ impl Line {
         Self { label: label.into(), colour, width, runs: runs(&thinned, |_, _| false) }
     }
 
-    /// A line through errors: of points too many to show, the largest stay.
+    /// A line through errors; if there are too many points to show, the largest are kept.
     pub fn peaks(label: impl Into<String>, colour: Colour, width: u32, points: &[Point]) -> Self {
         let thinned =
             thin(points, MOST_POINTS, |points, thinned| thinned.push(points[extreme(points, |a, b| a > b)]));
@@ -70,13 +70,14 @@ fn thin(points: &[Point], most: usize, keep: impl Fn(&[Point], &mut Vec<Point>))
     thinned
 }
 
-/// The index of the value that comes before all others; of none, the first.
+/// The index of the value that comes before all others; of an empty slice, the first.
 fn extreme(points: &[Point], is_before: impl Fn(f64, f64) -> bool) -> usize {
     let values = points.iter().enumerate().filter_map(|(index, (_, value))| Some((index, (*value)?)));
     values.reduce(|best, next| if is_before(next.1, best.1) { next } else { best }).map_or(0, |(index, _)| index)
 }
 
-/// What is larger is no measurement, and the difference of two such is not finite: the marks of an axis would never end.
+/// Larger values are not measurements, and the difference of two would not be finite: the axis would get infinitely
+/// many ticks.
 const LARGEST: f64 = 1e300;
 
 /// Runs of values that can be drawn, interrupted between a value and the next where `is_break` says so.

@@ -6,11 +6,11 @@ use super::line::Line;
 /// Lines over one time axis.
 #[derive(Clone, Debug)]
 pub struct Panel {
-    /// Above it; may be empty.
+    /// The title above it; may be empty.
     pub title: String,
-    /// What the values are, with their unit: `roll (deg)`.
+    /// The label of the values, with their unit: `roll (deg)`.
     pub axis: String,
-    /// Those without a point are left out.
+    /// Lines without points are left out.
     pub lines: Vec<Line>,
 }
 

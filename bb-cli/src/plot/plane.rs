@@ -8,15 +8,15 @@ use std::path::Path;
 /// Lines over two quantities: a map, or a spectrum.
 #[derive(Clone, Debug)]
 pub struct Plane {
-    /// Above it; may be empty.
+    /// The title above it; may be empty.
     pub title: String,
-    /// What is along, with its unit.
+    /// The label of the horizontal axis, with its unit.
     pub x_axis: String,
-    /// What is upwards, with its unit.
+    /// The label of the vertical axis, with its unit.
     pub y_axis: String,
-    /// How both axes are divided.
+    /// The scale of both axes.
     pub scale: Scale,
-    /// Those without a point are left out.
+    /// Lines without points are left out.
     pub lines: Vec<Line>,
 }
 
@@ -27,10 +27,10 @@ impl Plane {
     }
 }
 
-/// What a [`Sheet`] has.
+/// A part of a [`Sheet`].
 #[derive(Clone, Debug)]
 pub enum Part {
-    /// As high as so many panels.
+    /// As high as this many panels.
     Plane(Plane, u32),
     /// Over time.
     Panel(Panel),
@@ -39,7 +39,7 @@ pub enum Part {
 /// Planes and panels below one another, with a title.
 #[derive(Clone, Debug)]
 pub struct Sheet {
-    /// Above them.
+    /// The title above them.
     pub title: String,
     /// From the top.
     pub parts: Vec<Part>,
@@ -48,7 +48,7 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// Writes it, an SVG or a PNG by the file's name.
+    /// Writes it as an SVG or a PNG, depending on the file's name.
     ///
     /// # Errors
     /// It cannot be written there.

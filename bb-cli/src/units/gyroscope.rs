@@ -1,29 +1,30 @@
-//! Whether the gyroscope is in rad/s: over a second the direction of gravity must turn as the gyroscope says.
+//! Checks whether the gyroscope is in rad/s: over a second, the direction of gravity must turn as the gyroscope
+//! reports.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 
 /// The time over which turns are compared.
 const SPAN_S: f64 = 1.0;
-/// Directions of gravity are means over so many samples at both ends.
+/// Directions of gravity are means over this many samples at both ends.
 const MEAN: usize = 5;
-/// Between samples farther apart nothing is known of the turn.
+/// If samples are farther apart, the turn between them is unknown.
 const LONGEST_S: f64 = 0.1;
-/// A verdict needs so many spans in motion,
+/// A verdict needs this many spans in motion,
 const FEWEST: usize = 3;
-/// which the unit at hand misses by this median, rad,
+/// where the assumed unit is wrong by this median, rad,
 const WRONG: f64 = 0.1;
-/// and the other unit by so many times less.
+/// and the other unit by this factor less.
 const CLEARER: f64 = 3.0;
-/// No gyroscope of a robot measures more, rad/s: 2,000 deg/s.
+/// The largest rate of a robot's gyroscope, rad/s: 2,000 deg/s.
 const FASTEST: f64 = 35.0;
 
 type Sample = (f64, Vector3<f64>, Vector3<f64>);
 
-/// What is wrong with the unit; nothing, if nothing is, or the recording does not tell.
+/// A remark on the unit; `None` if it is right, or the recording does not show it.
 pub(super) fn verdict(samples: &[Sample]) -> Option<String> {
     let mut errors: Vec<(f64, f64)> = spans(samples)
         .map(|span| (error(span, 1.0), error(span, std::f64::consts::PI / 180.0)))
-        // Spans at rest tell nothing: both units give no turn.
+        // Spans at rest are uninformative: both units give no turn.
         .filter(|(as_radians, as_degrees)| as_radians.max(*as_degrees) > WRONG)
         .collect();
     if errors.len() >= FEWEST {
@@ -52,7 +53,7 @@ pub(super) fn verdict(samples: &[Sample]) -> Option<String> {
     })
 }
 
-/// The samples of each span, one after the other, without those that have a gap.
+/// The samples of each span, consecutively, without spans that have a gap.
 fn spans(samples: &[Sample]) -> impl Iterator<Item = &[Sample]> {
     let mut rest = samples;
     std::iter::from_fn(move || {
@@ -69,7 +70,8 @@ fn spans(samples: &[Sample]) -> impl Iterator<Item = &[Sample]> {
     })
 }
 
-/// The angle between gravity at the end of a span as it is measured and as the gyroscope, times `scale`, says.
+/// The angle between the measured direction of gravity at the end of a span and the one predicted by the gyroscope
+/// times `scale`.
 fn error(span: &[Sample], scale: f64) -> f64 {
     let mean = |samples: &[Sample]| samples.iter().map(|(.., force)| force).sum::<Vector3<f64>>();
     let (start, end) = (mean(&span[..MEAN]), mean(&span[span.len() - MEAN..]));

@@ -7,24 +7,24 @@ use super::text::{Text, contains};
 use crate::component::{Estimator, Inputs, Options, Outputs, TakenAt};
 use crate::stub::UNKNOWN_INDEX;
 
-/// What is wrong with the inputs of an estimator.
+/// A fault in the inputs of an estimator.
 #[derive(Clone, Copy)]
 enum InputFault {
-    /// The algorithm takes one input, and several are declared.
+    /// The algorithm takes one input, but several are declared.
     Single,
     /// A required one is not declared.
     Missing(&'static str),
-    /// It is nested, and the algorithm needs several inputs.
+    /// It is nested, but the algorithm needs several inputs.
     NeedsSeveral,
-    /// It is nested, and the algorithm needs none of its several inputs.
+    /// It is nested, but the algorithm requires none of its several inputs.
     NeedsNone,
 }
 
-/// Checks that an estimator has its required options among `given`, its required inputs among `declared`, and an output if it
-/// has several. `declared` is `None` for a nested estimator, whose one input is its sensor's.
+/// Checks that an estimator has its required options among `given`, its required inputs among `declared`, and an
+/// output if it has several. `declared` is `None` for a nested estimator, whose only input is its sensor's.
 ///
-/// Everything that is missing is one message, since it is reported at one word. The text is made only if something is missing:
-/// rustc interprets these functions for each estimator of each robot.
+/// Everything missing is reported in one message, since it is reported at one token. The text is built only if
+/// something is missing: rustc interprets these functions for each estimator of each robot.
 #[track_caller]
 pub const fn check_estimator<E: Estimator>(
     estimator: &str,
@@ -63,7 +63,7 @@ const fn missing_input<I: Inputs>(declared: &[&str]) -> Option<InputFault> {
     }
     let mut number = 0;
     while number < declared.len() {
-        // A misspelt name is reported as such, and may be meant to be the missing one.
+        // A misspelt name is reported as such, and may be meant as the missing one.
         if find_input::<I>(declared[number]) == UNKNOWN_INDEX {
             return None;
         }
@@ -110,7 +110,7 @@ const fn describe_input(text: Text, estimator: &str, fault: InputFault) -> Text 
     }
 }
 
-/// An algorithm of several outputs has none declared.
+/// An algorithm with several outputs has none declared.
 const fn describe_outputs(text: Text, estimator: &str, fields: &[&str]) -> Text {
     let text = text.name(estimator).push(" has several outputs; declare the ones to publish, `output ");
     list(text.push(fields[0]).push(";`, of "), fields)

@@ -51,7 +51,7 @@ pub(super) const fn missing_option<'a>(fields: &'a [OptionField], given: &[&str]
     None
 }
 
-/// That it is missing.
+/// The error text for a missing option.
 pub(super) const fn describe_missing(text: Text, component: &str, field: &OptionField) -> Text {
     let text = text.name(component).push(" needs the option ").name(field.name);
     text.push("; give it: `").push(component).push("(").push(field.name).push(" = …)`")

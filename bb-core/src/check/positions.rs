@@ -2,7 +2,7 @@
 
 use super::text::Text;
 
-/// Checks that one of the publishers at the joint tells its position.
+/// Checks that one of the publishers at the joint reports its position.
 #[track_caller]
 pub const fn check_position(actuator: &str, joint: &str, tell: &[bool]) {
     let mut index = 0;

@@ -22,7 +22,7 @@ pub const fn check_role(command: &str, role: Role, before: &[(&str, Role)]) {
     }
 }
 
-/// Checks that a command that arms may start while the robot is disarmed, and one that disarms while it is not.
+/// Checks that an arming command may start while the robot is disarmed, and a disarming one while it is not.
 #[track_caller]
 pub const fn check_reachable(command: &str, role: Role, allowed: &[&str]) {
     let (mut disarmed, mut other, mut index) = (false, false, 0);

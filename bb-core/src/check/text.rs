@@ -1,6 +1,6 @@
-//! Text made at compile time, and the distance of two names.
+//! Text built at compile time, and the distance between two names.
 
-/// A text of bounded length, made in a constant.
+/// A text of bounded length, built in a constant.
 #[derive(Clone, Copy)]
 pub(super) struct Text {
     bytes: [u8; 1024],
@@ -92,7 +92,7 @@ const fn longest(a: &str, b: &str) -> usize {
     if a.len() > b.len() { a.len() } else { b.len() }
 }
 
-/// Levenshtein's distance, in bytes; names over 63 bytes are far from everything.
+/// Levenshtein distance, in bytes; names over 63 bytes are far from everything.
 const fn distance(a: &str, b: &str) -> usize {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     if a.len() > 63 || b.len() > 63 {

@@ -6,23 +6,23 @@ use crate::time::MonotonicTime;
 
 /// Moves a joint.
 ///
-/// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. The
-/// framework starts and stops it with the robot, makes it safe when the robot is disarmed, and publishes the commands it was
-/// carried out at its path. A command whose payload is a [`JointCommand`](crate::JointCommand), as the standard ones are, is held
-/// to the limits of the joint first. An actuator says what it does with [`ActuatorContext::begin_motion`] and
-/// [`ActuatorContext::end_motion`].
+/// It gets its commands only while the robot is armed, one at a time, on the thread that sends them. The framework
+/// starts and stops it with the robot, makes it safe when the robot is disarmed, and publishes the commands that it
+/// carried out at its path. A command whose payload is a [`JointCommand`](crate::JointCommand), as the standard ones
+/// are, is first held to the limits of the joint. An actuator reports its motions with
+/// [`ActuatorContext::begin_motion`] and [`ActuatorContext::end_motion`].
 ///
 /// ```
 /// use bb_core::prelude::*;
 ///
-/// /// Where a joint is to go.
+/// /// The target position of a joint.
 /// #[derive(Clone, Copy, Debug, Payload)]
 /// pub struct Position {
 ///     /// rad or m.
 ///     pub position: f64,
 /// }
 ///
-/// /// A servo that believes that it is where it was told to go.
+/// /// A servo that assumes it has reached its commanded position.
 /// #[derive(Debug, Default)]
 /// pub struct Servo {
 ///     target: f64,
@@ -68,10 +68,10 @@ pub trait Actuator: Sized + Send + 'static {
     /// Carries out a command.
     ///
     /// # Errors
-    /// Any error: it is reported, and the actuator is made safe and restarted.
+    /// Any error is reported, and the actuator is made safe and restarted.
     fn handle_command(&mut self, command: &Stamped<Self::Command>) -> Result<(), Fault>;
 
-    /// When [`update`](Self::update) is to be called; asked after each call of its code. None, the default: not at all.
+    /// When to call [`update`](Self::update); asked after each call of its code. The default is `None`: never.
     fn next_update(&self) -> Option<MonotonicTime> {
         None
     }

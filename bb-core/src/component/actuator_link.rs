@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 /// Sends commands of type `T` to one actuator.
 ///
-/// If the [`Command`](crate::Command) that obtained it is cancelled or times out, dropping it with the command's future stops
-/// the joint, if the last command that the actuator carried out was sent by that command, and `T` has a command that stops
-/// ([`JointCommand::stop`](crate::JointCommand::stop)).
+/// If this link was obtained by a [`Command`](crate::Command) that is cancelled or times out, the link is dropped
+/// with the command's future. That stops the joint, provided that command sent the last command that the actuator
+/// carried out, and `T` has a stop command ([`JointCommand::stop`](crate::JointCommand::stop)).
 pub struct ActuatorLink<T: Payload> {
     accepts: Arc<dyn Accepts<T>>,
     permit: Permit,
@@ -21,7 +21,7 @@ impl<T: Payload> ActuatorLink<T> {
         Self { accepts, permit }
     }
 
-    /// Sends a command; it has been carried out when this returns.
+    /// Sends a command, and returns once it has been carried out.
     ///
     /// # Errors
     /// The robot is not armed, the command holds a NaN, the actuator has failed, or the command that obtained this link has
@@ -58,7 +58,7 @@ impl<T: Payload> fmt::Debug for ActuatorLink<T> {
 pub enum ActuatorError {
     /// The robot is not armed.
     NotArmed(Safety),
-    /// The command that sent this has ended or was cancelled: its handles are dead.
+    /// The command that sent this has ended or was cancelled; its handles no longer work.
     Cancelled,
     /// The command holds a NaN or an infinity.
     NonFinite,
@@ -68,8 +68,8 @@ pub enum ActuatorError {
     Stopped,
     /// The actuator has failed at this command.
     Failed(String),
-    /// The actuator's own code has sent this, or that of another actuator which it waits for in turn, and would wait for
-    /// itself.
+    /// The caller is the actuator's own code, or the code of another actuator which it waits for in turn, and would
+    /// wait for itself.
     Inside,
 }
 
@@ -100,6 +100,6 @@ impl From<OutOfBounds> for ActuatorError {
 /// An actuator that takes commands of type `T`.
 pub(crate) trait Accepts<T>: Send + Sync {
     fn accept(&self, command: T, permit: &Permit) -> Result<(), ActuatorError>;
-    /// Stops the joint if the last command that was carried out came with that permit.
+    /// Stops the joint if the last command carried out came with that permit.
     fn stop_motion_of(&self, permit: &Permit);
 }

@@ -34,7 +34,7 @@ impl<O: Options> Binding<O> {
     }
 }
 
-/// A type that an option bound to a parameter of type `T` can have.
+/// The type of an option that can be bound to a parameter of type `T`.
 #[diagnostic::on_unimplemented(
     message = "an option of type `{Self}` cannot be bound to a parameter of type `{T}`",
     label = "is a parameter of type `{T}`"
@@ -57,7 +57,7 @@ macro_rules! from_parameter {
 from_parameter! {
     bool => bool: |value| value;
     f64 => f64: |value| value, f32: |value| (value as f32).clamp(f32::MIN, f32::MAX), Duration: |value| FromQuantity::from_quantity(value);
-    // Beyond the option's own range the nearest number: what is out of the range that it states is refused.
+    // The nearest number, even beyond the option's own range: a value outside its stated range is refused.
     i64 => i64: |value| value,
         i32: |value| clamped(value),
         i16: |value| clamped(value),

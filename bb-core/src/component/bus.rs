@@ -46,7 +46,7 @@ impl Bus {
         subscribed.unwrap_or_else(|| Err(Fault::new("the robot is gone")))
     }
 
-    /// Subscribes to messages of any payload; with names of payload types, to those only.
+    /// Subscribes to messages of any payload; with names of payload types, only to those.
     pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
@@ -61,11 +61,11 @@ impl Bus {
         subscribed.unwrap_or_else(|| DynamicSubscription::new([], select, payloads, overflow))
     }
 
-    /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits, `_`, `-` and `.` with
-    /// `/` between them. Existing subscriptions to everything, or to a subtree with this path, receive what it
-    /// publishes. A second publisher at the same path shares it.
+    /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits,
+    /// `_`, `-` and `.`, separated by `/`. Existing subscriptions to everything, or to a subtree with this path,
+    /// receive its messages. A second publisher at the same path shares it.
     ///
-    /// A robot has at most 1024 such paths; the oldest that is no longer used makes room for a new one.
+    /// A robot has at most 1024 such paths; a new one replaces the oldest that is no longer used.
     ///
     /// # Errors
     /// The path is that of a declared publisher or of a topic that every robot has, it has another payload already, it is
@@ -76,7 +76,7 @@ impl Bus {
         Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), permit: self.permit.clone() })))
     }
 
-    /// All paths that are published at.
+    /// All paths with a publisher.
     pub fn paths(&self) -> Vec<&'static str> {
         self.with_topics(|topics| topics.iter().map(|topic| topic.path()).collect()).unwrap_or_default()
     }
@@ -110,7 +110,8 @@ impl Bus {
         self.host.actuators()
     }
 
-    /// The path of the actuator that moves a joint, the first that is declared if several do; none if none does.
+    /// The path of the actuator that moves a joint: the first declared one if there are several, `None` if there is
+    /// none.
     pub fn actuator_of(&self, joint: &str) -> Option<&'static str> {
         self.host.actuated_joints().into_iter().find(|(_, moved)| *moved == joint).map(|(path, _)| path)
     }

@@ -17,12 +17,13 @@ use std::time::Duration;
 
 /// A short task of a robot: arm, stop, move to a place.
 ///
-/// It is an `async` function on the robot's own clock: in a simulation, [`CommandContext::sleep`] takes virtual time. It may
-/// await anything else too. A command is cancelled by dropping its future, so what must be undone is undone in a `Drop`. From the moment it is cancelled, what it has obtained through its context refuses to act, even if its code
-/// blocks and has not noticed yet.
+/// It is an `async` function on the robot's own clock: in a simulation, [`CommandContext::sleep`] takes virtual time.
+/// It may await anything else too. A command is cancelled by dropping its future, so put cleanup in a `Drop`. From
+/// the moment it is cancelled, anything it has obtained through its context refuses to act, even if its code blocks
+/// and has not noticed yet.
 ///
-/// To a journal, commands are part of the outside world: it holds what they did and how they ended, and a replay does not
-/// run them.
+/// To a journal, commands are part of the outside world: it holds their effects and how they ended, and a replay does
+/// not run them.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -50,8 +51,8 @@ use std::time::Duration;
 pub trait Command: Sized + Send + 'static {
     /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
-    /// The arguments its caller gives; derive [`Payload`] for it, so that tools can start the command with arguments from JSON. A
-    /// command that a health transition starts gets the default.
+    /// The arguments its caller gives. Derive [`Payload`] for the type, so that tools can start the command with
+    /// arguments from JSON. A command started by a health transition gets the default.
     type Arguments: Field + Default + Send + 'static;
     /// Its result.
     type Output: Field + Send + 'static;
@@ -83,7 +84,7 @@ pub struct Outcome<T> {
 }
 
 impl<T> Outcome<T> {
-    /// Ends with that value; the robot goes back to the state it was in.
+    /// Ends with that value; the robot returns to its previous state.
     pub fn done(value: T) -> Self {
         Self { value, next_state: None }
     }
@@ -100,7 +101,7 @@ impl<T> Outcome<T> {
     }
 }
 
-/// What a running command is given, and how it reaches the robot.
+/// The context of a running command, through which it reaches the robot.
 #[derive(Clone, Debug)]
 pub struct CommandContext {
     pub(crate) name: &'static str,
@@ -137,16 +138,16 @@ impl CommandContext {
         }
     }
 
-    /// Whether it was cancelled or has timed out: what it sends is refused from then on. A command that blocks its thread
-    /// should check it from time to time.
+    /// Whether it was cancelled or has timed out. Anything it sends from then on is refused. A command that blocks
+    /// its thread should check this from time to time.
     pub fn is_cancelled(&self) -> bool {
         !self.permit.is_valid()
     }
 
-    /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs. It is removed when the
-    /// code of the command has returned. If the robot was disarmed in the meantime, it runs once more then, for what the code
-    /// has started since. All callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that
-    /// fails or takes longer leads to the safety state `error`.
+    /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs. It is
+    /// removed when the command's code has returned. If the robot was disarmed in the meantime, it then runs once
+    /// more, for anything the code has started since. All callbacks run concurrently, each on its own thread, and
+    /// must return within 5 s. One that fails or takes longer leads to the safety state `error`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.hooks.add(Arc::new(hook));
     }

@@ -14,7 +14,7 @@ use std::cell::RefCell;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What an estimator is given when it starts: its place in the robot, and where its inputs come from.
+/// An estimator's context at its start: its place in the robot, and where its inputs come from.
 #[derive(Debug)]
 pub struct Context {
     robot: &'static str,
@@ -35,13 +35,13 @@ impl Context {
         Self { robot, declaration, now, safety, requests: RefCell::default() }
     }
 
-    /// Takes what was asked for.
+    /// Takes the requests made so far.
     pub(crate) fn into_requests(self) -> Vec<Request> {
         self.requests.into_inner()
     }
 
-    /// A context of no robot, for tests of an estimator's `init`: an input at each transform given, the first one the
-    /// driver. (Contexts are constants of robots; this one is leaked, a few hundred bytes each time.)
+    /// A context without a robot, for tests of an estimator's `init`: an input at each transform given, the first
+    /// being the driver. (Contexts are constants of robots; this one is leaked, a few hundred bytes each time.)
     ///
     /// ```
     /// use bb_core::nalgebra::Isometry3;
@@ -84,13 +84,14 @@ impl Context {
         self.declaration.frame
     }
 
-    /// Takes points from the frame of `input` to the frame of the output: the product of the fixed joints between.
+    /// Transforms points from the frame of `input` to the frame of the output: the product of the fixed joints
+    /// between.
     ///
-    /// The identity where both are the same frame, and where the input has no frame (a robot-level sensor).
+    /// The identity if both are the same frame, or if the input has no frame (a robot-level sensor).
     ///
     /// # Errors
-    /// No input of that name is declared, or there is a moving joint between them: where the input is then changes, and
-    /// [`Estimator::handle_transforms`] is told with each message. (Only an estimator that declares
+    /// No input of that name is declared, or there is a moving joint between them. In that case the transform
+    /// changes, and [`Estimator::handle_transforms`] gets it with each message. (Only an estimator that declares
     /// [`Estimator::HANDLES_MOVING_JOINTS`] may span one.)
     ///
     /// [`Estimator::HANDLES_MOVING_JOINTS`]: super::Estimator::HANDLES_MOVING_JOINTS
@@ -116,7 +117,7 @@ impl Context {
         self.safety.hardware_error(message);
     }
 
-    /// The same for use in later callbacks: keep it.
+    /// A link with the same functions, to keep for later callbacks.
     pub fn safety(&self) -> SafetyLink {
         self.safety.clone()
     }
@@ -126,7 +127,7 @@ impl Context {
         self.requests.borrow_mut().push(request);
     }
 
-    /// What has been asked for: for tests.
+    /// The requests made so far: for tests.
     pub fn requests(&self) -> Vec<Request> {
         self.requests.borrow().clone()
     }
@@ -151,7 +152,7 @@ fn transform_of(input: &InputDeclaration) -> Result<Isometry3<f64>, Fault> {
     Ok(transform.isometry())
 }
 
-/// What every component that runs on a thread of its own, or owns hardware, is given when it starts.
+/// The context of a component that runs on its own thread or owns hardware, at its start.
 #[derive(Clone, Debug)]
 pub struct ComponentContext {
     path: &'static str,
@@ -188,9 +189,9 @@ impl ComponentContext {
         self.host.topology()
     }
 
-    /// A value that the components of this run share, made by the first that asks for its type: the world in which
-    /// simulated components are, or the bus that several drivers use. It lives as long as the robot runs, through restarts
-    /// of the components.
+    /// A value that the components of this run share, created by the first that asks for its type: the simulated
+    /// world of simulated components, or the bus that several drivers use. It lives as long as the robot runs,
+    /// through restarts of the components.
     pub fn shared<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Arc<T> {
         self.host.shared().get(make)
     }
@@ -199,9 +200,10 @@ impl ComponentContext {
         self.host.replacement(self.path)
     }
 
-    /// Registers a callback that makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches a laser off. All
-    /// callbacks run concurrently, each on a thread of its own, and must return within 5 s; one that fails or takes longer
-    /// leads to the safety state `error`. A restart of the component replaces what it registered before.
+    /// Registers a callback that makes its hardware safe when the robot is disarmed: stops a lidar's motor, switches
+    /// a laser off. All callbacks run concurrently, each on its own thread, and must return within 5 s. One that
+    /// fails or takes longer leads to the safety state `error`. A restart of the component replaces its earlier
+    /// callbacks.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.host.on_disarm(self.path, None, Arc::new(hook));
     }
@@ -238,25 +240,25 @@ macro_rules! component_context {
 }
 
 component_context! {
-    /// What a sensor is given when it starts.
+    /// A sensor's context at its start.
     SensorContext, SensorDeclaration
 }
 
 component_context! {
-    /// What a controller or a bridge is given when it starts.
+    /// The context of a controller or a bridge at its start.
     ServiceContext, SensorDeclaration
 }
 
-/// What an actuator is given when it starts.
+/// An actuator's context at its start.
 #[derive(Clone, Debug)]
 pub struct ActuatorContext {
     common: ComponentContext,
     declaration: &'static ActuatorDeclaration,
-    /// What it has reported and what is not yet published.
+    /// Reports not yet published.
     reports: Arc<Mutex<Vec<MotionReport>>>,
 }
 
-/// What an actuator reports of its motion.
+/// An actuator's report of its motion.
 #[derive(Clone, Debug)]
 pub(crate) enum MotionReport {
     Begin(BeginMotion),
@@ -281,14 +283,14 @@ impl SensorContext {
         period_s(self.declaration)
     }
 
-    /// Topics, actuators, parameters and commands, by path: for a sensor that computes what it reads from what others
-    /// publish. What it reads in `read` is no input: neither declared nor checked.
+    /// Topics, actuators, parameters and commands, by path: for a sensor whose readings are computed from what others
+    /// publish. Messages read this way in `read` are not inputs: they are neither declared nor checked.
     pub fn bus(&self) -> Bus {
         Bus::new(Arc::clone(&self.common.host), Permit::UNLIMITED)
     }
 
-    /// Takes points from the sensor's frame to the root link's: the product of the fixed joints between; `None` if
-    /// one of the joints moves, or the sensor has no frame.
+    /// Transforms points from the sensor's frame to the root link's: the product of the fixed joints between. `None`
+    /// if one of the joints moves, or the sensor has no frame.
     pub fn root_from_frame(&self) -> Option<Isometry3<f64>> {
         self.declaration.root_from_frame.map(|transform| transform.isometry())
     }
@@ -317,13 +319,14 @@ impl ActuatorContext {
         self.declaration.joint
     }
 
-    /// Publishes at `begin_motion` below the actuator's path that it begins to move its joint, once the call of its code
-    /// that says so has returned. What threads of its own report waits for the next call of its code.
+    /// Publishes, at `begin_motion` below the actuator's path, that it begins to move its joint. The message is
+    /// published once the current call of its code has returned. Reports from its own threads wait for the next call
+    /// of its code.
     pub fn begin_motion(&self, motion: BeginMotion) {
         self.report(MotionReport::Begin(motion));
     }
 
-    /// The same at `end_motion` of the end of a motion.
+    /// The same at `end_motion`, for the end of a motion.
     pub fn end_motion(&self, motion: EndMotion) {
         self.report(MotionReport::End(motion));
     }

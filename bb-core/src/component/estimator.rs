@@ -48,25 +48,26 @@ pub trait Estimator: Sized + Send + 'static {
     /// A payload, or a struct of several outputs.
     type Output: Outputs;
 
-    /// Whether it takes transforms that change, with [`handle_transforms`](Self::handle_transforms), so that its inputs may
+    /// Whether it handles changing transforms, with [`handle_transforms`](Self::handle_transforms), so its inputs may
     /// span moving joints.
     const HANDLES_MOVING_JOINTS: bool = false;
 
-    /// Makes it, at the start and at every restart.
+    /// Creates it, at the start and at every restart.
     ///
     /// # Errors
-    /// At the start, any error keeps the robot from starting, except [`Fault::skip`], which leaves the estimator out; at a
-    /// restart, it is tried again later.
+    /// At the start, any error keeps the robot from starting, except [`Fault::skip`], which leaves the estimator out.
+    /// At a restart, it is tried again later.
     fn init(options: Self::Options, context: &Context) -> Result<Self, Fault>;
 
     /// Handles one message, or the snapshot of all inputs when the driver has arrived.
     ///
     /// # Errors
-    /// Any error: it is reported, and the estimator is restarted with fresh state.
+    /// Any error is reported, and the estimator is restarted with fresh state.
     fn handle_input(&mut self, input: <Self::Input as Inputs>::View<'_>) -> Result<Reply<Self::Output>, Fault>;
 
-    /// Takes where its inputs are, each at the time of its message, right before [`handle_input`](Self::handle_input); called
-    /// if it declares [`HANDLES_MOVING_JOINTS`](Self::HANDLES_MOVING_JOINTS). If a joint between an input that is not optional and
+    /// Takes the transforms of its inputs, each at the time of its message, right before
+    /// [`handle_input`](Self::handle_input). Called if it declares
+    /// [`HANDLES_MOVING_JOINTS`](Self::HANDLES_MOVING_JOINTS). If a joint between an input that is not optional and
     /// the output is unknown or too old, neither is called: the dispatch is dropped, counted and degrades its health.
     ///
     /// # Errors
@@ -76,7 +77,7 @@ pub trait Estimator: Sized + Send + 'static {
         Ok(())
     }
 
-    /// Handles a timer, a tick or a timeout that it has asked for. What it emits is stamped with the time now.
+    /// Handles a timer, a tick or a timeout that it has asked for. Outputs are stamped with the current time.
     ///
     /// # Errors
     /// As for [`handle_input`](Self::handle_input).
@@ -119,14 +120,14 @@ pub trait HandleCall<Q>: Estimator {
     /// Its answer.
     type Response;
 
-    /// How a journal holds these requests, so that a replay makes them again: `Some(RequestCodec::bytes())` for a request
-    /// that derives [`Payload`](crate::Payload). By default the journal holds only what they made the estimator emit.
+    /// How a journal holds these requests, so that a replay repeats them: `Some(RequestCodec::bytes())` for a request
+    /// that derives [`Payload`](crate::Payload). By default, the journal holds only the outputs that they caused.
     const RECORD: Option<RequestCodec<Q>> = None;
 
     /// Answers, and may emit outputs as well.
     ///
     /// # Errors
-    /// As for [`handle_input`](Estimator::handle_input); the caller is told as well.
+    /// As for [`handle_input`](Estimator::handle_input); the caller gets the error as well.
     fn handle_call(&mut self, request: Q) -> Result<(Self::Response, Reply<Self::Output>), Fault>;
 }
 
@@ -174,23 +175,23 @@ impl<O> Reply<O> {
         self
     }
 
-    /// Asks for a timer, a tick, a timeout or a continue as well. A reply has one request: the last one wins.
+    /// Also asks for a timer, a tick, a timeout or a continue. A reply has one request: the last one wins.
     pub fn and(mut self, request: Request) -> Self {
         self.request = Some(request);
         self
     }
 
-    /// What is asked for.
+    /// The request, if any.
     pub fn request(&self) -> Option<Request> {
         self.request
     }
 
-    /// What is to be emitted.
+    /// The output, if any.
     pub fn output(&self) -> Option<&O> {
         self.output.as_ref()
     }
 
-    /// Takes out what is to be emitted.
+    /// Takes out the output, if any.
     pub fn into_output(self) -> Option<O> {
         self.output
     }

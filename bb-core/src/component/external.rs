@@ -1,4 +1,4 @@
-//! A sensor that other code feeds.
+//! A sensor fed by other code.
 
 use super::{Fault, NoOptions, Reading, Sensor, SensorContext};
 use crate::Payload;

@@ -3,7 +3,7 @@
 use crate::declaration::{Dimension, Range};
 use std::time::Duration;
 
-/// What is known of one option.
+/// The description of one option.
 #[derive(Clone, Copy, Debug)]
 pub struct OptionField {
     /// Its name.
@@ -20,7 +20,8 @@ pub struct OptionField {
     pub range: Option<Range>,
 }
 
-/// A type that an option given as a text can have: any that is `From<&'static str>`, as `String` and `PathBuf` are.
+/// The type of an option that can be given as a string: any that is `From<&'static str>`, such as `String` and
+/// `PathBuf`.
 #[diagnostic::on_unimplemented(message = "expected `{Self}`, found a text", label = "a text, not `{Self}`")]
 pub trait FromText {
     /// Converts the text.
@@ -34,7 +35,7 @@ impl<T: From<&'static str>> FromText for T {
     }
 }
 
-/// A type that an option given as a number with a unit can have; a time may also be a `Duration`.
+/// The type of an option that can be given as a number with a unit; a time may also be a `Duration`.
 #[diagnostic::on_unimplemented(
     message = "a number with a unit cannot be `{Self}`",
     label = "has a unit",
@@ -52,14 +53,14 @@ pub trait FromQuantity {
     {
         None
     }
-    /// From a text in the SI unit, where an `f64` would be less exact.
+    /// From a string in the SI unit, for types more exact than an `f64`.
     fn from_exact(_text: &str) -> Option<Self>
     where
         Self: Sized,
     {
         None
     }
-    /// Its value in SI as decimal digits, where an `f64` would be less exact.
+    /// Its value in SI as decimal digits, for types more exact than an `f64`.
     fn to_exact(&self) -> Option<String> {
         None
     }
@@ -86,7 +87,7 @@ impl FromQuantity for f32 {
 }
 
 impl FromQuantity for Duration {
-    /// Negative times are 0, and too long ones the longest there is.
+    /// Negative times become 0, and times too long the longest possible.
     fn from_quantity(seconds: f64) -> Self {
         let longest = if seconds > 0.0 { Self::MAX } else { Self::ZERO };
         Self::try_from_secs_f64(seconds).unwrap_or(longest)

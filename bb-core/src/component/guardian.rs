@@ -1,4 +1,4 @@
-//! What any component can do for the safety of the robot.
+//! Safety functions for any component.
 
 use super::Fault;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::sync::Arc;
 /// Makes hardware safe.
 pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
 
-/// Keeps disarm callbacks and takes note of hardware errors; the runtime implements it.
+/// Keeps disarm callbacks and records hardware errors; the runtime implements it.
 pub(crate) trait Guardian: Send + Sync {
     /// Adds a callback of the component at `path`, or of that execution of the command there.
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook);
@@ -15,7 +15,7 @@ pub(crate) trait Guardian: Send + Sync {
 }
 
 /// Registers disarm callbacks and reports hardware errors, for a component whose later calls get no context: an
-/// estimator keeps the one that [`Context::safety`](super::Context::safety) gives. Clones are the same.
+/// estimator keeps the link from [`Context::safety`](super::Context::safety). Clones share it.
 #[derive(Clone)]
 pub struct SafetyLink {
     path: &'static str,
@@ -23,15 +23,15 @@ pub struct SafetyLink {
 }
 
 impl SafetyLink {
-    /// With no guardian, for tests, nothing happens.
+    /// For tests: without a guardian, nothing happens.
     pub(crate) fn new(path: &'static str, guardian: Option<Arc<dyn Guardian>>) -> Self {
         Self { path, guardian }
     }
 
-    /// Registers a callback that makes hardware safe when the robot is disarmed. All callbacks run concurrently, each on a thread of its
-    /// own, and must return within 5 s; one that fails or takes longer leads to the safety state `error`. A restart of the
-    /// component replaces what it registered before; a `handle_options` that registers any replaces those of the previous
-    /// `handle_options`, and keeps those of `init`.
+    /// Registers a callback that makes hardware safe when the robot is disarmed. All callbacks run concurrently, each
+    /// on its own thread, and must return within 5 s. One that fails or takes longer leads to the safety state
+    /// `error`. A restart of the component replaces its earlier callbacks. A `handle_options` that registers any
+    /// replaces those of the previous `handle_options`, and keeps those of `init`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         if let Some(guardian) = &self.guardian {
             guardian.on_disarm(self.path, None, Arc::new(hook));
@@ -65,7 +65,7 @@ impl OwnHooks {
         Self { path, guardian, execution }
     }
 
-    /// Once the code of the execution has returned, it is run at once, and not kept.
+    /// Once the execution's code has returned, a callback is run at once, and not kept.
     pub(crate) fn add(&self, hook: DisarmHook) {
         self.guardian.on_disarm(self.path, Some(self.execution), hook);
     }

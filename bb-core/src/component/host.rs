@@ -14,15 +14,15 @@ use crate::topology::Topology;
 use std::any::Any;
 use std::fmt;
 
-/// What components reach of the robot that runs them; the runtime implements it.
+/// The interface between components and the robot that runs them; the runtime implements it.
 pub(crate) trait Host: Guardian {
     fn origin(&self) -> Origin;
     fn clock(&self) -> &Clock;
     fn joints(&self) -> Joints;
     fn topology(&self) -> &'static Topology;
-    /// What components of this run share.
+    /// Values shared by the components of this run.
     fn shared(&self) -> &SharedValues;
-    /// What takes the place of the component at `path`, if anything does.
+    /// The replacement of the component at `path`, if there is one.
     fn replacement(&self, path: &str) -> Option<Replacement>;
     fn is_stopping(&self) -> bool;
     fn state(&self) -> &'static str;
@@ -33,11 +33,12 @@ pub(crate) trait Host: Guardian {
     fn set_parameter(&self, path: &str, value: ParameterValue, permit: &Permit) -> Result<(), ParameterError>;
     /// The declared topics.
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic]));
-    /// The topics that are made at run time.
+    /// The topics created at run time.
     fn registry(&self) -> &Registry;
     /// Whether there is a journal.
     fn is_journaled(&self) -> bool;
-    /// Has something published, unless the robot has stopped; waits first while too much waits for the journal's sink.
+    /// Calls `publish` unless the robot has stopped; first waits while too many entries are queued for the journal's
+    /// sink.
     fn while_open(&self, publish: &mut dyn FnMut());
     /// Something may be published at a path of one's own, or no more.
     fn note_path(&self, change: PathChange);

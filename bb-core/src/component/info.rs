@@ -1,18 +1,19 @@
-//! What an estimator may ask of the framework, and what comes of it.
+//! Requests of an estimator to the framework, and their results.
 
 use std::time::Duration;
 
-/// What an estimator asks for in addition to its outputs: from a callback with [`Reply::and`](super::Reply::and), from `init`
-/// with [`Context::request`](super::Context::request). Nothing is due sooner than a microsecond after it was asked for.
+/// A request that an estimator makes in addition to its outputs: from a callback with
+/// [`Reply::and`](super::Reply::and), from `init` with [`Context::request`](super::Context::request). Nothing is due
+/// sooner than a microsecond after the request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
-    /// [`handle_continue`](super::Estimator::handle_continue) with this number, before anything else happens to it. After a million
-    /// in a row it is stopped, since nothing else could run.
+    /// [`handle_continue`](super::Estimator::handle_continue) with this number, before any other callback. After a
+    /// million in a row the estimator is stopped, since nothing else could run.
     Continue(u32),
-    /// [`Info::Timeout`], if nothing else happens to it for this long.
+    /// [`Info::Timeout`], if no other callback runs for this long.
     Timeout(Duration),
-    /// [`Info::Timer`] with the number, once, after this time. A pending one of the same number is replaced.
+    /// [`Info::Timer`] with this number, once, after this time. Replaces a pending timer of the same number.
     Timer(u32, Duration),
     /// [`Info::Tick`] at a fixed rate from now on; a period of zero ends it.
     Tick(Duration),
@@ -22,10 +23,10 @@ pub enum Request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Info {
-    /// Nothing has happened for as long as it asked.
+    /// No callback ran for the requested time.
     Timeout,
     /// The timer of that number.
     Timer(u32),
-    /// The next period of its tick has begun. Periods that are missed while it is busy are skipped; the phase is kept.
+    /// The next period of its tick has begun. Periods missed while it is busy are skipped; the phase is kept.
     Tick,
 }

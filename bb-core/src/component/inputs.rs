@@ -1,8 +1,8 @@
-//! What an estimator takes: one payload, or a struct with a field per input.
+//! The input of an estimator: one payload, or a struct with a field per input.
 //!
-//! The driver's message goes to the estimator by reference. Every other input has a [`Slot`] that keeps its last known
-//! message. When the driver arrives, [`InputAt::snapshot`] holds the slots against the driver's time and makes the
-//! struct that the estimator takes, or names the input that was missing or too old.
+//! The estimator gets the driver's message by reference. Every other input has a [`Slot`] that keeps its latest
+//! message. When the driver's message arrives, [`InputAt::snapshot`] checks the slots against its time, and builds
+//! the estimator's input struct or names the input that was missing or too old.
 
 use crate::Payload;
 use crate::declaration::{EstimatorDeclaration, InputDeclaration};
@@ -11,52 +11,52 @@ use crate::time::MonotonicTime;
 use std::cell::Cell;
 use std::ops::Deref;
 
-/// What an estimator takes.
+/// The input of an estimator.
 ///
-/// An estimator of one input names the payload: `type Input = Imu;`, and its `handle_input` gets `&Stamped<Imu>`. One of
-/// several inputs derives a struct whose fields are the inputs by name; an `Option` says that the estimator can run
-/// without it.
+/// An estimator with one input names the payload: `type Input = Imu;`, and its `handle_input` gets `&Stamped<Imu>`.
+/// One with several inputs derives a struct whose fields are the inputs by name; an `Option` means that the estimator
+/// can run without that input.
 ///
 /// ```
 /// use bb_core::prelude::*;
 ///
-/// /// What a wheeled robot's pose is made of.
+/// /// The inputs for a wheeled robot's pose.
 /// #[derive(Debug, Inputs)]
 /// pub struct PoseInputs<'a> {
 ///     /// The inertial sensor.
 ///     pub imu: Input<'a, Imu>,
 ///     /// The wheels.
 ///     pub odometry: Input<'a, Odometry>,
-///     /// Magnetic heading, where the robot has it.
+/// /// Magnetic heading, if the robot has it.
 ///     pub magnetic_field: Option<Input<'a, MagneticField>>,
 /// }
 /// ```
 ///
-/// The estimator names it with the lifetime `'static`, `type Input = PoseInputs<'static>;`. Without it, rustc
-/// suggests a lifetime parameter on the implementation, which does not compile either.
+/// The estimator names it with the lifetime `'static`, `type Input = PoseInputs<'static>;`. Without the lifetime,
+/// rustc suggests a lifetime parameter on the implementation, which does not compile either.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be the input of an estimator",
     label = "neither a payload nor a struct of inputs",
     note = "name a payload, or derive a struct of several: `#[derive(Inputs)]`"
 )]
 pub trait Inputs: 'static {
-    /// What `handle_input` gets.
+    /// The argument of `handle_input`.
     type View<'a>;
-    /// The last known message of each input.
+    /// The latest message of each input.
     #[doc(hidden)]
     type Cache: Default + Send + 'static;
     /// The field that a nested estimator's sensor feeds: the only required one.
     #[doc(hidden)]
     type Nested: TakenAt<Self>;
-    /// The inputs by name; none if the input is a single payload.
+    /// The inputs by name; empty if the input is a single payload.
     const FIELDS: &'static [InputField];
 
-    /// False for the stand-in of an estimator that is not known, in a robot that does not compile.
+    /// False for the placeholder of an unknown estimator, in a robot that does not compile.
     #[doc(hidden)]
     const KNOWN: bool = true;
 }
 
-/// What is known of one field of an input struct.
+/// The description of one field of an input struct.
 #[derive(Clone, Copy, Debug)]
 pub struct InputField {
     /// Its name.
@@ -68,7 +68,7 @@ pub struct InputField {
 /// The number of a field in an input or output struct.
 pub type FieldIndex = usize;
 
-/// A field of an input or output struct, as a type: what the expansion of `robot!` names it by.
+/// A field of an input or output struct, as a type: the expansion of `robot!` refers to fields by it.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct At<const I: FieldIndex>;
@@ -99,7 +99,7 @@ impl<'a, T> Input<'a, T> {
         Self { message, is_new: false }
     }
 
-    /// Whether it has arrived since the last dispatch, so that a slow sensor's reading is fused once.
+    /// Whether it has arrived since the last dispatch, so that each reading of a slow sensor is fused once.
     pub fn is_new(&self) -> bool {
         self.is_new
     }
@@ -117,23 +117,23 @@ impl<T> Deref for Input<'_, T> {
     }
 }
 
-/// That input number `I` of `Self` exists: what it carries, and what happens when it arrives.
+/// Input number `I` of `Self` exists: its payload, and how its arrival is handled.
 #[doc(hidden)]
 pub trait InputAt<const I: FieldIndex>: Inputs {
     /// The payload it takes.
     type Payload: Payload;
 
-    /// Its slot; none if a single payload is all the estimator takes, which needs no cache.
+    /// Its slot; `None` if the estimator takes only a single payload, which needs no cache.
     fn slot(cache: &mut Self::Cache) -> Option<&mut Slot<Self::Payload>>;
 
-    /// What the estimator takes when this input is the driver and `message` has arrived.
+    /// The estimator's input when this input is the driver and `message` has arrived.
     fn snapshot<'a>(
         cache: &'a mut Self::Cache,
         message: &'a Stamped<Self::Payload>,
     ) -> Result<Self::View<'a>, SyncMiss>;
 }
 
-/// The same, asked of the field: a type is named once, where a number would be computed at each use.
+/// [`InputAt`] implemented by the field: a type is named once, while a number would be computed at each use.
 #[doc(hidden)]
 pub trait TakenAt<T: Inputs + ?Sized>: 'static {
     /// Its number.
@@ -184,7 +184,7 @@ impl<T: Payload> InputAt<0> for T {
     }
 }
 
-/// The last known message of one input, and how old it may be.
+/// The latest message of one input, and how old it may be.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Slot<T> {
@@ -199,30 +199,32 @@ impl<T> Default for Slot<T> {
     }
 }
 
-/// Which input a dispatch was dropped for.
+/// The input because of which a dispatch was dropped.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SyncMiss {
     /// Its number among the declared inputs.
     pub input: usize,
-    /// How much older than the driver it was; none if it has not arrived yet.
+    /// How much older than the driver it was; `None` if it has not arrived yet.
     pub age_nanos: Option<i64>,
 }
 
 impl<T: Payload> Slot<T> {
-    /// Says which declared input fills it.
+    /// Sets the declared input that fills it.
     pub fn declare(&mut self, declaration: &'static InputDeclaration) {
         self.declaration = Some(declaration);
     }
 
-    /// Keeps `message` as the last known. A panic of the payload's `Clone` is returned; the message is kept all the same.
+    /// Keeps `message` as the latest. If the payload's `Clone` panics, the panic is returned and the message is still
+    /// kept.
     #[inline]
     pub(crate) fn store(&mut self, message: &Stamped<T>) -> Result<(), Panic> {
         self.is_new.set(true);
         copy_to(&mut self.message, message)
     }
 
-    /// The miss of a required input that has not arrived, or is too old for a driver of `time`; none if all is well.
+    /// The miss of a required input that has not arrived, or is too old for a driver of `time`; `None` if there is no
+    /// miss.
     pub fn miss(&self, time: MonotonicTime) -> Option<SyncMiss> {
         let declaration = self.declaration.filter(|declaration| !declaration.optional)?;
         let Some(message) = &self.message else {
@@ -248,7 +250,7 @@ impl<T: Payload> Slot<T> {
     }
 }
 
-/// Says which declared input of an estimator fills the field `F`.
+/// Sets the declared input of an estimator that fills the field `F`.
 #[doc(hidden)]
 pub fn declare<F: TakenAt<T>, T: Inputs>(
     cache: &mut T::Cache,

@@ -8,8 +8,8 @@ use crate::time::MonotonicTime;
 /// A bridge that publishes all joints as a whole, as `sensor_msgs/JointState`, at its declared rate:
 /// `bridge joint_states: JointPublisher() { rate: 50 Hz; }`.
 ///
-/// Each message is of one time: the newest at which all joints that are known and not stale are known. Nothing is published
-/// while that has not moved on.
+/// All joints in a message are at the same time: the latest at which every joint that is known and not stale has a
+/// state. Nothing is published until that time advances.
 #[derive(Debug)]
 pub struct JointPublisher {
     joints: Joints,

@@ -5,10 +5,11 @@ use std::any::Any;
 
 /// The options of a sensor or an estimator: a plain struct, filled from the parentheses in `robot!`.
 ///
-/// Derive it. Every field has either a default or is `required` (its type then implements `Default`, whose value is used until one is
-/// given). A field may be of any type. An `f64`, an `f32`, a `Duration` or an `Option` of one of these may state a unit:
-/// a literal in `robot!` must then carry one of that dimension, and arrives in SI; a `Duration` is always a time. A number may state a range, which a literal must be in. Other values, such as constants, are taken as they
-/// are and validated at the start.
+/// Derive it. Every field has either a default or is `required` (its type then implements `Default`, whose value is
+/// used until one is given). A field may be of any type. An `f64`, an `f32`, a `Duration` or an `Option` of one of
+/// these may state a unit: a literal in `robot!` must then have a unit of that dimension, and is converted to SI; a
+/// `Duration` is always a time. A number may state a range, and a literal must be within it. Other values, such as
+/// constants, are passed unchanged and validated at the start.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -19,10 +20,11 @@ use std::any::Any;
 ///     /// Device file.
 ///     #[option(required)]
 ///     pub port: String,
-///     /// Readings beyond it are dropped. Unit: m.
+/// /// Readings beyond it are dropped. Unit: m.
 ///     #[option(default = 4.0, range = 0.1..=30.0, unit = "m")]
 ///     pub maximum_range: f64,
-///     /// How long a reading may take. In `robot!` it is written with a unit, `timeout = 20 ms`; here it is a value of Rust.
+/// /// How long a reading may take. In `robot!` it is written with a unit, `timeout = 20 ms`; here it is a Rust
+/// value.
 ///     #[option(default = Duration::from_millis(50))]
 ///     pub timeout: Duration,
 /// }
@@ -36,10 +38,10 @@ use std::any::Any;
     note = "derive it: `#[derive(Clone, Debug, Options)]`, with `#[option(default = …)]` on each field"
 )]
 pub trait Options: Clone + std::fmt::Debug + Send + 'static {
-    /// What is known of each option, in the order of the fields.
+    /// The description of each option, in the order of the fields.
     const FIELDS: &'static [OptionField];
 
-    /// All defaults; a required option is at its type's `Default`.
+    /// All defaults; a required option has its type's `Default`.
     fn defaults() -> Self;
 
     /// Checks every range. The error names the option, its value and what is accepted.

@@ -1,13 +1,13 @@
-//! What an estimator emits: one payload, or a struct with a field per output.
+//! The output of an estimator: one payload, or a struct with a field per output.
 
 use super::{At, FieldIndex};
 use crate::Payload;
 
-/// What an estimator emits.
+/// The output of an estimator.
 ///
-/// An estimator of one output names the payload: `type Output = Orientation;`, published at the estimator's own path.
-/// One of several derives a struct of `Option`s; each field that is `Some` is published at the path of the `output`
-/// of its name.
+/// An estimator with one output names the payload: `type Output = Orientation;`, published at the estimator's own
+/// path. One with several outputs derives a struct of `Option`s; each field that is `Some` is published at the path
+/// of the `output` with its name.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -27,35 +27,35 @@ use crate::Payload;
     note = "name a payload, or derive a struct of several: `#[derive(Outputs)]`"
 )]
 pub trait Outputs: Sized + Send + 'static {
-    /// The outputs by name; none if the output is a single payload, whose name is `out`.
+    /// The outputs by name; empty if the output is a single payload, whose name is `out`.
     const FIELDS: &'static [&'static str];
 
-    /// False for the stand-in of an estimator that is not known, in a robot that does not compile.
+    /// False for the placeholder of an unknown estimator, in a robot that does not compile.
     #[doc(hidden)]
     const KNOWN: bool = true;
 
-    /// What is published if no output is declared: the single payload.
+    /// The output published if none is declared: the single payload.
     #[doc(hidden)]
     type Only: EmittedAt<Self>;
 }
 
-/// That output number `I` of `Self` exists, and how to take it out of what was emitted.
+/// Output number `I` of `Self` exists, and can be taken out of an emitted value.
 #[doc(hidden)]
 pub trait OutputAt<const I: FieldIndex>: Outputs {
-    /// What it carries.
+    /// Its payload.
     type Payload: Payload;
 
     /// Takes it, if it was emitted.
     fn take(emitted: &mut Option<Self>) -> Option<Self::Payload>;
 
-    /// What emits this output alone.
+    /// The value that emits only this output.
     fn alone(payload: Self::Payload) -> Self;
 }
 
-/// The same, asked of the field; see [`TakenAt`](super::TakenAt).
+/// [`OutputAt`] implemented by the field; see [`TakenAt`](super::TakenAt).
 #[doc(hidden)]
 pub trait EmittedAt<T>: 'static {
-    /// What it carries.
+    /// Its payload.
     type Payload: Payload;
 
     /// See [`OutputAt::take`].

@@ -4,15 +4,15 @@ use super::Fault;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Given to a command with its context and revoked when it ends or is cancelled. What it has obtained through that context
-/// refuses to act from then on, even if the command's code still runs.
+/// Given to a command with its context and revoked when it ends or is cancelled. Handles obtained through that
+/// context then refuse to act, even if the command's code still runs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Permit(Option<Arc<AtomicUsize>>);
 
-/// Set once the permit is revoked; below it, how many threads act.
+/// Set once the permit is revoked; the bits below count the threads that are acting.
 const REVOKED: usize = 1 << (usize::BITS - 1);
 
-/// A handle acts as long as this lives.
+/// A handle acts until this is dropped.
 #[derive(Debug)]
 pub(crate) struct Acting<'a>(Option<&'a AtomicUsize>);
 
@@ -31,7 +31,8 @@ impl Permit {
         }
     }
 
-    /// What a handle does while what this returns lives has begun before the permit was revoked; none if it was revoked.
+    /// Begins an action, which lasts until the returned value is dropped. Returns `None` if the permit was revoked;
+    /// otherwise the action has begun before any revocation.
     pub(crate) fn act(&self) -> Option<Acting<'_>> {
         let Some(state) = &self.0 else { return Some(Acting(None)) };
         let acting = Acting(Some(state));
@@ -39,7 +40,7 @@ impl Permit {
         (before & REVOKED == 0).then_some(acting)
     }
 
-    /// Whether a handle still acts that began to before the permit was revoked.
+    /// Whether an action that began before the permit was revoked is still in progress.
     pub(crate) fn is_acting(&self) -> bool {
         self.0.as_ref().is_some_and(|state| state.load(Ordering::SeqCst) & !REVOKED > 0)
     }

@@ -1,9 +1,9 @@
-//! What takes the place of a declared component.
+//! The replacement of a declared component.
 
 use std::any::Any;
 use std::sync::Arc;
 
-/// Makes a component that takes the place of another one; the lifecycle knows how.
+/// Creates a component that replaces another one; the lifecycle knows how.
 #[derive(Clone)]
 pub(crate) struct Replacement {
     make: Arc<dyn Any + Send + Sync>,
@@ -16,7 +16,7 @@ impl Replacement {
         Self { make: Arc::new(make), payload }
     }
 
-    /// What makes it, if that is an `M`.
+    /// The constructor, if it is an `M`.
     pub(crate) fn make<M: 'static>(&self) -> Option<&M> {
         self.make.downcast_ref()
     }

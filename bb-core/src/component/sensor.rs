@@ -6,8 +6,9 @@ use crate::time::MonotonicTime;
 
 /// Reads a device, a recording or a simulation.
 ///
-/// The framework calls [`read`](Sensor::read) at the declared `rate`; without one, again and again, so that a driver may
-/// wait for its device there. The reading is published, and all estimators downstream run, before the next call.
+/// The framework calls [`read`](Sensor::read) at the declared `rate`; without a rate, it calls it repeatedly, so a
+/// driver may wait for its device there. The reading is published, and all estimators downstream run, before the next
+/// call.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -20,7 +21,7 @@ use crate::time::MonotonicTime;
 ///     pub velocity: f64,
 /// }
 ///
-/// /// An encoder on a joint that turns for ever.
+/// /// An encoder on a joint that turns forever.
 /// #[derive(Debug)]
 /// pub struct SimulatedEncoder(EncoderOptions);
 ///
@@ -60,13 +61,13 @@ pub trait Sensor: Sized + Send + 'static {
     /// A read that waits must return [`Reading::nothing`] from time to time, so that the robot can stop.
     ///
     /// # Errors
-    /// There is no reading, because the device is unplugged, for example. The fault is reported and the sensor is restarted, after a
-    /// backoff of at most a second, for as long as the robot runs; nothing else is restarted. A [`Fault::permanent`]
-    /// leaves it stopped.
+    /// There is no reading, for example because the device is unplugged. The fault is reported and the sensor is
+    /// restarted, after a backoff of at most a second, for as long as the robot runs; nothing else is restarted. A
+    /// [`Fault::permanent`] leaves it stopped.
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
 
-    /// When it is read first; `None` means at once. A recording gives the stamp of its first message: virtual time
-    /// starts at the earliest of all.
+    /// The time of its first reading; `None` means at once. A recording returns the stamp of its first message:
+    /// virtual time starts at the earliest of all.
     fn starts_at(&self) -> Option<MonotonicTime> {
         None
     }
@@ -81,12 +82,12 @@ pub trait Sensor: Sized + Send + 'static {
         Err(Fault::remake())
     }
 
-    /// Closes the device before the sensor stops or is restarted; not called after a panic. When the robot stops, it has
-    /// been disarmed before.
+    /// Closes the device before the sensor stops or is restarted; not called after a panic. When the robot stops, it
+    /// has already been disarmed.
     fn terminate(&mut self) {}
 }
 
-/// What one [`Sensor::read`] gave, and when to read next.
+/// The result of one [`Sensor::read`], and when to read next.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use]
 pub struct Reading<T> {
@@ -127,7 +128,7 @@ impl<T> Reading<T> {
         Self { payload: None, time: None, next: Next::Never }
     }
 
-    /// Asks to be read next at `time`, whatever the rate: a recording asks for its next message's.
+    /// Asks to be read next at `time`, regardless of the rate: a recording asks for the time of its next message.
     pub fn next_at(mut self, time: MonotonicTime) -> Self {
         self.next = Next::At(time);
         self

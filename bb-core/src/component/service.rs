@@ -1,4 +1,4 @@
-//! The contract of controllers and bridges: what runs beside the dataflow of sensors and estimators.
+//! The contract of controllers and bridges, which run beside the dataflow of sensors and estimators.
 
 use super::{Fault, Options, Reading, ServiceContext};
 use crate::Payload;
@@ -6,8 +6,8 @@ use crate::time::MonotonicTime;
 
 /// A controller or a bridge: it runs beside the dataflow and reaches everything by path, through [`ServiceContext::bus`].
 ///
-/// A controller drives actuators from what sensors and estimators publish; a bridge connects the robot to a dashboard, a
-/// middleware or a radio. They differ only in the word they are declared with, and so in their path.
+/// A controller drives actuators from published messages of sensors and estimators; a bridge connects the robot to a
+/// dashboard, a middleware or a radio. They differ only in the keyword that declares them, and so in their path.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a service",
     label = "cannot be declared as a controller or a bridge",
@@ -16,17 +16,17 @@ use crate::time::MonotonicTime;
 pub trait Service: Sized + Send + 'static {
     /// Its options: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
-    /// What it publishes at its path: its state, a diagnosis.
+    /// The payload it publishes at its path: its state, or a diagnosis.
     type Output: Payload;
 
-    /// Makes it, at the start and at every restart.
+    /// Creates it, at the start and at every restart.
     ///
     /// # Errors
-    /// Why it cannot start: at the start, the robot then does not start.
+    /// Why it cannot start. At the start of the robot, the robot then does not start.
     fn init(options: Self::Options, context: &ServiceContext) -> Result<Self, Fault>;
 
-    /// Does its work once: at the declared `rate`, or again and again where none is declared, so that it may wait for what
-    /// it needs; it must then return now and then, so that the robot can stop.
+    /// Does its work once: at the declared `rate`, or repeatedly without one, so it may wait for its device or peer.
+    /// It must then return from time to time, so that the robot can stop.
     ///
     /// # Errors
     /// Why it cannot go on; the fault is reported, and the service is restarted with fresh state.

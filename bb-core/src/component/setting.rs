@@ -1,7 +1,7 @@
 //! Options by name, for settings that are read at run time.
 //!
-//! An option can be of any type. Which of its values can be written in a file is found out by its type, at compile time: a
-//! quantity with a unit, a value with a JSON form ([`Field`]), or a text.
+//! An option can be of any type. Which of its values a file can contain is derived from its type at compile time: a
+//! quantity with a unit, a value with a JSON form ([`Field`]), or a string.
 
 use super::{FromQuantity, OptionField};
 use crate::declaration::unit::{Quantity, dimension_name, si_unit};
@@ -14,7 +14,7 @@ use std::marker::PhantomData;
 pub trait Setting {
     /// Sets it from JSON.
     fn set(&mut self, json: &str) -> Result<(), String>;
-    /// Its value as it would be written; none if it cannot be.
+    /// Its value as it would be written; `None` if it cannot be.
     fn value(&self) -> Option<String>;
     /// What can be written.
     fn kind(&self) -> SettingKind;
@@ -33,12 +33,12 @@ pub enum SettingKind {
     Value(Shape),
     /// A text.
     Text,
-    /// Nothing: the option can be set by code alone.
+    /// Nothing: only code can set the option.
     Code,
 }
 
-/// Finds out what can be written for an option of type `T`, by the order in which methods are looked up: see
-/// [`WithUnit`], [`ByValue`], [`ByText`] and [`ByCode`].
+/// Determines what can be written for an option of type `T`, by the order of method lookup: see [`WithUnit`],
+/// [`ByValue`], [`ByText`] and [`ByCode`].
 #[derive(Debug)]
 pub struct SettingOf<T>(PhantomData<fn() -> T>);
 
@@ -62,11 +62,11 @@ impl<T: FromQuantity> WithUnit<T> for &&&SettingOf<T> {
     }
 }
 
-/// A value that has a JSON form, such as a number, a list, or what derives `Payload`.
+/// A value with a JSON form, such as a number, a list, or a type that derives `Payload`.
 pub trait ByValue<T> {
     /// The option in `slot`.
     fn plain<'a>(&self, slot: &'a mut T) -> Box<dyn Setting + 'a>;
-    /// The same, of an option that states a unit and is no single number: its numbers are in SI.
+    /// The same for an option that states a unit and is not a single number: its numbers are in SI.
     fn with_unit<'a>(&self, _: OptionField, slot: &'a mut T) -> Box<dyn Setting + 'a> {
         self.plain(slot)
     }
@@ -126,7 +126,7 @@ impl<T: FromQuantity> Setting for QuantitySlot<'_, T> {
         let text = text_of(json);
         let number = text.trim().strip_suffix(&si_unit(dimension.exponents)).map(str::trim_end);
         let slot = number.and_then(T::from_exact).unwrap_or_else(|| T::from_quantity(value));
-        // A `Duration` is not negative, and neither endless nor finer than a nanosecond.
+        // A `Duration` is neither negative nor infinite, and not finer than a nanosecond.
         let held = slot.to_quantity().unwrap_or(f64::NAN);
         if (held - value).abs() > 1e-6 * value.abs() {
             return Err(format!("cannot be {text}"));
@@ -154,7 +154,7 @@ impl<T: FromQuantity> Setting for QuantitySlot<'_, T> {
     }
 }
 
-/// The value in SI of a quantity of this dimension, written as a JSON text.
+/// The value in SI of a quantity of this dimension, written as a JSON string.
 pub(crate) fn quantity(json: &str, exponents: [i8; 6]) -> Result<f64, String> {
     let expected = dimension_name(exponents);
     let example = si_unit(exponents);
@@ -240,7 +240,7 @@ impl Setting for CodeSlot {
     }
 }
 
-/// A JSON text without its quotation marks.
+/// A JSON string without its quotation marks.
 fn text_of(json: &str) -> String {
     from_json(json).unwrap_or_else(|_| json.to_owned())
 }

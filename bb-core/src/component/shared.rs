@@ -10,12 +10,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(crate) struct SharedValues(Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>);
 
 impl SharedValues {
-    /// The value of type `T`, made if it is not there.
+    /// The value of type `T`, created if it does not exist yet.
     pub(crate) fn get<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Arc<T> {
         if let Some(found) = self.find() {
             return found;
         }
-        // Not under the lock, since it is user code; of two that are made at the same time, the first is kept.
+        // Not under the lock, since it is user code. If two are created at the same time, the first is kept.
         let made = Arc::new(make());
         let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let kept = Arc::clone(values.entry(TypeId::of::<T>()).or_insert_with(|| Arc::clone(&made) as _));

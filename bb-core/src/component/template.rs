@@ -1,4 +1,4 @@
-//! Options of which any thread makes its own.
+//! Options that any thread can copy.
 
 use super::{Binding, Options};
 use crate::declaration::ParameterValues;
@@ -6,15 +6,15 @@ use crate::fault::{Fault, caught};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Options for any thread. They may be sent and need not be shared, and their code (`clone`, `validate`) is the user's: one
-/// thread at a time has them, without a lock, and those who wait for one that hangs give up.
+/// Options for any thread. They are `Send` but need not be `Sync`, and their code (`clone`, `validate`) is the
+/// user's. One thread at a time holds them, without a lock, and a thread that waits for one that hangs gives up.
 pub(crate) struct Template<O> {
-    /// None while a thread has them.
+    /// `None` while a thread holds them.
     options: Mutex<Option<O>>,
     returned: Condvar,
 }
 
-/// How long a thread waits for another one that has them.
+/// How long a thread waits for another one that holds them.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
 impl<O: Options> Template<O> {
@@ -24,7 +24,7 @@ impl<O: Options> Template<O> {
         Ok(Self { options: Mutex::new(Some(options)), returned: Condvar::new() })
     }
 
-    /// The options with the values put in, validated; why not.
+    /// The options with the parameter values applied and validated; the error says why not.
     pub(crate) fn bound(&self, binding: &Binding<O>, values: &ParameterValues) -> Result<O, String> {
         let taken = Taken { options: self.take(), template: self };
         let Some(options) = &taken.options else {

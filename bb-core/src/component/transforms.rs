@@ -1,17 +1,17 @@
-//! Where the inputs of an estimator are when it runs.
+//! The transforms of an estimator's inputs when it runs.
 
 use super::Fault;
 use crate::joints::LookupError;
 use nalgebra::Isometry3;
 
-/// Where the inputs of an estimator are at one dispatch, each at the time of its message; see
+/// The transforms of an estimator's inputs at one dispatch, each at the time of its message; see
 /// [`Estimator::handle_transforms`](super::Estimator::handle_transforms).
 #[derive(Clone, Copy, Debug)]
 pub struct InputTransforms<'a> {
     inputs: &'a [InputTransform],
 }
 
-/// Where one input is.
+/// The transform of one input.
 #[derive(Clone, Debug)]
 pub struct InputTransform {
     name: &'static str,
@@ -22,7 +22,7 @@ pub struct InputTransform {
 #[derive(Clone, Debug)]
 enum Placed {
     At(Isometry3<f64>),
-    /// Its payload is the same from every frame.
+    /// Its payload is the same in every frame.
     Nowhere,
     /// No message of it takes part in this dispatch.
     Absent,
@@ -30,7 +30,7 @@ enum Placed {
 }
 
 impl InputTransform {
-    /// Of an input that takes part: takes points from its frame to that of the output. For tests of an estimator.
+    /// Of an input that takes part: transforms points from its frame to the output's. For tests of an estimator.
     ///
     /// ```
     /// use bb_core::component::{InputTransform, InputTransforms};
@@ -46,7 +46,7 @@ impl InputTransform {
         Self { name, is_driver: true, placed: Placed::At(frame_from_input) }
     }
 
-    /// At first: where it is if no joint moves between.
+    /// Initially: its transform if no joint moves between.
     pub(crate) fn declared(name: &'static str, is_driver: bool, fixed: Option<Isometry3<f64>>) -> Self {
         Self { name, is_driver, placed: fixed.map_or(Placed::Nowhere, Placed::At) }
     }
@@ -79,11 +79,12 @@ impl<'a> InputTransforms<'a> {
         Self { inputs }
     }
 
-    /// Takes points from the frame of `input`, at the time of its message, to that of the output.
+    /// Transforms points from the frame of `input`, at the time of its message, to that of the output.
     ///
     /// # Errors
-    /// No such input is declared, it takes no part in this dispatch, its payload depends on no frame, or it is optional and a
-    /// joint between is unknown or too old. (For an input that is not optional, there is no dispatch then.)
+    /// No such input is declared, it takes no part in this dispatch, its payload depends on no frame, or it is
+    /// optional and a joint between is unknown or too old. (If the input is not optional, there is no dispatch in
+    /// that case.)
     pub fn frame_from_input(&self, input: &str) -> Result<Isometry3<f64>, Fault> {
         let declared = self.inputs.iter().find(|declared| declared.name == input);
         declared.ok_or_else(|| Fault::new(format!("no input `{input}` is declared")))?.get()

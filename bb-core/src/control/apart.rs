@@ -1,5 +1,5 @@
-//! Disarm callbacks that run outside of a disarming: those of an `init` that failed, and those of code that may have started
-//! something after the robot was disarmed.
+//! Disarm callbacks that run outside of a disarming: those of an `init` that failed, and those of code that may have
+//! started hardware after the robot was disarmed.
 //!
 //! They stay registered while they run, so a disarming that begins meanwhile also runs them and waits for them.
 
@@ -26,13 +26,13 @@ pub(super) struct Apart {
     left: Vec<u64>,
 }
 
-/// Why callbacks run, which determines the consequences.
+/// Why callbacks run; this determines the consequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Why {
-    /// An `init` has failed: a device that is unplugged is no danger. Each that succeeds is forgotten; one that fails is a
-    /// fault, and stays for the next disarming.
+    /// An `init` has failed: an unplugged device is not dangerous. Each callback that succeeds is forgotten; one that
+    /// fails is a fault, and stays for the next disarming.
     FailedInit,
-    /// Something may have been started on a robot that is disarmed: what cannot be made safe is a hardware error.
+    /// Hardware may have been started on a disarmed robot: a callback that fails is a hardware error.
     Started,
     /// The same by a cancelled command, which is gone once they have returned.
     Lingered(u64),
@@ -56,8 +56,8 @@ impl Control {
         self.register(path, Owner::Actuator, code);
     }
 
-    /// Registers what makes hardware safe. While the robot is being disarmed it is run as well, and once it has been disarmed
-    /// for the last time, it is run at once.
+    /// Registers a callback that makes hardware safe. While the robot is being disarmed, it is run as well. After the
+    /// last disarming, it is run at once.
     fn register(&self, path: &'static str, owner: Owner, code: DisarmHook) {
         let mut step = self.step();
         let is_known = match owner {
@@ -66,7 +66,7 @@ impl Control {
         };
         let is_callback = inside::is_callback(self.id());
         if is_callback && (step.state.has_ended || step.state.is_stopped()) {
-            // A callback that is registered by a callback runs at the next disarming, and there is no further one.
+            // A callback registered by a callback runs at the next disarming, but there is none after this.
             step.finish();
             return discard(code);
         }
@@ -85,7 +85,7 @@ impl Control {
         if step.state.is_stopped() {
             key = step.run_apart(path, vec![callback], Why::Started);
         } else if !is_callback {
-            // A callback that is registered by a callback runs at the next disarming.
+            // A callback registered by a callback runs at the next disarming.
             step.join_disarming(vec![callback]);
         }
         step.lingers_on(owner);
@@ -93,10 +93,11 @@ impl Control {
         self.wait_apart(key);
     }
 
-    /// Runs `make`, which creates the component at `path` or changes its options. The callbacks that it registers replace earlier
-    /// ones once it has succeeded. At no time is there no callback for the hardware.
+    /// Runs `make`, which creates the component at `path` or changes its options. Once it has succeeded, the
+    /// callbacks it registered replace earlier ones. The hardware has a callback at all times.
     ///
-    /// There is no further attempt before the callbacks of an earlier one have returned, since they still hold the device.
+    /// The next attempt waits until the callbacks of the previous one have returned, since they still hold the
+    /// device.
     pub(crate) fn replacing_hooks<T>(
         &self,
         path: &'static str,
@@ -128,15 +129,15 @@ impl Control {
         made
     }
 
-    /// Waits until the callbacks have returned or have timed out, or until a disarming begins, which runs them too and may have
-    /// to wait for the caller.
+    /// Waits until the callbacks have returned or have timed out, or until a disarming begins, which runs them too
+    /// and may have to wait for the caller.
     fn wait_apart(&self, key: Option<Key>) {
         let Some(key) = key else { return };
         // A robot that does not start is disarmed next.
         if self.0.mode != Mode::Real || cfg!(loom) || !self.lock().has_begun {
             return;
         }
-        // The callback of an actuator waits for the code that this is a part of.
+        // The callback of an actuator waits for the code that this call is part of.
         let Some(_waits) = inside::waits_for(self.id()) else { return };
         let is_over = |state: &State| state.apart.iter().all(|apart| apart.key != key) || state.disarming.is_some();
         if !self.wait_until(DISARM_WITHIN + Duration::from_millis(500), is_over) {
@@ -197,8 +198,8 @@ impl Control {
 }
 
 impl Step<'_> {
-    /// If the robot was disarmed while a component was created or its options changed, its callbacks may have run before its
-    /// hardware was started, so they run once more.
+    /// If the robot was disarmed while a component was created or its options changed, its callbacks may have run
+    /// before its hardware was started, so they run once more.
     fn run_again(&mut self, path: &'static str, callbacks: Vec<Arc<Callback>>, disarmings: u64) -> Option<Key> {
         let has_begun = self.state.generation != disarmings;
         let was_disarmed = has_begun && self.state.machine.safety != Safety::Armed;
@@ -209,8 +210,8 @@ impl Step<'_> {
         self.run_apart(path, left, Why::Started)
     }
 
-    /// The code of a cancelled command has returned. It may have started something after its callbacks had run, so they run once
-    /// more before it is gone. Returns true if there are any.
+    /// The code of a cancelled command has returned. It may have started hardware after its callbacks had run, so
+    /// they run once more before it is gone. Returns true if there are any.
     pub(super) fn makes_safe_after(&mut self, id: u64) -> bool {
         let lingers_on = |execution: &RunningCommand| execution.id == id && execution.lingers_on;
         if self.state.machine.safety == Safety::Armed || !self.state.executions.iter().any(lingers_on) {
@@ -278,7 +279,7 @@ impl Step<'_> {
     }
 }
 
-/// In a replay, the journal says what components have reported, and there is no hardware.
+/// In a replay, the journal contains the components' reports, and there is no hardware.
 impl Guardian for Control {
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
         match self.0.mode {

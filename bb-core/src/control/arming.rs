@@ -1,4 +1,4 @@
-//! Arming, disarming, and what leads to the safety state `error`.
+//! Arming, disarming, and the causes of the safety state `error`.
 
 use super::callback::Reason;
 use super::inside;
@@ -36,7 +36,7 @@ impl State {
         self.disarming.as_ref().is_some_and(|disarming| disarming.generation == generation)
     }
 
-    /// Whether it was disarmed for the last time.
+    /// Whether the last disarming is over.
     pub(super) fn is_stopped(&self) -> bool {
         self.is_stopping && self.disarming.is_none()
     }
@@ -47,7 +47,7 @@ impl State {
 }
 
 impl Control {
-    /// Arms the robot, unless it is in `error` or stops. Waits until cancelled commands are gone.
+    /// Arms the robot, unless it is in `error` or stopping. Waits until cancelled commands are gone.
     pub(crate) fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
         if self.0.mode == Mode::Replay {
             return Err(ArmError::Replay);
@@ -57,7 +57,7 @@ impl Control {
             return Err(ArmError::Cancelled);
         }
         if self.0.mode == Mode::Real {
-            // If it is in vain, the entry finds them still there.
+            // If the wait fails, the entry finds them still there.
             self.wait_until(ARM_WITHIN, |state| {
                 state.machine.safety != Safety::Disarmed
                     || !state.has_lingering()
@@ -76,15 +76,15 @@ impl Control {
         step.arm()
     }
 
-    /// In a replay: somebody asked for the robot to be armed.
+    /// In a replay: arming was requested.
     pub(crate) fn replay_arm(&self) {
         // Whether it succeeds follows from the state.
         let _ = self.step().arm();
     }
 
-    /// Disarms the robot: commands are cancelled and the disarm callbacks run. If not everything could be made safe, the
-    /// safety state is `error`, which `force` leaves even if something still fails. Of a robot that is disarmed, what would
-    /// arm it is cancelled.
+    /// Disarms the robot: commands are cancelled and the disarm callbacks run. If not everything could be made safe,
+    /// the safety state is `error`; with `force`, that state is left even if something still fails. If the robot is
+    /// disarmed already, commands that would arm it are cancelled.
     pub(crate) fn disarm(&self, force: bool) -> Result<(), DisarmError> {
         if self.0.mode == Mode::Replay {
             return Err(DisarmError::Replay);
@@ -106,7 +106,7 @@ impl Control {
             step.finish();
             return Ok(());
         };
-        // Before the callbacks begin: of robots that disarm each other, the one that closes the circle is told.
+        // Before the callbacks begin: if robots disarm each other, the one that closes the cycle gets the error.
         let waits = inside::waits_for(self.id());
         step.finish();
         let Some(_waits) = waits else { return Err(DisarmError::Callback) };
@@ -118,7 +118,7 @@ impl Control {
         outcome.get().cloned().unwrap_or(Err(DisarmError::Unfinished))
     }
 
-    /// In a replay: somebody asked for the robot to be disarmed.
+    /// In a replay: disarming was requested.
     pub(crate) fn replay_disarm(&self, force: bool) {
         let mut step = self.step();
         if !step.state.is_stopped() {
@@ -127,7 +127,7 @@ impl Control {
         step.finish();
     }
 
-    /// Whether somebody waits for a callback to run for that reason.
+    /// Whether some caller waits for a callback to run for that reason.
     pub(super) fn is_wanted(&self, reason: Reason, number: u64) -> bool {
         let state = self.lock();
         match reason {
@@ -147,11 +147,11 @@ impl Control {
         }
     }
 
-    /// The same of one that runs because the robot is disarmed; `None` if there was none to run.
+    /// The same for one that runs because the robot is disarmed; `None` if there was none to run.
     pub(super) fn hook_returned(&self, generation: u64, number: Option<u64>, error: Option<SafetyError>) {
         let mut step = self.step();
         let Some(disarming) = step.state.disarming_of(generation) else { return };
-        // It is there as often as it was asked for.
+        // It is listed once per request.
         if let Some(index) = disarming.left.iter().position(|(other, _)| Some(*other) == number) {
             disarming.left.remove(index);
         }
@@ -162,7 +162,7 @@ impl Control {
         }
     }
 
-    /// The time of the disarm callbacks is over: those that have not returned are not safe.
+    /// The time limit of the disarm callbacks has passed: those that have not returned are not safe.
     pub(super) fn disarm_timeout(&self, generation: u64) {
         let mut step = self.step();
         let Some(disarming) = step.state.disarming_of(generation) else { return };
@@ -172,7 +172,7 @@ impl Control {
         step.disarmed(errors);
     }
 
-    /// The disarm callbacks have returned, or their time is over.
+    /// The disarm callbacks have returned, or their time limit has passed.
     pub(crate) fn disarmed(&self, errors: Vec<SafetyError>) {
         let step = self.step();
         if step.state.disarming.is_some() {
@@ -193,9 +193,9 @@ impl Control {
         step.finish();
     }
 
-    /// Of a robot that has ended: the callbacks of all components, which the caller drops, so that what they own is closed
-    /// and what they hold of the robot no longer keeps it alive. Those of commands whose code has not returned stay, and run
-    /// once it has.
+    /// For a robot that has ended: the callbacks of all components. The caller drops them, so that the resources they
+    /// own are closed and their references no longer keep the robot alive. Callbacks of commands whose code has not
+    /// returned stay, and run once it has.
     pub(crate) fn take_all_hooks(&self) -> Vec<(&'static str, impl Send + Sync + use<>)> {
         let state = &mut *self.lock();
         let lingering = state.executions.iter().filter(|execution| matches!(execution.phase, Phase::Lingering));
@@ -205,7 +205,7 @@ impl Control {
     }
 }
 
-/// The disarm callback of a component did not come back.
+/// The disarm callback of a component did not return.
 pub(super) fn late_at(path: &'static str) -> SafetyError {
     SafetyError { path, message: "did not come back from disarming in time".to_owned() }
 }
@@ -222,7 +222,7 @@ impl Step<'_> {
         result
     }
 
-    /// Begins to disarm the robot, or has it disarmed by force from now on.
+    /// Begins to disarm the robot, or upgrades the current disarming to a forced one.
     fn disarm(&mut self, force: bool) {
         self.state.disarms += 1;
         match self.state.machine.safety {
@@ -258,9 +258,9 @@ impl Step<'_> {
         lingering.filter_map(|execution| self.declared(execution.command)).map(|declared| declared.path).collect()
     }
 
-    /// Motion is inhibited from here on; the disarm callbacks run once the lock is released. The generation.
+    /// Motion is inhibited from here on; the disarm callbacks run once the lock is released. Returns the generation.
     pub(super) fn begin_disarming(&mut self, by: Option<u64>, name: Option<&'static str>, force: bool) -> u64 {
-        // Those of commands too, which end below.
+        // Includes the callbacks of commands, which end below.
         let hooks = if self.control.0.mode == Mode::Replay { Vec::new() } else { self.state.hooks.all() };
         for execution in &mut self.state.executions {
             let may_act = || execution.task.as_ref().is_some_and(|task| task.may_act());
@@ -295,7 +295,7 @@ impl Step<'_> {
         self.line(Event::Disarmed { errors: errors.clone() });
         self.control.0.limits.clear(Limit::Disarming(disarming.generation));
         let is_safe = errors.is_empty();
-        // Force forgives what cannot be made safe, but not of a robot that nobody can disarm again.
+        // Force ignores callbacks that fail, but not for a robot that nobody can disarm again.
         let is_forgiven = disarming.force && !self.state.is_stopping;
         let is_error = disarming.to_error || !(is_safe || is_forgiven);
         for error in &errors {
@@ -306,7 +306,7 @@ impl Step<'_> {
             true => Err(DisarmError::Error),
             false => Ok(()),
         };
-        // It is set here alone.
+        // It is set only here.
         let _ = disarming.outcome.set(outcome.clone());
         self.state.last_disarm = outcome;
         self.state.machine.safety = if is_error { Safety::Error } else { Safety::Disarmed };
@@ -325,7 +325,7 @@ impl Step<'_> {
     pub(super) fn hardware_error(&mut self, error: SafetyError) {
         self.publish_safety_error(error);
         match self.state.machine.safety {
-            // Of a robot that is disarmed, something may move all the same.
+            // Something on a disarmed robot may still move.
             Safety::Armed | Safety::Disarmed if !self.state.is_stopped() => {
                 self.begin_disarming(None, None, false);
             }

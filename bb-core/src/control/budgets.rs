@@ -1,8 +1,9 @@
-//! Budgets of panics. When a component exceeds its supervisor's budget, everything below that supervisor is restarted, and
+//! Panic budgets. When a component exceeds its supervisor's budget, everything below that supervisor is restarted;
 //! eventually the robot is disarmed.
 //!
-//! Supervisors mirror the topology: one for the robot, one for each link, one for each joint. The parent of a link's is
-//! that of the joint that carries it, the parent of a joint's is that of the link it is mounted on.
+//! Supervisors mirror the topology: one for the robot, one for each link, one for each joint. The parent of a link's
+//! supervisor is that of the joint that carries it; the parent of a joint's supervisor is that of the link it is
+//! mounted on.
 
 use crate::declaration::Supervisor;
 use crate::lifecycle::Supervision;
@@ -10,14 +11,14 @@ use crate::time::MonotonicTime;
 use crate::topology::Topology;
 use std::collections::VecDeque;
 
-/// What a supervisor decides.
+/// The decision of a supervisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// That component alone.
+    /// Restart that component alone.
     Restart,
-    /// All components of this supervisor and of those below it.
+    /// Restart all components of this supervisor and of those below it.
     RestartAll(Supervisor),
-    /// The robot has used up its budget.
+    /// The robot has exhausted its budget.
     GiveUp,
 }
 

@@ -1,4 +1,4 @@
-//! One disarm callback: user code, on a thread of its own, and never on two.
+//! One disarm callback: user code, on its own thread, and never on two at once.
 
 use super::inside;
 use super::{Control, Key};
@@ -21,14 +21,14 @@ pub(super) struct Callback {
 #[derive(Default)]
 struct Runs {
     is_running: bool,
-    /// What it was asked for while it runs: it runs once more.
+    /// Reasons to run once more, collected while it runs.
     waiting: Vec<Reason>,
 }
 
-/// What a callback runs for, and who waits for it.
+/// Why a callback runs, and who waits for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reason {
-    /// The robot is disarmed, for the time of that number.
+    /// The disarming with that number.
     Disarming(u64),
     /// See [`super::apart`].
     Apart(Key),
@@ -44,7 +44,7 @@ impl Callback {
         self.runs().is_running
     }
 
-    /// Has it run on a thread of its own; false if there is no thread to be had.
+    /// Runs it on its own thread; returns false if no thread can be started.
     pub(super) fn start(self: &Arc<Self>, control: &Control, reason: Reason) -> bool {
         if !self.begin(control, reason) {
             return true;
@@ -52,7 +52,7 @@ impl Callback {
         let (callback, robot) = (Arc::clone(self), control.clone());
         let is_started = spawn(format!("disarm {}", self.path), move || {
             callback.work(&robot, reason);
-            // It may be the last owner of what the code captured.
+            // It may be the last owner of the values that the code captured.
             discard(callback);
         });
         if is_started.is_err() {
@@ -68,7 +68,7 @@ impl Callback {
         }
     }
 
-    /// True if the caller is to run it. If it runs already, that thread runs it once more.
+    /// Returns true if the caller is to run it. If it runs already, that thread runs it once more.
     fn begin(&self, control: &Control, reason: Reason) -> bool {
         let mut runs = self.runs();
         if !std::mem::replace(&mut runs.is_running, true) {
@@ -76,8 +76,8 @@ impl Callback {
         }
         runs.waiting.push(reason);
         if runs.waiting.len() > 1 {
-            // It hangs: reasons that nobody waits for any more must not pile up. They stay in the list while the control
-            // state is asked, since the run may end meanwhile.
+            // It hangs: reasons that nobody waits for any more must not pile up. They stay in the list while the
+            // control state is asked, since the run may end meanwhile.
             let waiting = runs.waiting.clone();
             drop(runs);
             let is_over = |reason: &Reason| !control.is_wanted(*reason, self.number);
@@ -101,7 +101,7 @@ impl Callback {
         }
     }
 
-    /// What it is to be run for once more; if there is nothing, it does not run any more.
+    /// The reasons to run once more; if there are none, it is no longer running.
     fn wanted(&self, control: &Control) -> Vec<Reason> {
         loop {
             let mut runs = self.runs();

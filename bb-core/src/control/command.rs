@@ -10,7 +10,7 @@ use crate::message::codec::{Shape, from_json, to_json};
 use std::any::Any;
 use std::fmt;
 
-/// What a command has done since the start.
+/// Counts of a command since the start.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CommandStatistics {
@@ -40,7 +40,7 @@ pub(super) trait AnyCommand: Send + Sync {
     fn role(&self) -> Role;
     /// The parameters that its options are bound to.
     fn bound_to(&self) -> &'static [usize];
-    /// `arguments` are of its own type; `None` stands for the default. User code runs here.
+    /// `arguments` are of its own type; `None` means the default. User code runs here.
     fn start(
         &self,
         arguments: Option<Arguments>,
@@ -51,13 +51,13 @@ pub(super) trait AnyCommand: Send + Sync {
     fn check(&self, parameters: &ParameterValues) -> Result<(), String>;
     /// The schemas of its arguments and its result.
     fn shapes(&self) -> (Shape, Shape);
-    /// Its arguments from JSON; the default ones from an empty text.
+    /// Its arguments from JSON; the default ones from empty text.
     fn arguments(&self, json: &str) -> Result<Arguments, Fault>;
     /// Its result as JSON.
     fn result_json(&self, result: Value) -> Result<String, Fault>;
 }
 
-/// A command as `robot!` lists it.
+/// A command as listed by `robot!`.
 pub struct Prepared(pub(super) Box<dyn AnyCommand>);
 
 struct OfType<C: Command> {

@@ -44,7 +44,7 @@ impl Control {
         let arguments = command.0.arguments(json)?;
         let step = self.step();
         if let Err(fault) = permit.check() {
-            // It was cancelled while the arguments were made.
+            // It was cancelled while the arguments were created.
             drop(step);
             crate::fault::discard(arguments);
             return Err(fault);

@@ -1,4 +1,4 @@
-//! The effects of an entry of the control state that are user code. They run without the lock, on threads that nothing else
+//! The effects of a control-state entry that are user code. They run without the lock, on threads that nothing else
 //! waits for.
 
 use super::callback::{Callback, Reason};
@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 pub(super) struct Effects {
     pub(super) wakers: Wakers,
     logs: Vec<Log>,
-    /// Lines for loggers wait, and no thread writes them yet.
+    /// Lines for loggers are queued, and no thread writes them yet.
     has_lines: bool,
     /// Commands to begin.
     pub(super) begun: Vec<Arc<Task>>,
@@ -31,16 +31,16 @@ pub(super) struct Effects {
     pub(super) results: Vec<(Arc<Slot>, Result<Value, CommandError>)>,
     /// Disarm callbacks, for the disarming of that number.
     pub(super) hooks: Vec<(u64, Vec<Arc<Callback>>)>,
-    /// Disarm callbacks that run while nobody disarms the robot.
+    /// Disarm callbacks that run outside of a disarming.
     pub(super) apart: Vec<(Key, Vec<Arc<Callback>>)>,
     pub(super) dropped: Vec<Value>,
     /// Disarm callbacks of commands that have ended.
     pub(super) forgotten: Vec<Arc<Callback>>,
-    /// Owners of the wiring, which may be the last.
+    /// References to the wiring, which may be the last ones.
     pub(super) wired: Vec<Wired>,
 }
 
-/// What loggers and handlers of telemetry receive.
+/// A message for loggers and telemetry handlers.
 #[derive(Clone, Debug)]
 pub(super) enum Log {
     Health(HealthTransition),
@@ -108,7 +108,7 @@ impl Effects {
             control.start_writing_logs();
         }
         for (reason, callbacks) in without_thread {
-            // Better late than never.
+            // No thread could be started: better run late than never.
             callbacks.iter().for_each(|callback| callback.run(control, reason));
             callbacks.into_iter().for_each(discard);
         }
@@ -132,7 +132,7 @@ impl Effects {
 }
 
 impl Control {
-    /// Runs user code on a thread of the pool, where it harms nobody; on virtual time on the caller's.
+    /// Runs user code on a thread of the pool, where it delays nothing else; on virtual time, on the caller's thread.
     fn run_on_pool(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
         match self.0.mode {
             Mode::Real => self.0.pool.submit(lane, code),
@@ -148,8 +148,8 @@ impl Control {
         }
     }
 
-    /// Runs each disarm callback on a thread of its own, and returns those for which no thread could be started. On virtual time
-    /// all of them wait for [`Self::run_pending_hooks`].
+    /// Runs each disarm callback on its own thread, and returns those for which no thread could be started. On
+    /// virtual time, all of them wait for [`Self::run_pending_hooks`].
     fn start_hooks(&self, generation: u64, all: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
         if self.0.mode != Mode::Real {
             lock(&self.0.pending_hooks).push_back((generation, all));
@@ -166,8 +166,8 @@ impl Control {
         inside::InActuator::new(self.id())
     }
 
-    /// On virtual time: runs the waiting disarm callbacks in order on the calling thread, and returns true if there were any. None
-    /// of them runs inside code that it would wait for.
+    /// On virtual time: runs the waiting disarm callbacks in order on the calling thread, and returns true if there
+    /// were any. None of them runs inside code that it would wait for.
     pub(crate) fn run_pending_hooks(&self) -> bool {
         if inside::is_waited_for(self.id()) {
             return false;
@@ -200,7 +200,7 @@ impl Control {
         }
     }
 
-    /// Waits until loggers have the lines that were written so far, `longest` at most.
+    /// Waits until loggers have all lines written so far, `longest` at most.
     pub(crate) fn wait_for_lines(&self, longest: Duration) {
         let deadline = Instant::now() + longest;
         while lock(&self.0.reporter.0).is_running && Instant::now() < deadline {

@@ -1,4 +1,4 @@
-//! How a command ends: by itself, cancelled, or because its time is over.
+//! How a command ends: by itself, cancelled, or timed out.
 
 use super::arming::ARM_WITHIN;
 use super::execution::CommandError;
@@ -14,7 +14,7 @@ use crate::node::Mode;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How long until it is looked again whether the handles of a command still act.
+/// How often to check whether the handles of a command still act.
 const LOOK_AGAIN: Duration = Duration::from_millis(1);
 
 impl Control {
@@ -101,7 +101,7 @@ impl Step<'_> {
         }
     }
 
-    /// Cancels what would arm the robot.
+    /// Cancels a command that would arm the robot.
     pub(super) fn cancel_arming(&mut self) {
         for id in self.not_ended(|step, execution| step.role(execution.command) == Role::Arming) {
             self.cancel_one(id);
@@ -152,7 +152,7 @@ impl Step<'_> {
 
     fn set_phase(&mut self, index: usize, phase: Phase) {
         if let Some(execution) = self.state.executions.get_mut(index) {
-            // Its code has ended: nothing it holds may act any more.
+            // Its code has ended: none of its handles may act any more.
             execution.permit.revoke();
             execution.phase = phase;
         }
@@ -200,7 +200,7 @@ impl Step<'_> {
         self.control.0.declared.states.iter().copied().find(|state| *state == name)
     }
 
-    /// The execution at `index` ends. What that does to the operational state is published by the caller.
+    /// Ends the execution at `index`. The caller publishes the change of the operational state.
     pub(super) fn end(
         &mut self,
         index: usize,
@@ -212,7 +212,7 @@ impl Step<'_> {
         let (id, command, health) = (execution.id, execution.command, execution.health);
         execution.permit.revoke();
         let slot = Arc::clone(&execution.slot);
-        // One whose code has ended is gone; another one's code has yet to notice.
+        // An execution whose code has ended is gone; another one's code has yet to notice.
         let previous = std::mem::replace(&mut execution.phase, Phase::Lingering);
         let goes_on = matches!(previous, Phase::Running)
             && matches!(result, Err(CommandError::Cancelled | CommandError::TimedOut));
@@ -262,11 +262,12 @@ impl Step<'_> {
         }
     }
 
-    /// The code of a cancelled execution has returned. What it may have started since is made safe before it is gone.
+    /// The code of a cancelled execution has returned. Hardware it may have started since is made safe before it is
+    /// gone.
     fn returned(&mut self, id: u64) {
         let acts = |execution: &RunningCommand| execution.id == id && execution.permit.is_acting();
         if self.control.0.mode == Mode::Real && self.state.executions.iter().any(acts) {
-            // A thread that it has left behind is about to publish, and must not once the robot is armed again.
+            // A thread it has left running is about to publish, and must not do so once the robot is armed again.
             return self.control.0.limits.set(Limit::Gone(id), self.now + LOOK_AGAIN);
         }
         if !self.makes_safe_after(id) {

@@ -1,4 +1,4 @@
-//! What the caller of a command holds.
+//! The caller's handle of a command.
 
 use super::WeakControl;
 use super::task::Value;
@@ -12,13 +12,13 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
-/// A command that runs. Await it on any executor, or wait for it; dropping it lets the command run on.
+/// A running command. Await it on any executor, or wait for it. Dropping it lets the command run on.
 pub struct Execution<T> {
     slot: Arc<Slot>,
     result: PhantomData<fn() -> T>,
 }
 
-/// Why a command has given no result.
+/// Why a command has no result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CommandError {
@@ -30,7 +30,7 @@ pub enum CommandError {
     Cancelled,
 }
 
-/// Where the result is left.
+/// The place of the result.
 pub(super) struct Slot {
     /// The number of the execution.
     id: u64,
@@ -44,13 +44,13 @@ pub(super) struct Slot {
 #[derive(Default)]
 struct State {
     result: Option<Result<Value, CommandError>>,
-    /// Once there is or was a result; the first one counts.
+    /// Set once there is or was a result; the first one counts.
     has_ended: bool,
     waker: Option<Waker>,
 }
 
 impl State {
-    /// The result; an error if it was taken already.
+    /// The result; an error if it was already taken.
     fn take(&mut self) -> Option<Result<Value, CommandError>> {
         let taken = || Err(CommandError::Failed("its result was taken already".into()));
         self.has_ended.then(|| self.result.take().unwrap_or_else(taken))
@@ -62,7 +62,8 @@ impl Slot {
         Self { id, command, control, state: Mutex::default(), changed: Condvar::new() }
     }
 
-    /// Leaves the result; the waker of a task that awaits it, which is user code, and a result that came too late.
+    /// Stores the result. Returns the waker of a task that awaits it, which is user code, and a result that came too
+    /// late.
     pub(super) fn set(&self, result: Result<Value, CommandError>) -> (Option<Waker>, Option<Value>) {
         let mut state = lock(&self.state);
         if state.has_ended {
@@ -114,7 +115,7 @@ impl<T: 'static> Execution<T> {
         result.map(typed)
     }
 
-    /// Waits for the result. On virtual time nobody moves the clock meanwhile: run the simulation and use
+    /// Waits for the result. On virtual time, nothing advances the clock meanwhile: run the simulation and use
     /// [`Self::try_result`].
     ///
     /// # Errors
@@ -132,8 +133,8 @@ impl<T: 'static> Execution<T> {
         self.slot.wait_timeout(timeout).map(typed)
     }
 
-    /// Cancels it. Its result is [`CommandError::Cancelled`] at once, and from now on its handles refuse to act; its future is
-    /// dropped as soon as its code yields.
+    /// Cancels it. Its result is [`CommandError::Cancelled`] at once, and from now on its handles refuse to act. Its
+    /// future is dropped as soon as its code yields.
     pub fn cancel(&self) {
         self.slot.cancel();
     }

@@ -50,15 +50,16 @@ impl Control {
     }
 }
 
-/// The number of cancelled executions whose code has not returned at which no further command starts. The pool has as many
-/// threads for commands. Other executions are bounded by the concurrency of their categories.
+/// No further command starts while this many cancelled executions have not returned from their code. The pool has as
+/// many threads for commands. Other executions are bounded by the concurrency of their categories.
 const MOST_LINGERING: usize = 512;
 
-/// How many more are accepted of commands that disarm the robot or were started by health.
+/// Additional limit for commands that disarm the robot or were started by health.
 const MORE_FOR_SAFETY: usize = 512;
 
 impl Step<'_> {
-    /// Whether another command may start. A command that hangs leaves an execution behind each time it is started and cancelled.
+    /// Whether another command may start. A command that hangs leaves an execution running each time it is started
+    /// and cancelled.
     pub(super) fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
         let is_for_safety = of_health || role == Role::Disarming;
         let most = if is_for_safety { MOST_LINGERING + MORE_FOR_SAFETY } else { MOST_LINGERING };
@@ -67,7 +68,7 @@ impl Step<'_> {
         if lingering < most { Ok(()) } else { Err(RefusalReason::Hanging) }
     }
 
-    /// Which threads of the pool run a command.
+    /// The lane of the pool that runs a command.
     pub(super) fn lane(&self, command: usize, of_health: bool) -> Lane {
         match self.role(command) {
             Role::Disarming => Lane::Disarming,

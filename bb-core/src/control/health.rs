@@ -1,4 +1,4 @@
-//! What estimators and other components report: health, faults and panics; and the watchdog.
+//! Reports of estimators and other components: health, faults and panics; and the watchdog.
 
 use super::budgets::Verdict;
 use super::effects::Log;
@@ -22,7 +22,7 @@ impl Overseer for Control {
     }
 
     fn output_failed(&self, estimator: usize, message: String) {
-        // A replay's journal has it.
+        // In a replay, it is in the journal.
         if self.0.mode != Mode::Replay
             && let Some(islands) = self.0.islands.get()
         {
@@ -31,7 +31,7 @@ impl Overseer for Control {
     }
 
     fn message_failed(&self, path: &'static str, message: String) {
-        // A replay's journal has it.
+        // In a replay, it is in the journal.
         if self.0.mode != Mode::Replay {
             self.note_fault(path, message);
         }
@@ -109,8 +109,8 @@ impl Control {
         step.finish();
     }
 
-    /// Notes a fault that is not a component's failure, or a component that hangs. It is kept, published and logged, and has no
-    /// other consequence.
+    /// Records a fault that is not a component's failure, or a component that hangs. It is kept, published and
+    /// logged, and has no other consequence.
     pub(crate) fn note_fault(&self, path: &'static str, message: String) {
         let mut step = self.step();
         step.note_fault(path, message);

@@ -1,4 +1,4 @@
-//! Disarm callbacks: what makes hardware safe, and whose they are.
+//! Disarm callbacks, which make hardware safe, and their owners.
 
 use super::callback::Callback;
 use crate::component::DisarmHook;
@@ -16,18 +16,18 @@ struct Hook {
     owner: Owner,
 }
 
-/// When a callback is forgotten.
+/// The lifetime of a callback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Owner {
-    /// Never: it is the actuator's own.
+    /// Never forgotten: it is the actuator's own.
     Actuator,
-    /// When the component is made again.
+    /// Forgotten when the component is created again.
     Component,
-    /// When the component is made again, or its options change and that registers callbacks.
+    /// Forgotten when the component is created again, or when a change of its options registers callbacks.
     Options,
-    /// When the code of that execution of a command has returned.
+    /// Forgotten when the code of that command execution has returned.
     Execution(u64),
-    /// The `init` that registered it has failed. It is forgotten when it has made safe what that had started.
+    /// The `init` that registered it has failed. It is forgotten once it has made safe what that `init` had started.
     FailedInit,
 }
 
@@ -38,14 +38,14 @@ impl Hooks {
         callback
     }
 
-    /// One that is not kept.
+    /// Creates one that is not kept.
     pub(super) fn make(&mut self, path: &'static str, run: DisarmHook) -> Arc<Callback> {
         let number = self.next;
         self.next += 1;
         Arc::new(Callback::new(number, path, run))
     }
 
-    /// What is registered from now on has a number from this one on.
+    /// Callbacks registered from now on have numbers from this one on.
     pub(super) fn next(&self) -> u64 {
         self.next
     }
@@ -59,8 +59,8 @@ impl Hooks {
         own.map(|hook| Arc::clone(&hook.callback)).collect()
     }
 
-    /// The component at `path` was made, and those from `first` on are new. All it has now, and the ones that are replaced,
-    /// which are to be dropped without a lock.
+    /// The component at `path` was created; callbacks from `first` on are new. Returns its current callbacks, and the
+    /// replaced ones, which are to be dropped without a lock.
     pub(super) fn made(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
         let old = self.take(|hook| {
             let is_replaced = matches!(hook.owner, Owner::Component | Owner::Options | Owner::FailedInit);
@@ -69,8 +69,8 @@ impl Hooks {
         (self.of_component(path), old)
     }
 
-    /// The same of a component whose options have changed. What it registered when it was made is kept: a callback too many
-    /// fails loudly, and one too few does so when something burns.
+    /// The same for a component whose options have changed. Its callbacks from its creation are kept: with one too
+    /// many, the failure is loud; with one too few, it shows only when hardware burns.
     pub(super) fn changed(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
         let mut has_any = false;
         for hook in self.since(path, first) {
@@ -82,8 +82,8 @@ impl Hooks {
         (self.of_component(path), old)
     }
 
-    /// The component at `path` could not be made. What it had registered from `first` on, and the ones of earlier failures,
-    /// which are to be dropped without a lock.
+    /// The component at `path` could not be created. Returns the callbacks it had registered from `first` on, and
+    /// those of earlier failures, which are to be dropped without a lock.
     pub(super) fn failed(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Vec<Arc<Callback>>) {
         let new: Vec<_> = self
             .since(path, first)
@@ -98,13 +98,13 @@ impl Hooks {
         (new, old)
     }
 
-    /// Whether what an `init` of the component at `path` registered that failed then has not returned.
+    /// Whether callbacks of a failed `init` of the component at `path` have not returned.
     pub(super) fn hang(&self, path: &str) -> bool {
         let mut failed = self.all.iter().filter(|hook| hook.is_of(path) && hook.owner == Owner::FailedInit);
         failed.any(|hook| hook.callback.is_running())
     }
 
-    /// Those of the component at `path`, an actuator's own among them.
+    /// The callbacks of the component at `path`, including an actuator's own.
     fn of_component(&self, path: &str) -> Vec<Arc<Callback>> {
         let is_own = |hook: &&Hook| matches!(hook.owner, Owner::Actuator | Owner::Component | Owner::Options);
         let own = self.all.iter().filter(|hook| hook.is_of(path)).filter(is_own);
@@ -123,22 +123,22 @@ impl Hooks {
         self.all.extract_if(.., |hook| fits(hook)).map(|hook| hook.callback).collect()
     }
 
-    /// Takes out the one of that number; to be dropped without a lock.
+    /// Removes the callback of that number; drop it without a lock.
     pub(super) fn take_one(&mut self, number: u64) -> Vec<Arc<Callback>> {
         self.take(|hook| hook.callback.number == number)
     }
 
-    /// Takes out those of an execution; to be dropped without a lock.
+    /// Removes those of an execution; drop them without a lock.
     pub(super) fn take_of_execution(&mut self, execution: u64) -> Vec<Arc<Callback>> {
         self.take(|hook| hook.owner == Owner::Execution(execution))
     }
 
-    /// Takes out those of a component that is given up; to be dropped without a lock.
+    /// Removes those of a component that is given up; drop them without a lock.
     pub(super) fn take_failed(&mut self, path: &str) -> Vec<Arc<Callback>> {
         self.take(|hook| hook.is_of(path) && hook.owner == Owner::FailedInit)
     }
 
-    /// Takes out all but those of these executions; to be dropped without a lock.
+    /// Removes all but those of these executions; drop them without a lock.
     pub(super) fn take_but_of(&mut self, executions: &[u64]) -> Vec<Arc<Callback>> {
         self.take(|hook| !matches!(hook.owner, Owner::Execution(id) if executions.contains(&id)))
     }

@@ -1,14 +1,14 @@
-//! Whether the calling thread runs code that disarming waits for: such code must not wait for the disarming in turn.
+//! Whether the calling thread runs code that disarming waits for. Such code must not wait for the disarming in turn.
 
 use std::cell::RefCell;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Pairs of robots of this process: code that the disarming of the first one waits for, waits for the second one to be
+/// Pairs of robots of this process: code that the first one's disarming waits for is waiting for the second one to be
 /// disarmed.
 static WAITS: Mutex<Vec<(usize, usize)>> = Mutex::new(Vec::new());
 
 thread_local! {
-    /// What the calling thread is inside of: of one robot, and from there perhaps of another.
+    /// Code that the calling thread is inside of: of one robot, and called from there perhaps of another.
     static INSIDE: RefCell<Vec<(usize, Code)>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -36,12 +36,13 @@ pub(super) fn is_waited_for(robot: usize) -> bool {
     INSIDE.with_borrow(|inside| inside.iter().any(|(other, _)| *other == robot))
 }
 
-/// The calling thread waits for a robot to be disarmed as long as this lives.
+/// The calling thread waits for a robot to be disarmed until this is dropped.
 #[derive(Debug)]
 pub(super) struct Waits(Vec<(usize, usize)>);
 
-/// Called before the calling thread waits for `robot` to be disarmed; `None` if that would wait for this thread in turn: it runs
-/// code that the disarming of `robot` waits for, directly or because code of `robot` waits for another robot.
+/// Called before the calling thread waits for `robot` to be disarmed. Returns `None` if the wait would deadlock: the
+/// thread runs code that the disarming of `robot` waits for, directly or because code of `robot` waits for another
+/// robot.
 pub(super) fn waits_for(robot: usize) -> Option<Waits> {
     let inside: Vec<usize> = INSIDE.with_borrow(|inside| inside.iter().map(|(robot, _)| *robot).collect());
     if inside.is_empty() {
@@ -81,7 +82,7 @@ fn all_waits() -> MutexGuard<'static, Vec<(usize, usize)>> {
     WAITS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The calling thread is inside as long as this lives. They end in the reverse order.
+/// The calling thread is inside until this is dropped. Guards are dropped in the reverse order.
 struct Inside;
 
 impl Inside {
@@ -97,7 +98,7 @@ impl Drop for Inside {
     }
 }
 
-/// The calling thread runs an actuator's code as long as this lives.
+/// The calling thread runs an actuator's code until this is dropped.
 pub(crate) struct InActuator {
     _inside: Inside,
 }

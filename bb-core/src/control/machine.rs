@@ -9,13 +9,13 @@ pub(super) const IDLE: &str = "idle";
 /// Armed, and a command runs.
 pub(super) const EXECUTING: &str = "executing";
 
-/// What the operational state is made of.
+/// The parts of the operational state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Machine {
     pub(super) safety: Safety,
     /// The state while no command runs.
     pub(super) resting: &'static str,
-    /// Commands that run.
+    /// Number of running commands.
     pub(super) running: usize,
 }
 

@@ -1,7 +1,7 @@
-//! Every order in which threads can enter the control state, by a model checker: `RUSTFLAGS="--cfg loom"`.
+//! Model-checks every order in which threads can enter the control state: `RUSTFLAGS="--cfg loom"`.
 //!
-//! In each of them, a robot that was told to stop stays disarmed, hardware that could not be made safe leads to `error`, and an
-//! actuator does not move after it was made safe.
+//! In each order, a robot that was told to stop stays disarmed, hardware that could not be made safe leads to
+//! `error`, and an actuator does not move after it was made safe.
 
 use super::{Control, bare};
 use crate::component::{Guardian, Permit};
@@ -16,7 +16,8 @@ fn control() -> Control {
     bare::control(Mode::Real, &[], [])
 }
 
-/// What moves, as the runtime drives it: under one lock it asks whether the robot is armed and moves, or is made safe.
+/// A motor as driven by the runtime: under one lock, it either checks that the robot is armed and moves, or is made
+/// safe.
 #[derive(Clone, Default)]
 struct Motor(Arc<Mutex<Positions>>);
 
@@ -50,10 +51,11 @@ impl Motor {
     }
 }
 
-/// What a thread does.
+/// The code of a thread.
 type Thread = fn(&Control, &Motor);
 
-/// Has an armed robot entered by these threads, in all orders with that many preemptions at most; `holds` at the end.
+/// Lets these threads enter an armed robot, in all orders with at most this many preemptions; `holds` is checked at
+/// the end.
 fn check<const THREADS: usize>(threads: [Thread; THREADS], prepare: fn(&Control) -> Motor, holds: fn(&Control)) {
     let mut checker = loom::model::Builder::new();
     checker.preemption_bound = Some(2);
@@ -91,7 +93,7 @@ const BURNS: Thread = |control, _| control.hardware_error("motor", "it burns".to
 /// The first time that the robot is disarmed.
 const TIME_IS_OVER: Thread = |control, _| control.disarm_timeout(1);
 
-/// A brake that fails. Without a motor beside it: a model has room for five threads.
+/// A brake that fails. There is no motor: a model has room for five threads.
 fn brake(control: &Control) -> Motor {
     control.on_disarm("brake", None, std::sync::Arc::new(|| Err(Fault::new("no air"))));
     Motor::default()
@@ -155,7 +157,7 @@ fn an_init_that_fails_while_the_robot_is_disarmed() {
         while control.is_disarming() {
             thread::yield_now();
         }
-        // Where the disarming runs the callback at that time, it runs it once more, on its own thread.
+        // If the disarming runs the callback at that moment, it runs it once more, on its own thread.
         while control.makes_safe() {
             thread::yield_now();
         }

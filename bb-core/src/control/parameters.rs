@@ -1,4 +1,4 @@
-//! Parameters: what is set, what refuses it, who is told.
+//! Parameters: setting and validating them, and notifying components.
 
 use super::{Bound, Control};
 use crate::component::Permit;
@@ -48,7 +48,7 @@ impl Control {
             journal.wait_for_room();
         }
         let refuse = |message: String| ParameterError { path: declared.path.to_owned(), message };
-        // Whether options would be valid is user code, so it is asked without the lock; again if another parameter was set
+        // Validation of options is user code, so it runs without the lock, and again if another parameter was set
         // meanwhile.
         loop {
             let (values, version, checks) = {
@@ -91,7 +91,7 @@ impl Control {
         }
     }
 
-    /// In a replay: a parameter was set. Those whose options are bound to it are told by lines of their own.
+    /// In a replay: a parameter was set. Components whose options are bound to it are notified by their own lines.
     pub(crate) fn replay_parameter(&self, number: usize, value: ParameterValue) {
         let mut step = self.step();
         let Some((values, from)) = step.state.parameters.with(number, value.clone()) else { return };
@@ -104,7 +104,7 @@ impl Control {
         step.finish();
     }
 
-    /// Remembers that the options of a component are bound to parameters.
+    /// Records that the options of a component are bound to parameters.
     pub(super) fn bind_to(
         &self,
         path: &'static str,
@@ -115,7 +115,7 @@ impl Control {
         self.lock().bound.push(Bound { path, parameters, check, target });
     }
 
-    /// Commands take their options when they start, so that they need not be told.
+    /// Commands take their options when they start, so they need no notification.
     pub(super) fn bind_commands(&self) {
         for (number, command) in self.0.declared.commands.iter().enumerate() {
             let bound = self.0.commands.get(number).map_or(&[][..], |command| command.0.bound_to());

@@ -1,4 +1,4 @@
-//! How a command starts, or why it does not.
+//! Starting commands, and the reasons for refusing them.
 
 use super::command::Arguments;
 use super::effects::Log;

@@ -11,7 +11,7 @@ use crate::pubsub::Topic;
 use crate::time::{MonotonicTime, WallTime};
 use std::sync::atomic::Ordering;
 
-/// The processing of one entry: the lock, the entry's time, and what follows from it once the lock is released. No user code
+/// The processing of one entry: the lock, the entry's time, and the effects once the lock is released. No user code
 /// may be called while it lives.
 pub(super) struct Step<'a> {
     pub(super) control: &'a Control,
@@ -35,7 +35,7 @@ impl Control {
 }
 
 impl Step<'_> {
-    /// Writes the entry's line; its number, or 0 without a journal.
+    /// Writes the entry's line. Returns its number, or 0 without a journal.
     pub(super) fn line(&self, event: Event) -> u64 {
         match &self.control.0.journal {
             Some(_) if self.state.has_ended => 0,
@@ -56,7 +56,7 @@ impl Step<'_> {
         topic.publish_deferred(&stamp.message(payload), &mut self.effects.wakers, &mut None);
     }
 
-    /// Publishes what has changed of safety and state since the step began or since the last time.
+    /// Publishes changes of safety and state since the step began or since the last call.
     pub(super) fn publish_machine(&mut self, command: Option<&'static str>) {
         let before = std::mem::replace(&mut self.before, self.state.machine);
         let after = self.state.machine;
@@ -93,7 +93,7 @@ impl Step<'_> {
         self.publish(&self.control.0.topics.fault, fault, self.now);
     }
 
-    /// Adds an entry for an estimator. In a replay, the journal has it.
+    /// Adds an entry for an estimator. In a replay, it is in the journal.
     pub(super) fn post(&mut self, estimator: usize, entry: NodeEntry) {
         if self.control.0.mode != Mode::Replay
             && let Some(islands) = self.control.0.islands.get()

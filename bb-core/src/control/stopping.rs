@@ -1,4 +1,4 @@
-//! How the robot stops: it is disarmed first, whatever hangs.
+//! Stopping the robot: it is disarmed first, even if code hangs.
 
 use super::arming::DISARM_WITHIN;
 use super::inside;
@@ -44,7 +44,7 @@ impl Control {
     pub(crate) fn wait_until_disarmed(&self) {
         if self.0.mode == Mode::Real {
             let generation = self.lock().generation;
-            // If another robot's callback stops this one, those of this robot do not wait for that one.
+            // If another robot's callback stops this one, the callbacks of this robot do not wait for that one.
             let _waits = inside::waits_for(self.id());
             self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| !state.is_disarming(generation));
             // In case the timekeeper's thread is gone.
@@ -103,7 +103,7 @@ impl Control {
         self.0.sleeper.wake_at(time, None, waker);
     }
 
-    /// When the watchdog looks next.
+    /// When the watchdog checks next.
     pub(crate) fn next_watch(&self) -> Option<MonotonicTime> {
         self.0.watch.next()
     }
@@ -113,14 +113,14 @@ impl Control {
         self.0.sleeper.next()
     }
 
-    /// When a time limit is over next.
+    /// When the next time limit passes.
     pub(crate) fn next_limit(&self) -> Option<MonotonicTime> {
         self.0.limits.next()
     }
 }
 
 impl super::step::Step<'_> {
-    /// Disarms whatever the safety state: hardware that was started while the robot was disarmed may move as well.
+    /// Disarms in any safety state: hardware started while the robot was disarmed may move as well.
     fn begin_stop(&mut self) {
         let was_in_error = self.state.machine.safety == Safety::Error;
         if self.state.disarming.is_none() {

@@ -89,13 +89,13 @@ impl Control {
         control
     }
 
-    /// Says where islands are, once the robot is wired.
+    /// Sets the islands, once the robot is wired.
     pub(crate) fn set_islands(&self, islands: Box<dyn Islands>) {
         // It is set once.
         let _ = self.0.islands.set(islands);
     }
 
-    /// Says what components and commands see of the robot.
+    /// Sets the interface that components and commands have to the robot.
     pub(crate) fn set_host(&self, host: &Arc<dyn Host>) {
         // It is set once.
         let _ = self.0.host.set(Arc::downgrade(host));
@@ -110,12 +110,12 @@ impl Control {
         WeakControl(Arc::downgrade(&self.0))
     }
 
-    /// The state, for a look; entries are processed by [`Self::step`](super::step).
+    /// Locks the state for reading; entries are processed by [`Self::step`](super::step).
     pub(super) fn lock(&self) -> StateGuard<'_> {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until `holds`, `longest` at most; returns whether it holds.
+    /// Waits until `holds`, `longest` at most. Returns whether it holds.
     #[cfg(not(loom))]
     pub(super) fn wait_until(&self, longest: Duration, holds: impl Fn(&State) -> bool) -> bool {
         let deadline = std::time::Instant::now() + longest;
@@ -147,12 +147,12 @@ impl Control {
         self.lock().components.push(Supervised { path, supervisor, order: Box::new(order) });
     }
 
-    /// A sensor or a service was told something: on virtual time it obeys before time goes on.
+    /// A sensor or a service got an order: on virtual time, it obeys before time advances.
     pub(crate) fn note_order(&self) {
         self.0.has_orders.store(true, Ordering::Release);
     }
 
-    /// Whether any was told something since the last time.
+    /// Whether any got an order since the last call.
     pub(crate) fn take_orders(&self) -> bool {
         self.0.has_orders.swap(false, Ordering::AcqRel)
     }
@@ -165,7 +165,7 @@ impl Control {
         self.lock().machine.safety
     }
 
-    /// The same without the lock: for actuators, which ask under a lock of their own before every command.
+    /// The same without the lock: for actuators, which ask under their own lock before every command.
     pub(crate) fn safety_now(&self) -> Safety {
         match self.0.safety.load(Ordering::SeqCst) {
             safety if safety == Safety::Armed as u8 => Safety::Armed,
@@ -175,7 +175,7 @@ impl Control {
         }
     }
 
-    /// Calls `call` with what has been done so far, while no entry is processed.
+    /// Calls `call` with a summary so far, while no entry is processed.
     pub(crate) fn between_entries<T>(&self, call: impl FnOnce(Summary) -> T) -> T {
         let state = self.lock();
         call(self.summary(&state))

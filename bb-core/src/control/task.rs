@@ -16,7 +16,7 @@ use std::task::{Context, Poll, Wake, Waker};
 pub(super) type Value = Box<dyn Any + Send>;
 pub(super) type Ended = Result<Outcome<Value>, Fault>;
 pub(super) type RunningFuture = Pin<Box<dyn Future<Output = Ended> + Send>>;
-/// Makes the future: user code too, which runs where the future is polled.
+/// Creates the future. This is user code too, and runs where the future is polled.
 pub(super) type Starter = Box<dyn FnOnce() -> Result<RunningFuture, Fault> + Send>;
 
 /// One execution's future.
@@ -49,8 +49,8 @@ enum Code {
 /// Polls at one instant of virtual time before a command is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-/// Commands that may begin at one instant of virtual time: one that starts itself, or two that start each other, would keep
-/// time from going on.
+/// Commands that may begin at one instant of virtual time: one that starts itself, or two that start each other,
+/// would keep time from advancing.
 pub(super) const MOST_AT_ONCE: u32 = 100_000;
 
 impl Task {
@@ -66,7 +66,7 @@ impl Task {
         Self { id, lane, control, state: Mutex::new(state) }
     }
 
-    /// Has it polled.
+    /// Schedules it to be polled.
     pub(super) fn schedule(self: &Arc<Self>) {
         let mut state = self.lock();
         match state.code {
@@ -84,12 +84,12 @@ impl Task {
         }
     }
 
-    /// Its code is not entered any more. Before [`Self::cancel`], which cannot be called under a lock.
+    /// Its code is not entered any more. Call this before [`Self::cancel`], which cannot be called under a lock.
     pub(super) fn mark_cancelled(&self) {
         self.lock().is_cancelled = true;
     }
 
-    /// Whether it has code that may do something: a thread is inside, or its future is to be dropped.
+    /// Whether its code may still act: a thread is inside, or its future is to be dropped.
     pub(super) fn may_act(&self) -> bool {
         matches!(self.lock().code, Code::Polled | Code::Future(_))
     }
@@ -99,7 +99,8 @@ impl Task {
         let Some(control) = self.control.upgrade() else { return };
         let mut state = self.lock();
         state.is_cancelled = true;
-        // It may be waiting for a thread of its lane, and all of these may hang. On virtual time nothing waits for long.
+        // It may be waiting for a thread of its lane, and all of these may hang. On virtual time, nothing waits for
+        // long.
         state.is_scheduled &= control.is_virtual();
         drop(state);
         self.schedule();
@@ -205,7 +206,7 @@ impl Task {
         state.entered.filter(|_| matches!(state.code, Code::Polled))
     }
 
-    /// Which threads of the pool run it, or drop its future.
+    /// The lane of the pool that runs it, or drops its future.
     pub(super) fn lane(&self) -> Lane {
         if self.lock().is_cancelled { Lane::Dropping } else { self.lane }
     }

@@ -18,7 +18,7 @@ pub struct SystemTopics {
     pub(crate) journal: Topic<JournalLine>,
     pub(crate) commands: Box<[Topic<CommandEvent>]>,
     pub(crate) parameters: Box<[Topic<ParameterChange>]>,
-    /// Topics made at run time.
+    /// Topics created at run time.
     pub(crate) registry: Registry,
 }
 

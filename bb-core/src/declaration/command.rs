@@ -51,8 +51,8 @@ impl Cancel {
 }
 
 impl CommandDeclaration {
-    /// Whether it may start in a state; by default, what arms starts `disarmed`, what disarms in every other state, and
-    /// the rest when the robot is `idle`.
+    /// Whether it may start in a state. By default, arming commands start in `disarmed`, disarming ones in every
+    /// other state, and the rest when the robot is `idle`.
     pub(crate) fn allowed(&self, role: Role, state: &str) -> bool {
         match (self.allowed_states, role) {
             (Some(states), _) => states.contains(&state),

@@ -11,7 +11,7 @@ pub struct EstimatorDeclaration {
     pub path: &'static str,
     /// The frame of what it publishes.
     pub frame: Frame,
-    /// Its inputs, in the order of their declaration; a nested estimator's only one is its sensor.
+    /// Its inputs, in the order of their declaration. A nested estimator's only input is its sensor.
     pub inputs: &'static [InputDeclaration],
     /// The paths it publishes at: one per declared output, or its own.
     pub outputs: &'static [&'static str],
@@ -26,7 +26,7 @@ pub struct EstimatorDeclaration {
 }
 
 impl EstimatorDeclaration {
-    /// The input whose arrival dispatches.
+    /// The input whose arrival triggers a dispatch.
     pub(crate) fn driver(&self) -> Option<&'static InputDeclaration> {
         self.inputs.iter().find(|input| input.driver)
     }
@@ -49,9 +49,9 @@ impl EstimatorDeclaration {
 pub struct HealthDeclaration {
     /// How long a callback may take.
     pub latency_budget_nanos: Option<i64>,
-    /// After how long without a run completed on a message of the driver it is lost.
+    /// How long without a completed run on a driver message until it is lost.
     pub lost_after_nanos: Option<i64>,
-    /// After how many good completions in a row it is healthy again: at least 1.
+    /// How many good completions in a row until it is healthy again: at least 1.
     pub recover_after: u32,
     /// The number of the command that is started when it degrades.
     pub on_degraded: Option<usize>,
@@ -92,7 +92,7 @@ pub struct IslandDeclaration {
     pub is_measured: bool,
     /// The numbers of its estimators, in the order in which a message reaches them.
     pub estimators: &'static [usize],
-    /// What comes in from outside.
+    /// The publishers outside the island that feed it.
     pub inlets: &'static [InletDeclaration],
 }
 
@@ -123,7 +123,7 @@ pub struct InputDeclaration {
     pub name: &'static str,
     /// The path of its publisher.
     pub source: &'static str,
-    /// Whether its arrival dispatches.
+    /// Whether its arrival triggers a dispatch.
     pub driver: bool,
     /// Whether the estimator is called without it when it is missing or too old.
     pub optional: bool,
@@ -136,7 +136,7 @@ pub struct InputDeclaration {
 }
 
 impl InputDeclaration {
-    /// The one input of a nested estimator: its sensor, which is in the same frame.
+    /// The only input of a nested estimator: its sensor, which is in the same frame.
     pub const fn nested(name: &'static str, source: &'static str) -> Self {
         Self {
             index: 0,

@@ -46,7 +46,8 @@ pub(crate) fn graph(
     graph.text
 }
 
-/// The component that publishes at `path`: an estimator of several outputs publishes below its own path, or elsewhere.
+/// The component that publishes at `path`: an estimator with several outputs publishes below its own path, or
+/// elsewhere.
 fn publisher_of<'a>(path: &'a str, estimators: &'a [EstimatorDeclaration]) -> &'a str {
     let owner = estimators.iter().find(|estimator| estimator.outputs.contains(&path));
     owner.map_or(path, |estimator| estimator.path)
@@ -116,7 +117,7 @@ impl Graph {
     }
 }
 
-/// A name that both languages take: letters, digits and `_`; other characters by their number.
+/// A name valid in both languages: letters, digits and `_`; other characters are replaced by their number.
 fn id(name: &str) -> String {
     let mut id = String::from("n_");
     for character in name.chars() {

@@ -1,8 +1,9 @@
 //! Concatenates constant arrays.
 
-/// The values of all parts in order: `N`, which is at least 1.
+/// Concatenates all parts, in order; `N` is at least 1.
 ///
-/// `robot!` writes long tables in parts: the time that rustc takes for one constant grows with the square of its values.
+/// `robot!` writes long tables in parts: the time that rustc takes for one constant grows with the square of its
+/// length.
 pub const fn join<T: Copy, const N: usize>(parts: &[&[T]]) -> [T; N] {
     let mut all = [parts[0][0]; N];
     let (mut count, mut part) = (0, 0);

@@ -103,7 +103,7 @@ impl ParameterDeclaration {
         let Some(range) = self.range else { return Ok(()) };
         let is_inside = match value {
             ParameterValue::Float(value) => (range.start..=range.end).contains(value),
-            // As integers: a large one would be rounded to a float inside.
+            // Compared as integers: a large one would be rounded to a float within the range.
             ParameterValue::Integer(value) => {
                 (range.start.ceil() as i128..=range.end.floor() as i128).contains(&i128::from(*value))
             }
@@ -127,7 +127,8 @@ impl ParameterValues {
         &self.0
     }
 
-    /// The same with another value for the parameter `number`, and the previous value; `None` if there is no such parameter.
+    /// A copy with another value for the parameter `number`, and the previous value; `None` if there is no such
+    /// parameter.
     pub(crate) fn with(&self, number: usize, value: ParameterValue) -> Option<(Self, ParameterValue)> {
         let mut values = self.0.to_vec();
         let previous = std::mem::replace(values.get_mut(number)?, value);

@@ -9,7 +9,7 @@ bb_macros::unit_tables!();
 pub(crate) struct Quantity {
     /// In SI.
     pub(crate) value: f64,
-    /// None for a number without a unit.
+    /// `None` for a number without a unit.
     pub(crate) exponents: Option<[i8; 6]>,
 }
 
@@ -17,7 +17,7 @@ impl Quantity {
     /// Reads a number and a unit after it, if there is one.
     ///
     /// # Errors
-    /// The text is not a number, or the unit is unknown; names the nearest one.
+    /// The text is not a number, or the unit is unknown; the error names the nearest one.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let text = text.trim();
         let (number, unit) = split(text).ok_or_else(|| format!("expected a number with a unit, found `{text}`"))?;
@@ -30,7 +30,7 @@ impl Quantity {
     }
 }
 
-/// The longest beginning that is a number, and the rest: in `5e3 m` the `e` belongs to the number.
+/// The longest prefix that is a number, and the rest: in `5e3 m` the `e` belongs to the number.
 fn split(text: &str) -> Option<(f64, &str)> {
     let is_of_number = |letter: char| letter.is_ascii_digit() || "+-.eE_".contains(letter);
     let end = text.find(|letter| !is_of_number(letter)).unwrap_or(text.len());
@@ -40,8 +40,8 @@ fn split(text: &str) -> Option<(f64, &str)> {
     })
 }
 
-/// The dimension of a unit and its factor to SI: a symbol, or a product of powers of symbols, `kg*m/s^2`. A `/` belongs to
-/// the symbol after it alone.
+/// The dimension of a unit and its factor to SI: a symbol, or a product of powers of symbols, `kg*m/s^2`. A `/`
+/// applies only to the symbol after it.
 pub(crate) fn parse_unit(text: &str) -> Result<([i8; 6], f64), String> {
     let (mut exponents, mut factor) = ([0_i8; 6], 1.0);
     let mut sign = 1;

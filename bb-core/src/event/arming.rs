@@ -11,7 +11,7 @@ pub enum ArmError {
     Error,
     /// The robot is being disarmed.
     Disarming,
-    /// The robot stops.
+    /// The robot is stopping.
     Stopping,
     /// The code of these commands, which were cancelled, has not returned.
     Lingering(Vec<&'static str>),
@@ -29,11 +29,11 @@ pub enum DisarmError {
     Failed(Vec<SafetyError>),
     /// The safety state is `error`, and this disarm was not forced, or hardware reported an error meanwhile.
     Error,
-    /// A disarm callback or an actuator's own code called: the robot is being disarmed, and the caller must not wait for
-    /// itself. The same holds for a disarm callback of another robot if disarming this one waits for that robot.
+    /// A disarm callback or an actuator's own code called: the robot is being disarmed, and the caller would wait for
+    /// itself. The same applies to a disarm callback of another robot if disarming this one waits for that robot.
     Callback,
-    /// The robot is still being disarmed: its time limit has not been enforced yet, or another thread of a simulation runs the
-    /// callbacks.
+    /// The robot is still being disarmed: its time limit has not been enforced yet, or another thread of a simulation
+    /// runs the callbacks.
     Unfinished,
     /// The robot is replayed: its journal says when it is disarmed.
     Replay,

@@ -59,15 +59,15 @@ pub struct CategoryDeclaration {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 #[non_exhaustive]
 pub enum RefusalReason {
-    /// Its `allowed_states` do not include this one.
+    /// Its `allowed_states` do not include the current state.
     State,
-    /// Its category is full, and it cancels none of the commands that run.
+    /// Its category is full, and it cancels none of the running commands.
     Busy,
     /// The safety state is `error`, or the robot is being disarmed.
     Safety,
     /// The robot is stopping.
     Stopping,
-    /// Too many executions that were cancelled have not returned from their code.
+    /// Too many cancelled executions have not returned from their code.
     Hanging,
 }
 

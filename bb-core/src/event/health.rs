@@ -4,7 +4,7 @@ use crate::Payload;
 use crate::time::MonotonicTime;
 use std::fmt;
 
-/// How far an estimator's output can be relied on.
+/// How far an estimator's output can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 pub enum HealthState {
     /// Its last completions were good.
@@ -12,7 +12,7 @@ pub enum HealthState {
     Healthy,
     /// Something was bad, and not enough good completions have followed.
     Degraded,
-    /// No run was completed on a message of the driver for `lost_after`.
+    /// No run on a driver message was completed for `lost_after`.
     Lost,
 }
 
@@ -26,13 +26,13 @@ pub enum HealthReason {
     SyncMiss,
     /// The driver's message was older than its `within` when it arrived.
     StaleInput,
-    /// The algorithm reported that its estimate is not to be trusted.
+    /// The algorithm reported that its estimate should not be trusted.
     Diverged,
     /// It failed and is restarted, or was restarted by a supervisor or with new options.
     Restarted,
-    /// It failed and stays stopped.
+    /// It failed and remains stopped.
     Stopped,
-    /// No run was completed on a message of the driver for `lost_after`.
+    /// No run on a driver message was completed for `lost_after`.
     Lost,
     /// A run was completed again, or enough good completions followed.
     Recovered,
@@ -45,7 +45,7 @@ pub enum HealthReason {
 pub struct HealthTransition {
     /// The path of the estimator.
     pub estimator: &'static str,
-    /// The path of the publisher whose message, or whose silence, was the cause.
+    /// The path of the publisher whose message, or lack of messages, was the cause.
     pub source: &'static str,
     /// The previous state.
     pub from: HealthState,

@@ -5,7 +5,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::task::Waker;
 
-/// How a call of user code failed.
+/// A failed call of user code.
 pub(crate) struct Failed {
     pub(crate) fault: Fault,
     /// It panicked, and may have left its data inconsistent.
@@ -62,7 +62,8 @@ pub(crate) fn retire<C>(mut component: C, panicked: bool, close: impl FnOnce(&mu
 pub(crate) fn of_panic(panic: Box<dyn Any + Send>) -> Fault {
     let message = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let message = message.or_else(|| panic.downcast_ref::<String>().cloned());
-    // The payload of a panic may itself panic when it is dropped, and so may the payload of that panic, which is leaked.
+    // The value carried by a panic may itself panic when dropped, and so may the value of that panic, which is
+    // leaked.
     if let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(panic))) {
         std::mem::forget(second);
     }

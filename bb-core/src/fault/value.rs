@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-/// Why a sensor or an estimator cannot start, or stops. Any error becomes one with `?`.
+/// Why a sensor or an estimator cannot start, or stops. Any error converts to one with `?`.
 ///
 /// ```
 /// use bb_core::Fault;
@@ -22,26 +22,26 @@ pub struct Fault {
     pub(crate) then: Then,
 }
 
-/// What happens to the component.
+/// The consequence for the component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Then {
     /// It is restarted.
     Restart,
-    /// It stays stopped: a restart would not help.
+    /// It remains stopped: a restart would not help.
     Stay,
     /// It is not needed in this robot.
     Skip,
-    /// It takes new options only by being restarted with them.
+    /// It takes new options only by a restart.
     Remake,
 }
 
 impl Fault {
-    /// A fault with a message of its own.
+    /// A fault with this message.
     pub fn new(message: impl Into<String>) -> Self {
         Self::from(message.into())
     }
 
-    /// A fault that a restart does not fix, such as a broken file: the component stays stopped.
+    /// A fault that a restart does not fix, such as a broken file: the component remains stopped.
     pub fn permanent(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self { error: error.into(), then: Then::Stay }
     }
@@ -56,7 +56,7 @@ impl Fault {
         Self { error: "it is restarted with its new options".into(), then: Then::Remake }
     }
 
-    /// The error it was made from.
+    /// The underlying error.
     pub fn as_error(&self) -> &(dyn Error + Send + Sync + 'static) {
         &*self.error
     }

@@ -1,18 +1,19 @@
-//! A checksum of a message, to compare an output with that of the run.
+//! A checksum of a message, to compare an output with that of the recorded run.
 
 use crate::message::codec::Writer;
 use crate::message::{Payload, Stamped};
 use std::cell::RefCell;
 
 thread_local! {
-    /// Kept for its room.
+    /// Kept to reuse its allocation.
     static BYTES: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Of the payload's bytes, the times and the frame. Not cryptographic: it finds an algorithm that is not deterministic.
+/// Of the payload's bytes, the times and the frame. Not cryptographic: it detects an algorithm that is not
+/// deterministic.
 pub(crate) fn checksum<T: Payload>(message: &Stamped<T>) -> u64 {
     BYTES.with(|bytes| {
-        // A payload's own `write` may publish: then it gets a buffer of its own.
+        // A payload's own `write` may publish; it then gets another buffer.
         let mut own = Vec::new();
         let mut kept = bytes.try_borrow_mut();
         let bytes = match &mut kept {

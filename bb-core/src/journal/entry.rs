@@ -9,8 +9,8 @@ use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 
-/// One line of a journal. It is a payload: [`Builder::publish_journal`](crate::Builder::publish_journal) publishes lines at
-/// `journal`.
+/// One line of a journal. It is a payload: [`Builder::publish_journal`](crate::Builder::publish_journal) publishes
+/// lines at `journal`.
 #[derive(Clone, Debug, Payload)]
 pub struct JournalLine {
     /// Its number, from 1, without gaps.
@@ -21,7 +21,7 @@ pub struct JournalLine {
     pub event: Event,
 }
 
-/// The same, by the name that those use who hold many of them.
+/// The same type, under a name for code that handles many of them.
 pub type Entry = JournalLine;
 
 /// See [`Entry`]. Islands, estimators, publishers, actuators, commands and parameters are named by their numbers.
@@ -30,7 +30,7 @@ pub type Entry = JournalLine;
 pub enum Event {
     /// The journal begins.
     Begin {
-        /// The robot and its settings, one fact a line.
+        /// The robot and its settings, one fact per line.
         declaration: Vec<String>,
         /// Wall time minus monotonic time, in nanoseconds.
         wall_offset_nanos: i64,
@@ -42,18 +42,18 @@ pub enum Event {
         /// Wall time minus monotonic time, in nanoseconds.
         offset_nanos: i64,
     },
-    /// A sensor or a service published, or other code for it.
+    /// A sensor or a service published a message, or other code did for it.
     Message {
         /// The publisher.
         publisher: usize,
-        /// What.
+        /// The message.
         message: Recorded,
     },
-    /// A command, a service or other code published at a path of its own.
+    /// A command, a service or other code published at a path of its choice.
     Own {
         /// The path.
         path: &'static str,
-        /// What.
+        /// The message.
         message: Recorded,
     },
     /// An actuator carried out a command.
@@ -63,13 +63,13 @@ pub enum Event {
         /// The command.
         message: Recorded,
     },
-    /// An island took in a message.
+    /// An island received a message.
     Deliver {
         /// The island.
         island: usize,
-        /// Which of its publishers, as the island numbers them.
+        /// The publisher, as numbered by the island.
         entry: usize,
-        /// The number of the message's line; 0 for one that another island has published.
+        /// The number of the message's line; 0 for a message published by another island.
         message: u64,
     },
     /// A message did not fit in the inbox of an island.
@@ -86,7 +86,7 @@ pub enum Event {
         /// The island.
         island: usize,
     },
-    /// An island did what was due.
+    /// An island did the work that was due.
     Wake {
         /// The island.
         island: usize,
@@ -98,7 +98,7 @@ pub enum Event {
         /// The values of all parameters.
         values: Vec<ParameterValue>,
     },
-    /// An estimator was restarted from above.
+    /// An estimator was restarted by its supervisor.
     Restart {
         /// The estimator.
         estimator: usize,
@@ -108,7 +108,7 @@ pub enum Event {
         /// The estimator.
         estimator: usize,
     },
-    /// An estimator learnt that it is lost.
+    /// An estimator was told that it is lost.
     Silence {
         /// The estimator.
         estimator: usize,
@@ -154,7 +154,7 @@ pub enum Event {
         /// The message.
         message: Recorded,
     },
-    /// A change of health, a fault or a panic that an estimator had reported was taken note of.
+    /// A change of health, a fault or a panic reported by an estimator was processed.
     Report {
         /// The estimator.
         estimator: usize,
@@ -177,7 +177,8 @@ pub enum Event {
         /// Whether it panicked.
         panicked: bool,
     },
-    /// A component hangs or did not stop well, or something other than a component failed. It had no other consequence.
+    /// A component hangs or did not stop properly, or something other than a component failed. It had no other
+    /// consequence.
     Noted {
         /// Its path.
         path: &'static str,
@@ -188,7 +189,7 @@ pub enum Event {
     HardwareError {
         /// By which component.
         path: &'static str,
-        /// What.
+        /// What happened.
         message: String,
     },
     /// A parameter was set.
@@ -198,7 +199,7 @@ pub enum Event {
         /// Its new value.
         value: ParameterValue,
     },
-    /// A command was asked for.
+    /// A command was requested.
     Command {
         /// The command.
         command: usize,
@@ -229,10 +230,10 @@ pub enum Event {
     Arm,
     /// The robot was disarmed.
     Disarm {
-        /// Whatever its state.
+        /// Whether it was forced.
         force: bool,
     },
-    /// The disarm callbacks have returned, or their time is over.
+    /// The disarm callbacks have returned, or their time limit has passed.
     Disarmed {
         /// What could not be made safe.
         errors: Vec<SafetyError>,
@@ -241,21 +242,21 @@ pub enum Event {
     ArmTimeout,
     /// The robot was stopped.
     Stop,
-    /// An estimator failed because the code of one of its outputs had panicked where that was handed on.
+    /// An estimator failed: the code of one of its outputs panicked during delivery.
     OutputFailed {
         /// The estimator.
         estimator: usize,
         /// What happened.
         message: String,
     },
-    /// Where the inputs of a line's dispatches were that span moving joints.
+    /// The transforms of a line's inputs that span moving joints.
     Placed {
         /// The number of that line.
         cause: u64,
         /// Each, in order.
         inputs: Vec<PlacedInput>,
     },
-    /// A command, a service or other code may publish at a path of its own.
+    /// A command, a service or other code may publish at a path of its choice.
     OwnPublisher {
         /// The path.
         path: &'static str,
@@ -291,7 +292,7 @@ pub enum End {
 /// A request to an estimator.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub struct Request {
-    /// Whether somebody waits for the answer.
+    /// Whether a caller waits for the answer.
     pub kind: RequestKind,
     /// The name of its type.
     pub name: String,
@@ -299,7 +300,7 @@ pub struct Request {
     pub bytes: Option<Vec<u8>>,
 }
 
-/// How a request is made.
+/// The kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub enum RequestKind {
     /// With an answer: `HandleCall`.
@@ -308,7 +309,7 @@ pub enum RequestKind {
     Cast,
 }
 
-/// A message in a journal: as it was, or as bytes that were read from a file.
+/// A message in a journal: the value itself, or bytes read from a file.
 #[derive(Clone, Debug)]
 pub enum Recorded {
     /// As it was published.
@@ -318,7 +319,7 @@ pub enum Recorded {
 }
 
 impl Finite for Recorded {
-    /// A journal holds what came, NaN included.
+    /// A journal holds every message, NaN included.
     fn is_finite(&self) -> bool {
         true
     }

@@ -1,4 +1,4 @@
-//! Lines that wait for the sink, and how many may.
+//! Lines waiting for the sink, and their limits.
 
 use super::{Entry, Event};
 use crate::message::Field as _;
@@ -9,22 +9,22 @@ use std::time::{Duration, Instant};
 /// The load at which outside producers start to wait for the sink.
 pub(super) const CAPACITY: Load = Load { lines: 1 << 16, bytes: 64 << 20 };
 
-/// The load at which the journal ends. Estimators and the control state do not wait for the sink. One line beyond it is taken,
-/// however large.
+/// The load at which the journal ends. Estimators and the control state do not wait for the sink. One line beyond it
+/// is accepted, however large.
 pub(super) const MOST: Load = Load { lines: 4 * CAPACITY.lines, bytes: 4 * CAPACITY.bytes };
 
 /// The load of one batch for the sink.
 pub(super) const BATCH: Load = Load { lines: 1 << 10, bytes: 1 << 20 };
 
-/// How long outside producers wait for a sink that is too slow. One that takes no line for so long while [`CAPACITY`] waits
-/// hangs. Then the journal ends there: it never has a gap.
+/// How long outside producers wait for a sink that is too slow. A sink that takes no line for this long while
+/// [`CAPACITY`] is queued hangs. The journal then ends there: it never has a gap.
 pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
-/// How much waits.
+/// The amount of queued data.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Load {
     pub(super) lines: usize,
-    /// What the lines hold, on the heap and beside it.
+    /// The bytes of the lines, on the heap and inline.
     pub(super) bytes: usize,
 }
 
@@ -44,12 +44,12 @@ impl Load {
     }
 }
 
-/// The bytes that a line counts, before any lock is taken.
+/// The bytes that a line counts, computed before any lock is taken.
 pub(super) fn bytes_of(event: &Event) -> usize {
     size_of::<Entry>().saturating_add(event.heap_bytes())
 }
 
-/// Lines that are handed to the sink together.
+/// Lines handed to the sink together.
 #[derive(Default)]
 pub(super) struct Batch {
     pub(super) lines: Vec<Entry>,
@@ -59,19 +59,19 @@ pub(super) struct Batch {
 /// See the [module](self).
 pub(super) struct Queue {
     batches: VecDeque<Batch>,
-    /// What waits, with the batch that is being handed to the sink.
+    /// The queued load, including the batch being handed to the sink.
     load: Load,
-    /// Its room is used again.
+    /// Kept to reuse its allocation.
     spare: Vec<Entry>,
     next: u64,
     pub(super) wall_offset_nanos: i64,
-    /// While too much waits: how many lines the sink had taken when that was last seen to change, and when.
+    /// While too much is queued: how many lines the sink had taken when that number last changed, and when it did.
     stalled: Option<(u64, Instant)>,
-    /// Why no more lines are taken.
+    /// Why no more lines are accepted.
     pub(super) ended: Option<Ended>,
 }
 
-/// How a journal ended before the run.
+/// Why a journal ended before the run.
 #[derive(Debug)]
 pub(super) struct Ended {
     pub(super) message: String,
@@ -105,7 +105,7 @@ impl Queue {
         }
     }
 
-    /// Adds a line: its number, and whether that fills a batch.
+    /// Adds a line. Returns its number, and whether that fills a batch.
     pub(super) fn push(&mut self, time: MonotonicTime, event: Event, bytes: usize) -> (u64, bool) {
         let number = self.next;
         self.next += 1;
@@ -135,19 +135,19 @@ impl Queue {
         self.batches.front().is_some_and(|first| first.load.fills(BATCH))
     }
 
-    /// What the sink gets next.
+    /// The next batch for the sink.
     pub(super) fn take(&mut self) -> Option<Batch> {
         self.batches.pop_front()
     }
 
-    /// The sink has it.
+    /// The sink has taken it.
     pub(super) fn handed_over(&mut self, batch: Batch) {
         self.load.take(batch.load);
         self.spare = batch.lines;
     }
 
-    /// Ends the journal if its sink, which has taken so many lines, hangs or is so slow that too much waits; whether it has
-    /// ended now. It is reported later: a logger may block for as long as the sink does.
+    /// Ends the journal if its sink, which has taken `taken` lines, hangs or is so slow that too much is queued.
+    /// Returns whether it has ended now. It is reported later: a logger may block for as long as the sink does.
     #[cold]
     pub(super) fn judge(&mut self, taken: u64) -> bool {
         if self.ended.is_some() {

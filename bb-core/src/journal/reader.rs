@@ -5,7 +5,7 @@ use crate::message::DecodeError;
 use crate::pubsub::{AnyTopic, DynamicMessage};
 use std::fmt;
 
-/// The publishers of a robot, whose payloads a journal names by number. Every [`Robot`](crate::Robot) has them.
+/// The publishers of a robot, whose payloads a journal refers to by number. Every [`Robot`](crate::Robot) has them.
 pub trait Publishers {
     /// Their topics.
     #[doc(hidden)]
@@ -17,8 +17,8 @@ pub trait Publishers {
     fn list_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic>;
 }
 
-/// Reads lines of a robot `R` from a recording: their messages are decoded, so that a payload which had other fields then is
-/// found before the journal is played.
+/// Reads lines of a robot `R` from a recording. Their messages are decoded, so a payload whose fields have changed
+/// since is detected before the journal is played.
 pub struct JournalReader<R: Publishers> {
     topics: R::Topics,
 }
@@ -30,7 +30,7 @@ impl<R: Publishers> Default for JournalReader<R> {
 }
 
 impl<R: Publishers> JournalReader<R> {
-    /// A line as [`Replay::play`](crate::Replay::play) takes it.
+    /// A line in the form that [`Replay::play`](crate::Replay::play) takes.
     ///
     /// # Errors
     /// Its message cannot be read: the payload had other fields then, or the line is of another robot.
@@ -48,7 +48,7 @@ impl<R: Publishers> JournalReader<R> {
     }
 }
 
-/// A message of a journal, by the topic that it is for.
+/// A message of a journal, decoded by its topic.
 pub(crate) fn decoded(topic: &dyn AnyTopic, message: Recorded) -> Result<DynamicMessage, DecodeError> {
     match message {
         Recorded::Message(message) => Ok(message),

@@ -1,4 +1,4 @@
-//! Numbers lines, and hands them to the sink on a thread of its own.
+//! Numbers lines, and hands them to the sink on a separate thread.
 
 use super::queue::{Ended, LONGEST_WAIT, Queue, bytes_of};
 use super::{Entry, Event};
@@ -9,14 +9,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Where lines go. It is called on a thread that runs nothing else, in the order of the lines' numbers, and dropped there after
-/// the last one.
+/// The destination of lines. It is called on a thread that runs nothing else, in the order of the lines' numbers, and
+/// dropped there after the last one.
 pub type Sink = Arc<dyn Fn(Entry) + Send + Sync>;
 
-/// How often the thread looks, if no batch of lines wakes it before.
+/// How often the thread checks, unless a full batch wakes it before.
 const PERIOD: Duration = Duration::from_millis(2);
 
-/// The writing end. Clones are the same journal.
+/// The writing end. Clones share the journal.
 #[derive(Clone)]
 pub(crate) struct Journal(Arc<Inner>);
 
@@ -24,7 +24,7 @@ struct Inner {
     state: Mutex<State>,
     /// Whether outside producers have to wait: read without the lock.
     is_full: AtomicBool,
-    /// How many lines the sink has taken: whether it goes on is seen by it.
+    /// How many lines the sink has taken, to see whether it makes progress.
     taken: AtomicU64,
     arrived: Condvar,
     room: Condvar,
@@ -64,8 +64,8 @@ impl Journal {
         }))
     }
 
-    /// Puts the first line in its place, before those of components that did something as they were made. Nothing is handed to
-    /// the sink before.
+    /// Puts the first line in its place, before those of components that acted during their creation. Nothing is
+    /// handed to the sink before.
     pub(crate) fn begin(&self, time: MonotonicTime, event: Event) {
         let bytes = bytes_of(&event);
         let mut state = self.0.lock();
@@ -73,8 +73,8 @@ impl Journal {
         state.has_begun = true;
     }
 
-    /// Writes a line of an entry that sees this offset of the wall clock; its number, or 0 if the journal has ended. Never
-    /// waits for the sink.
+    /// Writes a line of an entry that sees this offset of the wall clock. Returns its number, or 0 if the journal has
+    /// ended. Never waits for the sink.
     pub(crate) fn write(&self, time: MonotonicTime, wall_offset_nanos: i64, event: Event) -> u64 {
         let bytes = bytes_of(&event);
         let mut state = self.0.lock();
@@ -102,7 +102,7 @@ impl Journal {
         number
     }
 
-    /// Outside producers call this first. It waits while too many lines wait for the sink.
+    /// Outside producers call this first. It waits while too many lines are queued for the sink.
     #[inline]
     pub(crate) fn wait_for_room(&self) {
         if self.0.is_full.load(Ordering::Relaxed) {
@@ -110,7 +110,7 @@ impl Journal {
         }
     }
 
-    /// Hands what waits to the sink on the calling thread, unless another thread does so already.
+    /// Hands queued lines to the sink on the calling thread, unless another thread does so already.
     pub(crate) fn flush(&self) {
         self.0.flush();
     }
@@ -135,7 +135,7 @@ impl Journal {
         self.0.lock().queue.ended.is_some()
     }
 
-    /// Checks whether the sink hangs while nobody writes. Returns the error once; the journal has then ended.
+    /// Checks whether the sink hangs while no lines are written. Returns the error once; the journal has then ended.
     pub(crate) fn look(&self) -> Option<String> {
         let mut state = self.0.lock();
         self.0.judge(&mut state);
@@ -144,8 +144,8 @@ impl Journal {
         Some(message.clone())
     }
 
-    /// Waits until the sink of a journal that was closed has the last line and is gone, `longest` at most; false if it does not
-    /// have it. A journal without a thread of its own hands it over here.
+    /// Waits, `longest` at most, until the sink of a closed journal has the last line and is gone. Returns false if
+    /// it does not have the last line. A journal without its own thread hands it over here.
     pub(crate) fn hand_over(&self, longest: Duration) -> bool {
         if !self.0.lock().has_thread {
             self.0.flush();
@@ -183,7 +183,7 @@ impl Inner {
         self.finish();
     }
 
-    /// Hands out waiting lines. The sink is user code; only its own thread waits for it.
+    /// Hands over waiting lines. The sink is user code; only its own thread waits for it.
     fn flush(&self) {
         let mut state = self.lock();
         if state.is_draining || !state.has_begun {
@@ -197,7 +197,7 @@ impl Inner {
                 if let Err(fault) = guarded(|| sink(line)) {
                     tracing::error!(%fault, "the journal's sink failed");
                 }
-                // One thread at a time is here: a plain store instead of an atomic addition.
+                // Only one thread at a time gets here: a plain store instead of an atomic addition.
                 self.taken.store(self.taken.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
             }
             state = self.lock();
@@ -208,7 +208,7 @@ impl Inner {
         state.is_draining = false;
     }
 
-    /// After the last line: what the sink owns, such as a file, is closed here.
+    /// After the last line: resources owned by the sink, such as a file, are closed here.
     fn finish(&self) {
         let sink = self.lock().sink.take();
         discard(sink);
@@ -286,7 +286,7 @@ mod tests {
         assert!(matches!(lines[40_002].event, Event::WallClock { offset_nanos: 6 }));
     }
 
-    /// A journal whose sink hangs at the first line, until what is returned beside it is dropped.
+    /// A journal whose sink hangs at the first line, until the returned sender is dropped.
     fn hanging() -> (Journal, std::sync::mpsc::Sender<()>) {
         let (release, hang) = std::sync::mpsc::channel::<()>();
         let hang = Mutex::new(hang);
@@ -306,7 +306,7 @@ mod tests {
         (journal, release)
     }
 
-    /// Writes so many lines; how many were taken.
+    /// Writes this many lines. Returns how many were accepted.
     fn fill(journal: &Journal, lines: usize) -> usize {
         (0..lines).filter(|_| journal.write(MonotonicTime::ZERO, 0, Event::Arm) > 0).count()
     }
@@ -357,7 +357,7 @@ mod tests {
         }
     }
 
-    /// A line of so many bytes.
+    /// A line of this many bytes.
     fn large(bytes: usize) -> Event {
         Event::Noted { path: "large", message: "x".repeat(bytes) }
     }
@@ -381,7 +381,7 @@ mod tests {
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 std::thread::sleep(Duration::from_millis(300));
-                // The sink takes what is waiting and stops hanging.
+                // The sink takes the queued lines and stops hanging.
                 drop(release);
             });
             journal.wait_for_room();
@@ -392,7 +392,7 @@ mod tests {
         assert!(journal.hand_over(Duration::from_secs(20)));
     }
 
-    /// The last line that is written is the first at which the sink hangs.
+    /// The last line written is the first at which the sink hangs.
     #[test]
     fn a_sink_that_hangs_at_the_last_line_keeps_nobody_who_hands_it_over() {
         let (release, hang) = std::sync::mpsc::channel::<()>();

@@ -1,17 +1,17 @@
-//! From one link to another.
+//! Chains of joints from one link to another.
 
 use super::KinematicsError;
 use super::coordinates::{Motion, Rate};
 use super::model::{Kinematics, LinkId, check};
 use nalgebra::{Dim, Isometry3, Matrix, RawStorageMut, U6, Vector3, Vector6};
 
-/// The joints between two links, prepared: those that are fixed are multiplied out, so that a chain without moving joints is
-/// a constant.
+/// The joints between two links, precomputed: fixed joints are multiplied out, so a chain without moving joints is a
+/// constant.
 #[derive(Clone, Debug)]
 pub struct Chain {
-    /// From the last body that carries both towards the tip.
+    /// From the last common ancestor towards the tip.
     to_tip: Box<[Step]>,
-    /// From there towards the base.
+    /// From the last common ancestor towards the base.
     to_base: Box<[Step]>,
     body_from_tip: Isometry3<f64>,
     base_from_body: Isometry3<f64>,
@@ -34,7 +34,7 @@ impl Kinematics {
     pub fn chain(&self, base: LinkId, tip: LinkId) -> Result<Chain, KinematicsError> {
         let (base, tip) = (self.placement(base)?, self.placement(tip)?);
         let (mut of_base, mut of_tip) = (self.ancestors(base.body), self.ancestors(tip.body));
-        // What carries both moves neither in the frame of the other.
+        // Common ancestors move neither link in the frame of the other.
         while of_base.last().is_some() && of_base.last() == of_tip.last() {
             of_base.pop();
             of_tip.pop();
@@ -52,7 +52,7 @@ impl Kinematics {
         let (mut to_tip, mut to_base) = (steps(of_tip), steps(of_base));
         let mut body_from_tip = tip.body_from_link;
         let mut base_from_body = base.body_from_link.inverse();
-        // Without joints on one side, its constant goes into the other's first.
+        // If one side has no joints, its constant is folded into the other side's first.
         if to_base.is_empty() {
             match to_tip.first_mut() {
                 Some(first) => {
@@ -73,7 +73,7 @@ impl Kinematics {
         Ok(Chain { to_tip, to_base, body_from_tip, base_from_body, positions, velocities })
     }
 
-    /// A body and those that carry it, up to the root.
+    /// A body and its ancestors, up to the root.
     fn ancestors(&self, body: Option<usize>) -> Vec<usize> {
         std::iter::successors(body, |body| self.bodies.get(*body).and_then(|body| body.parent)).collect()
     }
@@ -83,13 +83,13 @@ impl Chain {
     /// `base_from_tip` at a position.
     ///
     /// # Errors
-    /// Another number of positions than the robot has.
+    /// The number of positions is not that of the robot.
     pub fn transform(&self, positions: &[f64]) -> Result<Isometry3<f64>, KinematicsError> {
         check("positions", self.positions, positions)?;
         Ok(self.at(positions))
     }
 
-    /// The same for as many positions as there are.
+    /// The same, with the number of positions unchecked.
     #[inline]
     pub(crate) fn at(&self, positions: &[f64]) -> Isometry3<f64> {
         let mut from_tip = self.body_from_tip;
@@ -105,12 +105,12 @@ impl Chain {
         self.base_from_body * from_tip
     }
 
-    /// `base_from_tip`, and into `jacobian` the velocity of the tip relative to the base for a unit of each velocity: that of
-    /// the tip's origin, m/s, in the first three rows, the angular one, rad/s, in the others, in the axes of the base. A
-    /// column a velocity of the robot; those that do not move the chain are zero.
+    /// `base_from_tip`. `jacobian` is set to the velocity of the tip relative to the base per unit of each velocity,
+    /// in the axes of the base. Rows 1–3 are the velocity of the tip's origin, m/s; rows 4–6 the angular velocity,
+    /// rad/s. There is one column per velocity of the robot; those that do not move the chain are zero.
     ///
     /// # Errors
-    /// Another number of positions, or of columns, than the robot has.
+    /// The number of positions, or of columns, is not that of the robot.
     pub fn jacobian<C: Dim, S: RawStorageMut<f64, U6, C>>(
         &self,
         positions: &[f64],
@@ -122,7 +122,7 @@ impl Chain {
             return Err(KinematicsError::Coordinates { what: "columns", expected, given });
         }
         jacobian.fill(0.0);
-        // In the axes of the tip, which both sides know.
+        // In the axes of the tip, which both sides have.
         let mut from_tip = self.body_from_tip;
         for step in self.to_tip.iter().rev() {
             add_columns(&step.motion, &from_tip, 1.0, jacobian);
@@ -130,7 +130,7 @@ impl Chain {
         }
         for step in &self.to_base {
             from_tip = step.motion.carry_back(positions, &(step.joint_from_parent * from_tip));
-            // What moves the base moves the tip the other way, seen from there.
+            // A motion of the base moves the tip in the opposite direction, seen from the base.
             add_columns(&step.motion, &from_tip, -1.0, jacobian);
         }
         let base_from_tip = self.base_from_body * from_tip;
@@ -143,12 +143,13 @@ impl Chain {
         Ok(base_from_tip)
     }
 
-    /// How many moving joints there are between the two links.
+    /// The number of moving joints between the two links.
     pub fn joints(&self) -> usize {
         self.to_tip.len() + self.to_base.len()
     }
 
-    /// The same between frames fixed to the two links: takes points from that on the tip to that on the base.
+    /// The same between frames fixed to the two links: transforms points from the one on the tip to the one on the
+    /// base.
     pub(crate) fn between(mut self, base_from_frame: &Isometry3<f64>, tip_from_frame: &Isometry3<f64>) -> Self {
         let frame_from_base = base_from_frame.inverse();
         self.body_from_tip *= tip_from_frame;
@@ -163,7 +164,7 @@ impl Chain {
         self
     }
 
-    /// Has its positions renumbered by `renumber`, from those of the robot to as many of its own.
+    /// Renumbers its positions by `renumber`, from those of the robot to `positions` of its own.
     pub(crate) fn renumbered(mut self, positions: usize, renumber: impl Fn(usize) -> usize) -> Self {
         for step in self.to_tip.iter_mut().chain(&mut self.to_base) {
             step.motion.renumber(&renumber);
@@ -182,7 +183,7 @@ impl Chain {
     }
 }
 
-/// What a joint does to the tip, in the axes of the tip.
+/// Adds the effect of a joint on the tip, in the axes of the tip.
 #[inline]
 fn add_columns<C: Dim, S: RawStorageMut<f64, U6, C>>(
     motion: &Motion,

@@ -1,4 +1,4 @@
-//! How one joint moves what it carries, in the frame in which its axis is z.
+//! How one joint moves its child, in the frame in which its axis is z.
 
 use crate::topology::JointKind;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -6,17 +6,17 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vec
 /// How a joint moves, and where its coordinates are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Motion {
-    /// About z.
+    /// Rotates about z.
     Turn(Coordinate),
-    /// Along z.
+    /// Slides along z.
     Slide(Coordinate),
-    /// Along x and y, about z: the first of its three positions and velocities.
+    /// Slides along x and y and rotates about z: the index of the first of its three positions and velocities.
     Plane { position: usize, velocity: usize },
-    /// Freely: the first of its seven positions and six velocities.
+    /// Moves freely: the index of the first of its seven positions and six velocities.
     Free { position: usize, velocity: usize },
 }
 
-/// Where the coordinate of a joint is, and what that joint makes of it if it mimics another.
+/// The coordinate of a joint, with multiplier and offset if the joint mimics another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Coordinate {
     pub(super) position: usize,
@@ -39,14 +39,14 @@ pub(super) struct Rate {
     pub(super) angular: Vector3<f64>,
 }
 
-/// Rotates about z by twice the angle of that half: the quaternion's w and z.
+/// The quaternion's w and z for a rotation of `angle` about z.
 #[inline]
 fn half(angle: f64) -> (f64, f64) {
     let (sin, cos) = (0.5 * angle).sin_cos();
     (cos, sin)
 }
 
-/// `Rz · isometry`, by the quaternion's w and z.
+/// `Rz · isometry`, where the quaternion's w and z give the rotation.
 #[inline]
 fn turned((w, z): (f64, f64), isometry: &Isometry3<f64>) -> Isometry3<f64> {
     let (cos, sin) = (w * w - z * z, 2.0 * w * z);
@@ -57,7 +57,8 @@ fn turned((w, z): (f64, f64), isometry: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(translation), UnitQuaternion::new_unchecked(rotation))
 }
 
-/// The position of a floating joint. The zero quaternion is no rotation: it makes everything that the joint carries NaN.
+/// The position of a floating joint. The zero quaternion is not a rotation: all poses carried by the joint become
+/// NaN.
 fn free(positions: &[f64]) -> Isometry3<f64> {
     let q = positions;
     let rotation = UnitQuaternion::new_normalize(Quaternion::new(q[3], q[4], q[5], q[6]));
@@ -105,7 +106,7 @@ impl Motion {
         }
     }
 
-    /// Where its positions are from now on.
+    /// Changes the indices of its positions.
     pub(super) fn renumber(&mut self, renumber: impl Fn(usize) -> usize) {
         match self {
             Self::Turn(Coordinate { position, .. }) | Self::Slide(Coordinate { position, .. }) => {
@@ -115,7 +116,7 @@ impl Motion {
         }
     }
 
-    /// The velocity, or the derivative of its components, from all velocities or their derivatives.
+    /// The velocity, or its derivative, from all velocities or all their derivatives.
     pub(super) fn rate(&self, velocities: &[f64]) -> Rate {
         let v = velocities;
         let zero = Vector3::zeros();
@@ -136,7 +137,7 @@ impl Motion {
         }
     }
 
-    /// Calls `add` with each of its velocities and what a unit of it does to the child, in the axes of the child.
+    /// Calls `add` with each of its velocities and the effect of one unit on the child, in the axes of the child.
     #[inline]
     pub(super) fn each_velocity(&self, mut add: impl FnMut(usize, Rate)) {
         let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -218,10 +219,10 @@ impl Owner {
     }
 }
 
-/// The mean of the rotations on the way to that one: the left Jacobian of SO(3).
+/// The mean rotation along the way to `rotation`: the left Jacobian of SO(3).
 fn mean_rotation(rotation: &Vector3<f64>) -> Matrix3<f64> {
     let square = rotation.norm_squared();
-    // Below, the first terms of the series are as exact as can be represented.
+    // Below this angle, the first terms of the series are exact to machine precision.
     let (first, second) = if square < 1e-8 {
         (0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0)
     } else {

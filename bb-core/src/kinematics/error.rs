@@ -1,4 +1,4 @@
-//! What cannot be computed.
+//! Errors of the kinematics.
 
 use std::fmt;
 
@@ -11,12 +11,12 @@ pub enum KinematicsError {
         /// The link.
         link: &'static str,
     },
-    /// Two joints carry that link, or one carries the root.
+    /// Two joints carry that link, or a joint carries the root.
     TwoParents {
         /// The link.
         link: &'static str,
     },
-    /// That joint moves along or about an axis that is absent, zero or not finite.
+    /// The axis of that moving joint is absent, zero or not finite.
     NoAxis {
         /// The joint.
         joint: &'static str,
@@ -26,7 +26,8 @@ pub enum KinematicsError {
         /// The joint.
         joint: &'static str,
     },
-    /// That joint mimics one that it cannot follow: itself in the end, or one that has not exactly one degree of freedom.
+    /// That joint mimics a joint that it cannot follow: itself, directly or through others, or one that has not
+    /// exactly one degree of freedom.
     Mimic {
         /// The joint.
         joint: &'static str,
@@ -35,19 +36,19 @@ pub enum KinematicsError {
     NoLink(String),
     /// A number is NaN or infinite.
     NotFinite {
-        /// What it is a part of.
+        /// The argument that contains it.
         what: &'static str,
     },
     /// No position was found that reaches a target; it may still be within reach.
     NotConverged {
-        /// How far the best position is from it, m.
+        /// Position error of the best attempt, m.
         position_error: f64,
-        /// By which angle, rad; 0 if only a position was asked for.
+        /// Its rotation error, rad; 0 if only a position was asked for.
         rotation_error: f64,
-        /// How many iterations were made, restarts included.
+        /// The number of iterations, restarts included.
         iterations: u32,
     },
-    /// A slice has another length than the robot has coordinates.
+    /// The length of a slice differs from the robot's number of coordinates.
     Coordinates {
         /// Positions, velocities or accelerations.
         what: &'static str,

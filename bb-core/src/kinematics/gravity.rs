@@ -1,4 +1,4 @@
-//! What links weigh: the centre of mass, and the efforts that hold a robot against gravity.
+//! Effects of gravity: the centre of mass, and the efforts that hold a robot against gravity.
 
 use super::mass::Mass;
 use super::tree::Frames;
@@ -11,7 +11,7 @@ impl Frames {
         self.own_masses.iter().map(|own| own.mass).sum()
     }
 
-    /// The centre of mass of the robot in the frame of the root, m; none if no link has a mass.
+    /// The centre of mass of the robot in the frame of the root, m; `None` if no link has a mass.
     pub fn centre_of_mass(&self) -> Option<Vector3<f64>> {
         let fixed = self.own_masses.first()?;
         let moments = self.states.iter().zip(self.own_masses.iter().skip(1)).map(|(state, own)| {
@@ -22,11 +22,11 @@ impl Frames {
         (mass > 0.0).then(|| moment / mass)
     }
 
-    /// The efforts that hold the robot still where it was put last, under a gravity in m/s² in the frame of the root,
-    /// (0, 0, −9.8) if its z points up: for each velocity, N·m where it turns, N where it slides.
+    /// The efforts that hold the robot at rest in its last position, under a gravity in m/s² in the frame of the
+    /// root: (0, 0, −9.8) if its z points up. One for each velocity: N·m for a rotation, N for a translation.
     ///
     /// # Errors
-    /// Another number of efforts than the robot has velocities.
+    /// The number of efforts is not that of the robot's velocities.
     pub fn gravity_efforts(&mut self, gravity: &Vector3<f64>, efforts: &mut [f64]) -> Result<(), KinematicsError> {
         check("efforts", self.kinematics().velocities(), efforts)?;
         efforts.fill(0.0);

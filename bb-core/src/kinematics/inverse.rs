@@ -1,9 +1,9 @@
-//! The position of the joints that puts a link where it is wanted.
+//! Inverse kinematics: joint positions that bring a link to a target.
 //!
 //! Damped least squares with the damping of Chan and Lawrence (1988), proportional to the squared error: `δ = W⁻¹ Jᵀ
-//! (J W⁻¹ Jᵀ + λ I)⁻¹ e`, whose matrix is 6×6 for any number of joints. A joint that would leave its limits is held there
-//! and the step is computed again without it. An attempt that makes no progress is given up for one from a random position;
-//! the random numbers are the same in each call.
+//! (J W⁻¹ Jᵀ + λ I)⁻¹ e`. The matrix is 6×6 for any number of joints. A joint that would leave its limits is held
+//! there, and the step is computed again without it. An attempt without progress is abandoned and restarted from a
+//! random position; the random numbers are the same in each call.
 
 use super::coordinates::Owner;
 use super::model::{Kinematics, LinkId};
@@ -12,7 +12,7 @@ use crate::topology::JointKind;
 use nalgebra::{Isometry3, Matrix6, Matrix6xX, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::PI;
 
-/// Where a link is wanted, in the frame of the base.
+/// The target of a link, in the frame of the base.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
     /// `base_from_tip`.
@@ -21,7 +21,7 @@ pub enum Target {
     Position(Vector3<f64>),
 }
 
-/// How a solution is looked for.
+/// Settings of the search for a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InverseParams {
     /// The largest error of a solution, m. 1 µm by default.
@@ -30,9 +30,11 @@ pub struct InverseParams {
     pub rotation_tolerance: f64,
     /// Iterations in all, restarts included. 3,000 by default, some milliseconds for an arm.
     pub max_iterations: u32,
-    /// What a unit of each velocity costs: joints with a larger weight move less. Empty, the default, weighs all alike.
+    /// The cost of a unit of each velocity: joints with a larger weight move less. Empty, the default, means equal
+    /// weights.
     pub weights: Vec<f64>,
-    /// A position to come close to where the target leaves a choice; of the length of a position. Empty for none, the default.
+    /// A preferred position, approached as far as the target leaves freedom; it has the length of a position. Empty,
+    /// the default, for none.
     pub posture: Vec<f64>,
 }
 
@@ -51,30 +53,30 @@ impl Default for InverseParams {
 /// A position that reaches the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solution<'a> {
-    /// The position, of all joints; those that do not move the chain are where they started.
+    /// The position of all joints; those that do not move the chain are unchanged.
     pub positions: &'a [f64],
-    /// m
+    /// Position error, m.
     pub position_error: f64,
-    /// rad; 0 if only a position was asked for.
+    /// Rotation error, rad; 0 if only a position was asked for.
     pub rotation_error: f64,
-    /// Iterations in all.
+    /// The total number of iterations.
     pub iterations: u32,
-    /// How often it began again from a random position.
+    /// How often it restarted from a random position.
     pub restarts: u32,
 }
 
-/// Solves for one chain. Made once; solving allocates nothing.
+/// Solves for one chain. Create it once; solving allocates nothing.
 #[derive(Clone, Debug)]
 pub struct InverseKinematics {
     chain: Chain,
     params: InverseParams,
     owners: Vec<Owner>,
-    /// Of each velocity that is a coordinate with limits, its position and bounds.
+    /// Position and bounds of each velocity that is a coordinate with limits.
     limits: Vec<Option<(usize, f64, f64)>>,
     /// The reciprocal weight of each velocity, 0 for those that do not move the chain.
     mobility: Vec<f64>,
     jacobian: Matrix6xX<f64>,
-    /// The same of the joints that are not held at a limit, times their mobility.
+    /// The same for the joints that are not held at a limit, times their mobility.
     free: Matrix6xX<f64>,
     held: Vec<bool>,
     step: Vec<f64>,
@@ -82,13 +84,13 @@ pub struct InverseKinematics {
     best: Vec<f64>,
 }
 
-/// Attempts that do not halve their error in so many iterations are given up.
+/// An attempt that does not halve its error in this many iterations is abandoned.
 const PATIENCE: u32 = 8;
 
 /// The longest step of a joint in one iteration, rad or m.
 const LONGEST_STEP: f64 = 0.7;
 
-/// Once the target is reached, so many iterations bring the rest towards the posture.
+/// Once the target is reached, this many iterations move the redundant joints towards the posture.
 const POLISH: u32 = 60;
 
 /// Position and rotation error, and both as one vector.
@@ -102,7 +104,8 @@ impl InverseKinematics {
     /// For the chain from `base` to `tip`.
     ///
     /// # Errors
-    /// A link does not belong to this robot; weights or a posture of another length, or not finite, or a weight that is not positive.
+    /// A link does not belong to this robot; weights or a posture of another length or not finite; or a weight that
+    /// is not positive.
     pub fn new(
         kinematics: &Kinematics,
         base: LinkId,
@@ -150,16 +153,17 @@ impl InverseKinematics {
         })
     }
 
-    /// The best position of the last call, also if that did not converge.
+    /// The best position of the last call, even if it did not converge.
     pub fn best(&self) -> &[f64] {
         &self.best
     }
 
-    /// Looks for a position that reaches the target, beginning at `start`, near which it is if the target is.
+    /// Searches for a position that reaches the target, beginning at `start`. The solution is near `start` if the
+    /// target is.
     ///
     /// # Errors
-    /// [`KinematicsError::NotConverged`] with the error of the best position, [`Self::best`]; a start of another length;
-    /// a start or a target that is not finite.
+    /// [`KinematicsError::NotConverged`] with the error of the best position, [`Self::best`]; a start of another
+    /// length; or a start or a target that is not finite.
     pub fn solve(&mut self, target: &Target, start: &[f64]) -> Result<Solution<'_>, KinematicsError> {
         super::model::check("positions", self.positions.len(), start)?;
         finite("start", start)?;
@@ -193,7 +197,7 @@ impl InverseKinematics {
             let is_polishing =
                 !self.params.posture.is_empty() && polished < POLISH && iterations < self.params.max_iterations;
             if has_reached && !is_polishing {
-                // A step towards the posture may have left the target: what counts is the last position there.
+                // A step towards the posture may have left the target: the last position that reached it counts.
                 let (position_error, rotation_error) = best.unwrap_or((error.position, error.rotation));
                 return Ok(Solution {
                     positions: &self.best,
@@ -233,7 +237,7 @@ impl InverseKinematics {
         }
     }
 
-    /// How far the tip is from the target, in the axes of the base; the Jacobian beside it.
+    /// Computes the error of the tip, in the axes of the base, and the Jacobian.
     fn error(&mut self, target: &Target) -> Result<Error, KinematicsError> {
         let base_from_tip = self.chain.jacobian(&self.positions, &mut self.jacobian)?;
         let tip = base_from_tip.translation.vector;
@@ -247,12 +251,12 @@ impl InverseKinematics {
         Ok(Error { position: linear.norm(), rotation: angular.norm(), vector })
     }
 
-    /// Computes the step; the largest change of a joint.
+    /// Computes the step; returns the largest change of a joint.
     fn compute_step(&mut self, error: &Vector6<f64>, cost: f64, position_only: bool) -> f64 {
         self.held.fill(false);
         let mut error = *error;
         if position_only {
-            // Rows that are not asked for.
+            // Rows without a target.
             self.jacobian.fixed_rows_mut::<3>(3).fill(0.0);
             error.fixed_rows_mut::<3>(3).fill(0.0);
         }
@@ -265,7 +269,7 @@ impl InverseKinematics {
             for (weighted, column) in self.free.column_iter().zip(self.jacobian.column_iter()) {
                 normal.ger(1.0, &weighted, &column, 1.0);
             }
-            // Without the last term, a singular position has no step at all.
+            // Without the last term, the step would be undefined at a singular position.
             let damping = cost + 1e-12;
             for diagonal in 0..6 {
                 normal[(diagonal, diagonal)] += damping;
@@ -286,7 +290,7 @@ impl InverseKinematics {
         self.step.iter().fold(0.0, |longest: f64, part| longest.max(part.abs()))
     }
 
-    /// Adds what leads towards the posture and does not move the tip.
+    /// Adds a motion towards the posture that does not move the tip.
     fn add_posture(&mut self, factor: &nalgebra::Cholesky<f64, nalgebra::U6>) {
         if self.params.posture.is_empty() {
             return;
@@ -310,7 +314,7 @@ impl InverseKinematics {
         }
     }
 
-    /// Holds joints that are at a limit and would leave it; whether there is one more.
+    /// Holds joints that are at a limit and would leave it; returns whether there is another one.
     fn hold(&mut self) -> bool {
         let mut is_new = false;
         for (index, limit) in self.limits.iter().enumerate() {
@@ -331,7 +335,7 @@ impl InverseKinematics {
         }
     }
 
-    /// Begins again at a random position within the limits.
+    /// Restarts at a random position within the limits.
     fn scatter(&mut self, random: &mut Random) {
         for owner in &self.owners {
             match owner.kind {
@@ -339,7 +343,7 @@ impl InverseKinematics {
                     let limit = self.limits.get(owner.velocity).copied().flatten();
                     let reach = if owner.kind == JointKind::Prismatic { 1.0 } else { PI };
                     let (lower, upper) = limit.map_or((-reach, reach), |(_, lower, upper)| {
-                        // Two turns of a wrist are two names for one pose.
+                        // Turning a wrist by full turns gives the same pose.
                         let centre = match (lower.is_finite(), upper.is_finite()) {
                             (true, true) => 0.5 * (lower + upper),
                             (true, false) => lower + reach,
@@ -350,7 +354,7 @@ impl InverseKinematics {
                     });
                     self.positions[owner.position] = lower + (upper - lower) * random.next();
                 }
-                // The best so far, seen from another side.
+                // The best position so far, with a random heading.
                 JointKind::Planar => self.positions[owner.position + 2] = PI * (2.0 * random.next() - 1.0),
                 JointKind::Fixed | JointKind::Floating => {}
             }

@@ -1,9 +1,9 @@
-//! What bodies weigh.
+//! Masses of bodies.
 
 use super::model::Kinematics;
 use nalgebra::{Point3, Vector3};
 
-/// Mass, and mass times position of its centre, in the frame of a body.
+/// Mass, and first moment (mass times position of the centre), in the frame of a body.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Mass {
     pub(super) mass: f64,
@@ -17,7 +17,7 @@ impl Mass {
     }
 }
 
-/// That of the links which are fixed to the root, then that of each body.
+/// The mass of the links fixed to the root, then that of each body.
 pub(super) fn own_masses(kinematics: &Kinematics) -> Vec<Mass> {
     let mut masses = vec![Mass::default(); kinematics.bodies.len() + 1];
     for link in &kinematics.links {

@@ -1,4 +1,4 @@
-//! The tree of what moves: fixed joints are multiplied out, and each moving joint has its axis along z.
+//! The kinematic tree: fixed joints are multiplied out, and each moving joint has its axis along z.
 
 use super::KinematicsError;
 use super::coordinates::{Coordinate, Motion, Owner};
@@ -9,59 +9,60 @@ use std::ops::Range;
 /// The kinematics of a robot. See the [module](super) for coordinates and frames.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
-    /// The bodies that joints move, each after its parent.
+    /// The bodies moved by joints, each after its parent.
     pub(super) bodies: Box<[Body]>,
-    /// Where the links are, in the order of the topology.
+    /// The placement of the links, in the order of the topology.
     pub(super) links: Box<[Placement]>,
     joints: Box<[(&'static str, JointCoordinates)]>,
-    /// The smallest and largest position that limits allow; infinite where there is none.
+    /// The smallest and largest position within the limits; infinite without a limit.
     pub(super) bounds: Box<[(f64, f64)]>,
     velocities: usize,
     /// The joints with coordinates of their own.
     owners: Box<[Owner]>,
 }
 
-/// What one joint moves, with all links that are fixed to it. Its frame is that of the joint, turned so that z is its axis.
+/// A body: the child of one joint, with all links fixed to it. Its frame is that of the joint, rotated so that z is
+/// its axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Body {
-    /// The number of the body it is mounted on; none if that is the root.
+    /// The number of its parent body; `None` for the root.
     pub(super) parent: Option<usize>,
-    /// Takes points from the body at the position zero to its parent.
+    /// Transforms points from the body at position zero to its parent.
     pub(super) parent_from_joint: Isometry3<f64>,
     pub(super) joint_from_parent: Isometry3<f64>,
     pub(super) motion: Motion,
 }
 
-/// Where a link is.
+/// The placement of a link.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placement {
     pub(super) name: &'static str,
-    /// The body it belongs to; none for the root.
+    /// The body it belongs to; `None` for the root.
     pub(super) body: Option<usize>,
     pub(super) body_from_link: Isometry3<f64>,
     pub(super) inertial: Option<Inertial>,
 }
 
-/// A link of the robot that gave it.
+/// A link of the robot whose [`Kinematics`] returned it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LinkId(pub(super) usize);
 
-/// Which coordinates are those of a joint. Both ranges are empty for a fixed joint; for one that mimics another they are that
-/// one's.
+/// Which coordinates belong to a joint. Both ranges are empty for a fixed joint; a joint that mimics another has that
+/// joint's.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct JointCoordinates {
-    /// Among the positions.
+    /// Indices into the positions.
     pub positions: Range<usize>,
-    /// Among the velocities.
+    /// Indices into the velocities.
     pub velocities: Range<usize>,
 }
 
 impl Kinematics {
-    /// Of a robot, `Rover::TOPOLOGY`, or of links and joints made otherwise.
+    /// Of a robot, `Rover::TOPOLOGY`, or of links and joints from elsewhere.
     ///
     /// # Errors
-    /// The links are no tree, a joint moves and has no axis, its limits exclude each other, or it mimics what it cannot follow. Robots that `robot!` declares
-    /// have none of these.
+    /// The links do not form a tree, a moving joint has no axis, its limits exclude each other, or it mimics a joint
+    /// that it cannot follow. Robots that `robot!` declares have none of these errors.
     pub fn new(topology: &Topology) -> Result<Self, KinematicsError> {
         topology.joints.iter().try_for_each(check_limit)?;
         let mut positions = 0;
@@ -95,7 +96,7 @@ impl Kinematics {
         if let Some(root) = placed.first_mut() {
             *root = Some((None, Isometry3::identity()));
         }
-        // Links may be listed before those that carry them: each round places at least one more, or none can be.
+        // A link may be listed before its parent: each round places at least one more, or none can be placed.
         loop {
             let mut has_placed = false;
             for (link, carrier) in carried_by.iter().enumerate() {
@@ -146,12 +147,12 @@ impl Kinematics {
         Ok(Self { bodies: bodies.into(), links, joints, bounds, velocities, owners })
     }
 
-    /// How many numbers a position has.
+    /// The length of a position.
     pub fn positions(&self) -> usize {
         self.bounds.len()
     }
 
-    /// How many numbers a velocity has.
+    /// The length of a velocity.
     pub fn velocities(&self) -> usize {
         self.velocities
     }
@@ -166,13 +167,13 @@ impl Kinematics {
         self.joints.iter().find(|(joint, _)| *joint == name).map(|(_, coordinates)| coordinates)
     }
 
-    /// The smallest and largest value of each number of a position; infinite where the joint has no limit. The limits of a
-    /// joint that mimics another are limits of that one.
+    /// The smallest and largest value of each element of a position; infinite where the joint has no limit. The
+    /// limits of a joint that mimics another apply to that one.
     pub fn bounds(&self) -> &[(f64, f64)] {
         &self.bounds
     }
 
-    /// The position in which every joint is at zero, or at the nearest that its limits allow.
+    /// The position in which every joint is at zero, or as near to zero as its limits allow.
     pub fn neutral(&self) -> Vec<f64> {
         let mut position: Vec<f64> =
             self.bounds.iter().map(|(lower, upper)| lower.max(0.0_f64.min(*upper))).collect();
@@ -184,11 +185,11 @@ impl Kinematics {
         position
     }
 
-    /// Moves a position by `velocity` over `duration_s`: with that velocity all the while, in the axes of the child where a
-    /// joint is planar or floating. Limits are not looked at.
+    /// Moves a position by a constant `velocity` for `duration_s`, in the axes of the child for planar and floating
+    /// joints. Limits are not applied.
     ///
     /// # Errors
-    /// Another number of positions or velocities than the robot has.
+    /// The number of positions or velocities is not that of the robot.
     pub fn integrate(
         &self,
         position: &mut [f64],
@@ -237,7 +238,7 @@ fn link_name(topology: &Topology, number: usize) -> &'static str {
     topology.links.get(number).map_or("", |link| link.name)
 }
 
-/// Numbers of a position and of a velocity.
+/// The lengths of a joint's position and velocity.
 const fn degrees(kind: JointKind) -> (usize, usize) {
     match kind {
         JointKind::Fixed => (0, 0),
@@ -247,7 +248,7 @@ const fn degrees(kind: JointKind) -> (usize, usize) {
     }
 }
 
-/// The joint whose coordinates a joint has in the end, and what it makes of them.
+/// The joint whose coordinates a joint follows in the end, with multiplier and offset.
 #[derive(Clone, Copy, Debug)]
 struct Followed {
     joint: usize,
@@ -275,7 +276,7 @@ fn follow(topology: &Topology, joint: usize) -> Result<Followed, KinematicsError
     Err(KinematicsError::Mimic { joint })
 }
 
-/// How a joint moves, and the rotation from the frame in which its axis is z to its own; none for a fixed one.
+/// How a joint moves, and the rotation from the frame in which its axis is z to its own; `None` for a fixed one.
 fn motion(
     joint: &Joint,
     coordinates: &JointCoordinates,
@@ -296,7 +297,7 @@ fn motion(
     let axis = joint.axis.map(Vector3::from).and_then(|axis| Unit::try_new(axis, 1e-9));
     let axis = axis.filter(|axis| axis.iter().all(|part| part.is_finite()));
     let axis = axis.ok_or(KinematicsError::NoAxis { joint: joint.name })?;
-    // Opposite axes have no shortest rotation: half a turn about x is one of them.
+    // For opposite axes the shortest rotation is not unique: take half a turn about x.
     let joint_from_axis = UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &axis)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     Ok(Some((motion, joint_from_axis)))

@@ -6,45 +6,45 @@ use super::mass::{Mass, own_masses};
 use super::model::{Kinematics, LinkId};
 use nalgebra::{Isometry3, Vector3};
 
-/// Where all links are and how they move, at one state of the joints. Made once; updates allocate nothing.
+/// The poses and motions of all links, at one state of the joints. Create it once; updates allocate nothing.
 #[derive(Clone, Debug)]
 pub struct Frames {
     kinematics: Kinematics,
     pub(super) states: Vec<State>,
-    /// Each body and what it carries, for [`Self::gravity_efforts`].
+    /// The mass of each body with everything it carries, for [`Self::gravity_efforts`].
     pub(super) masses: Vec<Mass>,
-    /// Of what is fixed to the root, and of each body, by itself.
+    /// The mass of the links fixed to the root, and of each body, without its children.
     pub(super) own_masses: Vec<Mass>,
 }
 
-/// Of a body, relative to the root; vectors in its own axes, at its origin.
+/// The state of a body, relative to the root; vectors in its own axes, at its origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct State {
     pub(super) root_from_body: Isometry3<f64>,
     pub(super) motion: LinkMotion,
 }
 
-/// How a link moves relative to the root: its origin, in the axes of the link.
+/// The motion of a link relative to the root: that of its origin, in the axes of the link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkMotion {
-    /// m/s
+    /// Linear velocity, m/s.
     pub velocity: Vector3<f64>,
-    /// rad/s
+    /// Angular velocity, rad/s.
     pub angular_velocity: Vector3<f64>,
     /// The second derivative of the origin's position, m/s².
     pub acceleration: Vector3<f64>,
-    /// rad/s²
+    /// Angular acceleration, rad/s².
     pub angular_acceleration: Vector3<f64>,
 }
 
 impl LinkMotion {
-    /// Of a link that does not move.
+    /// A link at rest.
     pub const REST: Self = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         Self { velocity: zero, angular_velocity: zero, acceleration: zero, angular_acceleration: zero }
     };
 
-    /// That of a frame fixed to this one: `frame_from_fixed`.
+    /// The motion of a frame fixed to this one: `frame_from_fixed`.
     pub fn at(&self, frame_from_fixed: &Isometry3<f64>) -> Self {
         let (omega, alpha) = (&self.angular_velocity, &self.angular_acceleration);
         let lever = &frame_from_fixed.translation.vector;
@@ -57,14 +57,14 @@ impl LinkMotion {
         }
     }
 
-    /// The same after a joint that moves the child with this velocity and derivative, in the axes of the child; `self` is that
-    /// of the parent at the child's origin, in the axes of the child.
+    /// The motion of the child, which its joint moves with this velocity and derivative, in the axes of the child.
+    /// `self` is the motion of the parent at the child's origin, in the axes of the child.
     fn after(&self, rate: &Rate, derivative: &Rate) -> Self {
         let omega = &self.angular_velocity;
         Self {
             velocity: self.velocity + rate.linear,
             angular_velocity: omega + rate.angular,
-            // Coriolis, and the turning of the axes in which the relative velocity is given.
+            // Coriolis terms, and the rotation of the axes in which the relative velocity is given.
             acceleration: self.acceleration
                 + omega.cross(&rate.linear) * 2.0
                 + derivative.linear
@@ -86,15 +86,15 @@ impl Frames {
         frames
     }
 
-    /// The robot whose frames these are.
+    /// The robot with these frames.
     pub fn kinematics(&self) -> &Kinematics {
         &self.kinematics
     }
 
-    /// Puts the robot into a position, at rest.
+    /// Sets the position of the robot, at rest.
     ///
     /// # Errors
-    /// Another number of positions than the robot has.
+    /// The number of positions is not that of the robot.
     pub fn update(&mut self, positions: &[f64]) -> Result<(), KinematicsError> {
         self.kinematics.check_positions(positions)?;
         self.place(positions);
@@ -102,10 +102,10 @@ impl Frames {
         Ok(())
     }
 
-    /// Puts the robot into a position and motion; `accelerations` are the derivatives of the velocities.
+    /// Sets the position and motion of the robot; `accelerations` are the derivatives of the velocities.
     ///
     /// # Errors
-    /// Another number of positions, velocities or accelerations than the robot has.
+    /// The number of positions, velocities or accelerations is not that of the robot.
     pub fn update_motion(
         &mut self,
         positions: &[f64],
@@ -146,7 +146,7 @@ impl Frames {
         Ok(placement.body.map_or(*body_from_link, |body| self.states[body].root_from_body * body_from_link))
     }
 
-    /// `base_from_tip`, of any two links.
+    /// `base_from_tip`, for any two links.
     ///
     /// # Errors
     /// A link does not belong to this robot.
@@ -154,7 +154,7 @@ impl Frames {
         Ok(self.root_from_link(base)?.inv_mul(&self.root_from_link(tip)?))
     }
 
-    /// How a link moves.
+    /// The motion of a link.
     ///
     /// # Errors
     /// The link does not belong to this robot.

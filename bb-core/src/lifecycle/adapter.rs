@@ -10,14 +10,14 @@ use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
 use std::fmt;
 
-/// A component as its `Slot` sees it.
+/// A component as seen by its `Slot`.
 pub trait Component: Sized + Send + 'static {
     /// Its options.
     type Options: Options;
     /// The context for its start.
     type Context: Send;
 
-    /// Makes it.
+    /// Creates it.
     ///
     /// # Errors
     /// Why it cannot start.
@@ -82,7 +82,7 @@ component! {
     pub(crate) AsEstimator: Estimator, Context
 }
 
-/// A sensor, or what takes its place.
+/// A sensor, or its replacement.
 #[doc(hidden)]
 pub enum AsSensor<S: Sensor> {
     /// As declared.
@@ -91,7 +91,7 @@ pub enum AsSensor<S: Sensor> {
     Replaced(StandInSensor<S::Output>),
 }
 
-/// What takes the place of a sensor.
+/// The replacement of a sensor.
 #[doc(hidden)]
 pub struct StandInSensor<T>(Box<dyn AnySensor<T>>);
 
@@ -121,7 +121,7 @@ impl<S: Sensor> Component for AsSensor<S> {
     fn change(&mut self, options: S::Options, context: &SensorContext) -> Result<(), Fault> {
         match self {
             Self::Declared(sensor) => sensor.handle_options(options, context),
-            // The options are those of what it replaces.
+            // The options belong to the replaced component.
             Self::Replaced(_) => Ok(()),
         }
     }
@@ -139,7 +139,7 @@ component! {
     pub AsService: Service, ServiceContext
 }
 
-/// An actuator, or what takes its place.
+/// An actuator, or its replacement.
 pub(crate) enum AsActuator<A: Actuator> {
     Declared(A),
     Replaced(Box<dyn StandIn<A::Command>>),
@@ -187,7 +187,7 @@ impl<A: Actuator> Component for AsActuator<A> {
     fn change(&mut self, options: A::Options, context: &ActuatorContext) -> Result<(), Fault> {
         match self {
             Self::Declared(actuator) => actuator.handle_options(options, context),
-            // The options are those of what it replaces.
+            // The options belong to the replaced component.
             Self::Replaced(_) => Ok(()),
         }
     }

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 /// How failed components are restarted.
 ///
-/// A fault (`Err`) restarts its component alone, for as long as the robot runs. A panic does too, and counts against the
-/// budget of the component's supervisor.
+/// A fault (`Err`) restarts its component alone, for as long as the robot runs. So does a panic, which also counts
+/// against the budget of the component's supervisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Supervision {
     /// How many panics a supervisor allows within [`Self::within`] before it escalates to its parent, which restarts
@@ -14,14 +14,14 @@ pub struct Supervision {
     pub max_restarts: usize,
     /// See [`Self::max_restarts`]. Default: 5 s.
     pub within: Duration,
-    /// How long the first restart of a component waits, 100 µs at least; each further one in a row twice as long. Default:
-    /// 10 ms.
+    /// The delay before the first restart of a component, at least 100 µs; it doubles with each further one in a row.
+    /// Default: 10 ms.
     pub first_backoff: Duration,
-    /// The longest wait. Default: 1 s.
+    /// The longest delay. Default: 1 s.
     pub longest_backoff: Duration,
 }
 
-/// The shortest wait. On virtual time, a component that fails again and again without it would stop the time from advancing.
+/// The shortest delay. On virtual time, a component that fails repeatedly without it would stop time from advancing.
 const SHORTEST: Duration = Duration::from_micros(100);
 
 impl Default for Supervision {
@@ -36,14 +36,14 @@ impl Default for Supervision {
 }
 
 impl Supervision {
-    /// How long restart number `attempt` in a row waits, from 0.
+    /// The delay of restart number `attempt` in a row, from 0.
     fn backoff(&self, attempt: u32) -> Duration {
         let factor = 1_u32.checked_shl(attempt).unwrap_or(u32::MAX);
         self.first_backoff.saturating_mul(factor).min(self.longest_backoff).max(SHORTEST)
     }
 }
 
-/// How often in a row a component has failed, and when last.
+/// How often in a row a component has failed, and when it last failed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Failures {
     count: u32,
@@ -53,7 +53,7 @@ pub(super) struct Failures {
 impl Failures {
     /// Counts a failure; returns when to restart the component.
     pub(super) fn add(&mut self, now: MonotonicTime, supervision: &Supervision) -> MonotonicTime {
-        // After that long without a failure, the next one counts as the first.
+        // After this long without a failure, the next one counts as the first.
         if now.duration_since(self.last) > supervision.within {
             self.count = 0;
         }

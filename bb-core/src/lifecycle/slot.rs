@@ -7,9 +7,9 @@ use crate::declaration::ParameterValues;
 use crate::fault::{Failed, Fault, Then, caught, retire};
 use crate::time::MonotonicTime;
 
-/// The options and the context from which a component is made, at the start and at every restart.
+/// The options and the context from which a component is created, at the start and at every restart.
 pub(crate) struct Recipe<O> {
-    /// An error if they could not be copied, which keeps the robot from starting.
+    /// An error if they could not be copied; it keeps the robot from starting.
     options: Result<O, String>,
     binding: Binding<O>,
 }
@@ -36,12 +36,12 @@ pub(crate) struct Slot<C: Component> {
 }
 
 enum State<C> {
-    /// Not made yet, or retired.
+    /// Not created yet, or retired.
     Vacant,
     Running(C),
-    /// It has failed, and is restarted at that time.
+    /// It has failed, and will be restarted at that time.
     Waiting(MonotonicTime),
-    /// It stays stopped.
+    /// It remains stopped.
     Stopped,
 }
 
@@ -50,7 +50,7 @@ enum State<C> {
 pub(crate) enum AfterFault {
     /// A restart at that time.
     RestartAt(MonotonicTime),
-    /// None: it stays stopped.
+    /// No restart: it remains stopped.
     Stopped,
 }
 
@@ -72,7 +72,7 @@ impl<C: Component> Slot<C> {
         matches!(self.state, State::Running(_))
     }
 
-    /// When it is to be restarted, if it waits for that.
+    /// When it is to be restarted, if a restart is pending.
     pub(crate) fn restart_at(&self) -> Option<MonotonicTime> {
         match self.state {
             State::Waiting(at) => Some(at),
@@ -80,10 +80,10 @@ impl<C: Component> Slot<C> {
         }
     }
 
-    /// Makes it, after retiring the previous one. After an error it is vacant, and the caller either calls [`Self::fail`] or
-    /// prevents the robot from starting.
+    /// Creates it, after retiring the previous one. After an error it is vacant, and the caller either calls
+    /// [`Self::fail`] or prevents the robot from starting.
     pub(crate) fn make(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<(), Failed> {
-        // An error of the previous one while it closes does not concern the next one.
+        // An error while the previous one closes does not concern the next one.
         let _ = self.retire();
         let made = caught(|| C::make(self.recipe.bound(parameters)?, context))?;
         self.state = State::Running(made);
@@ -128,7 +128,7 @@ impl<C: Component> Slot<C> {
         true
     }
 
-    /// Its supervisor gives it up: it is not restarted any more.
+    /// Its supervisor gives up: it is no longer restarted.
     pub(crate) fn give_up(&mut self) {
         if matches!(self.state, State::Waiting(_)) {
             self.state = State::Stopped;

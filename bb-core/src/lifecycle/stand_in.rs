@@ -1,4 +1,4 @@
-//! Components that take the place of declared ones: simulated sensors and actuators.
+//! Replacements of declared components: simulated sensors and actuators.
 
 use crate::component::replacement::Replacement;
 use crate::component::{Actuator, ActuatorContext, Options, Reading, Sensor, SensorContext};
@@ -26,7 +26,7 @@ pub(crate) trait StandIn<T>: Send {
     fn terminate(&mut self);
 }
 
-/// A sensor of type `S`, with options, for another one.
+/// A sensor of type `S`, with options, to replace another one.
 pub(crate) fn replacement_of_sensor<S: Sensor>(options: S::Options) -> Replacement
 where
     S::Options: Sync,
@@ -38,7 +38,7 @@ where
     Replacement::new(make, S::Output::NAME)
 }
 
-/// An actuator of type `A`, with options, for another one.
+/// An actuator of type `A`, with options, to replace another one.
 pub(crate) fn replacement_of_actuator<A: Actuator>(options: A::Options) -> Replacement
 where
     A::Options: Sync,
@@ -50,7 +50,7 @@ where
     Replacement::new(make, A::Command::NAME)
 }
 
-/// Makes what takes the place of a sensor that publishes `T`.
+/// Creates the replacement of a sensor that publishes `T`.
 pub(super) fn make_sensor<T: Payload>(
     replacement: &Replacement,
     context: &SensorContext,
@@ -59,7 +59,7 @@ pub(super) fn make_sensor<T: Payload>(
     make.ok_or_else(|| other(replacement, "publishes", T::NAME))?(context)
 }
 
-/// Makes what takes the place of an actuator that takes `T`.
+/// Creates the replacement of an actuator that takes `T`.
 pub(super) fn make_actuator<T: Payload>(
     replacement: &Replacement,
     context: &ActuatorContext,

@@ -9,15 +9,15 @@
 //! | a message in the layout that ROS has for it | [`RosMessage`] |
 //! | a value to JSON and back, and the JSON Schema of a type | [`to_json`], [`from_json`], [`json_schema`] |
 //!
-//! A message has an *exact* layout, that of [`Stamped`](crate::Stamped) with all its fields. It may also have the layout of a
-//! ROS message, which viewers know, and which does not keep every value apart.
+//! A message has an *exact* layout, that of [`Stamped`](crate::Stamped) with all its fields. It may also have the
+//! layout of a ROS message, which viewers understand, but which cannot represent every value.
 //!
-//! Reading takes bytes from anywhere: it never panics, allocates no more than the bytes at hand justify, and names the
-//! field that is wrong.
+//! Reading accepts bytes from anywhere: it never panics, allocates no more than the available bytes justify, and
+//! names the field that is wrong.
 //!
-//! Why not an existing crate for CDR: they use serde, which knows the values of a type but not its shape, so that definitions
-//! for other programs would be written a second time and could differ; every payload and all its fields would have to
-//! implement serde's traits; and none guarantees the paragraph above.
+//! Why not an existing crate for CDR? They use serde, which knows the values of a type but not its shape, so
+//! definitions for other programs would be written a second time and could differ. Every payload and all its fields
+//! would have to implement serde's traits. And none gives the guarantees of the previous paragraph.
 
 mod algebra;
 mod collections;
@@ -53,11 +53,11 @@ pub use writer::Writer;
 
 use super::Finite;
 
-/// Data that can be written as bytes and read back the same, bit for bit, NaN included.
+/// Data that can be written as bytes and read back unchanged, bit for bit, NaN included.
 ///
 /// Numbers, `bool`, `char`, text, `Option`, `Vec`, arrays, `Arc`, times and nalgebra's fixed and dynamic matrices,
-/// quaternions and isometries are fields; `#[derive(Payload)]` makes structs and enums of fields fields. A type that
-/// contains itself cannot be one, since its shape would be infinite.
+/// quaternions and isometries are fields. `#[derive(Payload)]` makes structs and enums of fields into fields. A type
+/// that contains itself cannot be one, since its shape would be infinite.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be written to a recording and read back",
     label = "cannot be a field of a payload",
@@ -68,12 +68,12 @@ pub trait Field: Finite + Sized {
     /// What its bytes mean.
     const SHAPE: Shape;
 
-    /// Whether no value holds anything on the heap, so that [`heap_bytes`](Self::heap_bytes) need not be called.
+    /// Whether no value uses the heap, so that [`heap_bytes`](Self::heap_bytes) need not be called.
     const IS_INLINE: bool = false;
 
-    /// Bytes that it holds on the heap, beside its own `size_of`. What an `Arc` shares counts in full. Subscriptions are
-    /// bounded by it, see [`Overflow`](crate::Overflow); the derive adds up that of the fields, and a type with an
-    /// implementation of its own should say it too.
+    /// Bytes that it holds on the heap, in addition to its `size_of`. Data shared by an `Arc` counts in full.
+    /// Subscriptions are bounded by it, see [`Overflow`](crate::Overflow). The derive adds up the fields; a type with
+    /// its own implementation should report it too.
     fn heap_bytes(&self) -> usize {
         0
     }
@@ -95,10 +95,10 @@ pub trait Field: Finite + Sized {
         }
     }
 
-    /// Reads so many.
+    /// Reads `length` values.
     #[doc(hidden)]
     fn read_all(length: usize, reader: &mut Reader<'_>) -> Result<Vec<Self>, DecodeError> {
-        // A length from outside makes room only for what the bytes that follow may hold.
+        // A length from outside reserves only as much as the remaining bytes can hold.
         let mut values = Vec::with_capacity(length.min(reader.left() / size_of::<Self>().max(1)));
         for index in 0..length {
             values.push(Self::read(reader).map_err(|error| error.at_index(index))?);
@@ -110,7 +110,7 @@ pub trait Field: Finite + Sized {
 /// The bytes before the data: plain CDR, little endian.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
-/// Writers may pad to a multiple of four bytes. More than that left over is another type.
+/// Writers may pad to a multiple of four bytes. If more is left over, it is another type.
 const PADDING: usize = 3;
 
 /// Appends `value` as CDR, with the four bytes before it that name the encoding.

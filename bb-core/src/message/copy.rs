@@ -1,4 +1,4 @@
-//! Copies of messages that outlive the call in which they are handed on: for another thread, a subscriber, or later.
+//! Copies of messages that outlive the call that delivers them: for another thread, a subscriber, or later.
 
 use super::codec::{decode, encode};
 use super::{Payload, Stamped};
@@ -6,12 +6,12 @@ use crate::fault::discard;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What a panic carries.
+/// The value carried by a panic.
 pub(crate) type Panic = Box<dyn Any + Send>;
 
-/// Copies `message` to `kept`. If the payload's `Clone` panics, the payload is copied through its encoded form, which is how a
-/// replay gets it too: whether a message arrives does not depend on which thread had to copy it. The panic is returned for the
-/// publisher to be charged with it. `kept` is none if the encoded form cannot be read either.
+/// Copies `message` to `kept`. If the payload's `Clone` panics, the payload is copied through its encoded form, as in
+/// a replay: whether a message arrives does not depend on which thread had to copy it. The panic is returned so that
+/// the publisher can be charged with it. `kept` is `None` if the encoded form cannot be read either.
 #[inline]
 pub(crate) fn copy_to<T: Payload>(kept: &mut Option<Stamped<T>>, message: &Stamped<T>) -> Result<(), Panic> {
     let cloned = catch_unwind(AssertUnwindSafe(|| match &mut *kept {
@@ -25,7 +25,7 @@ pub(crate) fn copy_to<T: Payload>(kept: &mut Option<Stamped<T>>, message: &Stamp
     })
 }
 
-/// The same as a new message; the first panic is kept in `panic`.
+/// Returns the copy as a new message; stores the first panic in `panic`.
 #[inline]
 pub(crate) fn copied<T: Payload>(message: &Stamped<T>, panic: &mut Option<Panic>) -> Option<Stamped<T>> {
     let mut copy = None;

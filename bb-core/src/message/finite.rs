@@ -5,7 +5,8 @@ use nalgebra::{Dim, Isometry3, Matrix, Quaternion, RawStorage, Unit};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Data that knows whether all its numbers are finite. A message that is not is dropped before an estimator sees it.
+/// Data that knows whether all its numbers are finite. A message with other numbers is dropped before an estimator
+/// sees it.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not say whether its numbers are finite",
     label = "cannot be a field of a payload",

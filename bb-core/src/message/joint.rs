@@ -1,10 +1,11 @@
-//! What a message tells of joints.
+//! What a message reports about joints.
 
-/// What a payload tells of one joint: as many numbers as the joint has, in the order that
-/// [`kinematics`](crate::kinematics#coordinates) gives; one for a joint that turns or slides.
+/// What a payload reports about one joint: as many numbers as the joint has coordinates, in the order of
+/// [`kinematics`](crate::kinematics#coordinates); one for a revolute or prismatic joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointReading<'a> {
-    /// The joint, by its name or its path; none for the one at which it is measured, which the message's frame names.
+    /// The joint, by its name or its path; `None` for the joint at which it is measured, which the message's frame
+    /// names.
     pub joint: Option<&'a str>,
     /// Angles in rad, lengths in m.
     pub position: &'a [f64],
@@ -22,7 +23,7 @@ pub enum JointSide {
     /// At the joint itself.
     #[default]
     Joint,
-    /// At its motor: the declared transmission lies between.
+    /// At its motor, on the other side of the declared transmission.
     Motor,
 }
 
@@ -38,14 +39,14 @@ impl<'a> JointReading<'a> {
     }
 }
 
-/// A payload that tells the positions of joints, and says so with `#[payload(joint_position)]`: the runtime keeps what it
-/// tells, see [`joints`](crate::joints).
+/// A payload that reports the positions of joints, and declares so with `#[payload(joint_position)]`: the runtime
+/// keeps these positions, see [`joints`](crate::joints).
 ///
 /// ```
 /// use bb_core::prelude::*;
 /// use bb_core::{JointPositions, JointReading};
 ///
-/// /// What an absolute encoder reads.
+/// /// A reading of an absolute encoder.
 /// #[derive(Clone, Debug, Payload)]
 /// #[payload(joint_position)]
 /// pub struct Ticks {

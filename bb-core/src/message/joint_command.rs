@@ -1,9 +1,9 @@
-//! Commands to the actuator of a joint, and the limits that they are held to.
+//! Commands to the actuator of a joint, and the limits applied to them.
 
 use std::fmt;
 
-/// The bounds of a joint that its commands are held to, and where the joint is. Rad, rad/s and N·m where it turns; m, m/s
-/// and N where it slides. A bound that is not declared is infinite.
+/// The bounds applied to a joint's commands, and the joint's position. Rad, rad/s and N·m where it turns; m, m/s and
+/// N where it slides. A bound that is not declared is infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct JointBounds {
@@ -21,7 +21,7 @@ pub struct JointBounds {
     pub position: Option<f64>,
 }
 
-/// What a command exceeded and was brought back to.
+/// The quantities in which a command exceeded a bound and was clamped to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Exceeded {
@@ -33,7 +33,7 @@ pub struct Exceeded {
     pub effort: bool,
 }
 
-/// A quantity that a joint has limits of.
+/// A quantity for which a joint has limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LimitedQuantity {
     /// rad or m.
@@ -44,25 +44,25 @@ pub enum LimitedQuantity {
     Effort,
 }
 
-/// A command that is not carried out, because it leads beyond a limit and cannot be brought back to it.
+/// A command that is not carried out: it leads beyond a limit and cannot be clamped to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfBounds {
-    /// Of what.
+    /// The quantity.
     pub quantity: LimitedQuantity,
-    /// What was commanded.
+    /// The commanded value.
     pub value: f64,
     /// The bound that it exceeds.
     pub bound: f64,
 }
 
-/// A payload that commands a joint, and says so with `#[payload(joint_command)]`: the runtime holds it to the limits of the
-/// joint before the actuator gets it.
+/// A payload that commands a joint, and declares so with `#[payload(joint_command)]`: the runtime applies the limits
+/// of the joint before the actuator gets it.
 ///
 /// ```
 /// use bb_core::prelude::*;
 /// use bb_core::{Exceeded, JointBounds, JointCommand, OutOfBounds};
 ///
-/// /// What a gripper is told.
+/// /// A command to a gripper.
 /// #[derive(Clone, Debug, Payload)]
 /// #[payload(joint_command)]
 /// pub struct Grip {
@@ -87,10 +87,10 @@ pub struct OutOfBounds {
     note = "`#[payload(joint_command)]` promises it; implement `bb_core::JointCommand` for it"
 )]
 pub trait JointCommand: Sized {
-    /// Brings what exceeds the bounds back to them, and says what did.
+    /// Clamps values that exceed the bounds, and returns which did.
     ///
     /// # Errors
-    /// It would be another motion then: it is not carried out.
+    /// Clamping would make it another motion: it is not carried out.
     fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds>;
 
     /// The command that stops the joint, if there is one: sent when a [`Command`](crate::Command) that moves the joint is
@@ -115,12 +115,12 @@ impl JointBounds {
         position: None,
     };
 
-    /// Brings a position back to the limits.
+    /// Clamps a position to the limits.
     pub fn hold_position(&self, position: &mut f64, exceeded: &mut Exceeded) {
         exceeded.position |= hold(position, self.lower, self.upper);
     }
 
-    /// Brings a velocity back to the limits. At the end of its range, a joint does not move further out: the velocity is
+    /// Clamps a velocity to the limits. At the end of its range, a joint does not move further out: the velocity is
     /// then zero.
     pub fn hold_velocity(&self, velocity: &mut f64, exceeded: &mut Exceeded) {
         exceeded.velocity |= hold(velocity, -self.velocity, self.velocity);
@@ -135,25 +135,25 @@ impl JointBounds {
         }
     }
 
-    /// Brings a torque or force back to the limits.
+    /// Clamps a torque or force to the limits.
     pub fn hold_effort(&self, effort: &mut f64, exceeded: &mut Exceeded) {
         exceeded.effort |= hold(effort, -self.effort, self.effort);
     }
 
     /// # Errors
-    /// A position beyond the limits, by more than what rounding explains.
+    /// The position exceeds the limits by more than rounding explains.
     pub fn check_position(&self, position: f64) -> Result<(), OutOfBounds> {
         check(LimitedQuantity::Position, position, self.lower, self.upper)
     }
 
     /// # Errors
-    /// A velocity beyond the limits, by more than what rounding explains.
+    /// The velocity exceeds the limits by more than rounding explains.
     pub fn check_velocity(&self, velocity: f64) -> Result<(), OutOfBounds> {
         check(LimitedQuantity::Velocity, velocity, -self.velocity, self.velocity)
     }
 
     /// # Errors
-    /// A torque or force beyond the limits, by more than what rounding explains.
+    /// The torque or force exceeds the limits by more than rounding explains.
     pub fn check_effort(&self, effort: f64) -> Result<(), OutOfBounds> {
         check(LimitedQuantity::Effort, effort, -self.effort, self.effort)
     }
@@ -165,7 +165,7 @@ impl Exceeded {
         self.position || self.velocity || self.effort
     }
 
-    /// What it exceeded.
+    /// The quantities exceeded.
     pub fn quantities(self) -> impl Iterator<Item = LimitedQuantity> {
         let all = [
             (self.position, LimitedQuantity::Position),
@@ -180,7 +180,7 @@ impl LimitedQuantity {
     /// All of them.
     pub const ALL: &'static [Self] = &[Self::Position, Self::Velocity, Self::Effort];
 
-    /// As people read it.
+    /// Its name for people.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Position => "position",
@@ -213,7 +213,7 @@ fn hold(value: &mut f64, lower: f64, upper: f64) -> bool {
     is_outside
 }
 
-/// What rounding makes of a value at a bound, relative to it.
+/// The relative rounding error of a value at a bound.
 const ROUNDING: f64 = 1e-9;
 
 fn check(quantity: LimitedQuantity, value: f64, lower: f64, upper: f64) -> Result<(), OutOfBounds> {

@@ -1,4 +1,4 @@
-//! The name that a misspelt one was meant to be. The macro decides it in the same way for the names in `robot!`.
+//! Suggestions for misspelt names. The macro uses the same rule for the names in `robot!`.
 
 use strsim::osa_distance;
 
@@ -10,12 +10,12 @@ pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a s
         let longest = name.chars().count().max(candidate.chars().count());
         (distance <= limit && distance < longest).then_some((distance, candidate))
     });
-    // Of two that are equally near, the one that differs in case alone.
+    // Of two that are equally near, prefers one that differs only in case.
     near.min_by_key(|(distance, candidate)| (*distance, !candidate.eq_ignore_ascii_case(name)))
         .map(|(_, candidate)| candidate)
 }
 
-/// The path whose names are all near to those of `path`; else one with the same last name.
+/// A path whose names are all near to those of `path`; otherwise one with the same last name.
 pub(crate) fn nearest_path<'a>(path: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let names: Vec<&str> = path.split('/').collect();
     let known: Vec<&str> = known.into_iter().collect();

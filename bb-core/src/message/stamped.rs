@@ -5,7 +5,7 @@ use crate::time::{MonotonicTime, WallTime};
 use std::fmt;
 use std::ops::Deref;
 
-/// The name of a coordinate frame: that of a link or a joint, or empty where there is none.
+/// The name of a coordinate frame: that of a link or a joint, or empty for no frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Frame(&'static str);
 
@@ -99,8 +99,8 @@ impl<T> Deref for Stamped<T> {
     }
 }
 
-/// Whether a publisher of `Self` may feed an input of type `T`. It may if the types are equal, or if one of them is unknown
-/// because of another mistake.
+/// Whether a publisher of `Self` may feed an input of type `T`. It may if the types are equal, or if one of them is
+/// unknown because of another error.
 ///
 /// The wiring calls it at every `input`, where a mismatch is reported.
 #[diagnostic::on_unimplemented(

@@ -5,7 +5,7 @@ use crate::Payload;
 use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds};
 use crate::time::MonotonicTime;
 
-/// What an actuator that takes all standard commands can be told. The limits of the joint are applied before it gets one.
+/// A command to an actuator that takes all standard commands. The limits of the joint are applied before it gets one.
 #[derive(Clone, Debug, PartialEq, Payload)]
 #[payload(joint_command)]
 pub enum ActuatorCommand {
@@ -15,9 +15,9 @@ pub enum ActuatorCommand {
     Velocity(VelocityCommand),
     /// Apply an effort.
     Effort(EffortCommand),
-    /// Follow the points of a trajectory that belong to the joint, from now on.
+    /// Follow, from now on, the points of a trajectory that belong to the joint.
     Trajectory(JointTrajectory),
-    /// Come to rest as fast as the joint may, and stay where that is.
+    /// Come to rest as fast as the joint may, and hold that position.
     Hold,
     /// Come to rest as fast as the joint may; then the actuator applies no effort.
     Stop,
@@ -29,9 +29,9 @@ pub enum ActuatorCommand {
 pub struct PositionCommand {
     /// Angle in rad of a revolute or continuous joint; displacement in m of a prismatic one.
     pub position: f64,
-    /// Velocity at the target, or the speed of the motion for an actuator that only takes that: rad/s or m/s.
+    /// Velocity at the target; for an actuator that only takes a speed, the speed of the motion. rad/s or m/s.
     pub velocity: Option<f64>,
-    /// Effort to add to that of the actuator's own control: N·m or N.
+    /// Effort to add to the actuator's own control: N·m or N.
     pub effort: Option<f64>,
 }
 
@@ -41,7 +41,7 @@ pub struct PositionCommand {
 pub struct VelocityCommand {
     /// rad/s or m/s.
     pub velocity: f64,
-    /// Effort to add to that of the actuator's own control: N·m or N.
+    /// Effort to add to the actuator's own control: N·m or N.
     pub effort: Option<f64>,
 }
 
@@ -53,14 +53,14 @@ pub struct EffortCommand {
     pub effort: f64,
 }
 
-/// An actuator begins to move a joint. An open-loop estimator follows a joint without an encoder from it.
+/// An actuator begins to move a joint. An open-loop estimator uses it to follow a joint without an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct BeginMotion {
     /// Position at the start, rad or m.
     pub initial_position: f64,
     /// Position at the end, rad or m.
     pub target_position: f64,
-    /// Speed of the motion where it is known, rad/s or m/s; never negative.
+    /// Speed of the motion, if known, rad/s or m/s; never negative.
     pub speed: Option<f64>,
     /// When the joint is expected to arrive.
     pub expected_arrival: Option<MonotonicTime>,
@@ -78,13 +78,13 @@ pub struct EndMotion {
 /// Why a motion ended.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub enum MotionEnd {
-    /// The joint is at the target.
+    /// The joint has reached the target.
     Reached,
     /// Another command replaced the motion.
     Replaced,
     /// The actuator was told to stop, or was disarmed.
     Stopped,
-    /// The actuator gives all it may, and the joint does not move: something holds it.
+    /// The actuator applies its maximum effort, and the joint does not move: something blocks it.
     Stalled,
     /// The joint is at the end of its range, short of the target.
     Limit,
@@ -112,7 +112,7 @@ impl JointCommand for PositionCommand {
     fn limit(&mut self, bounds: &JointBounds) -> Result<Exceeded, OutOfBounds> {
         let mut exceeded = Exceeded::default();
         bounds.hold_position(&mut self.position, &mut exceeded);
-        // That of the target, or a speed: where the joint is does not matter to it.
+        // The velocity at the target, or a speed: the joint's position does not matter.
         let bounds = JointBounds { position: None, ..*bounds };
         self.velocity.iter_mut().for_each(|velocity| bounds.hold_velocity(velocity, &mut exceeded));
         self.effort.iter_mut().for_each(|effort| bounds.hold_effort(effort, &mut exceeded));

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Orientation {
-    /// Takes vectors of the body to the world (east, north, up).
+    /// Rotates vectors of the body to the world (east, north, up).
     pub world_from_body: UnitQuaternion<f64>,
     /// Covariance of the error as a small rotation of the body, rad².
     pub covariance: Option<Matrix3<f64>>,
@@ -26,8 +26,9 @@ impl Orientation {
 pub struct Pose {
     /// The body's origin in the world, m.
     pub position: Vector3<f64>,
-    /// Takes vectors of the body to the world.
+    /// Rotates vectors of the body to the world.
     pub world_from_body: UnitQuaternion<f64>,
-    /// Covariance of position (m²) and of orientation as a small rotation (rad²), both about the axes of the world, as ROS has it.
+    /// Covariance of position (m²) and of orientation as a small rotation (rad²), both about the axes of the world,
+    /// as in ROS.
     pub covariance: Option<Matrix6<f64>>,
 }

@@ -10,9 +10,10 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 pub struct PoseWithCovariance {
     /// The body's origin in the world, m.
     pub position: Vector3<f64>,
-    /// Takes vectors of the body to the world.
+    /// Rotates vectors of the body to the world.
     pub world_from_body: UnitQuaternion<f64>,
-    /// Covariance of position (m²) and of orientation as a small rotation (rad²), both about the axes of the world, as ROS has it.
+    /// Covariance of position (m²) and of orientation as a small rotation (rad²), both about the axes of the world,
+    /// as in ROS.
     pub covariance: Matrix6<f64>,
 }
 

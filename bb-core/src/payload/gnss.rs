@@ -1,17 +1,17 @@
-//! Positions from navigation satellites.
+//! Satellite navigation.
 
 use crate::Payload;
 use nalgebra::Matrix3;
 
-/// The position of an antenna, whose frame is the message's, from navigation satellites (`sensor_msgs/NavSatFix`).
+/// The position of an antenna, whose frame is the message's, from satellite navigation (`sensor_msgs/NavSatFix`).
 ///
-/// ROS has degrees where this has radians. A conversion there and back may differ in the last bit.
+/// ROS uses degrees and this payload radians. A conversion there and back may differ in the last bit.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct GnssFix {
     /// What the position is based on.
     pub status: GnssStatus,
-    /// Which systems were used.
+    /// Which satellite systems were used.
     pub services: GnssServices,
     /// The position, if the receiver has one.
     pub position: Option<GeodeticPosition>,
@@ -26,11 +26,11 @@ pub struct GeodeticPosition {
     pub latitude_rad: f64,
     /// Longitude, rad; positive to the east.
     pub longitude_rad: f64,
-    /// Height above the ellipsoid, m, if it is known; not above the sea.
+    /// Height above the ellipsoid (not above sea level), m, if known.
     pub altitude: Option<f64>,
 }
 
-/// What a position from satellites is based on.
+/// The basis of a satellite position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub enum GnssStatus {
     /// The receiver does not say.
@@ -46,14 +46,14 @@ pub enum GnssStatus {
     GroundAugmented,
 }
 
-/// Systems of navigation satellites.
+/// Satellite navigation systems.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub struct GnssServices {
     /// GPS.
     pub gps: bool,
     /// GLONASS.
     pub glonass: bool,
-    /// BeiDou, once COMPASS.
+    /// BeiDou, formerly COMPASS.
     pub beidou: bool,
     /// Galileo.
     pub galileo: bool,

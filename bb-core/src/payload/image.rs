@@ -1,4 +1,4 @@
-//! Images of cameras.
+//! Camera images.
 
 use crate::Payload;
 use std::sync::Arc;
@@ -15,9 +15,9 @@ pub struct Image {
     /// Channels and their size, by ROS's names: `rgb8`, `bgr8`, `mono8`, `mono16`, `16UC1` for a depth in mm, `32FC1` for
     /// one in m, `bayer_rggb8`.
     pub encoding: &'static str,
-    /// Whether numbers of several bytes begin with the most significant one.
+    /// Whether multi-byte numbers are big-endian.
     pub is_bigendian: bool,
-    /// Bytes of a row, with what pads it.
+    /// Bytes of a row, including padding.
     pub step: u32,
     /// The rows from the top: `step * height` bytes.
     pub data: Arc<[u8]>,

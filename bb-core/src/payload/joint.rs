@@ -16,8 +16,8 @@ pub struct JointState {
     pub effort: Option<f64>,
 }
 
-/// The state of the motor of a joint with a `transmission`: what an encoder on the motor's side of the gear reads. The
-/// runtime converts it to the joint's, see [`joints`](crate::joints).
+/// The state of the motor of a joint with a `transmission`: the reading of an encoder on the motor's side of the
+/// gear. The runtime converts it to the joint's, see [`joints`](crate::joints).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(joint_position)]
 pub struct MotorState {
@@ -29,8 +29,8 @@ pub struct MotorState {
     pub effort: Option<f64>,
 }
 
-/// The state of several joints (`sensor_msgs/JointState`). Each list is as long as the names, or empty where its quantity
-/// is not measured.
+/// The state of several joints (`sensor_msgs/JointState`). Each list is as long as the names, or empty if its
+/// quantity is not measured.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 #[payload(ros, joint_position)]
 pub struct JointStates {
@@ -44,12 +44,12 @@ pub struct JointStates {
     pub efforts: Vec<f64>,
 }
 
-/// All joints of a robot at one time, as the runtime knows them (`sensor_msgs/JointState`); what
-/// [`JointPublisher`](crate::component::JointPublisher) publishes. Unlike [`JointStates`] it is no measurement.
+/// All joints of a robot at one time, as the runtime knows them (`sensor_msgs/JointState`); published by
+/// [`JointPublisher`](crate::component::JointPublisher). Unlike [`JointStates`], it is not a measurement.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 #[payload(ros, no_frame)]
 pub struct JointSnapshot {
-    /// The joints whose state is known, in the order of their declaration, those that mimic others included.
+    /// The joints whose state is known, in the order of their declaration, including those that mimic others.
     pub names: Arc<[String]>,
     /// Angles in rad of revolute and continuous joints; displacements in m of prismatic ones.
     pub positions: Vec<f64>,

@@ -5,7 +5,7 @@ use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// Poses in their order, in the world: where a body was, or where it is to go (`nav_msgs/Path`).
+/// Poses in order, in the world: the past or planned path of a body (`nav_msgs/Path`).
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Path {
@@ -16,11 +16,11 @@ pub struct Path {
 /// A pose on a path.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct PathPose {
-    /// When the body is there; the Unix epoch where a path has no times.
+    /// When the body is there; the Unix epoch if a path has no times.
     pub time: WallTime,
     /// The body's origin in the world, m.
     pub position: Vector3<f64>,
-    /// Takes vectors of the body to the world.
+    /// Rotates vectors of the body to the world.
     pub world_from_body: UnitQuaternion<f64>,
 }
 
@@ -33,7 +33,7 @@ pub struct RelativePose {
     pub end: MonotonicTime,
     /// The body's origin at the end, in its frame at the start, m.
     pub position: Vector3<f64>,
-    /// Takes vectors of the body's frame at the end to its frame at the start.
+    /// Rotates vectors of the body's frame at the end to its frame at the start.
     pub start_from_end: UnitQuaternion<f64>,
     /// Covariance: position in the frame at the start (m²), then orientation as a small rotation of the body at the end
     /// (rad²).

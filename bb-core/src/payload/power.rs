@@ -4,7 +4,7 @@ use crate::Payload;
 
 /// The state of a battery (`sensor_msgs/BatteryState`).
 ///
-/// ROS has degrees Celsius and ampere hours in numbers of four bytes where this has kelvin and coulomb.
+/// ROS uses degrees Celsius and ampere hours in four-byte floats; this payload uses kelvin and coulomb.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 #[payload(ros, no_frame)]
 pub struct BatteryState {
@@ -30,9 +30,9 @@ pub struct BatteryState {
     pub technology: BatteryTechnology,
     /// Whether it is present.
     pub is_present: bool,
-    /// V, by cell; empty where the number of cells is not known.
+    /// V, by cell; empty if the number of cells is unknown.
     pub cell_voltages: Vec<Option<f64>>,
-    /// K, by cell; empty where the number of cells is not known.
+    /// K, by cell; empty if the number of cells is unknown.
     pub cell_temperatures: Vec<Option<f64>>,
     /// Its location in the robot.
     pub location: String,

@@ -11,9 +11,9 @@ pub struct Range {
     pub radiation: Radiation,
     /// The full angle of the cone, rad.
     pub field_of_view: f32,
-    /// The smallest distance that is measured, m.
+    /// The smallest measurable distance, m.
     pub min_range: f32,
-    /// The largest distance that is measured, m.
+    /// The largest measurable distance, m.
     pub max_range: f32,
     /// Distance, m. A sensor that only detects presence reports −∞ for an object and +∞ for none (REP 117).
     #[payload(non_finite)]
@@ -47,14 +47,14 @@ pub struct LaserScan {
     pub time_increment: f32,
     /// Time from scan to scan, s.
     pub scan_time: f32,
-    /// The smallest distance that is measured, m.
+    /// The smallest measurable distance, m.
     pub range_min: f32,
-    /// The largest distance that is measured, m.
+    /// The largest measurable distance, m.
     pub range_max: f32,
     /// Distances, m: −∞ if too near, +∞ if nothing was hit, NaN if the measurement failed (REP 117).
     #[payload(non_finite)]
     pub ranges: Arc<[f32]>,
-    /// Strength of the return in units of the device; empty where it is not measured.
+    /// Strength of the return in units of the device; empty if it is not measured.
     #[payload(non_finite)]
     pub intensities: Arc<[f32]>,
 }

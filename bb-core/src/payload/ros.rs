@@ -1,4 +1,4 @@
-//! How each payload is written as ROS's message, and read back: one file a ROS package.
+//! Conversions of each payload to and from its ROS message: one file per ROS package.
 
 mod covariance;
 mod geometry;

@@ -1,4 +1,4 @@
-//! What inertial, magnetic and pressure sensors measure.
+//! Measurements of inertial, magnetic and pressure sensors.
 
 use crate::Payload;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -9,9 +9,9 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 pub struct Imu {
     /// Angular velocity, rad/s.
     pub angular_velocity: Vector3<f64>,
-    /// Specific force, m/s²: what an accelerometer measures; at rest +9.81 along the axis that points up.
+    /// Specific force, m/s²: the measurement of an accelerometer; at rest +9.81 along the axis that points up.
     pub linear_acceleration: Vector3<f64>,
-    /// The device's own orientation, `world_from_body`, where it has one.
+    /// The device's own orientation, `world_from_body`, if it has one.
     pub orientation: Option<UnitQuaternion<f64>>,
     /// Covariance of the orientation, rad².
     pub orientation_covariance: Option<Matrix3<f64>>,
@@ -53,13 +53,13 @@ impl MagneticField {
 }
 
 /// One sample of a sensor with gyroscope, accelerometer and magnetometer in one housing: magnetic, angular rate,
-/// gravity (`sensor_msgs/Imu`, and `sensor_msgs/MagneticField` where there is a reading).
+/// gravity (`sensor_msgs/Imu`, and `sensor_msgs/MagneticField` if there is a reading).
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Marg {
     /// The inertial sample.
     pub imu: Imu,
-    /// The magnetic field, where there is a reading that belongs to this sample.
+    /// The magnetic field, if there is a reading for this sample.
     pub magnetic_field: Option<MagneticField>,
 }
 

@@ -15,7 +15,7 @@ pub struct JointTrajectory {
     pub points: Arc<[TrajectoryPoint]>,
 }
 
-/// Where the joints of a trajectory are at one time. Each list is as long as the names of the joints, or empty where its
+/// The state of a trajectory's joints at one time. Each list is as long as the names of the joints, or empty if its
 /// quantity is free.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub struct TrajectoryPoint {

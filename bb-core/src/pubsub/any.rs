@@ -9,16 +9,16 @@ use std::fmt;
 use std::sync::Arc;
 use std::task::Waker;
 
-/// A message whose payload's type is erased; [`downcast`](Self::downcast) gives it back. Clones are the same message.
+/// A message whose payload type is erased; [`downcast`](Self::downcast) gives it back. Clones share the message.
 #[derive(Clone)]
 pub struct DynamicMessage {
     path: &'static str,
     message: Arc<dyn AnyMessage>,
-    /// What it holds, on the heap and beside it: asked of the payload once, where no lock is held.
+    /// The bytes it holds, on the heap and inline: asked of the payload once, while no lock is held.
     bytes: usize,
 }
 
-/// What a message can do for those who do not know its payload.
+/// Operations on a message for code that does not know its payload.
 pub(super) trait AnyMessage: Send + Sync {
     fn payload_name(&self) -> &'static str;
     fn type_name(&self) -> &'static str;
@@ -80,25 +80,25 @@ impl DynamicMessage {
         self.message.as_any().downcast_ref()
     }
 
-    /// Calls `listener` with what it tells of the positions of joints, if anything; see
+    /// Calls `listener` with the positions of joints it reports, if any; see
     /// [`JointPositions`](crate::JointPositions).
     pub fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
         self.message.tell_joints(listener);
     }
 
-    /// Appends the message with its stamp, bit for bit, as CDR that [`schema`](Self::schema) describes and
-    /// [`codec::decode`](crate::message::codec::decode) reads as a `Stamped<T>`.
+    /// Appends the message with its stamp, bit for bit, as CDR. The layout is [`schema`](Self::schema), and
+    /// [`codec::decode`](crate::message::codec::decode) reads it as a `Stamped<T>`.
     pub fn encode(&self, bytes: &mut Vec<u8>) {
         self.message.encode(bytes);
     }
 
-    /// What a program that does not know the payload needs to read it.
+    /// The information a program needs to read it without knowing the payload.
     pub fn schema(&self) -> Schema {
         self.message.schema()
     }
 
-    /// Appends the message as ROS writes it; returns `false` and appends nothing if ROS has no message for its payload. The monotonic
-    /// time and the origin are not in it.
+    /// Appends the message in ROS's layout; returns `false` and appends nothing if ROS has no message for its
+    /// payload. The monotonic time and the origin are not included.
     pub fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool {
         self.message.encode_as_ros(bytes)
     }
@@ -108,7 +108,7 @@ impl DynamicMessage {
         self.message.ros_schema()
     }
 
-    /// Appends the second message of ROS; returns `false` and appends nothing if there is none.
+    /// Appends the second ROS message; returns `false` and appends nothing if there is none.
     pub fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool {
         self.message.encode_companion(bytes)
     }
@@ -118,7 +118,7 @@ impl DynamicMessage {
         self.message.ros_companion()
     }
 
-    /// The same with another wall time.
+    /// A copy with another wall time.
     pub fn at_wall_time(&self, time: WallTime) -> Self {
         Self { message: self.message.at_wall_time(time), ..*self }
     }
@@ -141,39 +141,39 @@ impl fmt::Debug for DynamicMessage {
     }
 }
 
-/// What all topics have in common.
+/// The common interface of all topics.
 pub trait AnyTopic: Any + Send + Sync {
     /// Its path.
     fn path(&self) -> &'static str;
     /// The name of its payload's type.
     fn payload_name(&self) -> &'static str;
-    /// Whether what its messages tell is seen from a frame.
+    /// Whether the values of its messages are relative to a frame.
     #[doc(hidden)]
     fn depends_on_frame(&self) -> bool;
-    /// Makes the definitions of its messages: the exact one, and those of ROS if it has any.
+    /// Returns the definitions of its messages: the exact one, and those of ROS if it has any.
     #[doc(hidden)]
     fn schemas(&self) -> fn() -> Vec<Schema>;
-    /// Everybody who listens.
+    /// All subscribers.
     fn subscribers(&self) -> Vec<SubscriberStatistics>;
-    /// Hands every message to `tap` as well.
+    /// Also hands every message to `tap`.
     #[doc(hidden)]
     fn tap(&self, tap: &Tap);
-    /// A message from its bytes, as [`DynamicMessage::encode`] has made them.
+    /// Decodes a message from bytes written by [`DynamicMessage::encode`].
     #[doc(hidden)]
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
-    /// Publishes a message if its payload is this topic's; else does nothing and returns `false`.
+    /// Publishes a message if its payload is this topic's; otherwise does nothing and returns `false`.
     fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
-    /// Itself, to be downcast to its type.
+    /// Itself, to downcast to its type.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
-    /// What it has counted.
+    /// Its counts.
     fn statistics(&self) -> TopicStatistics;
-    /// Tells all subscribers that no more will come; the tasks to wake, which is their code.
+    /// Tells all subscribers that no more will come. Returns the tasks to wake, which is the subscribers' code.
     #[must_use = "a task that waits for a message waits for ever unless it is woken"]
     fn close(&self) -> Vec<Waker>;
 }
 
-/// The queue of such a subscriber, for a topic to hand messages to.
+/// The queue of an untyped subscriber, to which a topic hands messages.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Tap(pub(super) Arc<Queue<DynamicMessage>>);

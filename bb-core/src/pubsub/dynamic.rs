@@ -11,8 +11,8 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-/// The messages of all selected publishers, in the order in which they were published, including publishers created later
-/// at paths made at run time. Dropping it unsubscribes.
+/// The messages of all selected publishers, in the order in which they were published, including publishers created
+/// later at run time. Dropping it unsubscribes.
 #[derive(Debug)]
 pub struct DynamicSubscription {
     queue: Arc<Queue<DynamicMessage>>,
@@ -22,8 +22,8 @@ pub struct DynamicSubscription {
 }
 
 impl DynamicSubscription {
-    /// Subscribes to those `topics` that are selected and whose payload is one of `payloads`. What matches none of them is
-    /// logged as a warning, and kept in [`unmatched`](Self::unmatched).
+    /// Subscribes to the selected `topics` whose payload is one of `payloads`. Parts of the selection that match none
+    /// of them are logged as a warning, and kept in [`unmatched`](Self::unmatched).
     pub fn new<'a, 'b>(
         topics: impl IntoIterator<Item = &'a dyn AnyTopic>,
         select: Select<'_>,
@@ -36,7 +36,7 @@ impl DynamicSubscription {
         subscription
     }
 
-    /// The same without a warning, where the paths `declared` have a publisher while the robot runs.
+    /// The same without a warning for the paths in `declared`, which have a publisher while the robot runs.
     pub(super) fn among(
         topics: &[&dyn AnyTopic],
         declared: &[&'static str],
@@ -58,7 +58,7 @@ impl DynamicSubscription {
         Self { queue, paths, schemas, unmatched }
     }
 
-    /// Logs what is unmatched. No lock may be held: it runs the user's `tracing` subscriber.
+    /// Logs unmatched parts. No lock may be held: it runs the user's `tracing` subscriber.
     pub(super) fn warn(&self) {
         for unmatched in &self.unmatched {
             tracing::warn!("{unmatched}");
@@ -69,28 +69,28 @@ impl DynamicSubscription {
         Tap(Arc::clone(&self.queue))
     }
 
-    /// The paths it listened to when it was made. Of those made later at run time, it also listens to the selected ones.
+    /// The paths it listened to when it was created. It also listens to selected paths created later at run time.
     pub fn paths(&self) -> &[&'static str] {
         &self.paths
     }
 
-    /// The definitions of what it listened to when it was made, by path: what a recorder would write.
+    /// The definitions of the topics it listened to when it was created, by path: what a recorder would write.
     pub fn schemas(&self) -> impl Iterator<Item = (&'static str, Vec<Schema>)> + '_ {
         self.paths.iter().zip(&self.schemas).map(|(path, schemas)| (*path, schemas()))
     }
 
-    /// The parts of its selection that matched nothing when it was made, each with the nearest name.
+    /// The parts of its selection that matched nothing when it was created, each with the nearest name.
     pub fn unmatched(&self) -> &[Unmatched] {
         &self.unmatched
     }
 
-    /// The oldest message that waits, if any.
+    /// The oldest waiting message, if any.
     pub fn try_recv(&self) -> Option<DynamicMessage> {
         self.queue.pop()
     }
 
-    /// Waits for the next message, `timeout` at most; none after that. (It does not end by itself when the robot stops,
-    /// since its publishers do so one by one.)
+    /// Waits for the next message, `timeout` at most; returns `None` after that. (It does not end by itself when the
+    /// robot stops, since its publishers stop one by one.)
     pub fn recv_timeout(&self, timeout: Duration) -> Option<DynamicMessage> {
         self.queue.wait(Some(timeout))
     }
@@ -101,7 +101,7 @@ impl DynamicSubscription {
         RecvDynamic(self)
     }
 
-    /// The messages that wait now; those that arrive meanwhile are left.
+    /// The messages waiting now; those that arrive meanwhile are left.
     pub fn drain(&self) -> impl Iterator<Item = DynamicMessage> + '_ {
         (0..self.queue.len()).map_while(|_| self.try_recv())
     }
@@ -131,7 +131,7 @@ impl Future for RecvDynamic<'_> {
 
 impl Drop for DynamicSubscription {
     fn drop(&mut self) {
-        // Its topics let go of it at their next message.
+        // Its topics release it at their next message.
         self.queue.abandon();
     }
 }

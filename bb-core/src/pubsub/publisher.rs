@@ -12,7 +12,7 @@ pub struct Publisher<T> {
     gate: Arc<dyn Gate>,
 }
 
-/// What a publisher passes on its way to its topic.
+/// The checks that a publisher passes on its way to its topic.
 pub(crate) trait Gate: Send + Sync {
     /// Has `publish` called with the stamp of a payload that is published at `path` now; not once the publisher may not act any
     /// more. A panic of the payload's `Clone` that it returns is a fault at `path`.
@@ -38,7 +38,7 @@ impl<T: Payload> Publisher<T> {
         self.gate.pass(self.path(), &mut |stamp| self.hand_out(&stamp.message(payload.take()?)));
     }
 
-    /// Publishes a message with the stamp that it has: one that comes from elsewhere and is passed on.
+    /// Publishes a message with its own stamp, for messages forwarded from elsewhere.
     pub fn forward(&self, message: &Stamped<T>) {
         self.gate.pass(self.path(), &mut |_| self.hand_out(message));
     }

@@ -12,25 +12,25 @@ use std::time::{Duration, Instant};
 
 /// What happens to a subscriber that is slower than its publisher.
 ///
-/// A subscription is bounded in messages and in bytes. The bytes of a message are what its payload holds on the heap
-/// ([`Field::heap_bytes`](crate::Field::heap_bytes)), and the message itself where that is larger than 1 KiB; smaller ones are
-/// bounded by their number alone. One message is always kept, however large it is.
+/// A subscription is bounded in messages and in bytes. The bytes of a message are those its payload holds on the heap
+/// ([`Field::heap_bytes`](crate::Field::heap_bytes)), plus the message itself if that is larger than 1 KiB; smaller
+/// ones are bounded only by their number. One message is always kept, however large it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overflow {
-    /// Keeps so many messages, and no more than [`Overflow::DEFAULT_BYTES`]; then the oldest makes room, and the loss is
-    /// counted.
+    /// Keeps this many messages, and at most [`Overflow::DEFAULT_BYTES`]. Beyond that, the oldest is dropped, and the
+    /// loss is counted.
     DropOldest {
         /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
         capacity: usize,
     },
-    /// The same with a bound in bytes of its own.
+    /// The same with its own bound in bytes.
     DropOldestWithin {
         /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
         capacity: usize,
-        /// Bytes that they may have together; `usize::MAX` for no bound.
+        /// Total bytes of the kept messages; `usize::MAX` for no bound.
         bytes: usize,
     },
-    /// Keeps only the newest; the loss of the others is counted.
+    /// Keeps only the newest message; the loss of the others is counted.
     KeepLatest,
 }
 
@@ -44,7 +44,7 @@ impl Overflow {
     /// The largest capacity of a subscription, in messages.
     pub const MAX_CAPACITY: usize = 1 << 20;
 
-    /// Bytes that the messages of a subscription may have together, unless it says otherwise: 64 MiB.
+    /// Default bound on the total bytes of a subscription's messages: 64 MiB.
     pub const DEFAULT_BYTES: usize = 64 << 20;
 
     fn bound(self) -> Bound {
@@ -57,17 +57,17 @@ impl Overflow {
     }
 }
 
-/// How much may wait.
+/// The bounds of a queue.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
     capacity: usize,
     bytes: usize,
 }
 
-/// Room that a queue makes in advance, in bytes; beyond it, room is made when messages first need it.
+/// Memory that a queue reserves in advance, in bytes; beyond it, memory is allocated when messages first need it.
 const ROOM_IN_ADVANCE: usize = 1 << 20;
 
-/// A message's own size that does not count towards the bytes of its subscription.
+/// A message's own size up to which it does not count towards the bytes of its subscription.
 const UNCOUNTED_BYTES: usize = 1 << 10;
 
 /// The bytes of a message that count towards the bound of a subscription.
@@ -76,25 +76,25 @@ pub(super) fn counted_bytes<T: Payload>(message: &Stamped<T>) -> usize {
     if T::IS_INLINE { own } else { own.saturating_add(message.payload.heap_bytes()) }
 }
 
-/// No user's code runs under its lock: messages are dropped, and wakers cloned, woken and dropped, without it.
+/// No user code runs under its lock: messages are dropped, and wakers cloned, woken and dropped, without it.
 #[derive(Debug)]
 pub(super) struct Queue<M> {
     state: Mutex<State<M>>,
     arrived: Condvar,
     bound: Bound,
-    /// Nobody reads it any more.
+    /// Its reader is gone.
     abandoned: AtomicBool,
 }
 
 #[derive(Debug)]
 struct State<M> {
     messages: VecDeque<Entry<M>>,
-    /// The sum of what they count.
+    /// The sum of the counted bytes.
     bytes: usize,
     lagged: u64,
     closed: bool,
     waker: Option<Waker>,
-    /// Threads that wait: notifying nobody would cost a system call.
+    /// Waiting threads: notifying nobody would cost a system call.
     waiting: usize,
 }
 
@@ -105,8 +105,8 @@ struct Entry<M> {
 }
 
 impl<M: Send + 'static> Queue<M> {
-    /// Adds a message of so many counted bytes; how many of the oldest had to make room for it. What is to be woken and
-    /// dropped goes to `wakers`.
+    /// Adds a message of `bytes` counted bytes. Returns how many of the oldest were dropped to make room for it.
+    /// Wakers and dropped messages go to `wakers`.
     pub(super) fn push(&self, message: M, bytes: usize, wakers: &mut Wakers) -> u64 {
         let mut lost = 0;
         let (state, evicted) = loop {
@@ -135,7 +135,7 @@ impl<M: Send + 'static> Queue<M> {
     }
 
     fn enqueue(&self, mut state: MutexGuard<'_, State<M>>, entry: Entry<M>, wakers: &mut Wakers) {
-        // Under the lock, so that what `abandon` takes out is all there is.
+        // Under the lock, so that `abandon` takes out everything.
         if self.is_abandoned() {
             drop(state);
             wakers.discard(entry.message);
@@ -156,7 +156,7 @@ impl<M: Send + 'static> Queue<M> {
 }
 
 impl<M> Queue<M> {
-    /// Room for the usual number of messages is made here, so that publishing allocates nothing.
+    /// Memory for the usual number of messages is reserved here, so publishing allocates nothing.
     pub(super) fn new(overflow: Overflow) -> Self {
         let bound = overflow.bound();
         let in_advance = bound.capacity.min(ROOM_IN_ADVANCE / size_of::<Entry<M>>());
@@ -171,20 +171,20 @@ impl<M> Queue<M> {
         Self { state: Mutex::new(state), arrived: Condvar::new(), bound, abandoned: AtomicBool::new(false) }
     }
 
-    /// Tells the reader that no more will come; the task to wake.
+    /// Tells the reader that no more will come. Returns the task to wake.
     #[must_use = "to wake a task is user code, which the caller runs where it harms nobody"]
     pub(super) fn close(&self) -> Option<Waker> {
         let mut state = self.lock();
         state.closed = true;
         let waker = state.waker.take();
         drop(state);
-        // Several threads may wait for the same subscription, and none of them will get a message any more.
+        // Several threads may wait for the same subscription, and none of them will get another message.
         self.arrived.notify_all();
         waker
     }
 
-    /// Says that nobody reads it any more. What waits is dropped here, and nothing is added from now on, so that
-    /// dropping the queue itself runs no user code, whatever lock is held.
+    /// Says that the reader is gone. Waiting messages are dropped here, and none are added from now on, so dropping
+    /// the queue itself runs no user code, whatever lock is held.
     pub(super) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Release);
         let mut state = self.lock();
@@ -225,7 +225,7 @@ impl<M> Queue<M> {
         self.lock().lagged
     }
 
-    /// Waits for a message until `timeout` (`None`: without end); `None` after that, or once closed and empty.
+    /// Waits for a message until `timeout` (`None`: forever). Returns `None` after that, or once closed and empty.
     pub(super) fn wait(&self, timeout: Option<Duration>) -> Option<M> {
         let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
         let mut state = self.lock();
@@ -260,7 +260,7 @@ impl<M> Queue<M> {
         drop(state);
         let waker = context.waker().clone();
         let mut state = self.lock();
-        // A message may have arrived meanwhile, and woken the waker of before.
+        // A message may have arrived meanwhile, and woken the previous waker.
         if let Some(ready) = state.ready() {
             drop(state);
             discard(waker);

@@ -1,4 +1,4 @@
-//! Topics that are made while the robot runs, and the subscriptions that are waiting for them.
+//! Topics created while the robot runs, and subscriptions waiting for them.
 
 use super::any::{AnyTopic, DynamicMessage, Tap};
 use super::queue::Queue;
@@ -12,10 +12,10 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::task::Waker;
 
-/// The topics of one robot that it does not declare. A topic that is made here is subscribed to by those whose selection
-/// includes it, whether they subscribed before or after.
+/// The topics of one robot that it does not declare. A topic created here is subscribed to by every subscription
+/// whose selection includes it, whether made before or after.
 ///
-/// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics, and of subscriptions only those that live.
+/// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics, and only live subscriptions.
 #[derive(Default)]
 pub(crate) struct Registry {
     /// The paths of all other topics of the robot.
@@ -34,14 +34,14 @@ struct State {
     is_closed: bool,
 }
 
-/// Where another topic has room.
+/// The place for another topic.
 enum Room {
     Free,
-    /// The path of a topic that nobody uses.
+    /// The path of an unused topic.
     Of(&'static str),
 }
 
-/// A topic, and which one it is in the order in which they were made.
+/// A topic, and its index in the order of creation.
 struct Made {
     number: u64,
     topic: Arc<dyn AnyTopic>,
@@ -68,7 +68,8 @@ pub(crate) enum PathChange {
 }
 
 impl Registry {
-    /// The largest number of paths. Beyond it, a topic without a publisher and without a typed subscription makes room.
+    /// The largest number of paths. Beyond it, a topic without a publisher and without a typed subscription is
+    /// removed.
     pub(crate) const MAX_TOPICS: usize = 1024;
 
     /// For a robot that declares these paths.
@@ -81,7 +82,7 @@ impl Registry {
         &self.declared
     }
 
-    /// Subscribes to what is selected of `topics`, of the topics made here, and of those that will be.
+    /// Subscribes to the selected ones of `topics`, of the topics created here, and of those created later.
     pub(crate) fn subscribe(
         &self,
         topics: &[&dyn AnyTopic],
@@ -92,7 +93,7 @@ impl Registry {
         let mut state = self.lock();
         let made: Vec<_> = state.topics.values().map(|made| Arc::clone(&made.topic)).collect();
         let topics: Vec<&dyn AnyTopic> = topics.iter().copied().chain(made.iter().map(|made| &**made)).collect();
-        // Under the lock, so that a topic made meanwhile is subscribed to once.
+        // Under the lock, so that a topic created meanwhile is subscribed to once.
         let subscription = DynamicSubscription::among(&topics, &self.declared, select, payloads, overflow);
         if !state.is_closed {
             state.selections.add(Selection::new(select, payloads, subscription.tap()));
@@ -120,7 +121,7 @@ impl Registry {
         topic.downcast().map_err(|_| PathError::other_payload(&*found, T::NAME, type_name::<T>()))
     }
 
-    /// The topic at the path of a message, made for its payload if it is not there.
+    /// The topic at the path of a message, created for its payload if it does not exist.
     pub(crate) fn topic_of(&self, message: &DynamicMessage) -> Result<Arc<dyn AnyTopic>, PathError> {
         let found = self.find_or_make(message.path(), |path| message.message().new_topic(path), &mut |_| ())?;
         if !message.message().fits(&*found) {
@@ -151,7 +152,7 @@ impl Registry {
             return Ok(Arc::clone(&made.topic));
         }
         let room = state.room().ok_or_else(|| PathError::TooMany(path.into()))?;
-        // Last, since a name that is interned stays.
+        // Last, since an interned name stays.
         let path = intern(path).ok_or_else(|| PathError::TooMany(path.into()))?;
         let evicted = match room {
             Room::Free => None,
@@ -178,7 +179,7 @@ impl Registry {
         drop(dropped);
     }
 
-    /// What all topics made here have counted, by path.
+    /// The counts of all topics created here, by path.
     pub(crate) fn statistics(&self) -> Vec<TopicStatistics> {
         let state = self.lock();
         let silent = |(path, expected): (&&'static str, &Expected)| {
@@ -198,12 +199,12 @@ impl Registry {
         all.into_values().collect()
     }
 
-    /// All topics made here, by path.
+    /// All topics created here, by path.
     pub(crate) fn topics(&self) -> Vec<Arc<dyn AnyTopic>> {
         self.lock().topics.values().map(|made| Arc::clone(&made.topic)).collect()
     }
 
-    /// Tells the subscribers that no more will come; the tasks to wake. No further topic is made.
+    /// Tells the subscribers that no more will come. Returns the tasks to wake. No further topic is created.
     #[must_use = "a task that waits for a message waits for ever unless it is woken"]
     pub(crate) fn close(&self) -> Vec<Waker> {
         let mut state = self.lock();
@@ -219,8 +220,8 @@ impl Registry {
 }
 
 impl State {
-    /// Room for another topic. An untyped subscription to a topic that makes room loses nothing: if it is made again, it is
-    /// subscribed to again.
+    /// Finds room for another topic. An untyped subscription to a removed topic loses nothing: if the topic is
+    /// created again, it is subscribed to again.
     fn room(&self) -> Option<Room> {
         if self.topics.len() - self.gone().count() < Registry::MAX_TOPICS {
             return Some(Room::Free);
@@ -290,7 +291,7 @@ impl fmt::Debug for Registry {
 #[derive(Default)]
 struct Selections {
     all: Vec<Selection>,
-    /// How many there may be before those that were dropped are removed: twice what was left the last time.
+    /// How many there may be before dropped ones are removed: twice the number left the last time.
     clean_at: usize,
 }
 
@@ -304,7 +305,7 @@ impl Selections {
         self.all.push(selection);
     }
 
-    /// Subscribes all that select it to a new topic.
+    /// Subscribes all whose selection includes it to a new topic.
     fn tap(&mut self, topic: &dyn AnyTopic) {
         self.clean();
         for selection in self.all.iter().filter(|selection| selection.includes(topic)) {
@@ -332,7 +333,7 @@ impl Selection {
         Self { select: select.into(), payloads, queue: Arc::downgrade(&tap.0) }
     }
 
-    /// A subscription that was dropped may still be on the lists of silent topics.
+    /// A dropped subscription may still be on the lists of silent topics.
     fn is_alive(&self) -> bool {
         self.queue.upgrade().is_some_and(|queue| !queue.is_abandoned())
     }
@@ -374,10 +375,10 @@ impl OwnedSelect {
     }
 }
 
-/// The longest path that is made at run time.
+/// The longest path created at run time.
 const MAX_PATH_BYTES: usize = 255;
 
-/// Names with `/` between them.
+/// Names separated by `/`.
 fn is_path(path: &str) -> bool {
     let is_name = |name: &str| {
         name.chars().any(char::is_alphanumeric)
@@ -386,7 +387,7 @@ fn is_path(path: &str) -> bool {
     path.len() <= MAX_PATH_BYTES && path.split('/').all(is_name)
 }
 
-/// Why nothing can be published at a path of one's own.
+/// Why nothing can be published at a path of the caller's choice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum PathError {
     Malformed(String),
@@ -551,7 +552,7 @@ mod tests {
         registry.topic("kept").expect("it is there").publish(&state(1.0));
         registry.topic("heard").expect("it is there").publish(&state(1.0));
         assert_eq!((kept.statistics().published, heard.drain().count()), (1, 1));
-        // One that was removed is heard again when it is made again.
+        // A topic that was removed is received again when it is created again.
         registry.topic(&path(0)).expect("an older one makes room").publish(&state(1.0));
         assert_eq!(all.drain().count(), 3);
 

@@ -1,4 +1,4 @@
-//! What an untyped subscription takes: which paths, and which payloads.
+//! The selection of an untyped subscription: paths and payloads.
 
 /// Which paths to subscribe to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -7,9 +7,9 @@ pub enum Select<'a> {
     All,
     /// One.
     Path(&'a str),
-    /// One, and all below it: `sensor/base_link`.
+    /// One, and everything below it: `sensor/base_link`.
     Below(&'a str),
-    /// What any of these includes.
+    /// The union of these.
     AnyOf(&'a [Select<'a>]),
 }
 
@@ -27,8 +27,8 @@ impl Select<'_> {
     }
 }
 
-/// Which payloads to subscribe to, by the names of their types. `None` converts to all of them; a name, `Some` of a name,
-/// an array or a slice of names to these only.
+/// Which payloads to subscribe to, by the names of their types. `None` converts to all of them; a name, `Some` of a
+/// name, an array or a slice of names to only these.
 ///
 /// ```
 /// use bb_core::Payloads;

@@ -1,4 +1,4 @@
-//! What topics and subscriptions have counted.
+//! The counts of topics and subscriptions.
 
 /// One subscriber of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -6,17 +6,17 @@
 pub struct SubscriberStatistics {
     /// Whether it knows the payload's type.
     pub is_typed: bool,
-    /// Messages that wait for it.
+    /// Messages waiting for it.
     pub waiting: usize,
     /// How many may wait.
     pub capacity: usize,
-    /// Bytes of the messages that wait, as far as they count towards the bound: see [`Overflow`](super::Overflow).
+    /// Bytes of the waiting messages that count towards the bound: see [`Overflow`](super::Overflow).
     pub bytes: usize,
     /// Messages it lost because it was slow.
     pub lost: u64,
 }
 
-/// What a topic has counted since the start.
+/// The counts of a topic since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct TopicStatistics {
@@ -26,8 +26,8 @@ pub struct TopicStatistics {
     pub payload: &'static str,
     /// Messages published.
     pub published: u64,
-    /// Messages that subscribers lost because they were slow, or read only after more had come than they keep.
+    /// Messages that subscribers lost because they were slow, or read only after more had arrived than they keep.
     pub lost: u64,
-    /// Subscriptions that listen now.
+    /// Current subscriptions.
     pub subscribers: usize,
 }

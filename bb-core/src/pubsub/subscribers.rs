@@ -5,13 +5,13 @@ use super::queue::Queue;
 use crate::message::Stamped;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// The list that a topic holds.
+/// The subscriber list of a topic.
 pub(super) struct Subscribers<T> {
-    /// Replaced as a whole, so that a publisher takes a list along and holds no lock while it wakes subscribers, who may
-    /// subscribe and unsubscribe on that thread. A queue that is dropped with its list is abandoned, and so runs no
-    /// user's code.
+    /// Replaced as a whole: a publisher takes a list along and holds no lock while it wakes subscribers, which may
+    /// subscribe and unsubscribe on that thread. A queue dropped with its list has been abandoned, and so runs no
+    /// user code.
     pub(super) queues: Arc<[Arc<Queue<Stamped<T>>>]>,
-    /// Those who do not know the payload.
+    /// Untyped subscribers.
     pub(super) taps: Arc<[Arc<Queue<DynamicMessage>>]>,
     pub(super) closed: bool,
 }
@@ -22,7 +22,7 @@ impl<T> Subscribers<T> {
     }
 }
 
-/// Takes `queue` off the list of its topic, if that is still there.
+/// Removes `queue` from the list of its topic, if the topic still exists.
 pub(super) fn leave<T>(topic: &Weak<Mutex<Subscribers<T>>>, queue: &Arc<Queue<Stamped<T>>>) {
     if let Some(subscribers) = topic.upgrade() {
         let mut subscribers = lock(&subscribers);

@@ -31,7 +31,7 @@ impl<T> Subscription<T> {
         self.path
     }
 
-    /// The oldest message that waits, if any.
+    /// The oldest waiting message, if any.
     pub fn try_recv(&self) -> Option<Stamped<T>> {
         self.queue.pop()
     }
@@ -52,7 +52,7 @@ impl<T> Subscription<T> {
         RecvAsync(self)
     }
 
-    /// Takes the messages that wait now; those that arrive meanwhile stay.
+    /// Takes the messages waiting now; those that arrive meanwhile stay.
     pub fn drain(&self) -> impl Iterator<Item = Stamped<T>> + '_ {
         (0..self.queue.len()).map_while(|_| self.try_recv())
     }

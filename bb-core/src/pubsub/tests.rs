@@ -1,4 +1,4 @@
-//! What subscribers' own code may do, and what concurrency may not break.
+//! Subscribers' own code, and concurrency.
 
 mod bounds;
 mod concurrent;

@@ -1,4 +1,4 @@
-//! One publisher's end: who listens to it.
+//! The publisher's end of a topic.
 
 use super::any::DynamicMessage;
 use super::queue::{Overflow, Queue, counted_bytes};
@@ -13,21 +13,21 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::Waker;
 
-/// Where the messages of one publisher are subscribed to. Dropping it tells its subscribers that no more will come.
+/// Distributes the messages of one publisher to its subscribers. Dropping it tells them that no more will come.
 pub struct Topic<T> {
     pub(super) path: &'static str,
     pub(super) published: AtomicU64,
     /// Messages that slow subscribers did not get.
     pub(super) lost: AtomicU64,
-    /// How many listen: read before the lock, so that publishing to nobody costs next to nothing.
+    /// The number of subscribers: read before the lock, so that publishing to nobody costs next to nothing.
     pub(super) listening: AtomicUsize,
     pub(super) subscribers: Arc<Mutex<Subscribers<T>>>,
-    /// Held while a message is written into a journal and enqueued, so that both have the same order.
+    /// Held while a message is written to a journal and enqueued, so that both have the same order.
     order: Mutex<()>,
 }
 
 impl<T> Topic<T> {
-    /// A topic that nobody listens to yet.
+    /// A topic without subscribers.
     pub fn new(path: &'static str) -> Self {
         let subscribers = Subscribers { queues: Arc::new([]), taps: Arc::new([]), closed: false };
         Self {
@@ -68,7 +68,7 @@ impl<T> Topic<T> {
 }
 
 impl<T: Payload> Topic<T> {
-    /// Hands a clone of `message` to everybody who listens.
+    /// Hands a clone of `message` to every subscriber.
     #[inline]
     pub fn publish(&self, message: &Stamped<T>) {
         self.published.fetch_add(1, Ordering::Relaxed);
@@ -90,13 +90,13 @@ impl<T: Payload> Topic<T> {
         self.hand_out(message);
     }
 
-    /// The same of a message that nobody listens to.
+    /// The same for a message without subscribers.
     #[inline]
     pub(crate) fn count_alone(&self) {
         self.published.store(self.published.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
     }
 
-    /// Whether anybody listens.
+    /// Whether there are subscribers.
     #[inline]
     pub(crate) fn is_listened_to(&self) -> bool {
         self.listening.load(Ordering::Acquire) > 0
@@ -113,7 +113,8 @@ impl<T: Payload> Topic<T> {
     ) -> L {
         if self.listening.load(Ordering::Acquire) == 0 {
             let line = write();
-            // A subscription that begins meanwhile does not get it: it might already have got one with a later line.
+            // A subscription that begins meanwhile does not get it: it might already have received one with a later
+            // line.
             self.published.fetch_add(1, Ordering::Relaxed);
             return line;
         }
@@ -181,13 +182,13 @@ impl<T: Payload> Topic<T> {
         self.count_lost(lost);
     }
 
-    /// Those who listen now.
+    /// The current subscribers.
     fn listeners(&self) -> Listeners<T> {
         let mut subscribers = lock(&self.subscribers);
         if subscribers.taps.iter().any(|tap| tap.is_abandoned()) {
             subscribers.taps = subscribers.taps.iter().filter(|tap| !tap.is_abandoned()).map(Arc::clone).collect();
         }
-        // Subscriptions that were dropped have left the list by themselves; here the count follows it.
+        // Dropped subscriptions have removed themselves from the list; the count is updated here.
         self.listening.store(subscribers.count(), Ordering::Release);
         Listeners { queues: Arc::clone(&subscribers.queues), taps: Arc::clone(&subscribers.taps) }
     }
@@ -206,7 +207,7 @@ impl<T: Payload> Topic<T> {
         Copies { bytes: counted_bytes(message), first, more, untyped, listeners }
     }
 
-    /// Hands out copies; no code of the payload runs.
+    /// Hands out copies; runs no code of the payload.
     fn enqueue(&self, copies: Copies<T>, wakers: &mut Wakers) {
         let Copies { listeners, first, more, untyped, bytes } = copies;
         let typed = listeners.queues.iter().zip(std::iter::once(first).chain(more));
@@ -225,13 +226,13 @@ impl<T: Payload> Topic<T> {
     }
 }
 
-/// Those who listen at one time.
+/// The subscribers at one time.
 struct Listeners<T> {
     queues: Arc<[Arc<Queue<Stamped<T>>>]>,
     taps: Arc<[Arc<Queue<DynamicMessage>>]>,
 }
 
-/// A message for each of them.
+/// A copy of the message for each of them.
 struct Copies<T> {
     listeners: Listeners<T>,
     /// One subscriber alone needs no allocation. None of a message that cannot be copied.

@@ -1,4 +1,4 @@
-//! Messages and topics of a known payload as implementations of the interfaces of erased ones.
+//! Implements the type-erased interfaces for messages and topics of a known payload.
 
 use super::any::{AnyMessage, AnyTopic, DynamicMessage, Tap};
 use super::statistics::{SubscriberStatistics, TopicStatistics};
@@ -95,7 +95,7 @@ impl<T: Payload> AnyTopic for Topic<T> {
     fn tap(&self, tap: &Tap) {
         let mut subscribers = lock(&self.subscribers);
         if !subscribers.closed {
-            // Those that were dropped leave the list here too: nothing may ever be published at this topic.
+            // Dropped ones are also removed here: nothing may ever be published at this topic.
             let others = subscribers.taps.iter().filter(|other| !other.is_abandoned());
             subscribers.taps = others.chain([&tap.0]).map(Arc::clone).collect();
             self.listening.store(subscribers.count(), Ordering::Release);

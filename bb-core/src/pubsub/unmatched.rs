@@ -1,4 +1,4 @@
-//! What a subscription asks for and nothing publishes.
+//! Parts of a subscription that match no publisher.
 
 use super::any::AnyTopic;
 use super::select::{Payloads, Select};
@@ -6,8 +6,8 @@ use crate::message::nearest::{nearest, nearest_path};
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// A part of a subscription that matches nothing when the subscription is made: a path, a subtree or a payload's name.
-/// What is published there later, at a path made at run time, is received all the same.
+/// A part of a subscription that matches nothing when the subscription is created: a path, a subtree or a payload's
+/// name. Messages published there later, at a path created at run time, are still received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unmatched {
     part: Part,
@@ -20,7 +20,7 @@ enum Part {
     Path,
     /// Nothing publishes there, but something does below it.
     PathAbove,
-    /// The robot declares it, and does not run.
+    /// The robot declares it, but does not run.
     Declared,
     Subtree,
     Payload,
@@ -32,7 +32,7 @@ impl Unmatched {
         &self.name
     }
 
-    /// What it was probably meant to be, if something is near.
+    /// The name probably meant, if one is near.
     pub fn nearest(&self) -> Option<&str> {
         self.nearest.as_deref()
     }
@@ -73,8 +73,8 @@ pub(crate) fn unmatched_at(path: &str, topics: &[&dyn AnyTopic], declared: &[&'s
     Unmatched::new(Part::Path, path, near)
 }
 
-/// The parts of a subscription to `topics` that match none of them. The paths `declared` have a publisher while the robot
-/// runs.
+/// The parts of a subscription to `topics` that match none of them. The paths in `declared` have a publisher while
+/// the robot runs.
 pub(super) fn unmatched(
     topics: &[&dyn AnyTopic],
     declared: &[&'static str],
@@ -84,7 +84,7 @@ pub(super) fn unmatched(
     let mut all = Vec::new();
     add_paths(topics, declared, select, &mut all);
     let selected = || topics.iter().filter(|topic| select.includes(topic.path()));
-    // Where no path matches, a payload is at fault only if nothing at all publishes it.
+    // If no path matches, a payload is at fault only if nothing at all publishes it.
     let is_any_selected = selected().next().is_some();
     let candidates: Vec<&dyn AnyTopic> =
         if is_any_selected { selected().copied().collect() } else { topics.to_vec() };

@@ -1,12 +1,12 @@
-//! What is left to do once no lock is held: wake tasks and drop messages. Both run a user's code.
+//! Work left until no lock is held: waking tasks and dropping messages. Both run user code.
 
 use std::any::Any;
 use std::mem::{forget, needs_drop};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::task::Waker;
 
-/// Wakers to wake and messages to drop, collected while locks may be held. [`run`](Self::run) it when none is; dropping
-/// it does the same. A panic in one of them is logged and does not keep the others from running.
+/// Wakers to wake and messages to drop, collected while locks may be held. Call [`run`](Self::run) when none is held;
+/// dropping it does the same. A panic in one of them is logged and does not prevent the others from running.
 #[derive(Default)]
 pub(crate) struct Wakers {
     /// The first few need no allocation.
@@ -17,7 +17,8 @@ pub(crate) struct Wakers {
 }
 
 impl Wakers {
-    /// For a publisher that holds no lock of its own: evicted messages are dropped as they come, without an allocation.
+    /// For a publisher that holds no lock of its own: evicted messages are dropped immediately, without an
+    /// allocation.
     pub(super) fn dropping_at_once() -> Self {
         let mut wakers = Self::default();
         wakers.drops_at_once = true;
@@ -32,8 +33,8 @@ impl Wakers {
         }
     }
 
-    /// Adds a message to drop; one that runs no code when it is dropped is dropped at once. No lock of this module may be
-    /// held.
+    /// Adds a message to drop; a message whose drop runs no code is dropped immediately. No lock of this module may
+    /// be held.
     #[inline]
     pub(super) fn discard<M: Send + 'static>(&mut self, message: M) {
         if self.drops_at_once || !needs_drop::<M>() {
@@ -55,7 +56,7 @@ impl Wakers {
         drop(self);
     }
 
-    /// The wakers one by one, for those who wake each on its own; the messages are dropped here.
+    /// The wakers one by one, for callers that wake each separately; the messages are dropped here.
     pub(crate) fn into_wakers(mut self) -> impl Iterator<Item = Waker> {
         self.evicted.drain(..).for_each(discard);
         let (first, more) = (std::mem::take(&mut self.first), std::mem::take(&mut self.more));
@@ -90,7 +91,7 @@ pub(super) fn discard<M>(value: M) {
     }
 }
 
-/// Runs a user's code that must not end the thread which happens to run it.
+/// Runs user code that must not end the calling thread.
 #[inline]
 fn contain(what: &'static str, call: impl FnOnce()) {
     if let Err(panic) = catch_unwind(AssertUnwindSafe(call)) {
@@ -103,7 +104,7 @@ fn log(what: &'static str, panic: Box<dyn Any + Send>) {
     let message = panic.downcast_ref::<&str>().copied();
     let message = message.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     tracing::error!(panic = message.unwrap_or("no message"), "{what} panicked");
-    // The payload of a panic may itself panic when it is dropped. The payload of that second panic is leaked.
+    // The value carried by a panic may itself panic when dropped. The value of that second panic is leaked.
     if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(panic))) {
         forget(again);
     }
@@ -120,7 +121,7 @@ mod tests {
     /// Counts its wakes and drops, and panics in each of them.
     struct Faulty(Arc<AtomicUsize>);
 
-    /// A panic whose payload panics, too.
+    /// A panic whose value panics as well.
     struct Payload;
 
     impl Drop for Payload {

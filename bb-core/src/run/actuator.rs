@@ -49,7 +49,7 @@ struct Inner<A: Actuator> {
     counts: Counts,
     reports: Reports,
     host: HostHandle,
-    /// Held while its code runs: nothing that must not wait for user code takes it.
+    /// Held while its code runs. Anything that must not wait for user code must not take this lock.
     state: Guarded<State<A>>,
 }
 
@@ -57,16 +57,16 @@ struct State<A: Actuator> {
     slot: Slot<AsActuator<A>>,
     /// It has failed, and could not be made safe then.
     is_unsafe: bool,
-    /// Which execution of a command has sent what it carried out last.
+    /// The command execution that sent the last command carried out.
     moved_by: Permit,
-    /// When it is to be updated, as far as the alarms know that are set.
+    /// The update time that the alarms currently hold.
     alarm: Option<MonotonicTime>,
-    /// On virtual time: what the control state is to be told once the lock is released. Loggers, handlers of telemetry and
-    /// subscribers are told of it on this thread, and may disarm the robot, which takes the lock.
+    /// On virtual time: changes to report to the control state once the lock is released. Loggers, telemetry handlers
+    /// and subscribers hear of them on this thread and may disarm the robot, which takes the lock.
     told: Vec<Told>,
 }
 
-/// What the control state is told.
+/// Changes to report to the control state.
 enum Told {
     Failed { message: String, panicked: bool },
     Unsafe(String),
@@ -93,7 +93,7 @@ impl<A: Actuator> ActuatorNode<A> {
         let environment = assembly.environment.clone();
         let control = assembly.control.clone();
         let mut slot = Slot::new(Recipe::new(options, binding), environment.supervision());
-        // A journal does not move anything.
+        // A replay does not move anything.
         if environment.mode() != Mode::Replay {
             let parameters = control.parameters();
             let _ = environment.make(declaration.path, || {
@@ -126,11 +126,11 @@ impl<A: Actuator> ActuatorNode<A> {
         if A::Command::COMMANDS_JOINT {
             inner.reports.announce(&inner.context, &*inner.host.0);
         }
-        // It may have something to do from the start.
+        // It may have work to do from the start.
         if inner.environment.mode() != Mode::Replay {
             inner.alone(|_| ());
         }
-        // Weak, since the control state that keeps these is kept by the actuator.
+        // Weak, since the actuator owns the control state, which keeps these callbacks.
         let told = Arc::downgrade(&inner);
         let target = BindTarget::Other(Box::new(move || Inner::tell(&told, Order::Options)));
         assembly.environment.bind(declaration.path, options, binding, target);
@@ -155,7 +155,7 @@ impl<A: Actuator> ActuatorNode<A> {
         &self.0.topic
     }
 
-    /// Has it carry out a command of a caller outside.
+    /// Carries out a command of an outside caller.
     ///
     /// # Errors
     /// See [`ActuatorError`].
@@ -183,7 +183,7 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
         let mut wakers = Wakers::default();
         self.alone(|state| {
             if state.moved_by.is_of_same(permit) {
-                // A robot that is disarmed has stopped it already, and an actuator that fails is made safe.
+                // Disarming has stopped it already, and a failing actuator is made safe.
                 let _ = self.carry_out(state, stop, &Permit::UNLIMITED, &mut wakers);
             }
         });
@@ -192,8 +192,8 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
 }
 
 impl<A: Actuator> Inner<A> {
-    /// Runs `run` while no other code of the actuator runs; none if it was called by code of the actuator itself, or of another
-    /// one that it waits for, which would wait for itself.
+    /// Runs `run` while no other code of the actuator runs. Returns `None` if the caller is code of this actuator, or
+    /// of another one that it waits for: the call would wait for itself.
     fn alone<T>(&self, run: impl FnOnce(&mut State<A>) -> T) -> Option<T> {
         let mut state = self.state.enter()?;
         let result = {
@@ -211,7 +211,7 @@ impl<A: Actuator> Inner<A> {
         Some(result)
     }
 
-    /// Has it woken when it is to be updated.
+    /// Schedules its next update.
     fn schedule_update(&self, state: &mut State<A>) {
         let Some(actuator) = state.slot.running() else { return };
         let Some(due) = actuator.next_update() else { return };
@@ -246,7 +246,7 @@ impl<A: Actuator> Inner<A> {
         wakers: &mut Wakers,
     ) -> Result<(), ActuatorError> {
         self.obey(state);
-        // Under the lock that disarming takes as well: nothing moves once that has returned.
+        // Under the lock that disarming takes as well: nothing moves after disarming has returned.
         let safety = self.control.safety_now();
         if safety != Safety::Armed {
             return Err(ActuatorError::NotArmed(safety));
@@ -293,7 +293,7 @@ impl<A: Actuator> Inner<A> {
         Ok(())
     }
 
-    /// Told by the control state, which must not wait for the actuator's code.
+    /// Called by the control state, which must not wait for the actuator's code.
     fn tell(this: &Weak<Self>, order: Order) {
         let Some(inner) = this.upgrade() else { return };
         let mut orders = lock(&inner.orders);
@@ -359,7 +359,7 @@ impl<A: Actuator> Inner<A> {
         };
         match made {
             Ok(()) => {
-                // A logger may block, and disarming needs the lock that is held here.
+                // A logger may block, and disarming needs the lock held here.
                 let path = self.declaration.path;
                 self.log(move || tracing::info!(component = path, "restarted"));
                 state.is_unsafe = false;

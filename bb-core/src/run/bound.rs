@@ -4,7 +4,7 @@ use super::Robot;
 use crate::component::OptionField;
 use crate::event::ParameterValue;
 
-/// The paths of a robot's components, as their options are listed.
+/// The paths of a robot's components, in the order of their options.
 pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
     let sensors = R::SENSORS.iter().map(|declared| declared.path);
     let estimators = R::ESTIMATORS.iter().map(|declared| declared.path);
@@ -26,7 +26,7 @@ pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'stati
     Some(R::PARAMETERS.get(*parameter)?.path)
 }
 
-/// Why an option that is bound to this parameter would refuse its new value.
+/// Why an option bound to this parameter would refuse its new value.
 pub(super) fn refused_by_bound<R: Robot>(
     options: &mut R::Options,
     parameters: &[ParameterValue],

@@ -37,7 +37,7 @@ use std::time::Instant;
 /// The wiring with its estimators, and the sensors that feed it.
 pub(super) type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
 
-/// A robot that is assembled and not yet started: options may still be changed, and a subscription made here misses
+/// A robot that is assembled but not yet started. Options may still be changed, and a subscription made here misses
 /// nothing.
 pub struct Builder<R: Robot> {
     pub(super) options: R::Options,
@@ -73,8 +73,8 @@ impl<R: Robot> Builder<R> {
         }
     }
 
-    /// The options of a component, at first as declared. They are validated at the start. An option that is bound to a
-    /// parameter has that one's value, whatever is set here.
+    /// The options of a component, initially as declared. They are validated at the start. An option bound to a
+    /// parameter takes that parameter's value, whatever is set here.
     pub fn options<C: Configurable<R>>(&mut self, component: C) -> &mut C::Options {
         component.options(&mut self.options)
     }
@@ -102,10 +102,10 @@ impl<R: Robot> Builder<R> {
         Ok(())
     }
 
-    /// Has a sensor of type `S` take the place of the one at `path`: a simulated one of a driver, or one that plays a recording
-    /// back. It keeps its path, frame, rate and supervision, and what is downstream does not notice; options that are declared,
-    /// set or bound to parameters are those of the driver, and are not used. If it publishes another payload than the one that
-    /// is declared, the robot does not start.
+    /// Replaces the sensor at `path` with one of type `S`: a driver with a simulated sensor, or with one that plays
+    /// back a recording. The path, frame, rate and supervision stay, and components downstream do not notice. Options
+    /// that are declared, set or bound to parameters belong to the replaced driver and are not used. If the
+    /// replacement publishes another payload than the declared one, the robot does not start.
     ///
     /// # Errors
     /// No sensor is at `path`; the error names the nearest one.
@@ -119,7 +119,7 @@ impl<R: Robot> Builder<R> {
         Ok(())
     }
 
-    /// The same for an actuator: `A` takes the same type of commands.
+    /// Replaces the actuator at `path`; `A` takes the same type of commands.
     ///
     /// # Errors
     /// No actuator is at `path`; the error names the nearest one.
@@ -137,7 +137,7 @@ impl<R: Robot> Builder<R> {
         &mut self.supervision
     }
 
-    /// How much is kept of the states of joints, and for how long they are good.
+    /// How much history of joint states is kept, and for how long a state is valid.
     pub fn joints(&mut self) -> &mut JointSettings {
         &mut self.joints
     }
@@ -148,15 +148,15 @@ impl<R: Robot> Builder<R> {
         self
     }
 
-    /// Has every processed entry handed to `sink`, enough to run the robot again: see [`journal`](crate::journal). The sink is
-    /// called on a thread of its own, on virtual time on the caller's. One that is slow makes sensors and other outside
-    /// producers wait; one that hangs for 2 s ends the journal, which is reported.
+    /// Hands every processed entry to `sink`, enough to run the robot again: see [`journal`](crate::journal). The
+    /// sink is called on its own thread, on virtual time on the caller's. A slow sink makes sensors and other outside
+    /// producers wait. A sink that hangs for 2 s ends the journal, which is reported.
     pub fn journal(&mut self, sink: impl Fn(Entry) + Send + Sync + 'static) {
         self.journal = Some(Arc::new(sink));
     }
 
-    /// Has the journal published at `journal`, for a recorder: give its subscription room, since a journal of which lines
-    /// were lost cannot be replayed beyond them.
+    /// Publishes the journal at `journal`, for a recorder. Give its subscription room: a journal that lost lines
+    /// cannot be replayed beyond the gap.
     pub fn publish_journal(&mut self) {
         let system = Arc::clone(&self.system);
         let origin = Origin { robot: R::NAME, node: self.node };
@@ -166,8 +166,9 @@ impl<R: Robot> Builder<R> {
         });
     }
 
-    /// Attaches a handler of telemetry, which gets the robot's name with every event: inputs, outputs, latencies and drops on
-    /// the thread that runs the estimator, so it must be quick; transitions and faults on a thread apart.
+    /// Attaches a telemetry handler, which gets the robot's name with every event. Inputs, outputs, latencies and
+    /// drops are reported on the thread that runs the estimator, so the handler must be quick; transitions and faults
+    /// on a separate thread.
     pub fn telemetry(&mut self, handler: impl Fn(&'static str, &TelemetryEvent) + Send + Sync + 'static) {
         self.telemetry.add(Arc::new(handler));
     }
@@ -177,13 +178,13 @@ impl<R: Robot> Builder<R> {
         self.subscribe_with(publisher, Overflow::default())
     }
 
-    /// Subscribes, and says what happens when the subscriber is slow.
+    /// Subscribes, with `overflow` for a subscriber that is slow.
     pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
         publisher.topic(&self.topics, &self.system).subscribe(overflow)
     }
 
-    /// Subscribes to messages of any payload, by path; with names of payload types, to those only. (Commands to actuators can
-    /// be subscribed to once the robot runs.)
+    /// Subscribes to messages of any payload, by path; with names of payload types, only to those. (Commands to
+    /// actuators can be subscribed to once the robot runs.)
     pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
@@ -194,10 +195,10 @@ impl<R: Robot> Builder<R> {
         self.system.registry.subscribe(&topics, select, &payloads.into(), overflow)
     }
 
-    /// Starts the robot in real time: each sensor on a thread of its own.
+    /// Starts the robot in real time, with one thread per sensor.
     ///
     /// # Errors
-    /// Names the component that cannot start; those that had started are stopped in order.
+    /// Names the component that cannot start. Components that had started are stopped in order.
     pub fn start(self) -> Result<Running<R>, StartError> {
         let (machine, sources) = self.assemble(Clock::real(), Mode::Real)?;
         Running::start(machine, sources)
@@ -207,14 +208,14 @@ impl<R: Robot> Builder<R> {
     /// runs it.
     ///
     /// # Errors
-    /// Names the component that cannot start; those that had started are stopped in order.
+    /// Names the component that cannot start. Components that had started are stopped in order.
     pub fn simulate(self) -> Result<Simulation<R>, StartError> {
         let (machine, sources) = self.assemble(Clock::virtual_at(MonotonicTime::ZERO), Mode::Virtual)?;
         Ok(Simulation::new(machine, sources))
     }
 
-    /// Prepares a robot to be run again from a journal, on virtual time and without sensors, services, actuators and the code
-    /// of commands. Options of estimators must be as they were.
+    /// Prepares to replay a robot from a journal: on virtual time, without sensors, services, actuators or the code
+    /// of commands. Options of estimators must be the same as in the recorded run.
     ///
     /// # Errors
     /// Names the component that cannot start.
@@ -225,7 +226,7 @@ impl<R: Robot> Builder<R> {
 
     /// Dropping the result stops in order what has started.
     fn assemble(self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
-        // Of a robot that does not start: dropped after all that is declared below.
+        // If the robot does not start: dropped after everything declared below.
         let mut _remains = None;
         let origin = Origin { robot: R::NAME, node: self.node };
         let journal = self.journal.filter(|_| mode != Mode::Replay);
@@ -291,7 +292,7 @@ impl<R: Robot> Builder<R> {
             let wiring: Option<Arc<R::Wiring>> = drained.get().and_then(std::sync::Weak::upgrade);
             if let (Some(wiring), Some(find)) = (wiring, R::ISLANDS.get(island)) {
                 let island = find(&wiring);
-                // The component is unknown: the code of a payload in an inbox, say.
+                // The component is unknown, for example if the panic is in the code of a payload in an inbox.
                 if let Err(failed) = contained(environment, || island.drain(&wiring)) {
                     tracing::error!(fault = %failed.fault, "an island was left");
                 }
@@ -304,7 +305,7 @@ impl<R: Robot> Builder<R> {
             control: control.clone(),
             host: HostHandle(Arc::clone(&host)),
         };
-        // What the others have started in `init` is made safe.
+        // Makes safe what the others have started in `init`.
         let abandon = |path, fault| {
             control.begin_stop();
             control.wait_until_disarmed();
@@ -313,7 +314,7 @@ impl<R: Robot> Builder<R> {
                 dropping.discard(&control, path, hook);
             }
             control.pool().close();
-            // Callbacks that hang are left running. There is no report, and the error says what prevents the robot from starting.
+            // Callbacks that hang are left running. There is no report; the error says why the robot does not start.
             dropping.wait(Instant::now() + STOP_WITHIN);
             StartError::component(path, fault)
         };
@@ -400,7 +401,7 @@ impl<R: Robot> fmt::Debug for Builder<R> {
     }
 }
 
-/// No robot is.
+/// No robot implements it.
 #[doc(hidden)]
 #[diagnostic::on_unimplemented(
     message = "a robot is assembled with `{Self}::builder()`, and there is no `new`",

@@ -1,4 +1,4 @@
-//! What a robot is, one fact a line: a journal begins with it, and one of another robot is refused.
+//! A robot's description, one fact a line. A journal begins with it, and a journal of another robot is refused.
 
 use super::Robot;
 use crate::control::Control;
@@ -30,7 +30,7 @@ pub(super) fn describe<R: Robot>(topics: &R::Topics, control: &Control) -> Vec<S
     facts
 }
 
-/// The first fact in which two robots differ: what the journal says, and what this robot has.
+/// The first fact in which two robots differ: the journal's line, and this robot's.
 pub(super) fn difference(journal: &[String], own: &[String]) -> Option<String> {
     let longest = journal.len().max(own.len());
     let differs = (0..longest).find(|index| journal.get(*index) != own.get(*index))?;

@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 /// How long the journal's sink may take for the last lines.
 const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
 
-/// How long actuators have to stop, and how long the sink has for the last lines and components to drop what they own,
-/// whatever else has used up the time.
+/// How long actuators have to stop, and how long the sink has for the last lines and components to drop their values,
+/// no matter how much time has been used up before.
 const LEAST_TO_STOP: Duration = Duration::from_millis(100);
 const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
 
@@ -50,8 +50,8 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Closes all actuators at the same time. Those that are busy at `deadline`, or whose code has not returned, are left running and
-    /// reported.
+    /// Closes all actuators concurrently. Those that are busy at `deadline`, or whose code has not returned, are left
+    /// running and reported.
     pub(super) fn terminate_actuators(self: &Arc<Self>, deadline: Instant) {
         let deadline = deadline.max(Instant::now() + LEAST_TO_STOP);
         let mut closing = Closing::default();
@@ -75,8 +75,8 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Takes no more messages; until `deadline`, waits for those that are on their way and until estimators that have stopped
-    /// have counted theirs.
+    /// Takes no more messages. Until `deadline`, waits for messages on their way and for stopped estimators to count
+    /// theirs.
     pub(super) fn close_door(&self, deadline: Instant) {
         if !self.environment.door().close(deadline) {
             let message = "a publisher did not come back: what followed from its message may be missing";
@@ -89,8 +89,9 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Ends the journal after the last entry of the control state, tells subscribers that no more will come, drops what disarm
-    /// callbacks own, and makes the last report. The journal's sink, and what is dropped, may take until `deadline`.
+    /// Ends the journal after the last entry of the control state, tells subscribers that no more will come, drops
+    /// the values of disarm callbacks, and makes the last report. The journal's sink and these drops may take until
+    /// `deadline`.
     pub(super) fn end(&self, deadline: Instant) {
         let summary = self.control.end(|summary| {
             if let Some(journal) = self.environment.journal() {
@@ -143,7 +144,8 @@ impl<R: Robot> Machine<R> {
     }
 }
 
-/// Waits until the journal's sink has the last lines; what is wrong if it does not take them, unless that was said before.
+/// Waits until the journal's sink has the last lines. Returns the problem if it does not take them, unless reported
+/// before.
 fn hand_over(journal: &Journal, deadline: Instant) -> Option<String> {
     let longest = HAND_OVER_WITHIN.min(deadline.saturating_duration_since(Instant::now()));
     let in_time = journal.hand_over(longest);

@@ -3,8 +3,8 @@
 use crate::fault::Fault;
 use std::fmt;
 
-/// A robot does not start: which component failed, and why. `Debug` prints the same as `Display`, since that is
-/// what a `main` that returns it shows.
+/// A robot does not start: which component failed, and why. `Debug` prints the same as `Display`, since a `main` that
+/// returns it shows `Debug`.
 pub struct StartError {
     path: &'static str,
     fault: Fault,

@@ -16,7 +16,7 @@ use std::any::Any;
 use std::fmt;
 use std::marker::PhantomData;
 
-/// What can be subscribed to: the handle of a sensor, of an estimator of one output, or of an output.
+/// A publisher that can be subscribed to: the handle of a sensor, of an estimator with one output, or of an output.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be subscribed to",
     label = "is no handle of a publisher",
@@ -34,8 +34,8 @@ pub trait Publisher<R: Robot>: Copy {
     fn topic<'a>(self, topics: &'a R::Topics, system: &'a SystemTopics) -> &'a Topic<Self::Payload>;
 }
 
-/// The topic of a publisher. The expansion numbers handles as it numbers topics; a robot that failed to verify has none, and
-/// never runs.
+/// The topic of a publisher. The expansion numbers handles and topics alike. A robot that failed to verify has no
+/// topics, and never runs.
 fn topic<R: Robot, T: Payload>(topics: &R::Topics, publisher: usize) -> &Topic<T> {
     let topic = R::topic(topics, publisher).and_then(|topic| topic.as_any().downcast_ref());
     topic.unwrap_or_else(unverified)
@@ -55,7 +55,7 @@ fn unverified<T>() -> T {
 
 type NodeOf<R, A> = fn(&<R as Robot>::Wiring) -> &ActuatorNode<A>;
 type PublishOf<R, T> = fn(&<R as Robot>::Wiring, &Stamped<T>, MonotonicTime);
-/// Has a function called with an estimator once it is free, and publishes what that emits.
+/// Calls a function with an estimator once it is free, and publishes what it emits.
 type VisitOf<R, E> = fn(&<R as Robot>::Wiring, MonotonicTime, Visit<'_, E>);
 
 macro_rules! handle {
@@ -105,7 +105,7 @@ handle! {
 }
 
 handle! {
-    /// Names an estimator of one output, `T`, of the robot `R`.
+    /// Names an estimator with one output, `T`, of the robot `R`.
     EstimatorHandle<E: Estimator, T: Payload> {
         number: usize,
         publisher: usize,
@@ -116,7 +116,7 @@ handle! {
 }
 
 handle! {
-    /// Names an estimator of several outputs of the robot `R`; each has an [`OutputHandle`] below it.
+    /// Names an estimator with several outputs of the robot `R`; each has an [`OutputHandle`] below it.
     EstimatorOfSeveralHandle<E: Estimator> {
         number: usize,
         component: usize,
@@ -167,7 +167,7 @@ handle! {
 }
 
 handle! {
-    /// Names a command of the robot `R`. What becomes of it is published at its path.
+    /// Names a command of the robot `R`. Its progress is published at its path.
     CommandHandle<C: Command> { number: usize, component: usize, kind: PhantomData<fn() -> (R, C)> }
 }
 
@@ -254,11 +254,11 @@ system_topic! {
     StateMachine at "state_machine" publishes StateTransition, state;
     /// Names the changes of the safety state.
     SafetyState at "safety" publishes SafetyTransition, safety;
-    /// Names the journal, if it is published.
+    /// Names the journal's topic, if it is published.
     JournalLines at "journal" publishes JournalLine, journal;
-    /// Names what has failed.
+    /// Names the faults of components.
     Faults at "fault" publishes ComponentFault, fault;
-    /// Names what leads to the safety state `error`.
+    /// Names the errors that lead to the safety state `error`.
     SafetyErrors at "safety/error" publishes SafetyError, safety_error;
 }
 
@@ -328,11 +328,11 @@ macro_rules! visitable {
 
 visitable!(EstimatorHandle<E: Estimator, T: Payload>, EstimatorOfSeveralHandle<E: Estimator>);
 
-/// What has options: the handle of a sensor or of an estimator.
+/// A component with options: the handle of a sensor or of an estimator.
 pub trait Configurable<R: Robot>: Copy {
     /// Its options.
     type Options;
-    /// Them, among those of the robot.
+    /// Returns them from the options of the robot.
     #[doc(hidden)]
     fn options(self, options: &mut R::Options) -> &mut Self::Options;
 }

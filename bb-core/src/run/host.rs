@@ -1,4 +1,4 @@
-//! The robot as its components see it, and where entries for its estimators go.
+//! The robot as its components see it, and the destination of entries for its estimators.
 
 use super::Robot;
 use super::actuator::AnyActuator;
@@ -21,7 +21,7 @@ use std::any::Any;
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock, Weak};
 
-/// Weak, since components that have a bus are a part of the wiring.
+/// Weak, since components with a bus are part of the wiring.
 pub(super) struct RobotHost<R: Robot> {
     pub(super) control: Control,
     pub(super) journal: Option<Journal>,
@@ -111,7 +111,7 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic])) {
         let system = self.control.topics().all();
-        // Before the robot is wired, and after it is gone, there are those of the system.
+        // Before the robot is wired, and after it is gone, there are only the system's topics.
         let Some(wiring) = self.wiring() else { return call(&system) };
         let mut topics = R::all_topics(R::wired_topics(&wiring));
         topics.extend(R::all_actuators(&wiring).into_iter().map(|actuator| actuator.any_topic()));

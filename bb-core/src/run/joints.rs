@@ -1,5 +1,5 @@
-//! What the store of joint states knows of a robot: the frames of its components, and which inputs of its estimators span
-//! moving joints.
+//! What the joint store knows of a robot: the frames of its components, and the estimator inputs that span moving
+//! joints.
 
 use super::Robot;
 use crate::declaration::EstimatorDeclaration;
@@ -37,7 +37,7 @@ fn routes(
 ) -> Vec<RouteOf> {
     let moving = declared.inputs.iter().filter(|input| input.frame_from_input.is_none());
     let placed = moving.filter(|input| !frameless.contains(&input.source));
-    // What is fused in one dispatch is as close in time as the estimator asks of its inputs.
+    // Inputs fused in one dispatch are as close in time as the estimator requires.
     let others = declared.inputs.iter().filter(|input| !input.driver);
     let tolerance_nanos = others.filter_map(|input| input.tolerance_nanos).min();
     let route = placed.filter_map(|input| {

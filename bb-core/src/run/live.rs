@@ -14,8 +14,8 @@ use crate::time::{Clock, MonotonicTime};
 use std::fmt;
 use std::sync::Arc;
 
-/// A robot that runs. [`Running`](super::Running) and [`Simulation`](super::Simulation) dereference to it; a clone may go
-/// to another thread, such as a driver's callback, and outlives the run.
+/// A running robot. [`Running`](super::Running) and [`Simulation`](super::Simulation) dereference to it. A clone may
+/// move to another thread, such as a driver's callback, and outlives the run.
 pub struct Live<R: Robot>(pub(super) Arc<Machine<R>>);
 
 impl<R: Robot> Clone for Live<R> {
@@ -35,8 +35,9 @@ impl<R: Robot> Live<R> {
         self.0.environment.joints().clone()
     }
 
-    /// A value that the components of this run share, made if none of them has; see
-    /// [`ComponentContext::shared`](crate::component::ComponentContext::shared). What it gives of a simulated robot is its world.
+    /// A value shared by the components of this run, created by `make` if there is none yet; see
+    /// [`ComponentContext::shared`](crate::component::ComponentContext::shared). For a simulated robot, it gives
+    /// access to its world.
     pub fn shared<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Arc<T> {
         self.0.host.shared().get(make)
     }
@@ -51,7 +52,7 @@ impl<R: Robot> Live<R> {
         self.0.subscribe(publisher, overflow)
     }
 
-    /// Subscribes from now on to messages of any payload, by path; with names of payload types, to those only.
+    /// Subscribes from now on to messages of any payload, by path; with names of payload types, only to those.
     pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
@@ -69,8 +70,8 @@ impl<R: Robot> Live<R> {
     /// Sends a request to an estimator and waits for its answer. Outputs that it emits are published as usual.
     ///
     /// # Errors
-    /// The estimator does not run, or fails at this request; or the caller was woken by an estimator's message on this very
-    /// thread, and would wait for itself.
+    /// The estimator does not run, or fails at this request; or the call comes from a waker that the estimator's own
+    /// message has woken on this thread, and would wait for itself.
     pub fn call<V: Visitable<R>, Q>(
         &self,
         estimator: V,
@@ -92,7 +93,7 @@ impl<R: Robot> Live<R> {
     {
         self.settled(|machine| {
             machine.cast(estimator, request)?;
-            // On virtual time nobody else would take it before the simulation goes on.
+            // On virtual time, nothing else would take it before the simulation goes on.
             machine.environment.drain_posted();
             Ok(())
         })
@@ -110,7 +111,7 @@ impl<R: Robot> Live<R> {
         self.settled(|machine| machine.command(command, arguments))
     }
 
-    /// Sends a command to an actuator; it has been carried out when this returns.
+    /// Sends a command to an actuator, and returns once it has been carried out.
     ///
     /// # Errors
     /// The robot is not armed, the command holds a NaN, or the actuator has failed.
@@ -127,10 +128,10 @@ impl<R: Robot> Live<R> {
         self.0.parameter(parameter)
     }
 
-    /// Sets a parameter: it is published, and reaches the options that are bound to it.
+    /// Sets a parameter. The change is published and reaches the options bound to it.
     ///
     /// # Errors
-    /// The value is not accepted, by the parameter's range or by a component, which is named.
+    /// The value is not accepted: it is out of the parameter's range, or the named component refuses it.
     pub fn set_parameter<T: ParameterType>(
         &self,
         parameter: ParameterHandle<R, T>,
@@ -161,15 +162,16 @@ impl<R: Robot> Live<R> {
     /// Disarms the robot: commands are cancelled, and the owners of hardware make it safe, within 5 s.
     ///
     /// # Errors
-    /// What could not be made safe; the safety state is `error` then.
+    /// What could not be made safe; the safety state is then `error`.
     pub fn disarm(&self) -> Result<(), DisarmError> {
         self.settled(|machine| machine.control.disarm(false))
     }
 
-    /// Leaves the safety state `error`, even if something still cannot be made safe: the caller has checked that.
+    /// Leaves the safety state `error`, even if something still cannot be made safe; the caller must have checked
+    /// that.
     ///
     /// # Errors
-    /// What could not be made safe again. The safety state is `disarmed` all the same.
+    /// What could not be made safe again. The safety state is `disarmed` nevertheless.
     pub fn force_disarm(&self) -> Result<(), DisarmError> {
         self.settled(|machine| machine.control.disarm(true))
     }
@@ -179,13 +181,13 @@ impl<R: Robot> Live<R> {
         self.0.report()
     }
 
-    /// Publishes as if `sensor` had measured `payload` at `time`; all estimators downstream run before this returns, except
-    /// those that are busy on another thread or have one of their own.
+    /// Publishes as if `sensor` had measured `payload` at `time`. All estimators downstream run before this returns,
+    /// except those that are busy on another thread or have their own.
     pub fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
         self.settled(|machine| machine.publish(sensor, time, payload));
     }
 
-    /// A handle of its own, for another thread.
+    /// A separate handle, for another thread.
     pub fn live(&self) -> Self {
         self.clone()
     }
@@ -195,8 +197,9 @@ impl<R: Robot> Live<R> {
         self.settled(|machine| machine.control.begin_stop());
     }
 
-    /// Has Ctrl-C, and on Unix the signals `SIGTERM` and `SIGHUP`, call [`Self::request_stop`]: the robot is disarmed before
-    /// anything else, whatever hangs. [`Running::wait`](super::Running::wait) returns then. A process has one such handler.
+    /// Makes Ctrl-C, and on Unix the signals `SIGTERM` and `SIGHUP`, call [`Self::request_stop`]. The robot is
+    /// disarmed before anything else, even if other code hangs, and [`Running::wait`](super::Running::wait) returns.
+    /// A process has one such handler.
     ///
     /// # Errors
     /// The process has a handler already, or the system refuses one.
@@ -206,7 +209,7 @@ impl<R: Robot> Live<R> {
         ctrlc::set_handler(move || live.request_stop()).map_err(std::io::Error::other)
     }
 
-    /// Does something from outside; on virtual time the journal's sink then gets its lines.
+    /// Performs an outside action; on virtual time, then passes the journal's lines to its sink.
     fn settled<T>(&self, call: impl FnOnce(&Machine<R>) -> T) -> T {
         let result = call(&self.0);
         self.0.settle();

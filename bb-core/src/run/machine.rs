@@ -25,15 +25,15 @@ pub(super) struct Machine<R: Robot> {
     pub(super) control: Control,
     pub(super) host: Arc<dyn Host>,
     pub(super) sources: Mutex<Vec<SharedSource>>,
-    /// The threads of the robot have nothing left to do.
+    /// The threads of the robot have no work left.
     pub(super) has_ended: AtomicBool,
-    /// What it had done when it ended.
+    /// Its report at the end.
     pub(super) last_report: OnceLock<Report>,
     /// Set in `drop`. The last field, since it is dropped last.
     pub(super) remains: Option<Remains>,
 }
 
-/// One-way requests that may wait for an estimator; one more is refused.
+/// How many one-way requests may wait for an estimator; further ones are refused.
 const MOST_CASTS: u32 = 1024;
 
 impl<R: Robot> Machine<R> {
@@ -185,8 +185,8 @@ impl<R: Robot> Machine<R> {
         running.map_or(island.declaration().name, |estimator| estimator.path)
     }
 
-    /// On virtual time, after something was done from outside: runs disarm callbacks that an actuator's own code has left, and
-    /// hands lines of the journal to its sink.
+    /// On virtual time, after an outside action: runs disarm callbacks left by an actuator's own code, and hands
+    /// lines of the journal to its sink.
     pub(super) fn settle(&self) {
         if !self.control.is_virtual() {
             return;
@@ -197,7 +197,7 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// What it has done so far; the last report once it has ended.
+    /// The report so far; the last report once it has ended.
     pub(super) fn report(&self) -> Report {
         match self.last_report.get() {
             Some(report) => report.clone(),

@@ -3,11 +3,11 @@
 use crate::time::{Clock, MonotonicTime};
 use std::sync::atomic::{AtomicI64, Ordering};
 
-/// When the code of a component was entered: for the report of one that hangs.
+/// When a component's code was entered: to report code that hangs.
 #[derive(Debug)]
 pub(super) struct Occupied(AtomicI64);
 
-/// No code of it runs.
+/// None of its code runs.
 const OUTSIDE: i64 = i64::MIN;
 
 impl Occupied {

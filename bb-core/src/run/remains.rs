@@ -1,5 +1,5 @@
-//! What a robot owns until the last handle of it is dropped: options, handlers of telemetry, what its estimators have kept. Their
-//! `Drop` is user code, and may block.
+//! Values that a robot owns until its last handle is dropped: options, telemetry handlers, state kept by estimators.
+//! Their `Drop` is user code, and may block.
 
 use crate::fault::discard;
 use crate::node::Mode;

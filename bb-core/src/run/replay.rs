@@ -17,10 +17,10 @@ use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// A robot that is run again from its journal, on the caller's thread. Subscribers get what was published in that run.
+/// A robot replayed from its journal, on the caller's thread. Subscribers receive the messages of that run.
 pub struct Replay<R: Robot> {
     live: Live<R>,
-    /// Lines that were not played yet: the line of a measured turn waits for the one that says how long its callbacks took.
+    /// Lines not played yet: the line of a measured turn waits for the line with the durations of its callbacks.
     waiting: VecDeque<Entry>,
     measured: HashMap<u64, Vec<Callback>>,
     placed: HashMap<u64, Vec<PlacedInput>>,
@@ -28,9 +28,9 @@ pub struct Replay<R: Robot> {
     last: u64,
     has_begun: bool,
     is_virtual: bool,
-    /// The last request of each island that the journal does not hold, by line and type.
+    /// The last request to each island that the journal does not hold, by line and type.
     unrecorded: HashMap<usize, (u64, String)>,
-    /// Turns that had not ended when the journal did.
+    /// Turns that had not ended when the journal ended.
     cut: Vec<ReplayError>,
     /// Why nothing more is played.
     refused: Option<ReplayError>,
@@ -61,8 +61,8 @@ impl<R: Robot> Replay<R> {
         }
     }
 
-    /// Replays lines, in the order of their numbers. A journal may be handed over in parts: the last lines of a part wait for
-    /// the next one, or for [`Self::stop`], where it depends on the lines that follow how they go.
+    /// Replays lines, in the order of their numbers. A journal may be handed over in parts. The last lines of a part
+    /// wait for the next part, or for [`Self::stop`], if their replay depends on lines that follow.
     ///
     /// # Errors
     /// The first line that does not fit: the journal is of another robot, lines are missing, or an algorithm is not
@@ -83,7 +83,7 @@ impl<R: Robot> Replay<R> {
             let line = entry.number;
             if line != self.last + 1 {
                 let message = format!("it follows line {}; the lines between are missing", self.last);
-                // What came before is played all the same.
+                // The lines before it are still played.
                 self.advance(true)?;
                 return Err(ReplayError { line, message });
             }
@@ -99,8 +99,8 @@ impl<R: Robot> Replay<R> {
         self.advance(false)
     }
 
-    /// Lets calls of type `Q` to an estimator be made again. Needed for journals of another process; requests that this
-    /// process has made itself are known.
+    /// Lets calls of type `Q` to an estimator be repeated. Needed for journals of another process; requests made by
+    /// this process are known.
     pub fn know_calls<V: Visitable<R>, Q>(&self, _: V)
     where
         V::Estimator: HandleCall<Q>,
@@ -116,8 +116,9 @@ impl<R: Robot> Replay<R> {
         know_casts::<V::Estimator, Q>();
     }
 
-    /// Plays what waits, stops the robot, and gives the last report. What does not fit is among its faults, and so is a line at
-    /// which the journal is cut: the turn that it begins had not ended, and is replayed as far as the journal tells.
+    /// Plays the waiting lines, stops the robot, and returns the last report. Lines that do not fit are among its
+    /// faults. So is a line at which the journal is cut: the turn that it begins had not ended, and is replayed as
+    /// far as the journal goes.
     pub fn stop(mut self) -> Report {
         let refused = self.refused.take().or_else(|| self.advance(true).err());
         for error in self.cut.drain(..).chain(refused) {
@@ -150,7 +151,7 @@ impl<R: Robot> Replay<R> {
             let Some(entry) = self.waiting.pop_front() else { return Ok(()) };
             let line = entry.number;
             if let Err(message) = self.line(entry) {
-                // What followed from a turn that the journal cuts is in it, and does not follow now.
+                // The consequences of a turn that the journal cuts are in the journal, and are not repeated now.
                 if !self.cut.is_empty() {
                     self.waiting.clear();
                     return Ok(());
@@ -161,7 +162,8 @@ impl<R: Robot> Replay<R> {
         Ok(())
     }
 
-    /// Whether it is not known yet how long the callbacks of a line took, where inputs were, or what was emitted in reply to a request.
+    /// Whether a line still lacks the durations of its callbacks, the places of its inputs, or the outputs emitted in
+    /// reply to a request.
     fn is_open(&self, entry: &Entry) -> bool {
         let Some(number) = self.island_of(&entry.event) else { return false };
         if let Event::Request { request: Request { bytes: None, .. }, .. } = &entry.event
@@ -172,7 +174,7 @@ impl<R: Robot> Replay<R> {
         self.has_not_ended(number, entry.number)
     }
 
-    /// Whether the lines are missing that an island writes when the turn of that line has ended.
+    /// Whether the lines are missing that an island writes when that line's turn has ended.
     fn has_not_ended(&self, island: usize, line: u64) -> bool {
         let island = self.live.0.island(island);
         let is_measured = island.is_some_and(|island| island.declaration().is_measured);
@@ -181,7 +183,7 @@ impl<R: Robot> Replay<R> {
         (is_measured && !self.measured.contains_key(&line)) || (is_placed && !self.placed.contains_key(&line))
     }
 
-    /// Prepares what the turn of a line is told by the journal; returns false if the journal ends before that turn does.
+    /// Prepares the journal's data for the turn of a line; returns false if the journal ends before that turn does.
     fn prepare(&mut self, island: usize, line: u64) -> bool {
         let is_whole = !self.has_not_ended(island, line);
         let environment = &self.live.0.environment;
@@ -197,7 +199,7 @@ impl<R: Robot> Replay<R> {
         is_whole
     }
 
-    /// The next line, of those that wait from `first` on, that an island processed or wrote while it did.
+    /// The next waiting line, from `first` on, that an island processed, or wrote while processing.
     fn next_of(&self, island: usize, first: usize) -> Option<usize> {
         let is_of_island = |event: &Event| match event {
             Event::Output { island: other, .. } => *other == island,
@@ -231,7 +233,8 @@ impl<R: Robot> Replay<R> {
         }
     }
 
-    /// Plays a line. Where the journal is cut in the turn of that line, it does not have all that the estimators ask for.
+    /// Plays a line. If the journal is cut in that line's turn, it lacks some of the data that the estimators ask
+    /// for.
     fn line(&mut self, entry: Entry) -> Result<(), String> {
         let Entry { number, time, event } = entry;
         if !self.has_begun {
@@ -306,7 +309,8 @@ impl<R: Robot> Replay<R> {
             Event::Report { estimator } => {
                 let is_told = control.replay_report(estimator)
                     || (self.is_virtual && control.is_stopping() && {
-                        // On virtual time the stop implies that estimators are retired, in order; this one failed at that.
+                        // On virtual time, the stop implies that estimators are retired, in order; this one failed in
+                        // doing so.
                         self.retire();
                         control.replay_report(estimator)
                     });
@@ -371,7 +375,7 @@ impl<R: Robot> Replay<R> {
         self.go_on(number, time, entry)
     }
 
-    /// The same for an entry that belongs to the turn before.
+    /// The same for an entry that belongs to the previous turn.
     fn go_on(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
         let machine = &self.live.0;
         let island = machine.island(number).ok_or("the robot has no such island")?;
@@ -400,7 +404,7 @@ impl<R: Robot> Replay<R> {
         let declared = R::ESTIMATORS.get(estimator).ok_or("the robot has no such estimator")?;
         if request.bytes.is_none() {
             self.unrecorded.insert(declared.island, (line, request.name.clone()));
-            // What it emitted comes before whatever else was due in that turn.
+            // Its outputs come before anything else that was due in that turn.
             let mut has_emitted = false;
             while let Some(next) = self.next_of(declared.island, 0)
                 && matches!(self.waiting[next].event, Event::Emission { .. })
@@ -461,7 +465,7 @@ impl<R: Robot> Replay<R> {
         )
     }
 
-    /// What an estimator emitted in reply to a request that the journal does not hold.
+    /// Publishes an estimator's output in reply to a request that the journal does not hold.
     fn emit(&self, publisher: usize, is_first: bool, time: MonotonicTime, message: Recorded) -> Result<(), String> {
         let message = self.message(publisher, message)?;
         let (number, island) = self.emitter(publisher).ok_or("the robot has no such publisher")?;
@@ -469,7 +473,7 @@ impl<R: Robot> Replay<R> {
             self.live.0.environment.node(number).counters().emitted.increment();
         }
         self.island(island, time, Replayed::Emission(&message))?;
-        // It is as it was.
+        // It matches the journal.
         let _ = self.live.0.environment.replayed().take(island);
         Ok(())
     }
@@ -517,8 +521,8 @@ impl<R: Robot> Replay<R> {
     }
 }
 
-/// Hands a recorded message to those who listen now. If its code panics for one of them, the message is what it was, and so is
-/// what followed from it.
+/// Hands a recorded message to the current subscribers. If its code panics for one of them, the message and its
+/// consequences are still the same.
 fn handed_out(hand_out: impl FnOnce()) {
     if let Err(fault) = guarded(hand_out) {
         tracing::error!(%fault, "a recorded message failed where it was copied");

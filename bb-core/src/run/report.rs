@@ -1,4 +1,4 @@
-//! What a run has done: what was published where, and what was dropped and why.
+//! The statistics of a run: messages published per topic, and messages dropped, with reasons.
 
 use super::SourceStatistics;
 use super::actuator::ActuatorStatistics;
@@ -24,7 +24,7 @@ pub struct Report {
     pub actuators: Vec<ActuatorStatistics>,
     /// Every command.
     pub commands: Vec<CommandStatistics>,
-    /// Every joint that moves by itself, and names that messages gave of joints that there are not.
+    /// Every moving joint, and unknown joint names that messages gave.
     pub joints: Vec<JointStatistics>,
     /// The operational state.
     pub state: &'static str,

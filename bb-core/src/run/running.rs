@@ -22,12 +22,12 @@ pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 /// How long it may take at least, once disarm callbacks have used up their time.
 const GRACE: Duration = Duration::from_millis(400);
 
-/// Within this time after the call, whatever hangs, the robot has stopped: all of the above, and the last lines of the
-/// journal.
+/// The robot has stopped within this time after the call, even if code hangs. Includes all of the above and the last
+/// lines of the journal.
 const BACK_WITHIN: Duration = Duration::from_millis(5800);
 
-/// How long loggers may take for the last lines. Otherwise a program that ends after `stop` would not log what could not be
-/// made safe.
+/// How long loggers may take for the last lines. Without this wait, a program that ends after `stop` would not log
+/// what could not be made safe.
 const LINES_WITHIN: Duration = Duration::from_millis(150);
 
 impl<R: Robot> Running<R> {
@@ -35,7 +35,7 @@ impl<R: Robot> Running<R> {
         let mut running = Self { live: Live(Arc::new(machine)), sources: Vec::new() };
         let machine = Arc::clone(&running.live.0);
         machine.control.pool().start();
-        // On an error here, `running` is dropped, which stops in order what runs already.
+        // On an error here, `running` is dropped, which stops what already runs, in order.
         threads::serve(&machine)?;
         let now = machine.environment.clock().now();
         machine.control.begin_watch(now);
@@ -57,9 +57,9 @@ impl<R: Robot> Running<R> {
         }
     }
 
-    /// Disarms the robot and cancels commands, at once and whatever hangs; then stops sensors and services, then estimators
-    /// and actuators; tells the subscribers, and gives the last report. Code that has not returned 5 s after the call is left
-    /// behind and reported as a fault.
+    /// Disarms the robot and cancels commands at once, even if code hangs. Then stops sensors and services, then
+    /// estimators and actuators; tells the subscribers, and returns the last report. Code that has not returned 5 s
+    /// after the call is left running and reported as a fault.
     pub fn stop(mut self) -> Report {
         self.shut_down();
         self.live.0.report()
@@ -75,7 +75,7 @@ impl<R: Robot> Running<R> {
         machine.control.wait_until_disarmed();
         let mut deadline = (start + STOP_WITHIN).max(Instant::now() + GRACE);
         if machine.islands().any(|island| island.is_inside(&machine.wiring)) {
-            // An estimator's message has woken the caller: its island cannot stop before this returns.
+            // An estimator's message has woken the caller: its island cannot stop before this call returns.
             deadline = Instant::now() + GRACE;
         }
         for (path, thread) in std::mem::take(&mut self.sources) {

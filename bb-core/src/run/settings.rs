@@ -1,7 +1,8 @@
-//! Options and parameters by path, without compiling: from a TOML file, from the command line, or from code.
+//! Options and parameters by path, set at run time: from a TOML file, from the command line, or from code.
 //!
-//! A setting is `PATH/NAME` for an option of the component at `PATH`, and the path of a parameter. Values are checked as the
-//! literals in `robot!` are: a number that states a unit is written as a text with a unit of that dimension, `"20 ms"`.
+//! A setting is `PATH/NAME` for an option of the component at `PATH`, or the path of a parameter. Values are checked
+//! like the literals in `robot!`: a number that states a unit is written as a string with a unit of that dimension,
+//! `"20 ms"`.
 //!
 //! ```toml
 //! [sensor.base.imu]
@@ -29,8 +30,8 @@ use assign::Assignment;
 use error::Place;
 
 impl<R: Robot> Builder<R> {
-    /// Sets an option or a parameter by path: `set("sensor/base/imu/maximum_range", "12 m")`. The value is JSON; what is
-    /// none is a text.
+    /// Sets an option or a parameter by path: `set("sensor/base/imu/maximum_range", "12 m")`. The value is JSON;
+    /// anything else is taken as a string.
     ///
     /// # Errors
     /// Why it was not set: an unknown path, with the nearest one, or what was expected.
@@ -41,7 +42,7 @@ impl<R: Robot> Builder<R> {
     /// Sets what a TOML file says. If anything in it is wrong, nothing is set.
     ///
     /// # Errors
-    /// All that is wrong, each with its line and column.
+    /// All problems, each with its line and column.
     #[cfg(feature = "toml")]
     pub fn load_settings(&mut self, file: impl AsRef<std::path::Path>) -> Result<(), SettingsError> {
         let file = file.as_ref();
@@ -50,7 +51,7 @@ impl<R: Robot> Builder<R> {
         self.set_from_toml(&name, &text)
     }
 
-    /// The same of a text; `name` is named in errors.
+    /// The same for TOML text; errors name it `name`.
     ///
     /// # Errors
     /// As [`Builder::load_settings`].

@@ -14,8 +14,8 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// A robot on virtual time. Sensors are read in the order of their due times (equal ones in the order of their
-/// declaration), on the caller's thread, as fast as the machine can, so that every run gives the same outputs. What else is
-/// due at the same time comes after them: timers, then the watchdog, then commands, then their time limits.
+/// declaration), on the caller's thread, as fast as the machine can, so every run gives the same outputs. Anything
+/// else due at the same time follows: timers, then the watchdog, then commands, then their time limits.
 pub struct Simulation<R: Robot> {
     live: Live<R>,
     sources: Vec<Box<dyn Source>>,
@@ -34,7 +34,7 @@ enum Kind {
 
 impl<R: Robot> Simulation<R> {
     pub(super) fn new(machine: Machine<R>, mut sources: Vec<Box<dyn Source>>) -> Self {
-        // A recording starts when it was made, and everything else with it.
+        // A simulation of a recording starts when the recording was made.
         if let Some(first) = sources.iter_mut().filter_map(|source| source.starts_at()).min() {
             machine.environment.clock().advance_to(first);
         }
@@ -42,7 +42,7 @@ impl<R: Robot> Simulation<R> {
         machine.control.begin_watch(now);
         machine.start_islands(now);
         machine.environment.drain_posted();
-        // Of hardware errors that components have reported as they were made.
+        // Faults of hardware errors that components reported during `init`.
         while machine.control.run_pending_hooks() {}
         sources.iter_mut().for_each(|source| source.begin());
         let due = sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
@@ -57,8 +57,8 @@ impl<R: Robot> Simulation<R> {
         self.due.peek().map(|Reverse((time, _))| *time)
     }
 
-    /// Moves time to the next sensor that is due and reads it, after whatever else is due before. Returns `false` once all
-    /// sensors have finished.
+    /// Moves time to the next due sensor and reads it, after anything else that is due before. Returns `false` once
+    /// all sensors have finished.
     pub fn step(&mut self) -> bool {
         self.catch_up();
         loop {
@@ -94,29 +94,29 @@ impl<R: Robot> Simulation<R> {
         self.run_until(self.clock().now());
     }
 
-    /// Runs everything that is due up to `time`, moves time there, and publishes as if `sensor` had measured `payload`
-    /// then; all estimators downstream run before this returns. A `time` that is over already does not move time: the
-    /// message is late.
+    /// Runs everything that is due up to `time`, moves time there, and publishes as if `sensor` had measured
+    /// `payload` then. All estimators downstream run before this returns. A `time` in the past does not move time:
+    /// the message is late.
     pub fn publish<S: Sensor>(&mut self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
         self.run_until(time);
         self.live.publish(sensor, time, payload);
         self.catch_up();
     }
 
-    /// Makes the callbacks of an estimator appear to take this long from now on, for its `latency_budget`: on virtual time
-    /// nothing takes time by itself.
+    /// Makes the callbacks of an estimator appear to take this long from now on, to test its `latency_budget`: on
+    /// virtual time, nothing takes time by itself.
     pub fn pretend_latency<V: Visitable<R>>(&self, estimator: V, latency: Duration) {
         let nanos = i64::try_from(latency.as_nanos()).unwrap_or(i64::MAX);
         self.live.0.environment.node(estimator.number()).pretend_latency(nanos);
     }
 
-    /// Stops sensors, then estimators, tells the subscribers, and gives the last report.
+    /// Stops sensors, then estimators, tells the subscribers, and returns the last report.
     pub fn stop(mut self) -> Report {
         self.shut_down();
         self.live.0.report()
     }
 
-    /// What is due next, and when; what is over already is due now.
+    /// What is due next, and when; anything overdue is due now.
     fn next(&self) -> Option<(MonotonicTime, Kind)> {
         let now = self.clock().now();
         let machine = &self.live.0;
@@ -161,7 +161,7 @@ impl<R: Robot> Simulation<R> {
         self.catch_up();
     }
 
-    /// Does what follows at once: entries that were posted, disarm callbacks, and orders to sensors.
+    /// Handles the immediate consequences: posted entries, disarm callbacks, and orders to sensors.
     fn catch_up(&mut self) {
         let machine = &self.live.0;
         machine.environment.drain_posted();
@@ -204,7 +204,7 @@ impl<R: Robot> Simulation<R> {
         machine.control.stop_signal().set();
         self.stop_sources();
         machine.close_door(std::time::Instant::now() + super::running::STOP_WITHIN);
-        // One thread runs all of this, so that nothing can be busy elsewhere.
+        // One thread runs all of this, so nothing can be busy elsewhere.
         machine.retire_quietly();
         machine.terminate_actuators(std::time::Instant::now());
         machine.settle();

@@ -1,5 +1,5 @@
-//! Sensors, controllers and bridges, which are called at a rate or when they ask to be: when each is called, where its readings
-//! go, and how it is restarted.
+//! Sensors, controllers and bridges, which are called at a rate or at the times they ask for: when each is called,
+//! where its readings go, and how it is restarted.
 
 use super::Robot;
 use super::occupied::{Entered, Occupied};
@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::Thread;
 
-/// What components are made with.
+/// Shared state from which components are created.
 #[derive(Clone, Debug)]
 pub struct Assembly {
     pub(super) environment: Environment,
@@ -35,9 +35,9 @@ impl Assembly {
 pub trait Source: Send {
     /// Its path.
     fn path(&self) -> &'static str;
-    /// When it wants to be read first, if it says so.
+    /// When it wants its first reading, if it says so.
     fn starts_at(&mut self) -> Option<MonotonicTime>;
-    /// Starts it: it is due at once, or at the time it asks for.
+    /// Starts it: its first reading is due at once, or at the time it asks for.
     fn begin(&mut self);
     /// When it is read or restarted next; `None` before it has begun and after it has finished.
     fn due(&self) -> Option<MonotonicTime>;
@@ -47,12 +47,12 @@ pub trait Source: Send {
     fn fire(&mut self);
     /// Closes the device.
     fn terminate(&mut self);
-    /// What others tell it and ask of it.
+    /// Its state shared with other threads.
     #[doc(hidden)]
     fn shared(&self) -> SharedSource;
 }
 
-/// The part of a source that other threads reach. Clones are the same.
+/// The part of a source that other threads reach. Clones share it.
 #[derive(Clone, Debug)]
 pub struct SharedSource(Arc<Shared>);
 
@@ -91,7 +91,7 @@ pub struct SourceStatistics {
     pub path: &'static str,
     /// How often it was read.
     pub readings: u64,
-    /// Readings at its rate that it missed because it, or what is downstream of it, took too long.
+    /// Readings at its rate that it missed because it, or a component downstream, took too long.
     pub skipped: u64,
     /// How often it was restarted.
     pub restarts: u64,
@@ -160,7 +160,7 @@ impl SharedSource {
     }
 }
 
-/// Beyond it a real sensor's next reading is a mistake: a day.
+/// A next reading of a real sensor further ahead is a mistake: a day.
 const FARTHEST_NANOS: i64 = 86_400_000_000_000;
 
 /// Readings at one instant of virtual time before the sensor is taken to be stuck.
@@ -182,7 +182,7 @@ struct Running<R: Robot, S: Periodic, P> {
 impl Assembly {
     /// Makes a sensor or a service and adds it to `sources`; its readings go to `publish`.
     ///
-    /// The wiring comes beside the function instead of in a closure: that it may go to another thread is known of every
+    /// The wiring is passed beside the function instead of in a closure. That the wiring is `Send` is known for every
     /// robot, and need not be proven again for each of its sensors.
     pub fn source<R: Robot, S: Periodic>(
         &self,
@@ -247,7 +247,7 @@ where
         self.environment.clock()
     }
 
-    /// Reads it once, publishes what it gave, and says when to read it next; `next` is what it said of that.
+    /// Reads it once, publishes the reading, and says when to read it next; `next` is set to the time it asked for.
     fn read(&mut self, due: MonotonicTime, next: &mut Next) -> Result<Option<MonotonicTime>, Fault> {
         let now = self.clock().now();
         let Some(component) = self.slot.running() else { return Ok(None) };
@@ -266,7 +266,7 @@ where
                 origin: self.environment.origin(),
             };
             *next = reading.next;
-            // A source that was left running may return after the robot has stopped.
+            // A source left running may return after the robot has stopped.
             if let Some(_inside) = self.environment.door().enter() {
                 (self.publish)(&self.wiring, &stamp.message(payload), now);
             }
@@ -361,8 +361,8 @@ where
     }
 }
 
-/// The first time after `due` that is a whole number of periods later and not yet over, and how many were missed: a sensor
-/// that has fallen behind skips these and keeps its phase.
+/// The first time in the future that is a whole number of periods after `due`, and how many periods were missed. A
+/// sensor that has fallen behind skips these and keeps its phase.
 fn next_on_grid(due: MonotonicTime, period: i64, now: MonotonicTime) -> (MonotonicTime, u64) {
     let period = period.max(1);
     let missed = now.nanos_since(due).max(0) / period;
@@ -437,7 +437,7 @@ where
         let mut next = Next::AtRate;
         let read = match caught(|| self.read(due, &mut next)) {
             Ok(read) => Ok(read),
-            // If somebody else's code has failed, it has given its reading.
+            // If somebody else's code has failed, the source has still given its reading.
             Err(failed) => blame(&self.environment, failed)
                 .and_then(|()| self.next_due(next, due, self.clock().now()).map_err(Failed::from)),
         };

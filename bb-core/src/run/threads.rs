@@ -105,7 +105,7 @@ fn spawn(path: &'static str, run: impl FnOnce() + Send + 'static) -> Result<Thre
     }
 }
 
-/// A panic that no component has caught, in the code of a payload say, must not end a thread that serves others.
+/// A panic not caught for any component, for example in a payload's code, must not end a thread that serves others.
 fn survive<R: Robot>(machine: &Machine<R>, path: &'static str, run: impl FnOnce()) {
     let done = contained(&machine.environment, run);
     if let Err(failed) = done {
@@ -113,7 +113,7 @@ fn survive<R: Robot>(machine: &Machine<R>, path: &'static str, run: impl FnOnce(
     }
 }
 
-/// Priority and core of the thread that calls it.
+/// Sets priority and core of the calling thread.
 #[cfg(feature = "realtime")]
 fn set_up(worker: WorkerDeclaration) -> Result<(), String> {
     if let Some(core) = worker.core

@@ -14,17 +14,17 @@ const LONGEST_WAIT: Duration = Duration::from_millis(200);
 /// How often the wall clock is read again.
 const WALL_PERIOD: Duration = Duration::from_secs(1);
 
-/// How often islands are looked at.
+/// How often islands are checked.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
-/// A callback that has not returned for so long hangs.
+/// A callback that has not returned for this long hangs.
 const HANGS_AFTER: Duration = Duration::from_secs(1);
 
-/// The same for a command, which may block its thread, and for a sensor or a service without a rate, which may wait for its
-/// device: as long as the robot waits for it when it stops.
+/// The same for a command, which may block its thread, and for a sensor or a service without a rate, which may wait
+/// for its device. Equal to the time that a stopping robot waits for it.
 const WAITS_TOO_LONG: Duration = Duration::from_secs(5);
 
-/// What was seen of an island the last time.
+/// An island's state at the last check.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     turn: Option<u64>,
@@ -94,7 +94,8 @@ fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
     }
 }
 
-/// The same of sensors and services. `reported`: when the code of each was entered, of which it was reported that it hangs.
+/// The same for sensors and services. `reported`: for each source already reported as hanging, when its code was
+/// entered.
 fn look_at_sources<R: Robot>(machine: &Machine<R>, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (source, reported) in machine.shared_sources().iter().zip(reported) {
         let longest = if source.has_rate() { HANGS_AFTER } else { WAITS_TOO_LONG };
@@ -102,14 +103,14 @@ fn look_at_sources<R: Robot>(machine: &Machine<R>, reported: &mut [Option<Monoto
     }
 }
 
-/// The same of actuators.
+/// The same for actuators.
 fn look_at_actuators<R: Robot>(machine: &Machine<R>, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (actuator, reported) in R::all_actuators(&machine.wiring).into_iter().zip(reported) {
         report_hanging(machine, actuator.path(), actuator.entered_at(), HANGS_AFTER, reported, now);
     }
 }
 
-/// The same of commands: of each the first execution that hangs. `reported`: those that were.
+/// The same for commands: the first hanging execution of each. `reported`: those already reported.
 fn look_at_commands<R: Robot>(machine: &Machine<R>, reported: &mut Vec<u64>, now: MonotonicTime) {
     let hanging = machine.control.hanging(now, WAITS_TOO_LONG);
     for Hanging { path, first, duration } in &hanging {

@@ -7,11 +7,11 @@ use crate::message::Stamp;
 use crate::node::{CallError, IslandState, Member, Node, Turn, publish, take_turn};
 use crate::time::MonotonicTime;
 
-/// What is called with an estimator, and the slot for what it emits.
+/// A function called with an estimator, and the slot for what it emits.
 type Call<'a, E> = dyn FnMut(&mut Node<E>, &Turn<'_>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + 'a;
 
-/// What is called with an estimator once it is free. A separate type, which rustc checks once, not in every function
-/// that it is given to.
+/// A function called with an estimator once it is free. A separate type: rustc checks it once, instead of in every
+/// function that takes it.
 #[allow(missing_debug_implementations)]
 pub struct Visit<'a, E: Estimator> {
     pub(super) estimator: usize,

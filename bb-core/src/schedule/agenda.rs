@@ -1,18 +1,18 @@
-//! When islands are to be woken, for timers, ticks and restarts.
+//! When to wake each island: for timers, ticks and restarts.
 
 use super::Bell;
 use crate::time::MonotonicTime;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The islands that something is due in, by time and then by number: the same order in every run.
+/// Islands with something due, ordered by time and then by number, so the order is the same in every run.
 #[derive(Clone, Debug)]
 pub(crate) struct Agenda {
     entries: Arc<Mutex<Entries>>,
     bell: Bell,
 }
 
-/// At most one entry for each island, its earliest: an island that is woken says when to be woken next.
+/// At most one entry per island, its earliest: an island that is woken says when to wake it next.
 #[derive(Debug, Default)]
 struct Entries {
     by_time: BTreeSet<(MonotonicTime, usize)>,
@@ -24,9 +24,9 @@ impl Agenda {
         Self { entries: Arc::default(), bell }
     }
 
-    /// Has `island` woken at `time`, or before. One that is woken for nothing goes back to sleep.
+    /// Wakes `island` at `time` or earlier. An island with nothing to do goes back to sleep.
     pub(crate) fn wake_at(&self, time: MonotonicTime, island: usize) {
-        // The last instant is one that never comes.
+        // The last instant never comes.
         if time == MonotonicTime::MAX {
             return;
         }
@@ -99,7 +99,7 @@ mod tests {
         assert_eq!(taken, [1, 3]);
     }
 
-    /// One that went unnoticed would cost 200 ms.
+    /// A missed wake-up would cost 200 ms.
     #[test]
     fn no_entry_goes_unnoticed() {
         let bell = Bell::default();

@@ -1,4 +1,4 @@
-//! Through which messages come in from threads that the robot does not wait for.
+//! Admits messages from threads that the robot does not wait for.
 
 #[cfg(loom)]
 use loom::sync::atomic::AtomicUsize;
@@ -8,24 +8,24 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Open from the start until the robot has stopped: what is published later is not taken, so that the last report counts what
-/// the journal holds, neither more nor less. Clones are the same door.
+/// Open from the start until the robot has stopped. Later messages are refused, so the last report counts exactly
+/// what the journal holds. Clones share the same door.
 #[derive(Clone, Debug)]
 pub(crate) struct Door(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {
-    /// Twice the number of those inside, and 1 once it is closed: in one word, so that a thread that enters either is
-    /// seen by the one that closes it or finds it closed.
+    /// Twice the number of threads inside, plus 1 once closed. One word, so an entering thread either is seen by the
+    /// closing thread or finds the door closed.
     state: AtomicUsize,
-    /// Without a journal nothing has to agree with it, and nobody is counted.
+    /// Without a journal there is nothing to agree with, so entries are not counted.
     is_counted: bool,
 }
 
 const CLOSED: usize = 1;
 const ONE_INSIDE: usize = 2;
 
-/// Somebody is inside as long as this lives.
+/// Its holder is inside until this is dropped.
 #[derive(Debug)]
 pub(crate) struct Inside<'a>(Option<&'a Shared>);
 
@@ -34,7 +34,7 @@ impl Door {
         Self(Arc::new(Shared { state: AtomicUsize::new(0), is_counted }))
     }
 
-    /// Lets the caller in; none once the door is closed.
+    /// Lets the caller in, or returns `None` once the door is closed.
     #[inline]
     pub(crate) fn enter(&self) -> Option<Inside<'_>> {
         let shared = &*self.0;
@@ -46,7 +46,7 @@ impl Door {
         (before & CLOSED == 0).then_some(inside)
     }
 
-    /// Lets nobody in any more, and waits until `deadline` for those who are inside; false if some are still.
+    /// Closes the door and waits until `deadline` for threads still inside; returns `false` if some remain.
     pub(crate) fn close(&self, deadline: Instant) -> bool {
         self.0.state.fetch_or(CLOSED, Ordering::AcqRel);
         while self.0.state.load(Ordering::Acquire) >= ONE_INSIDE {
@@ -87,7 +87,7 @@ mod model {
     fn nobody_is_inside_a_door_that_was_closed() {
         loom::model(|| {
             let door = Door::new(true);
-            // Only those inside count, without an order of its own.
+            // Only those inside count; no ordering is needed.
             let written = loom::sync::Arc::new(AtomicUsize::new(0));
             let publishers = [0, 1].map(|_| {
                 let (door, written) = (door.clone(), loom::sync::Arc::clone(&written));

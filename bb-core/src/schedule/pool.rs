@@ -1,8 +1,8 @@
-//! Threads that run user code which no thread of its own runs: turns of islands, commands, wakers.
+//! Threads for user code without a thread of its own: turns of islands, commands, wakers.
 //!
-//! Each job may block for ever. When jobs wait and no thread has taken one for some milliseconds, another thread is started,
-//! so that a blocked job delays others by no more than that. Jobs of the [`Lane`]s wait apart, and each lane but the
-//! robot's own may block so many threads: whatever fills one of them, the others go on, and the full one is reported.
+//! A job may block forever. When jobs wait and no thread has taken one for some milliseconds, another thread is
+//! started, so a blocked job delays others by no more than that. Each [`Lane`] has its own queue, and each lane but
+//! the robot's own has a limit on blocked threads. A full lane is reported and does not hold up the others.
 
 mod crew;
 #[cfg(all(test, loom))]
@@ -16,10 +16,10 @@ use std::fmt;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A job. It catches and reports the panics of user code itself; another panic ends there.
+/// A job. It catches and reports panics of user code itself; any other panic ends here.
 pub(crate) type Job = Box<dyn FnOnce() + Send>;
 
-/// What a job is for. Lanes are served in this order, but for jobs that have waited for long.
+/// The purpose of a job. Lanes are served in this order, except for jobs that have waited for long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
     /// Commands that disarm the robot: no other code takes their threads.
@@ -43,7 +43,7 @@ impl Lane {
     /// How many of its jobs may run at once; others wait until one returns.
     const fn most(self) -> usize {
         match self {
-            // A model has room for few threads.
+            // The model checker has room for few threads.
             Self::Commands if cfg!(loom) => 1,
             Self::Disarming | Self::Health => 64,
             Self::Robot => usize::MAX,
@@ -67,7 +67,7 @@ impl Lane {
 /// Threads that are always there.
 const READY: usize = if cfg!(loom) { 1 } else { 2 };
 
-/// How long a lane is full, and jobs of it wait, before that is reported.
+/// How long a lane must be full, with jobs waiting, before that is reported.
 const FULL_AFTER: Duration = Duration::from_secs(1);
 
 /// The threads of one robot. Clones are the same pool; it ends with [`Pool::close`].
@@ -84,7 +84,7 @@ struct Shared {
 }
 
 impl Pool {
-    /// A pool without threads yet. `alarm` is called when a job has to wait: someone then calls [`Pool::relieve`].
+    /// A pool without threads yet. `alarm` is called when a job has to wait; its receiver then calls [`Pool::relieve`].
     pub(crate) fn new(alarm: impl Fn() + Send + Sync + 'static) -> Self {
         Self::with(Duration::from_secs(5), alarm, threads::spawn)
     }
@@ -98,8 +98,8 @@ impl Pool {
         Self(Arc::new(Shared { state, idle_for, alarm: Box::new(alarm), spawn: Box::new(spawn) }))
     }
 
-    /// Starts the threads that are always there. A thread inherits priority and cores from the one that starts it, and a
-    /// real-time worker may be the first to submit a job.
+    /// Starts the permanent threads. A thread inherits priority and cores from its parent, and the first job may be
+    /// submitted by a real-time worker.
     pub(crate) fn start(&self) {
         for _ in 0..READY {
             self.start_thread(self.0.lock());
@@ -112,7 +112,7 @@ impl Pool {
         self.call(crew);
     }
 
-    /// Starts a thread if jobs wait and those there are take none; when to look again, if jobs wait.
+    /// Starts a thread if jobs wait and the existing ones take none. Returns when to look again, if jobs wait.
     pub(crate) fn relieve(&self) -> Option<Duration> {
         self.relieve_at(Instant::now())
     }
@@ -131,7 +131,7 @@ impl Pool {
         Some(wait)
     }
 
-    /// The next lane that has become full, in words, or that there is no thread to be had; each time once.
+    /// The next lane that has become full, or a failure to start threads, in words; each reported once.
     pub(crate) fn report(&self) -> Option<String> {
         let mut crew = self.0.lock();
         if let Some(error) = crew.newly_without_thread() {
@@ -142,7 +142,7 @@ impl Pool {
         Some(format!("{most} {jobs} have not returned, as many as there are threads for: others wait"))
     }
 
-    /// Waits until nothing is left of a lane, until `deadline` at most; else what is left, in words.
+    /// Waits until a lane is empty, until `deadline` at most; otherwise describes the remaining jobs.
     pub(crate) fn left(&self, lane: Lane, deadline: Instant) -> Option<String> {
         loop {
             let left = self.0.lock().left(lane);
@@ -156,7 +156,7 @@ impl Pool {
         }
     }
 
-    /// Runs what waits, on threads that end once nothing does. Nobody keeps time any more.
+    /// Runs the waiting jobs, on threads that end once none is left. Nobody keeps time any more.
     pub(crate) fn close(&self) {
         let mut crew = self.0.lock();
         let idle = crew.close();
@@ -164,7 +164,7 @@ impl Pool {
         idle.iter().for_each(threads::Thread::unpark);
     }
 
-    /// Tells someone of the jobs that may be taken.
+    /// Tells a thread about the jobs that may be taken.
     fn call(&self, mut crew: MutexGuard<'_, Crew>) {
         match crew.call() {
             Call::Nobody => {}
@@ -180,13 +180,14 @@ impl Pool {
         }
     }
 
-    /// Jobs may be submitted under a lock of the robot, and the thread that keeps time comes here as well: nothing is logged.
+    /// Jobs may be submitted under a lock of the robot, and the timekeeper calls this as well, so nothing is logged
+    /// here.
     fn start_thread(&self, mut crew: MutexGuard<'_, Crew>) {
         let number = crew.start();
         drop(crew);
         let pool = self.clone();
         if let Err(error) = (self.0.spawn)(format!("pool {number}"), Box::new(move || pool.work())) {
-            // The threads there are go on; the thread that keeps time tries again.
+            // The existing threads go on; the timekeeper tries again.
             self.0.lock().not_started(error, Instant::now());
             (self.0.alarm)();
         }
@@ -204,7 +205,7 @@ impl Pool {
                     } else {
                         drop(crew);
                     }
-                    // A logger that panics, say, which cannot be told so.
+                    // For example, a panic of a logger, which cannot be reported through that logger.
                     let _ = guarded(job);
                     crew = self.0.lock();
                     has_room = crew.done(lane);
@@ -244,10 +245,10 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::sync::mpsc;
 
-    /// Longer than anything takes that does not hang.
+    /// Longer than anything takes unless it hangs.
     const LONG: Duration = Duration::from_secs(20);
 
-    /// So many jobs of a lane that block until what is returned is dropped.
+    /// Submits this many jobs to a lane; they block until the returned value is dropped.
     fn block(pool: &Pool, lane: Lane, jobs: usize) -> mpsc::Sender<()> {
         let (release, blocked) = mpsc::channel::<()>();
         let blocked = Arc::new(Mutex::new(blocked));
@@ -320,7 +321,7 @@ mod tests {
         let release = block(&pool, Lane::Commands, 20);
         relieve_until(&pool, || pool.0.lock().threads() >= 20);
         drop(release);
-        // A trickle, which would keep all of them busy if it went round.
+        // A trickle of jobs, which would keep all of them busy if it were spread over them.
         let start = Instant::now();
         while pool.0.lock().threads() > READY {
             assert!(start.elapsed() < LONG, "{pool:?}");

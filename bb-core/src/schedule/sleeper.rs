@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
-/// The alarms that are set. Clones are the same.
+/// The alarms that are set. Clones share them.
 #[derive(Clone, Debug)]
 pub(crate) struct Sleeper {
     alarms: Arc<Mutex<Alarms>>,
     bell: Bell,
-    /// Where what is set through this clone is woken.
+    /// The lane that wakes alarms set through this clone.
     lane: Lane,
 }
 
@@ -29,7 +29,7 @@ impl Sleeper {
         Self { alarms: Arc::default(), bell, lane: Lane::Robot }
     }
 
-    /// The same for alarms that are woken in another lane than the robot's own.
+    /// A clone whose alarms are woken in another lane than the robot's own.
     pub(crate) fn in_lane(&self, lane: Lane) -> Self {
         Self { lane, ..self.clone() }
     }

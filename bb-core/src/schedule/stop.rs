@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Thread;
 use std::time::Duration;
 
-/// Set when the robot's sensors and services are to stop. Each thread that sleeps on it is parked on its own, so that
-/// thousands of them do not meet at one lock.
+/// Set when the robot's sensors and services are to stop. Each sleeping thread is parked separately, so thousands of
+/// them do not contend for one lock.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StopSignal(Arc<Shared>);
 
@@ -33,7 +33,8 @@ impl StopSignal {
         self.0.is_set.load(Ordering::SeqCst)
     }
 
-    /// Sleeps for `duration`, until the signal is set, or until the thread is unparked; the thread has registered.
+    /// Sleeps for `duration`, until the signal is set, or until the thread is unparked. The thread must have
+    /// registered.
     pub(crate) fn sleep(&self, duration: Duration) {
         if !self.is_set() {
             std::thread::park_timeout(duration);

@@ -11,15 +11,15 @@ use crate::message::codec::{Reader, Shape, Writer};
 use crate::message::{DecodeError, Field, Finite, Payload, Stamped};
 use crate::time::MonotonicTime;
 
-/// A payload, a sensor, an estimator and all the rest, wherever one is needed that is not known.
+/// A payload, sensor, estimator and so on, used wherever the real one is not known.
 #[derive(Clone, Copy, Debug)]
 pub struct Unknown;
 
-/// What an unknown estimator takes: anything.
+/// The input of an unknown estimator: anything.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownInput;
 
-/// What an unknown estimator emits: anything.
+/// The output of an unknown estimator: anything.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownOutput;
 

@@ -8,20 +8,20 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// The one source of time of a robot. Clones read the same clock.
+/// The only source of time of a robot. Clones read the same clock.
 ///
 /// *Real* time starts at zero when the process first reads it and never goes back. *Virtual* time does not move until
-/// it is set, so that a recorded or simulated run replays with the same stamps, as fast as the machine can.
+/// it is set, so a recorded or simulated run replays with the same stamps, as fast as the machine can.
 ///
-/// A clock made by [`Clock::real`] starts with the date that the machine has at that moment. A running robot keeps
-/// it up to date.
+/// A clock created by [`Clock::real`] starts with the machine's date at that moment. A running robot keeps it up to
+/// date.
 //
-// Real time is `std::time::Instant`. Condition variables wait on the same clock of the system, so that a deadline and
-// the wait for it cannot drift apart. The crates that read the processor's counter (quanta, minstant, fastant) need
-// 8.5 ns a read where `Instant` needs 22, but fail the tests below: without a fence, the counter may be read before an
-// earlier load, and a calibration done once drifts. With that fence and a sequence lock for new calibrations, a read
-// takes 17 ns, which is not worth the `unsafe` that the fence needs. How long a callback takes is another matter, since it
-// begins and ends on one thread: see `Stopwatch`.
+// Real time is `std::time::Instant`. Condition variables wait on the same system clock, so a deadline and the wait
+// for it cannot drift apart. Crates that read the processor's counter (quanta, minstant, fastant) need 8.5 ns a read
+// where `Instant` needs 22, but fail the tests below: without a fence, the counter may be read before an earlier
+// load, and a calibration done once drifts. With a fence, and a sequence lock for new calibrations, a read takes 17
+// ns. That gain is not worth the `unsafe` that the fence needs. Measuring the duration of a callback is different,
+// since it begins and ends on one thread: see `Stopwatch`.
 #[derive(Clone, Debug)]
 pub struct Clock {
     kind: Kind,
@@ -35,8 +35,8 @@ enum Kind {
     Virtual(Arc<AtomicI64>),
 }
 
-/// The least difference of the measured offset from the current one that replaces it: more than preemption between two reads
-/// causes, less than shows in a recording.
+/// The smallest change of the measured offset that is adopted: more than preemption between two reads causes, less
+/// than shows in a recording.
 const WALL_STEP_NANOS: u64 = 1_000_000;
 
 impl Clock {
@@ -48,13 +48,13 @@ impl Clock {
         Self { kind: Kind::Real(zero), wall_offset_nanos: Arc::new(AtomicI64::new(offset)) }
     }
 
-    /// A virtual clock that is at `start`, with the Unix epoch at its zero.
+    /// A virtual clock at `start`, with the Unix epoch at its zero.
     pub fn virtual_at(start: MonotonicTime) -> Self {
         let now = Arc::new(AtomicI64::new(start.as_nanos()));
         Self { kind: Kind::Virtual(now), wall_offset_nanos: Arc::new(AtomicI64::new(0)) }
     }
 
-    /// The time now.
+    /// The current time.
     pub fn now(&self) -> MonotonicTime {
         match &self.kind {
             Kind::Real(zero) => MonotonicTime::ZERO + zero.elapsed(),
@@ -62,20 +62,20 @@ impl Clock {
         }
     }
 
-    /// The calendar time that belongs to `time`, by the current offset.
+    /// The calendar time at `time`, by the current offset.
     pub fn wall_at(&self, time: MonotonicTime) -> WallTime {
         WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos()))
     }
 
-    /// The monotonic time that belongs to a calendar time, by the current offset: for devices that stamp with the date, such as a
-    /// GNSS receiver or a camera on the network.
+    /// The monotonic time at a calendar time, by the current offset: for devices that stamp with the date, such as a
+    /// GNSS receiver or a network camera.
     pub fn monotonic_at(&self, wall: WallTime) -> MonotonicTime {
         MonotonicTime::from_nanos(wall.as_unix_nanos().saturating_sub(self.wall_offset_nanos()))
     }
 
     /// Wall time minus monotonic time, in nanoseconds. It changes when the machine's date is set.
     pub fn wall_offset_nanos(&self) -> i64 {
-        // The offset guards no other data, so that no order is needed.
+        // The offset guards no other data, so no ordering is needed.
         self.wall_offset_nanos.load(Ordering::Relaxed)
     }
 
@@ -102,8 +102,8 @@ impl Clock {
         }
     }
 
-    /// Sets a virtual clock to `time`, which may be earlier: lines of a journal that different threads wrote have times that
-    /// differ by a little from the order of the lines.
+    /// Sets a virtual clock to `time`, which may be earlier: lines of a journal written by different threads have
+    /// times that differ slightly from the order of the lines.
     pub(crate) fn set_to(&self, time: MonotonicTime) {
         if let Kind::Virtual(nanos) = &self.kind {
             nanos.store(time.as_nanos(), Ordering::Release);

@@ -1,20 +1,22 @@
-//! The time of a device's own counter.
+//! The time of a device's counter.
 
 use super::MonotonicTime;
 
-/// Turns the counter of a device into the robot's time.
+/// Converts the counter of a device to the robot's time.
 ///
-/// A reading arrives after it was measured: later by the time that the transport takes, which varies by milliseconds on USB, a
-/// serial port or a loaded machine. The counter that many devices send along does not vary. This clock learns how far the
-/// counter is from the robot's clock, from the readings that were delayed least. The time that it gives is never after the
-/// arrival, and after the measurement by the smallest delay of the last 10 to 20 s (and 16 readings), plus what the device's
-/// oscillator may have drifted since. (Readings that arrive at the same time are kept in order by a nanosecond each.)
+/// A reading arrives after it was measured: later by the transport delay, which varies by milliseconds on USB, a
+/// serial port or a loaded machine. The counter that many devices send along does not vary. This clock learns the
+/// offset between the counter and the robot's clock from the readings with the smallest delay. The time it returns is
+/// never after the arrival. It is after the measurement by at most the smallest delay of the last 10 to 20 s (and 16
+/// readings), plus the possible drift of the device's oscillator since. (Readings that arrive at the same time are
+/// kept in order by a nanosecond each.)
 ///
 /// - The counter may wrap, also several times between two readings: the arrivals tell how often, as long as delays differ by
 ///   less than half a wrap.
-/// - A counter that jumps ahead of the arrivals by more than a second, or back, was started again: the clock starts over at once.
-/// - One that has stood still is taken for a transport that is late, since both look the same, until no reading of 10 to 20 s
-///   has been on time.
+/// - A counter that jumps ahead of the arrivals by more than a second, or back, was restarted: the clock starts over
+///   at once.
+/// - A counter that stood still looks the same as a late transport, and is treated as one until no reading of 10 to
+///   20 s has been on time.
 /// - A reading that is overtaken by another gets its own, earlier time.
 /// - Without a rate that is positive and finite, the time of a reading is its arrival.
 ///
@@ -31,16 +33,16 @@ use super::MonotonicTime;
 /// assert!(late.nanos_since(at(110)).abs() < 10_000);
 /// ```
 //
-// The lower envelope of arrival minus device time over a sliding window, tilted by the largest drift: one-way synchronisation as
-// in L. Zhang, Z. Liu, C. Xia, "Clock synchronization algorithms for network measurements", INFOCOM 2002, with the minimum of
-// two windows kept instead of a hull.
+// The lower envelope of arrival minus device time over a sliding window, tilted by the largest drift: one-way
+// synchronisation as in L. Zhang, Z. Liu, C. Xia, "Clock synchronization algorithms for network measurements",
+// INFOCOM 2002, but keeping the minima of two windows instead of a hull.
 #[derive(Clone, Debug)]
 pub struct DeviceClock {
-    /// None without a rate.
+    /// `None` without a rate.
     nanos_per_tick: Option<f64>,
-    /// Ticks after which the counter is at zero again; none for 64 bits.
+    /// Ticks after which the counter wraps to zero; `None` for 64 bits.
     modulus: Option<u64>,
-    /// How much faster or slower the device may count, relative.
+    /// The largest relative rate error of the device.
     drift: f64,
     state: Option<State>,
 }
@@ -52,7 +54,8 @@ struct State {
     elapsed: u64,
     arrival: MonotonicTime,
     last: MonotonicTime,
-    /// The first reading's time on the robot's clock, as far as this window and the one before tell, in nanoseconds.
+    /// The first reading's time on the robot's clock, estimated from this window and the previous one, in
+    /// nanoseconds.
     origin: [f64; 2],
     window_start: MonotonicTime,
     readings: u32,
@@ -61,37 +64,37 @@ struct State {
 const WINDOW_NANOS: i64 = 10_000_000_000;
 const WINDOW_READINGS: u32 = 16;
 
-/// By how much a reading may be ahead of its arrival, as the one before was late, or behind, as it was overtaken.
+/// How far a reading may be ahead of its arrival, if the previous one was late, or behind it, if it was overtaken.
 const TOLERANCE_NANOS: f64 = 1e9;
 
-/// What a reading is to the one before.
+/// The relation of a reading to the previous one.
 enum Step {
-    /// So many ticks later.
+    /// This many ticks later.
     Later(u64),
-    /// So many ticks earlier.
+    /// This many ticks earlier.
     Overtaken(u64),
-    /// The counter was started again.
+    /// The counter was restarted.
     Restarted,
 }
 
 impl DeviceClock {
-    /// Of a counter of `bits` bits, 64 at most, that counts `ticks_per_second`.
+    /// For a counter of `bits` bits, at most 64, that counts `ticks_per_second`.
     pub fn new(ticks_per_second: f64, bits: u32) -> Self {
         let modulus = 1_u64.checked_shl(bits).filter(|_| bits < 64);
         let nanos_per_tick = Some(1e9 / ticks_per_second).filter(|nanos| nanos.is_finite() && *nanos > 0.0);
         Self { nanos_per_tick, modulus, drift: 2e-4, state: None }
     }
 
-    /// How far the rate of the device's oscillator may be off, relative; 2e-4 (200 ppm) unless set. Crystals are within
-    /// 1e-4, and internal oscillators of microcontrollers within 1e-2. From 0 to 0.5. A device that is off by more gets times
-    /// before the measurement, by the excess over 10 to 20 s.
+    /// The largest relative error in the rate of the device's oscillator; 2e-4 (200 ppm) by default. Crystals are
+    /// within 1e-4, and internal oscillators of microcontrollers within 1e-2. From 0 to 0.5. If a device is off by
+    /// more, its times are before the measurement, by the excess over 10 to 20 s.
     pub fn with_drift(mut self, drift: f64) -> Self {
         self.drift = if drift.is_nan() { self.drift } else { drift.clamp(0.0, 0.5) };
         self
     }
 
-    /// When the counter was at `ticks`, of a reading that has arrived at `arrival`. Later readings get later times, as long as
-    /// the counter goes on.
+    /// The time at which the counter was at `ticks`, for a reading that arrived at `arrival`. Later readings get
+    /// later times, as long as the counter continues.
     pub fn time_of(&mut self, ticks: u64, arrival: MonotonicTime) -> MonotonicTime {
         let Some(nanos_per_tick) = self.nanos_per_tick else { return arrival };
         let ticks = self.modulus.map_or(ticks, |modulus| ticks % modulus);
@@ -124,7 +127,7 @@ impl DeviceClock {
                 let later = later % modulus;
                 // The number of wraps that agrees best with the arrivals.
                 let wraps = ((passed / nanos_per_tick - later as f64) / modulus as f64).round().max(0.0);
-                // Beyond any counter that is read: a conversion saturates.
+                // Larger than any counter: the conversion saturates.
                 (later.saturating_add((wraps as u64).saturating_mul(modulus)), modulus - later)
             }
             None => (later, later.wrapping_neg()),
@@ -159,7 +162,7 @@ impl DeviceClock {
         }
         origin[0] = origin[0].min(arrival.as_nanos() as f64 - device);
         let time = MonotonicTime::from_nanos((origin[0].min(origin[1]) + device) as i64).min(arrival);
-        // A first reading that was delayed is found out by the next ones; time does not go back for that.
+        // A delay of the first reading is discovered from later ones; time does not go back for that.
         let earliest = if elapsed > before.elapsed { before.last.plus_nanos(1) } else { before.last };
         State { ticks, elapsed, arrival, last: time.max(earliest), origin, window_start, readings }
     }
@@ -175,7 +178,8 @@ mod tests {
     }
 
     proptest! {
-        /// Between the measurement with the smallest delay and the arrival, whatever the delays; a counter that wraps often.
+        /// The time is between the measurement with the smallest delay and the arrival, for any delays; the counter
+        /// wraps often.
         #[test]
         fn a_time_is_between_measurement_and_arrival(
             delays in proptest::collection::vec(0..50_000_000_i64, 2..300),
@@ -187,16 +191,16 @@ mod tests {
             let (mut arrived, mut best) = (0, i64::MAX);
             let mut last = None;
             for (index, delay) in delays.iter().enumerate() {
-                // 100 Hz by the robot's clock, read by a counter of 1 MHz that runs at a rate of its own.
+                // 100 Hz by the robot's clock, read by a counter of 1 MHz with its own rate error.
                 let measured = 10_000_000 * index as i64;
                 let ticks = start.wrapping_add((measured as f64 * (1.0 + rate) / 1e3) as u64) % (1 << 18);
-                // A transport keeps the order.
+                // The transport keeps the order.
                 arrived = (measured + least + delay).max(arrived);
                 let time = clock.time_of(ticks, at(arrived)).as_nanos();
                 // A tick is 1 us. Two that arrive at once are kept in order by a nanosecond.
                 let latest = arrived + index as i64;
                 prop_assert!(time >= measured + least - 2_000 && time <= latest, "{time} {measured} {arrived}");
-                // What the best reading so far leaves open, and the drift since, at most.
+                // The uncertainty left by the best reading so far, and the largest drift since.
                 best = best.min(arrived - measured);
                 let drift = (3e-4 * measured as f64) as i64;
                 prop_assert!(time <= measured + best.max(last.unwrap_or(0) + 1 - measured) + drift + 2_000);
@@ -224,10 +228,10 @@ mod tests {
         let mut read = |ticks: u64, ms: i64| clock.time_of(ticks, at(ms * 1_000_000)).as_nanos() / 1_000;
         assert_eq!(read(3_000_000, 100), 100_000);
         assert_eq!(read(3_010_000, 110), 110_000);
-        // Off and on; and on again with a count above the one before.
+        // Off and on; and on again with a count above the previous one.
         assert_eq!(read(0, 5_000), 5_000_000);
         assert_eq!(read(90_000_000, 5_010), 5_010_000);
-        // It stood still for 0.9 s and went on counting from there: believed to be late for 20 s, then no longer.
+        // It stood still for 0.9 s and went on counting from there: treated as late for 20 s, then no longer.
         let times: Vec<i64> = (1..=2_100).map(|n| read(90_000_000 + n * 10_000, 5_910 + n as i64 * 10)).collect();
         assert!((5_020_000..5_021_000).contains(&times[0]), "{}", times[0]);
         assert_eq!(times[2_099], 26_910_000);

@@ -3,15 +3,16 @@
 use super::{Clock, MonotonicTime};
 use std::sync::{Once, OnceLock};
 
-/// Measures how long code takes on one thread. A read of the processor's counter costs less than half of one of the [`Clock`].
+/// Measures how long code takes on one thread. Reading the processor's counter costs less than half of reading the
+/// [`Clock`].
 ///
-/// It is no clock: readings of two threads cannot be compared, and the scale is exact to some parts in a million (a percent, if the
-/// machine was busy while it was found). Where a processor has no counter that runs at a constant rate, the crate `quanta`
-/// reads the system's clock.
+/// It is not a clock: readings of two threads cannot be compared, and the scale is exact to some parts in a million
+/// (a percent, if the machine was busy during calibration). If a processor has no counter that runs at a constant
+/// rate, the crate `quanta` reads the system's clock.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stopwatch(Option<&'static quanta::Clock>);
 
-/// What a stopwatch said.
+/// A reading of the stopwatch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Reading {
     Counter(u64),
@@ -21,19 +22,19 @@ pub(crate) enum Reading {
 static COUNTER: OnceLock<quanta::Clock> = OnceLock::new();
 
 impl Stopwatch {
-    /// Has the scale of the counter found, if nobody has yet: up to 200 ms of a busy machine, on a thread of its own.
+    /// Starts calibrating the counter, unless done already: up to 200 ms of a busy machine, on a separate thread.
     pub(crate) fn prepare() {
         static ONCE: Once = Once::new();
         ONCE.call_once(|| {
             let find = || {
                 COUNTER.get_or_init(quanta::Clock::new);
             };
-            // Without a thread, the clock is read.
+            // If the thread cannot be started, the clock is read.
             let _ = std::thread::Builder::new().name("bb-counter".into()).spawn(find);
         });
     }
 
-    /// By the counter, or by the clock as long as its scale is not known.
+    /// Reads the counter, or the clock until the counter is calibrated.
     #[inline]
     pub(crate) fn start() -> Self {
         Self(COUNTER.get())
@@ -47,8 +48,8 @@ impl Stopwatch {
         }
     }
 
-    /// The nanoseconds from `start` to `end`, both of this stopwatch; zero if the counter went back, as it may when a machine is
-    /// suspended.
+    /// The nanoseconds from `start` to `end`, both of this stopwatch. Zero if the counter went back, as it may when a
+    /// machine is suspended.
     #[inline]
     pub(crate) fn nanos_between(self, start: Reading, end: Reading) -> i64 {
         match (self.0, start, end) {
@@ -78,7 +79,7 @@ mod tests {
                 let shortest = inner.elapsed().as_nanos() as i64;
                 let measured = stopwatch.nanos_between(start, stopwatch.read(&clock));
                 let longest = outer.elapsed().as_nanos() as i64;
-                // A busy machine spoils the scale by a percent or two.
+                // A busy machine distorts the scale by a percent or two.
                 let tolerance = 100 + longest / 20;
                 let is_right = shortest - tolerance <= measured && measured <= longest + tolerance;
                 assert!(is_right, "{measured} ns in {shortest} to {longest}: {stopwatch:?}");

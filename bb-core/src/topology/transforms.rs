@@ -1,4 +1,4 @@
-//! The frames of a robot as ROS's messages of transforms.
+//! The frames of a robot as ROS transform messages.
 
 use super::{Joint, JointKind, Topology};
 use crate::message::codec::ros::{Header, Time, TransformStamped, TransformsMessage};
@@ -6,8 +6,8 @@ use crate::time::WallTime;
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 impl TransformsMessage {
-    /// What does not move: the frame of a joint in that of the link it is mounted on, and of a fixed joint that of the link
-    /// it carries.
+    /// The fixed transforms: the frame of each joint relative to its parent link, and of each fixed joint's child
+    /// link relative to the joint.
     pub fn fixed(topology: &Topology, time: WallTime) -> Self {
         let name = |link: usize| topology.links.get(link).map_or("", |link| link.name);
         let transforms = topology.joints.iter().filter_map(|joint| {
@@ -23,8 +23,8 @@ impl TransformsMessage {
         Self { transforms: transforms.collect() }
     }
 
-    /// What the joints of these numbers carry, if they move, with the position of each, in the coordinates of
-    /// [`kinematics`](crate::kinematics#coordinates); empty for one at rest.
+    /// The transforms of these joints, if they move, with the position of each in the coordinates of
+    /// [`kinematics`](crate::kinematics#coordinates); empty for a joint at rest.
     pub fn moving(
         topology: &Topology,
         joints: impl IntoIterator<Item = (usize, impl AsRef<[f64]>)>,
@@ -46,8 +46,8 @@ impl TransformsMessage {
 }
 
 impl Joint {
-    /// Takes points from the link that the joint carries to the joint's frame, at a position in the coordinates of
-    /// [`kinematics`](crate::kinematics#coordinates). At rest if there are not as many numbers as the joint has.
+    /// Transforms points from the link that the joint carries to the joint's frame, at a position in the coordinates
+    /// of [`kinematics`](crate::kinematics#coordinates). At rest if the position has the wrong length.
     pub fn motion(&self, position: &[f64]) -> Isometry3<f64> {
         let axis = Vector3::from(self.axis.unwrap_or([1.0, 0.0, 0.0]));
         match (self.kind, position) {
@@ -58,7 +58,7 @@ impl Joint {
             (JointKind::Prismatic, [length]) => Translation3::from(axis * *length).into(),
             (JointKind::Planar, [x, y, angle]) => {
                 let axis = Unit::new_normalize(axis);
-                // As the kinematics have it where the axis is opposite to z.
+                // Same convention as the kinematics if the axis is opposite to z.
                 let joint_from_plane = UnitQuaternion::rotation_between_axis(&Vector3::z_axis(), &axis)
                     .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
                 let moved = joint_from_plane * Vector3::new(*x, *y, 0.0);

@@ -1,10 +1,10 @@
-//! A topology as URDF. Numbers are written so that they are read back the same.
+//! A topology as URDF. Numbers are written so that they read back unchanged.
 
 use super::{Collision, Geometry, Inertial, Joint, Link, Material, Origin, Topology, Visual};
 use std::fmt::{Display, Write};
 
 impl Topology {
-    /// The robot as a URDF file. Sensors and estimators have no place in URDF and are left out.
+    /// The robot as a URDF file. URDF has no sensors and estimators; they are left out.
     pub fn to_urdf(&self, robot: &str) -> String {
         let mut xml = Xml::default();
         xml.line("<?xml version=\"1.0\"?>");

@@ -1,4 +1,4 @@
-//! Any of the filters, chosen at run time by name.
+//! Any of the filters, chosen by name at run time.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -21,7 +21,7 @@ macro_rules! any {
             /// Every filter with its defaults.
             pub const ALL: &'static [fn() -> Self] = &[$(|| Self::$estimator(super::$params::default())),*];
 
-            /// The filter's name, that of its folder.
+            /// The filter's name, which is that of its folder.
             pub fn name(&self) -> &'static str {
                 match self {
                     $(Self::$estimator(_) => stringify!($module),)*
@@ -89,7 +89,7 @@ impl FilterParams {
 }
 
 impl Default for FilterParams {
-    /// The most accurate.
+    /// The most accurate one.
     fn default() -> Self {
         Self::Mekf(super::MekfParams::default())
     }
@@ -109,7 +109,7 @@ impl Params for FilterParams {
     }
 }
 
-/// Which of the filters, and its parameters: what [`AnyFilter`] is made from.
+/// One of the filters with its parameters, from which [`AnyFilter`] is created.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "runtime", derive(bb_core::Options))]
 pub struct AnyParams {
@@ -118,7 +118,8 @@ pub struct AnyParams {
     pub filter: FilterParams,
 }
 
-/// One of the filters, chosen at run time. One that is chosen where the program is written is cheaper by itself.
+/// One of the filters, chosen at run time. If the choice is fixed in the program, using that filter directly is
+/// cheaper.
 ///
 /// ```
 /// use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, FilterParams};

@@ -1,11 +1,11 @@
 //! A complementary filter on quaternions, with six axes or nine.
 //!
-//! The gyroscope is integrated exactly for the sample's time. Then the orientation is turned by a fraction of
-//! what is left between it and the sensors that do not drift: about a horizontal axis towards gravity, and
-//! about the vertical towards magnetic north. The fraction is that of a first-order low-pass,
-//! `1 - exp(-dt/τ)`, so that the gyroscope rules above the frequency `1/(2πτ)` and the other sensor below.
+//! The gyroscope is integrated exactly for the sample's time. Then the orientation is turned by a fraction of its
+//! remaining difference from the drift-free sensors: about a horizontal axis towards gravity, and about the vertical
+//! towards magnetic north. The fraction is that of a first-order low-pass, `1 - exp(-dt/τ)`, so the gyroscope
+//! dominates above the frequency `1/(2πτ)` and the other sensor below.
 //!
-//! Two ideas are others':
+//! Two ideas come from others:
 //!
 //! * The two corrections are separate, in the world frame, so that a magnetic disturbance can never tilt the
 //!   orientation: R. G. Valenti, I. Dryanovski, J. Xiao, "Keeping a Good Attitude: A Quaternion-Based

@@ -1,4 +1,4 @@
-//! How far an orientation misses the measured directions of gravity and field.
+//! The deviation of an orientation from the measured directions of gravity and field.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -27,7 +27,7 @@ pub(super) fn misalignment<T: Real>(
     let (wz, xy, zz) = (w * z2, x * y2, z * z2);
     let world_north = Vector3::new(xy + wz, T::ONE - xx - zz, yz - wx);
     let vertical = world_up.dot(field);
-    // Both are unit vectors but for rounding.
+    // Both are unit vectors up to rounding.
     let squared = T::ONE - vertical * vertical;
     let horizontal = if squared > T::ZERO { squared.sqrt() } else { T::ZERO };
     // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
@@ -35,15 +35,15 @@ pub(super) fn misalignment<T: Real>(
     (error, world_up)
 }
 
-/// A unit vector, body frame, perpendicular to the expected vertical: about it a body that is exactly upside down,
-/// where the misalignment is zero, is turned upright.
+/// A unit vector, body frame, perpendicular to the expected vertical. A body that is exactly upside down, where the
+/// misalignment is zero, is turned upright about it.
 #[cold]
 pub(super) fn horizontal_axis<T: Real>(world_up: Vector3<T>) -> Vector3<T> {
     let axis = if world_up.x.abs() < T::HALF { Vector3::x() } else { Vector3::y() };
     axis.cross(&world_up).normalize()
 }
 
-/// East and up, as they are expected in the body frame: the first and third row of R.
+/// East and up as expected in the body frame: the first and third row of R.
 #[inline]
 pub(super) fn expected<T: Real>(world_from_body: &UnitQuaternion<T>) -> [Vector3<T>; 2] {
     let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);
@@ -53,7 +53,7 @@ pub(super) fn expected<T: Real>(world_from_body: &UnitQuaternion<T>) -> [Vector3
     [Vector3::new(T::ONE - yy - zz, xy - wz, xz + wy), Vector3::new(xz - wy, yz + wx, T::ONE - xx - yy)]
 }
 
-/// Up, as it is expected in the body frame, times the squared norm of `world_from_body`, which may have any.
+/// Up as expected in the body frame, times the squared norm of `world_from_body`, which may be any.
 #[inline]
 pub(super) fn expected_up<T: Real>(world_from_body: &Quaternion<T>) -> Vector3<T> {
     let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);

@@ -1,4 +1,4 @@
-//! How far an orientation is from the truth, and the root mean square over a recording.
+//! The error of an orientation, and the root mean square over a recording.
 //!
 //! The decomposition into heading and inclination is the one of D. Laidig, M. Caruso, A. Cereatti, T. Seel,
 //! "BROAD – A Benchmark for Robust Inertial Orientation Estimation", Data 6(7):72, 2021.
@@ -14,14 +14,14 @@ pub struct OrientationError {
     pub total: f64,
     /// Its part about the vertical, `2 atan |z / w|`, rad.
     pub heading: f64,
-    /// What is left: its part about a horizontal axis, `2 acos √(w² + z²)`, rad.
+    /// The rest: its part about a horizontal axis, `2 acos √(w² + z²)`, rad.
     pub inclination: f64,
 }
 
 impl OrientationError {
     /// The error of `estimate` against `truth`, both `world_from_body` with z up.
     ///
-    /// `None` if the truth is not finite, as where a tracking system lost its markers. An estimate that is
+    /// `None` if the truth is not finite, for example where a tracking system lost its markers. An estimate that is
     /// not finite gives NaN, so that it is never mistaken for a missing truth.
     pub fn between<T: Real>(estimate: &UnitQuaternion<T>, truth: &UnitQuaternion<T>) -> Option<Self> {
         if !truth.coords.iter().all(|component| component.is_finite()) {
@@ -41,7 +41,7 @@ impl OrientationError {
     }
 }
 
-/// Root mean squares of [`OrientationError`]s, gathered one at a time.
+/// Root mean squares of [`OrientationError`]s, added one at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorStatistics {
     count: u64,
@@ -52,7 +52,7 @@ pub struct ErrorStatistics {
 }
 
 impl ErrorStatistics {
-    /// Statistics of no samples.
+    /// Statistics without samples.
     pub fn new() -> Self {
         Self::default()
     }
@@ -69,12 +69,12 @@ impl ErrorStatistics {
         self.inclination += error.inclination * error.inclination;
     }
 
-    /// How many errors there are.
+    /// The number of errors.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// How many samples had no truth.
+    /// The number of samples without truth.
     pub fn skipped(&self) -> u64 {
         self.skipped
     }

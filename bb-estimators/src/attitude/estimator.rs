@@ -12,11 +12,11 @@ use bb_core::{Context, Estimator, Fault, Inputs, Options, Reply};
 use std::marker::PhantomData;
 
 /// The attitude filter `F` as an estimator that takes `I`: [`Imu`], [`Marg`](bb_core::payload::Marg) or
-/// [`ImuAndMagnetometer`]; and that emits `O`: [`Orientation`], or [`AttitudeOutputs`] with what else it knows.
+/// [`ImuAndMagnetometer`]; and emits `O`: [`Orientation`], or [`AttitudeOutputs`] with its other estimates.
 ///
-/// It emits the orientation of the frame where it is declared: in a sensor that sensor's, on a link that link's, to
-/// which the samples are turned first. Angular velocity and field are those of the whole rigid body; specific force
-/// is taken as measured, without the lever arm between sensor and link.
+/// It emits the orientation of the frame where it is declared: the sensor's frame in a sensor, the link's on a link.
+/// The samples are first rotated to that frame. Angular velocity and field are those of the whole rigid body;
+/// specific force is used as measured, without the lever arm between sensor and link.
 ///
 /// ```
 /// # fn main() {}
@@ -39,7 +39,7 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// A sample that the filter refuses (time that does not increase, absurd values) changes nothing and emits nothing.
+/// A sample refused by the filter (non-increasing time, absurd values) changes nothing and emits nothing.
 #[derive(Debug)]
 pub struct Attitude<F, I = Imu, O = Orientation> {
     filter: F,

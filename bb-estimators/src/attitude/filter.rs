@@ -1,4 +1,4 @@
-//! What every attitude filter does: samples in, one orientation out.
+//! The interface of every attitude filter: samples in, one orientation out.
 
 use core::fmt::Debug;
 
@@ -17,45 +17,44 @@ use super::{ImuSample, ParamsError, Real, SampleError};
 /// * The time step is the difference of two stamps. After a gap longer than [`MAX_GAP_S`](super::MAX_GAP_S)
 ///   nothing is integrated: tilt restarts from the accelerometer, heading is kept until the next field
 ///   sets it at once (for ever without a magnetometer).
-/// * In free fall the filter follows the gyroscope alone; one without a gyroscope stays as it is.
-/// * A sample that is refused leaves the filter as it was.
+/// * In free fall the filter follows the gyroscope alone; one without a gyroscope does not change.
+/// * A refused sample leaves the filter unchanged.
 ///
-/// The orientation has unit norm for ever.
+/// The orientation always has unit norm.
 pub trait AttitudeFilter<T: Real = f64>: Sized {
-    /// The tuning of the filter. `Default` is one set that works on ordinary sensors.
+    /// The tuning of the filter. `Default` is a set that works with ordinary sensors.
     type Params: Clone + Debug + Default + PartialEq;
 
-    /// Makes a filter that has seen no sample yet.
+    /// Creates a filter that has seen no sample yet.
     ///
     /// # Errors
     ///
     /// The first parameter outside its accepted range, by name.
     fn new(params: Self::Params) -> Result<Self, ParamsError>;
 
-    /// The parameters that the filter was made with.
+    /// The parameters that the filter was created with.
     fn params(&self) -> &Self::Params;
 
     /// Takes one sample.
     ///
     /// # Errors
     ///
-    /// [`SampleError`] if a value is not finite or absurdly large, or if time does not increase. The
-    /// filter is then as it was before the call.
+    /// [`SampleError`] if a value is not finite or absurdly large, or if time does not increase. The filter is then
+    /// unchanged.
     fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError>;
 
-    /// Starts from an orientation that is known, heading included, at `time_ns`, in place of one from the
-    /// first sample.
+    /// Starts from a known orientation, including the heading, at `time_ns`, instead of one from the first sample.
     ///
     /// # Errors
     ///
-    /// [`SampleError::NonFinite`] if the orientation is not a rotation. The filter is then as it was.
+    /// [`SampleError::NonFinite`] if the orientation is not a rotation. The filter is then unchanged.
     fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError>;
 
     /// The orientation after the last sample, or `None` before the filter has started.
     fn world_from_body(&self) -> Option<UnitQuaternion<T>>;
 
-    /// The gyroscope's bias, rad/s in the body frame: what it reads more than the angular velocity. `None` if the
-    /// filter does not estimate it; zero as long as it knows nothing of it.
+    /// The gyroscope's bias, rad/s in the body frame: its reading minus the angular velocity. `None` if the filter
+    /// does not estimate it; zero until it is known.
     fn gyroscope_bias(&self) -> Option<Vector3<T>> {
         None
     }
@@ -67,18 +66,19 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
         None
     }
 
-    /// Whether the sensor is at rest. `None` if the filter does not tell.
+    /// Whether the sensor is at rest. `None` if the filter does not report it.
     fn is_at_rest(&self) -> Option<bool> {
         None
     }
 
-    /// Whether the magnetic field is disturbed, so that the heading does not follow it as usual. `None` if the
-    /// filter does not tell, or uses no magnetometer.
+    /// Whether the magnetic field is disturbed, so that the heading does not follow it as usual. `None` if the filter
+    /// does not report it, or uses no magnetometer.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         None
     }
 
-    /// Whether the heading is known well enough to act on. `None` if the filter does not tell, or uses no magnetometer.
+    /// Whether the heading is known well enough to be used. `None` if the filter does not report it, or uses no
+    /// magnetometer.
     fn is_heading_trusted(&self) -> Option<bool> {
         None
     }
@@ -87,10 +87,10 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
     fn reset(&mut self);
 }
 
-/// What a filter is for: in its folder, for the command and the guides.
+/// A filter's purpose: in its folder, for the command and the guides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct About {
-    /// When to take it.
+    /// When to use it.
     pub when: &'static str,
     /// How it works, in a sentence.
     pub idea: &'static str,

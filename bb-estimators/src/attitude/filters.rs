@@ -1,6 +1,6 @@
-//! The filters there are. Each is one folder, and one line here, which everything that names all of them is made from: the
-//! modules of [`attitude`](super), the estimators at the top of the crate, [`AnyFilter`](super::AnyFilter), and with it the
-//! command, the examples, the tests of accuracy and the tables in the guides.
+//! The list of filters. Each is one folder, and one line here. Everything that names all filters is generated from
+//! it: the modules of [`attitude`](super), the estimators at the top of the crate, [`AnyFilter`](super::AnyFilter),
+//! and with it the command, the examples, the tests of accuracy and the tables in the guides.
 
 /// Calls the macro `$with` with the list of attitude filters, `$($head)*` before it:
 /// `folder Estimator Filter Params;`, one line each. Its items are in `bb_estimators::attitude`.

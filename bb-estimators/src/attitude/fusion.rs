@@ -1,4 +1,4 @@
-//! The revised AHRS algorithm that x-io's Fusion library made known, with six axes or nine.
+//! The revised AHRS algorithm known from x-io's Fusion library, with six axes or nine.
 //!
 //! S. O. H. Madgwick, "AHRS algorithms and calibration solutions to facilitate new applications using low-cost MEMS",
 //! PhD thesis, University of Bristol, 2014, chapter 7; and the documentation of x-io Technologies' Fusion library, for
@@ -6,10 +6,10 @@
 //!
 //! # Idea
 //!
-//! A complementary filter: the gyroscope is integrated, and the orientation turned towards gravity and, about the
-//! vertical alone, towards magnetic north, at a rate of the gain times the sine of the error.
+//! A complementary filter: the gyroscope is integrated, and the orientation is turned towards gravity and, only about
+//! the vertical, towards magnetic north, at a rate of the gain times the sine of the error.
 //!
-//! * Startup: the gain goes down to its value from 10 within 3 s.
+//! * Startup: the gain decreases from 10 to its value within 3 s.
 //! * Rejection: an accelerometer whose direction is farther from the expected one than a threshold is ignored for that
 //!   sample; the magnetometer likewise, by its heading.
 //! * Recovery: where more than 90 % of the samples are rejected for some seconds, all are taken, until most are right.

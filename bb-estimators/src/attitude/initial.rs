@@ -1,4 +1,4 @@
-//! The orientation that one accelerometer and, if there is one, one magnetometer sample show.
+//! The orientation given by one accelerometer sample and, if there is one, one magnetometer sample.
 //!
 //! Gravity gives the tilt, the horizontal part of the magnetic field the heading; the vertical part of the
 //! field, its dip, is not used.
@@ -13,19 +13,19 @@ use super::rotation::{turn_heading, turn_upright};
 pub use super::sample::FREE_FALL;
 use super::sample::Quantity;
 
-/// The least horizontal part of the magnetic field, as a fraction of its norm, that shows a heading: a dip of
-/// 89.4°, met only next to the magnetic poles.
+/// The smallest horizontal part of the magnetic field, as a fraction of its norm, that gives a heading: a dip of
+/// 89.4°, which occurs only near the magnetic poles.
 pub const MIN_HORIZONTAL_FRACTION: f64 = 0.01;
 
-/// Why two vectors show no orientation.
+/// Why two vectors give no orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InitialError {
     /// A component is NaN or infinite.
     NonFinite {
-        /// Which quantity.
+        /// The quantity.
         quantity: Quantity,
     },
-    /// The specific force is below [`FREE_FALL`], so it does not show where up is.
+    /// The specific force is below [`FREE_FALL`], so it does not show which way is up.
     FreeFall,
     /// The magnetic field is zero or vertical within [`MIN_HORIZONTAL_FRACTION`], so it shows no heading.
     NoHorizontalField,
@@ -47,7 +47,7 @@ impl fmt::Display for InitialError {
 
 impl Error for InitialError {}
 
-/// The orientation `world_from_body` in ENU that a sensor at rest shows.
+/// The orientation `world_from_body` in ENU given by a sensor at rest.
 ///
 /// `specific_force` (m/s²) and `magnetic_field` (any unit) are in the body frame. With a field, the body's
 /// heading is such that the horizontal field points along y, magnetic north. Without one, the result is the
@@ -78,8 +78,8 @@ pub fn initial_orientation<T: Real>(
     Ok(turn_heading(&level, error))
 }
 
-/// The angle, rad, by which the world's vertical has to be turned about to bring the horizontal part of the
-/// unit vector `field`, in the world frame, to y. `None` if it has no horizontal part.
+/// The angle, rad, about the world's vertical that brings the horizontal part of the unit vector `field`, in the
+/// world frame, to y. `None` if it has no horizontal part.
 pub(super) fn heading_error<T: Real>(field: &Vector3<T>) -> Option<T> {
     let squared = field.x * field.x + field.y * field.y;
     (squared > T::of(MIN_HORIZONTAL_FRACTION * MIN_HORIZONTAL_FRACTION)).then(|| field.x.atan2(field.y))

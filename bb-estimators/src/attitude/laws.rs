@@ -1,6 +1,6 @@
-//! Laws that hold for every attitude filter, whatever its method: one macro, one line for each filter.
+//! Laws that hold for every attitude filter, regardless of its method: one macro, one line per filter.
 //!
-//! Known answers that all filters share are here as well; those of one filter are in its own tests.
+//! Known answers shared by all filters are here as well; those of one filter are in its own tests.
 
 mod convergence;
 mod invariance;
@@ -30,8 +30,8 @@ pub(super) const UP: Vector3<f64> = Vector3::new(0.0, 0.0, 9.81);
 /// The magnetic field of central Europe, in the world.
 pub(super) const FIELD: Vector3<f64> = Vector3::new(0.0, 20e-6, -45e-6);
 
-/// Writes the tests of all laws for one filter, in both scalars. The parameters have to pull an error of 90° to below 0.1°
-/// within 200 s at 100 Hz.
+/// Generates the tests of all laws for one filter, in both scalars. The parameters must reduce an error of 90° to
+/// below 0.1° within 200 s at 100 Hz.
 macro_rules! attitude_laws {
     (nine_axes: $nine:expr, six_axes: $six:expr) => {
         crate::attitude::laws::attitude_laws_without_gyroscope!(nine_axes: $nine, six_axes: $six);
@@ -41,7 +41,7 @@ macro_rules! attitude_laws {
 }
 pub(super) use attitude_laws;
 
-/// Those of the laws that hold for filters that do not use the gyroscope, too.
+/// The laws that also hold for filters without a gyroscope.
 macro_rules! attitude_laws_without_gyroscope {
     (nine_axes: $nine:expr, six_axes: $six:expr) => {
         crate::attitude::laws::laws_in!(laws, f64, $nine, $six);
@@ -81,7 +81,7 @@ macro_rules! laws_in {
             use crate::attitude::laws;
             use proptest::prelude::*;
 
-            /// One that has seen no sample.
+            /// A filter that has seen no sample.
             macro_rules! nine {
                 () => {
                     laws::InScalar::<$scalar, _>::new($nine)
@@ -185,8 +185,8 @@ macro_rules! laws_in {
 }
 pub(super) use laws_in;
 
-/// What the laws need of a filter in addition to its trait.
+/// The interface that the laws need in addition to the filter's trait.
 pub(super) trait Filter: AttitudeFilter + Clone + PartialEq + core::fmt::Debug {
-    /// What a law allows for the rounding of the scalar that the filter computes with.
+    /// The tolerance of a law, for rounding in the filter's scalar.
     fn within(double: f64, single: f64) -> f64;
 }

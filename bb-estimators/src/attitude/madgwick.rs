@@ -4,8 +4,8 @@
 //! internal report, University of Bristol, 2010; S. O. H. Madgwick, A. J. L. Harrison, R. Vaidyanathan,
 //! "Estimation of IMU and MARG orientation using a gradient descent algorithm", ICORR 2011.
 //!
-//! The gyroscope is integrated; against its drift, every sample turns the orientation by a step of fixed
-//! length down the gradient of how badly it explains gravity and the magnetic field.
+//! The gyroscope is integrated. Against its drift, every sample turns the orientation by a step of fixed length down
+//! the gradient of the error in explaining gravity and the magnetic field.
 //!
 //! # Differences from the papers
 //!

@@ -4,9 +4,9 @@
 //! Transactions on Automatic Control 53(5), 2008: the explicit complementary filter with bias correction, their
 //! equations (32).
 //!
-//! The gyroscope is integrated. What gravity and field miss their expected directions by is an angular velocity,
-//! the cross products of measured and expected directions: in proportion it turns the orientation, and its
-//! integral is the gyroscope's bias.
+//! The gyroscope is integrated. The deviation of gravity and field from their expected directions gives an angular
+//! velocity, the sum of the cross products of measured and expected directions. The proportional part turns the
+//! orientation, and the integral is the gyroscope's bias.
 //!
 //! # Differences from the paper
 //!

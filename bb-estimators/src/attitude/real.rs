@@ -1,13 +1,13 @@
-//! The scalars that the algorithms compute with.
+//! The scalar types of the algorithms.
 
 use core::iter::Sum;
 
 use nalgebra::RealField;
 
-/// A scalar that every algorithm computes with: `f64`, the default everywhere, or `f32`, for processors that have no
-/// other in hardware.
+/// A scalar type supported by every algorithm: `f64`, the default everywhere, or `f32`, for processors without
+/// hardware support for `f64`.
 ///
-/// Time is integer nanoseconds and parameters are `f64` with both; what is computed with every sample is of this type.
+/// With both, time is integer nanoseconds and parameters are `f64`; per-sample computations use this type.
 pub trait Real: RealField + Copy + Default + Sum + sealed::Sealed {
     /// 0.
     const ZERO: Self;
@@ -19,8 +19,8 @@ pub trait Real: RealField + Copy + Default + Sum + sealed::Sealed {
     const HALF: Self;
     /// The difference between 1 and the next number.
     const EPSILON: Self;
-    /// The squared norm below which a vector of unknown unit is none: far enough above the least number for its direction
-    /// to be exact.
+    /// A vector of unknown unit with a smaller squared norm counts as zero: far enough above the smallest number for
+    /// its direction to be exact.
     const LEAST_SQUARE: Self;
 
     /// The nearest to `value`.
@@ -32,7 +32,7 @@ pub trait Real: RealField + Copy + Default + Sum + sealed::Sealed {
     /// Nanoseconds in seconds.
     fn seconds(nanoseconds: i64) -> Self;
 
-    /// The nearest to `value`, but not below what a few roundings of numbers near 1 add up to.
+    /// The nearest to `value`, but at least the sum of a few roundings of numbers near 1.
     #[inline(always)]
     fn above_rounding(value: f64) -> Self {
         Self::of(value).max(Self::of(4.0) * Self::EPSILON)

@@ -1,13 +1,13 @@
-//! Rotations of a unit quaternion, written out so that they cost little and keep the norm.
+//! Rotations of a unit quaternion, written out to be cheap and to keep the norm.
 //!
-//! The norm is kept to rounding by each, and [`renormalised`] takes the rounding away once a sample, without
-//! a root or a division.
+//! Each keeps the norm up to rounding, and [`renormalised`] removes the rounding once per sample, without a root or a
+//! division.
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::Real;
 
-/// Below this squared angle, rad², sine and cosine of the half angle are series.
+/// Below this squared angle, rad², sine and cosine of the half angle are computed by series.
 pub(super) const SERIES_SQUARED_ANGLE: f64 = 0.01;
 
 /// Cosine of half an angle, and the factor that makes the sine of half of it of the angle, for its square, rad².
@@ -21,7 +21,8 @@ pub(super) fn half_angle<T: Real>(squared_angle: T) -> (T, T) {
     (cos, sin / angle)
 }
 
-/// [`half_angle`] below [`SERIES_SQUARED_ANGLE`]: with h = (θ/2)² below 0.0025 the first terms left out are below 1e-19.
+/// [`half_angle`] below [`SERIES_SQUARED_ANGLE`]: with h = (θ/2)² below 0.0025, the first omitted terms are below
+/// 1e-19.
 #[inline]
 fn series_of_half_angle<T: Real>(squared_angle: T) -> (T, T) {
     let h = T::of(0.25) * squared_angle;
@@ -92,7 +93,7 @@ pub(super) fn turn_heading<T: Real>(world_from_body: &UnitQuaternion<T>, angle: 
     turn_heading_by(world_from_body, [cos, sin])
 }
 
-/// Turns `world_from_body` about the world's vertical by an angle of whose half these are cosine and sine.
+/// Turns `world_from_body` about the world's vertical by an angle, given by cosine and sine of its half.
 #[inline]
 pub(super) fn turn_heading_by<T: Real>(world_from_body: &UnitQuaternion<T>, [c, s]: [T; 2]) -> UnitQuaternion<T> {
     let q = world_from_body;
@@ -123,7 +124,7 @@ pub(super) fn turn_upright<T: Real>(world_from_body: &UnitQuaternion<T>, up: &Ve
     )
 }
 
-/// `orientation` with its norm, which is 1 but for rounding, brought back to 1.
+/// `orientation` with its norm, which is 1 up to rounding, restored to 1.
 pub(super) fn renormalised<T: Real>(orientation: &UnitQuaternion<T>) -> UnitQuaternion<T> {
     let q = orientation;
     // One step of Newton's method for 1/√n at n = 1.

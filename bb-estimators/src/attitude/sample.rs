@@ -7,24 +7,24 @@ use nalgebra::Vector3;
 
 use super::Real;
 
-/// Below this specific force, m/s², a sensor is in free fall and does not show where up is.
+/// Below this specific force, m/s², a sensor is in free fall and does not show which way is up.
 pub const FREE_FALL: f64 = 0.5;
 
-/// The greatest component of the angular velocity that a filter takes, rad/s. Gyroscopes end below 100 rad/s.
+/// The largest component of the angular velocity that a filter accepts, rad/s. Gyroscopes end below 100 rad/s.
 pub const MAX_ANGULAR_VELOCITY: f64 = 1e3;
 
-/// The greatest component of the specific force that a filter takes, m/s². Shock sensors end below 10⁵ m/s².
+/// The largest component of the specific force that a filter accepts, m/s². Shock sensors end below 10⁵ m/s².
 pub const MAX_SPECIFIC_FORCE: f64 = 1e6;
 
-/// The largest component of the magnetic field that a filter takes, in any unit.
+/// The largest component of the magnetic field that a filter accepts, in any unit.
 pub const MAX_MAGNETIC_FIELD: f64 = 1e15;
 
-/// One sample of an inertial sensor, with the magnetic field when there is a new one.
+/// One sample of an inertial sensor, with the magnetic field if there is a new one.
 ///
 /// All vectors are in the body frame, which is the sensor's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuSample<T = f64> {
-    /// When it was measured, nanoseconds since any fixed moment.
+    /// When it was measured, nanoseconds since any fixed time.
     pub time_ns: i64,
     /// Angular velocity of the body relative to the world, rad/s.
     pub angular_velocity: Vector3<T>,
@@ -34,7 +34,7 @@ pub struct ImuSample<T = f64> {
     pub magnetic_field: Option<Vector3<T>>,
 }
 
-/// A quantity that a filter is given.
+/// An input quantity of a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// [`ImuSample::angular_velocity`].
@@ -58,28 +58,28 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// Why a filter refused a sample. The filter is as it was before.
+/// Why a filter refused a sample. The filter is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SampleError {
     /// A component is NaN or infinite.
     NonFinite {
-        /// Which quantity.
+        /// The quantity.
         quantity: Quantity,
     },
     /// A component is larger than any sensor's.
     OutOfRange {
-        /// Which quantity.
+        /// The quantity.
         quantity: Quantity,
         /// The greatest magnitude of a component, in the quantity's unit.
         value: f64,
-        /// The greatest magnitude that is accepted.
+        /// The largest accepted magnitude.
         limit: f64,
     },
     /// The time stamp does not increase.
     TimeNotIncreasing {
-        /// The stamp of the last sample that was taken.
+        /// The stamp of the last accepted sample.
         previous_ns: i64,
-        /// The stamp of the sample that was refused.
+        /// The stamp of the refused sample.
         time_ns: i64,
     },
 }
@@ -100,7 +100,7 @@ impl fmt::Display for SampleError {
 
 impl Error for SampleError {}
 
-/// What a sample shows of the world, unit vectors in the body frame.
+/// The directions of a sample, as unit vectors in the body frame.
 pub(super) struct Directions<T> {
     /// Of the specific force; `None` in free fall.
     pub(super) up: Option<Vector3<T>>,
@@ -120,10 +120,10 @@ impl<T: Real> ImuSample<T> {
         }
     }
 
-    /// The directions it shows, if every value that a filter uses is finite and one that a sensor can give.
+    /// The directions, if every value that a filter uses is finite and within the range of sensors.
     #[inline]
     pub(super) fn directions(&self, magnetometer: bool) -> Result<Directions<T>, SampleError> {
-        // Most samples are within the spheres in the cubes, of which the squared norms are needed anyway.
+        // Most samples are within the spheres inscribed in these cubes, whose squared norms are needed anyway.
         let rate = self.angular_velocity.norm_squared();
         let force = self.specific_force.norm_squared();
         let field = match &self.magnetic_field {
@@ -142,7 +142,8 @@ impl<T: Real> ImuSample<T> {
         })
     }
 
-    /// Whether angular velocity and specific force are within what a sensor can give, and the force shows where up is.
+    /// Whether angular velocity and specific force are within the range of sensors, and the force shows which way is
+    /// up.
     #[inline(always)]
     pub(super) fn is_usual(&self) -> bool {
         let rate = self.angular_velocity.norm_squared();

@@ -1,4 +1,4 @@
-//! What every filter remembers, and how it starts, steps and restarts.
+//! The common state of every filter, and how it starts, steps and restarts.
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
@@ -9,8 +9,8 @@ use super::{ImuSample, Quantity, Real, SampleError};
 
 /// The longest time between two samples that a filter integrates over, seconds.
 ///
-/// Over a second a hand turns a sensor by more than half a turn, which no single angular velocity describes.
-/// After a longer gap the tilt restarts from the accelerometer.
+/// Within a second, a hand turns a sensor by more than half a turn, which no single angular velocity describes. After
+/// a longer gap, the tilt restarts from the accelerometer.
 pub const MAX_GAP_S: f64 = 1.0;
 
 const MAX_GAP_NS: i64 = (MAX_GAP_S * 1e9) as i64;
@@ -24,7 +24,7 @@ pub(super) struct AttitudeState<T: Real> {
     heading_known: bool,
 }
 
-/// What there is to do for one sample once it has been accepted.
+/// The remaining work for an accepted sample.
 pub(super) struct Step<T> {
     /// Time since the previous sample, in `0..=MAX_GAP_S`, seconds.
     pub(super) dt_s: T,
@@ -42,8 +42,8 @@ impl<T: Real> AttitudeState<T> {
         Self { magnetometer, previous_ns: None, world_from_body: None, heading_known: false }
     }
 
-    /// The time since the previous sample, s, and the orientation then, for a sample without a field to use and with nothing
-    /// unusual: with six axes that is nearly every one. `None` for all others, which are left to [`admit`](Self::admit).
+    /// The time since the previous sample, s, and the orientation then, for an ordinary sample without a field to
+    /// use: with six axes, that is nearly every one. `None` for all others, which are left to [`admit`](Self::admit).
     #[inline(always)]
     pub(super) fn admit_usual(&mut self, sample: &ImuSample<T>) -> Option<(T, UnitQuaternion<T>)> {
         if sample.magnetic_field.is_some() && self.magnetometer {
@@ -59,7 +59,7 @@ impl<T: Real> AttitudeState<T> {
         Some((T::seconds(dt_ns), world_from_body))
     }
 
-    /// Checks a sample. `None` if the state has started or restarted with it and there is nothing to step.
+    /// Checks a sample. `None` if the state has started or restarted with it, so there is no step.
     #[inline]
     pub(super) fn admit(&mut self, sample: &ImuSample<T>) -> Result<Option<Step<T>>, SampleError> {
         let Directions { up, field } = sample.directions(self.magnetometer)?;
@@ -72,7 +72,7 @@ impl<T: Real> AttitudeState<T> {
 
         let previous_ns = self.previous_ns.replace(time_ns);
         if let (Some(previous_ns), Some(world_from_body)) = (previous_ns, self.world_from_body) {
-            // The difference of two stamps can be wider than their type.
+            // The difference of two stamps can overflow their type.
             let dt_ns = time_ns.checked_sub(previous_ns).unwrap_or(i64::MAX);
             if dt_ns <= MAX_GAP_NS {
                 return Ok(Some(Step { dt_s: T::seconds(dt_ns), world_from_body, up, field }));
@@ -82,13 +82,13 @@ impl<T: Real> AttitudeState<T> {
         Ok(None)
     }
 
-    /// Keeps the orientation that a step ended with, of any norm but 0. The first field sets its heading.
+    /// Keeps the orientation after a step, of any norm but 0. The first field sets its heading.
     #[inline]
     pub(super) fn store(&mut self, world_from_body: &Quaternion<T>, field: Option<Vector3<T>>) {
         self.keep(normalised(world_from_body), field);
     }
 
-    /// Keeps the orientation that a step ended with. The first field sets its heading.
+    /// Keeps the orientation after a step. The first field sets its heading.
     #[inline]
     pub(super) fn keep(&mut self, world_from_body: UnitQuaternion<T>, field: Option<Vector3<T>>) {
         self.world_from_body = Some(world_from_body);
@@ -136,10 +136,10 @@ impl<T: Real> AttitudeState<T> {
         *self = Self::new(self.magnetometer);
     }
 
-    /// Levels what orientation there is, or none, and lets the next field set the heading.
+    /// Levels the orientation, if there is one, and lets the next field set the heading.
     #[cold]
     fn restart(&mut self, sample: &ImuSample<T>) {
-        // Again, so that a step need not keep them for this; they have been checked.
+        // Computed again, so that a step need not keep them for this; they have been checked.
         let Ok(Directions { up, field }) = sample.directions(self.magnetometer) else { return };
         self.heading_known = false;
         let stale = self.world_from_body;

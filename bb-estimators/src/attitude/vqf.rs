@@ -8,21 +8,21 @@
 //!
 //! The orientation is a product of three rotations: `world_from_body = heading ⊗ level ⊗ inertial_from_body`.
 //!
-//! * `inertial_from_body` integrates the gyroscope less its bias. Its frame drifts slowly, as a whole.
+//! * `inertial_from_body` integrates the gyroscope minus its bias. Its frame drifts slowly, as a whole.
 //! * In that frame gravity is constant except for the drift, so that a strong low-pass of the specific force, as a
 //!   vector with its length, leaves gravity alone, whatever the rotation of the body. `level` turns it upright.
 //! * `heading`, an angle about the vertical, goes to that of the field by a first-order filter. A disturbed field
 //!   cannot tilt.
 //!
-//! A Kalman filter finds the gyroscope's bias: at rest it is what the gyroscope reads, in motion what `level` has
-//! to turn by. The field's norm and dip show whether it is disturbed; it is then ignored for a time, and followed
-//! slowly after that. A new field becomes the reference once it has been seen in motion for long enough.
+//! A Kalman filter estimates the gyroscope's bias: at rest from the gyroscope's reading, in motion from the
+//! corrections of `level`. The field's norm and dip show whether it is disturbed; it is then ignored for a time, and
+//! followed slowly after that. A new field becomes the reference once it has been seen in motion for long enough.
 //!
 //! # Differences from the paper
 //!
-//! None of them moves the orientation by more than 0.02° RMS on any of ten trials of BROAD that start at rest. Started in
-//! the middle of fast motion they move it by up to 0.5° RMS, neither way the better; the published code differs from
-//! itself by up to 0.4° there when the sensor is mounted otherwise.
+//! None of them moves the orientation by more than 0.02° RMS on any of ten trials of BROAD that start at rest. If
+//! started in the middle of fast motion, they move it by up to 0.5° RMS, with neither variant better; there, the
+//! published code differs from itself by up to 0.4° when the sensor is mounted differently.
 //!
 //! * Limits hold for the length of a vector, where the published code takes each component by itself, which depends
 //!   on how the sensor is mounted and on where north is. For the same reason the bias's covariance nears its initial

@@ -1,12 +1,13 @@
 //! The noise of a sensor at rest, by its Allan deviation.
 //!
-//! IEEE Std 952-1997, annex C: the overlapping estimate of the Allan variance, and how white noise, bias instability and rate
-//! random walk show in it,
+//! IEEE Std 952-1997, annex C: the overlapping estimate of the Allan variance, and how white noise, bias instability
+//! and rate random walk appear in it,
 //!
 //! `σ²(τ) = N²/τ + (2 ln 2 / π) B² + K² τ/3`.
 //!
-//! How well each variance is known follows W. J. Riley, D. A. Howe, "Handbook of Frequency Stability Analysis", NIST Special
-//! Publication 1065, 2008, section 5.4.1: an estimate is χ² distributed, with degrees of freedom that depend on the noise.
+//! The uncertainty of each variance follows W. J. Riley, D. A. Howe, "Handbook of Frequency Stability Analysis", NIST
+//! Special Publication 1065, 2008, section 5.4.1: an estimate is χ² distributed, with degrees of freedom that depend
+//! on the noise.
 
 use core::error::Error;
 use core::fmt;
@@ -15,16 +16,17 @@ use nalgebra::{ComplexField, Matrix3, Vector3};
 /// Averaging times double, up to 2³¹ samples.
 const OCTAVES: usize = 32;
 
-/// The longest averaging time is this part of the whole, so that its deviation is known within a quarter: IEEE 952, C.22.
+/// The longest averaging time is this fraction of the whole, so that its deviation is known within a quarter: IEEE
+/// 952, C.22.
 const SHARE: usize = 9;
 
-/// The fewest samples.
+/// The smallest number of samples.
 const LEAST: usize = 256;
 
 /// The flat part of the curve, as a multiple of the bias instability: `√(2 ln 2 / π)`.
 const FLOOR: f64 = 0.664_28;
 
-/// How often the weights are renewed with the curve that was fitted.
+/// The number of times the weights are recomputed with the fitted curve.
 const ROUNDS: usize = 8;
 
 /// One averaging time.
@@ -32,9 +34,9 @@ const ROUNDS: usize = 8;
 pub struct AllanPoint {
     /// The averaging time τ, s.
     pub time_s: f64,
-    /// In the unit of the sensor.
+    /// The Allan deviation, in the unit of the sensor.
     pub deviation: f64,
-    /// Of the deviation, one standard deviation over it.
+    /// Relative standard deviation of the Allan deviation.
     pub relative_error: f64,
 }
 
@@ -45,31 +47,32 @@ pub struct AllanCurve {
     count: usize,
 }
 
-/// What a sensor's noise is made of; all in the unit of the sensor, rad/s or m/s².
+/// The components of a sensor's noise; all in the unit of the sensor, rad/s or m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorNoise {
     /// White noise N, unit/√Hz: angle random walk of a gyroscope, velocity random walk of an accelerometer.
     pub density: Known,
     /// Bias instability, unit: the lowest point of the curve over 0.664; at the longest averaging time it is an upper limit.
     pub bias_instability: f64,
-    /// At which averaging time, s.
+    /// The averaging time of the lowest point, s.
     pub bias_instability_time_s: f64,
-    /// Whether the curve rises again, so that the lowest point is one.
+    /// Whether the curve rises again, so that the lowest point is a minimum.
     pub is_lowest: bool,
     /// Rate random walk K, unit/s/√Hz.
     pub random_walk: Known,
-    /// What they were taken from.
+    /// The Allan deviations they were computed from.
     pub curve: AllanCurve,
 }
 
-/// A number and how well it is known.
+/// A number and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
-    /// The best value; 0 if nothing of it is seen.
+    /// The best value; 0 if it is not observed.
     pub value: f64,
     /// One standard deviation.
     pub deviation: f64,
-    /// It is less than this with a confidence of 97.7 %: the square of the value is known within two of its deviations.
+    /// It is less than this with a confidence of 97.7 %: the square of the value is known within two of its
+    /// deviations.
     pub at_most: f64,
 }
 
@@ -78,14 +81,14 @@ pub struct Known {
 pub enum AllanError {
     /// There are too few samples.
     TooShort {
-        /// How many there are.
+        /// The number of samples.
         samples: usize,
-        /// The least.
+        /// The smallest number required.
         least: usize,
     },
-    /// All samples are the same.
+    /// All samples are equal.
     Constant,
-    /// Samples vary by less than any sensor can tell, or by more than can be computed with.
+    /// Samples vary by less than any sensor can resolve, or by more than can be computed with.
     Unlikely {
         /// An Allan deviation, in the unit of the samples.
         deviation: f64,
@@ -109,11 +112,11 @@ impl fmt::Display for AllanError {
 
 impl Error for AllanError {}
 
-/// What a sensor's samples may vary by: beyond, the powers of it that the fit takes are no longer numbers.
+/// The range of a sensor's variation: outside it, the powers of it used by the fit overflow or underflow.
 const DEVIATIONS: core::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
-/// Replaces samples by their integral in samples, the mean taken away: `out[k]` is the sum of the first k. The slice begins with
-/// one element more, which is ignored; n samples have n + 1 integrals.
+/// Replaces samples by their integral in samples, with the mean removed: `out[k]` is the sum of the first k. The
+/// slice begins with one extra element, which is ignored; n samples have n + 1 integrals.
 ///
 /// ```
 /// use bb_estimators::calibration::integrate;
@@ -124,7 +127,7 @@ const DEVIATIONS: core::ops::RangeInclusive<f64> = 1e-30..=1e30;
 /// ```
 pub fn integrate(samples: &mut [f64]) {
     let count = samples.len().saturating_sub(1).max(1) as f64;
-    // Around the first, so that a large bias costs no digits.
+    // Relative to the first sample, so that a large bias costs no digits.
     let first = samples.get(1).copied().unwrap_or(0.0);
     let mean = samples.iter().skip(1).map(|sample| sample - first).sum::<f64>() / count;
     let mut sum = 0.0;
@@ -137,8 +140,8 @@ pub fn integrate(samples: &mut [f64]) {
     }
 }
 
-/// The overlapping Allan deviation over `m` samples, of the integrals that [`integrate`] gives; none if there are fewer than
-/// `2 m + 1` of them.
+/// The overlapping Allan deviation over `m` samples, from the integrals computed by [`integrate`]; `None` if there
+/// are fewer than `2 m + 1` of them.
 ///
 /// `σ²(m τ₀) = Σ (θ[k + 2m] - 2 θ[k + m] + θ[k])² / (2 m² (n - 2m))`, IEEE 952, C.14, with θ in samples.
 pub fn allan_deviation(integrals: &[f64], m: usize) -> Option<f64> {
@@ -152,14 +155,15 @@ pub fn allan_deviation(integrals: &[f64], m: usize) -> Option<f64> {
     Some(sqrt(sum / (2.0 * terms as f64)) / m as f64)
 }
 
-/// What the noise of a sensor at rest is made of, from the integrals that [`integrate`] gives and the period of the samples.
+/// The noise components of a sensor at rest, from the integrals computed by [`integrate`] and the period of the
+/// samples.
 ///
-/// The curve is fitted by weighted least squares, no part of it less than nothing; that neighbouring averaging times share their
-/// samples counts in the deviations.
+/// The curve is fitted by weighted least squares, with no component negative; the deviations account for the samples
+/// shared by neighbouring averaging times.
 ///
 /// # Errors
 ///
-/// [`AllanError`]: too few samples, all the same, or one that is not a number.
+/// [`AllanError`]: too few samples, all equal, or one that is not finite.
 pub fn sensor_noise(integrals: &[f64], period_s: f64) -> Result<SensorNoise, AllanError> {
     let samples = integrals.len().saturating_sub(1);
     if samples < LEAST {
@@ -174,7 +178,7 @@ pub fn sensor_noise(integrals: &[f64], period_s: f64) -> Result<SensorNoise, All
     while m <= samples / SHARE && curve.count < OCTAVES {
         let deviation = allan_deviation(integrals, m).unwrap_or(0.0);
         if deviation <= 0.0 {
-            // The square of something tiny is 0 as well.
+            // The square of a tiny number is 0 as well.
             let largest = integrals.iter().fold(0.0, |largest: f64, integral| largest.max(integral.abs()));
             return Err(if largest > 0.0 {
                 AllanError::Unlikely { deviation: largest }
@@ -216,27 +220,27 @@ impl Fitted {
     fn known(&self, i: usize) -> Known {
         let (square, spread) = (self.squares[i], sqrt(self.covariance[(i, i)].max(0.0)));
         let value = sqrt(square);
-        // Where the square is known badly its root is no better than the root of that.
+        // If the square is poorly known, its root is no better than the root of its deviation.
         let deviation = if square > spread { spread / (2.0 * value) } else { sqrt(spread) / 2.0 };
         Known { value, deviation, at_most: sqrt(square + 2.0 * spread) }
     }
 }
 
-/// What each part adds to the Allan variance at τ, for a square of 1.
+/// The contribution of each component to the Allan variance at τ, for a square of 1.
 fn parts(time_s: f64) -> Vector3<f64> {
     Vector3::new(1.0 / time_s, 1.0, time_s / 3.0)
 }
 
 impl AllanCurve {
-    /// By growing averaging time.
+    /// By increasing averaging time.
     pub fn points(&self) -> &[AllanPoint] {
         self.points.get(..self.count).unwrap_or(&[])
     }
 
-    /// Fits the parts, and fills in how well each point is known; `integrals` is how many there are.
+    /// Fits the components, and fills in the uncertainty of each point; `integrals` is their number.
     fn fit(&mut self, integrals: usize) -> Fitted {
         let mut fitted = Fitted { squares: Vector3::zeros(), covariance: Matrix3::zeros() };
-        // Of each point: which noise dominates, and what weight times its deviation is.
+        // For each point: the dominant noise, and the weight times its deviation.
         let mut seen = [(0, Vector3::zeros()); OCTAVES];
         for round in 0..ROUNDS {
             let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -268,8 +272,9 @@ impl AllanCurve {
     }
 }
 
-/// Of the Allan variances over m and 2^lag m samples, under white noise (0), flicker noise (1) or a random walk (2): both are
-/// sums over one spectrum, whose windows `sin⁴x / x²⁺ⁿ` overlap; here integrated numerically.
+/// Correlation of the Allan variances over m and 2^lag m samples, under white noise (0), flicker noise (1) or a
+/// random walk (2): both are sums over one spectrum, whose windows `sin⁴x / x²⁺ⁿ` overlap; integrated numerically
+/// here.
 fn correlation(noise: usize, lag: i32) -> f64 {
     let (first, ratio) = match noise {
         0 => ([0.530, 0.188, 0.066, 0.023], 0.35),
@@ -280,8 +285,8 @@ fn correlation(noise: usize, lag: i32) -> f64 {
     known.copied().unwrap_or_else(|| first[3] * ComplexField::powi(ratio, lag - 4))
 }
 
-/// Minimises `xᵀ A x - 2 bᵀ x` over x that are not negative, white noise among them in any case: of all subsets of the parts the
-/// best that is.
+/// Minimises `xᵀ A x - 2 bᵀ x` over non-negative x, always including white noise: the best feasible one of all
+/// subsets of the components.
 fn least_squares(normal: &Matrix3<f64>, right: &Vector3<f64>) -> Vector3<f64> {
     let mut best = Vector3::new(right[0] / normal[(0, 0)], 0.0, 0.0);
     let cost = |x: &Vector3<f64>| x.dot(&(normal * x)) - 2.0 * right.dot(x);

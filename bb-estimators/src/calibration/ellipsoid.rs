@@ -10,10 +10,10 @@ const UNKNOWNS: usize = 9;
 type Vector = SVector<f64, UNKNOWNS>;
 type Square = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
-/// Which elements M has: row and column of each, and of its mirror image.
+/// The elements of M: row and column of each, and of its mirror image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
-    /// Scale alone.
+    /// Only scale.
     Diagonal,
     /// The x axis of the sensor is that of the body.
     Triangular,
@@ -41,7 +41,7 @@ pub(super) struct Point {
     pub(super) deviation: f64,
 }
 
-/// What a fit gives.
+/// The result of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
     pub(super) linear: Linear,
@@ -53,10 +53,10 @@ pub(super) struct Fit {
     pub(super) residual: f64,
 }
 
-/// The most steps; a fit takes some five.
+/// The largest number of steps; a fit takes about five.
 const STEPS: usize = 60;
 
-/// A step that lowers the sum by less than this part is the last.
+/// A step that lowers the sum by less than this fraction is the last.
 const DONE: f64 = 1e-14;
 
 /// Fits by the method of Levenberg and Marquardt, from a start.
@@ -147,7 +147,7 @@ impl Sums {
         sums
     }
 
-    /// With the unknowns that the shape has not left out of the equations.
+    /// With the unknowns that the shape excludes removed from the equations.
     fn step(&self, damping: f64, shape: Shape) -> Option<Vector> {
         let mut normal = self.normal;
         for index in 0..UNKNOWNS {
@@ -166,7 +166,7 @@ impl Sums {
         let covariance = normal.cholesky().ok_or(unknown)?.inverse();
         let freedom = self.count - shape.unknowns() as f64;
         let chi_square = if freedom > 0.0 { self.cost / freedom } else { 1.0 };
-        // Points that fit worse than their deviations say are known less well than these say.
+        // If points fit worse than their deviations say, the deviations of the result are increased accordingly.
         let deviation = |index: usize| ComplexField::sqrt(covariance[(index, index)] * chi_square.max(1.0));
         let mut matrix_deviation = Matrix3::zeros();
         for (index, &(row, column)) in shape.elements().iter().enumerate() {
@@ -188,7 +188,7 @@ impl Sums {
 pub(super) fn sphere(points: impl Iterator<Item = Vector3<f64>> + Clone) -> Option<(Vector3<f64>, f64)> {
     let count = points.clone().count() as f64;
     let mean = points.clone().sum::<Vector3<f64>>() / count;
-    // About the mean, where the numbers are of one size.
+    // About the mean, where the numbers are of similar size.
     let mut normal = Matrix3::zeros();
     let mut right = Vector3::zeros();
     let mut squares = 0.0;

@@ -6,24 +6,24 @@ use core::fmt;
 /// Why the measurements give no calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CalibrationError {
-    /// Rest, or measurements, in too few directions.
+    /// Rests, or measurements, in too few directions.
     TooFew {
         /// What was counted, in the plural.
         what: &'static str,
-        /// How many there are.
+        /// The number found.
         found: usize,
-        /// How many it takes.
+        /// The number required.
         needed: usize,
     },
     /// A value is NaN or infinite.
     NonFinite,
     /// The directions do not determine a parameter.
     NotObservable {
-        /// Which: `scale` or `offset`, about the axis that is known least.
+        /// Which one: `scale` or `offset`, about the axis known least.
         parameter: &'static str,
-        /// How well it would be known: standard deviation, as a part of the norm.
+        /// Its uncertainty: standard deviation, as a fraction of the norm.
         deviation: f64,
-        /// The most that is accepted.
+        /// The largest accepted.
         limit: f64,
     },
     /// The measurements do not lie on an ellipsoid.

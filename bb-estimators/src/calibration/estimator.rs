@@ -6,8 +6,8 @@ use bb_core::{Context, Estimator, Fault, Inputs, Options, Payload, Reply, Stampe
 use nalgebra::{Matrix3, Vector3};
 use std::marker::PhantomData;
 
-/// Calibrates the samples of a sensor: an [`Imu`], or a [`Marg`] with its field. Its options are what `bb calibrate imu`
-/// prints.
+/// Calibrates the samples of a sensor: an [`Imu`], or a [`Marg`] with its field. Its options are the output of `bb
+/// calibrate imu`.
 ///
 /// ```
 /// # fn main() {}
@@ -57,9 +57,9 @@ pub struct CalibratedOptions {
 
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// What [`Calibrated`] takes.
+/// The input of [`Calibrated`].
 pub trait Calibrate: Payload + Clone {
-    /// The sample with its errors taken away.
+    /// The sample with its errors removed.
     fn calibrated(&self, options: &CalibratedOptions) -> Self;
 }
 

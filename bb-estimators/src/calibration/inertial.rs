@@ -1,4 +1,4 @@
-//! Gyroscope and accelerometer, from rests.
+//! Calibrates gyroscope and accelerometer from rests.
 
 use nalgebra::{ComplexField, Matrix3, Vector3};
 
@@ -8,7 +8,7 @@ use super::{CalibrationError, Linear, Rest};
 /// The gyroscope's offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroscopeFit {
-    /// What it reads at rest, rad/s, body frame.
+    /// The reading at rest, rad/s, body frame.
     pub offset: Vector3<f64>,
     /// Standard deviation of each axis: from the noise of the mean and the spread of the rests.
     pub deviation: Vector3<f64>,
@@ -16,12 +16,12 @@ pub struct GyroscopeFit {
     pub residual: f64,
 }
 
-/// What of the accelerometer was fitted.
+/// The fitted parameters of the accelerometer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
     /// Offset and scale: with six to eight directions.
     Scale,
-    /// Misalignment as well: with nine directions and more.
+    /// Also misalignment: with at least nine directions.
     ScaleAndMisalignment,
 }
 
@@ -30,9 +30,9 @@ pub enum Model {
 pub struct AccelerometerFit {
     /// Offset, m/s², and scale with misalignment, upper triangular.
     pub calibration: Linear,
-    /// What was fitted.
+    /// The fitted parameters.
     pub model: Model,
-    /// In how many directions the sensor rested, those within 15° taken as one.
+    /// The number of directions at rest, counting those within 15° as one.
     pub directions: usize,
     /// Standard deviations of the offset, m/s².
     pub offset_deviation: Vector3<f64>,
@@ -40,28 +40,28 @@ pub struct AccelerometerFit {
     pub matrix_deviation: Matrix3<f64>,
     /// Root mean square difference between the calibrated norm and gravity over the rests, m/s².
     pub residual: f64,
-    /// The same before the calibration.
+    /// The same, before the calibration.
     pub residual_before: f64,
 }
 
-/// Cosine of the angle within which two directions are one.
+/// Cosine of the angle within which two directions count as one.
 const ONE_DIRECTION: f64 = 0.966;
 
-/// Error of the mean of a rest beyond its noise, m/s²: a bias that wanders, a table that trembles. 0.2 mg.
+/// Error of the mean of a rest beyond its noise, m/s²: a bias that drifts, a table that trembles. 0.2 mg.
 const INSTABILITY: f64 = 2e-3;
 
-/// The least directions for offset and scale, and for misalignment too.
+/// The smallest numbers of directions: for offset and scale, and with misalignment.
 const SIX: usize = 6;
 const NINE: usize = 9;
 
-/// The worst standard deviation of scale and of offset that is accepted, as a part of gravity.
+/// The largest accepted standard deviation of scale and of offset, as a fraction of gravity.
 const LIMIT: f64 = 0.01;
 
-/// The gyroscope's offset: the mean over the rests, weighed by their length.
+/// The gyroscope's offset: the mean over the rests, weighted by their length.
 ///
 /// # Errors
 ///
-/// There is no rest, or one that is not finite.
+/// There is no rest, or a value is not finite.
 pub fn gyroscope(rests: &[Rest]) -> Result<GyroscopeFit, CalibrationError> {
     if rests.is_empty() {
         return Err(CalibrationError::TooFew { what: "rests", found: 0, needed: 1 });
@@ -82,12 +82,13 @@ pub fn gyroscope(rests: &[Rest]) -> Result<GyroscopeFit, CalibrationError> {
     Ok(GyroscopeFit { offset, deviation, residual: ComplexField::sqrt(spread.mean()) })
 }
 
-/// The accelerometer's offset and scale from rests in six directions, and its misalignment from nine: at rest it measures
-/// `gravity`, m/s², in any direction. Poses need not be exact.
+/// The accelerometer's offset and scale from rests in six directions, and its misalignment from nine. At rest it
+/// measures `gravity`, m/s², in any direction. Poses need not be exact.
 ///
 /// # Errors
 ///
-/// Too few directions, or ones that do not determine all; rests that are not finite, or that no calibration explains.
+/// Too few directions, or directions that do not determine all parameters; rests that are not finite, or that no
+/// calibration explains.
 pub fn accelerometer(rests: &[Rest], gravity: f64) -> Result<AccelerometerFit, CalibrationError> {
     let is_finite =
         |rest: &Rest| rest.force.iter().all(|value| value.is_finite()) && rest.force_deviation.is_finite();
@@ -106,7 +107,7 @@ pub fn accelerometer(rests: &[Rest], gravity: f64) -> Result<AccelerometerFit, C
         SIX..NINE => (Shape::Diagonal, Model::Scale),
         _ => (Shape::Triangular, Model::ScaleAndMisalignment),
     };
-    // Readings in g are as good a start as those in m/s².
+    // Readings in g are as good a start as readings in m/s².
     let norm = rests.iter().map(|rest| rest.force.norm()).sum::<f64>() / rests.len() as f64;
     let scale = gravity / norm.max(f64::MIN_POSITIVE);
     let start = Linear { offset: Vector3::zeros(), matrix: Matrix3::identity() * scale };
@@ -138,7 +139,7 @@ pub fn accelerometer(rests: &[Rest], gravity: f64) -> Result<AccelerometerFit, C
     })
 }
 
-/// How many directions the rests have: each that is not near one before it.
+/// The number of directions of the rests: those not near an earlier one.
 fn directions(rests: &[Rest]) -> usize {
     let near = |a: &Rest, b: &Rest| a.force.dot(&b.force) > ONE_DIRECTION * a.force.norm() * b.force.norm();
     let is_new = |index: &usize| !rests[..*index].iter().any(|before| near(before, &rests[*index]));

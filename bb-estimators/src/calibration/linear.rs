@@ -1,18 +1,18 @@
-//! What is done to a measurement.
+//! The linear correction of a measurement.
 
 use nalgebra::{Matrix3, Vector3};
 
 /// A calibration: the true vector is `matrix (measured - offset)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linear {
-    /// What the sensor reads where there is nothing to measure, in its unit, body frame.
+    /// The sensor's reading for a zero input, in its unit, body frame.
     pub offset: Vector3<f64>,
-    /// Scale and misalignment, and the change of unit where there is one.
+    /// Scale and misalignment, and the change of unit if there is one.
     pub matrix: Matrix3<f64>,
 }
 
 impl Linear {
-    /// Of a sensor that needs none.
+    /// For a sensor that needs no calibration.
     pub const IDENTITY: Self = Self {
         offset: Vector3::new(0.0, 0.0, 0.0),
         matrix: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),

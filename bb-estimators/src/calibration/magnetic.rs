@@ -1,4 +1,4 @@
-//! Magnetometer, from free motion.
+//! Calibrates the magnetometer, from free motion.
 
 use nalgebra::{ComplexField, Matrix3, Vector3};
 
@@ -22,23 +22,25 @@ pub struct MagnetometerFit {
     pub residual_before: f64,
 }
 
-/// The least measurements.
+/// The smallest number of measurements.
 const LEAST: usize = 100;
 
-/// The noise that is expected, as a part of the norm; a greater one shows in the residuals.
+/// The expected noise, as a fraction of the norm; larger noise shows in the residuals.
 const NOISE: f64 = 0.005;
 
-/// Measurements one after the other are taken to be wrong alike, by a disturbance of the surroundings say: so many count as one.
+/// Consecutive measurements are assumed to share errors, for example from a disturbance of the surroundings: this
+/// many count as one.
 const ALIKE: f64 = 10.0;
 
-/// The worst standard deviation of offset and scale that is accepted, as a part of the norm.
+/// The largest accepted standard deviation of offset and scale, as a fraction of the norm.
 const LIMIT: f64 = 0.05;
 
-/// The magnetometer's hard and soft iron from `fields`, measured in any unit while the sensor was turned about, far from iron
-/// that does not turn with it. With `norm`, the strength of the field where it was measured, calibrated fields have it; else
-/// they have the norm that leaves their volume as it is.
+/// The magnetometer's hard and soft iron from `fields`, measured in any unit while the sensor was turned in all
+/// directions, far from iron that does not turn with it. With `norm`, the strength of the field where it was
+/// measured, calibrated fields have that norm; otherwise they have the norm that preserves their volume.
 ///
-/// A soft iron that turns the field, as all misalignment between magnetometer and body, does not show in the norm.
+/// A rotation of the field by soft iron, like any misalignment between magnetometer and body, is not observable in
+/// the norm.
 ///
 /// # Errors
 ///
@@ -53,7 +55,7 @@ pub fn magnetometer(fields: &[Vector3<f64>], norm: Option<f64>) -> Result<Magnet
         return Err(CalibrationError::TooFew { what, found, needed });
     }
     let (centre, radius) = ellipsoid::sphere(fields.iter().copied()).ok_or(CalibrationError::NoEllipsoid)?;
-    // In units of the radius, so that the numbers are near 1 whatever the unit.
+    // In units of the radius, so that the numbers are near 1 for any unit.
     let points = fields
         .iter()
         .map(|field| Point { measured: (field - centre) / radius, deviation: NOISE * ComplexField::sqrt(ALIKE) });

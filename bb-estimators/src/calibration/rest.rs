@@ -1,4 +1,4 @@
-//! Finds when a sensor rests, and what it measured there.
+//! Finds rests of a sensor, and its measurements there.
 
 use nalgebra::ComplexField;
 use nalgebra::Vector3;
@@ -44,7 +44,7 @@ pub struct Rest {
     pub start_ns: i64,
     /// When it ends, nanoseconds.
     pub end_ns: i64,
-    /// How many samples it has.
+    /// The number of its samples.
     pub samples: u64,
     /// Specific force, in the sensor's unit.
     pub force: Vector3<f64>,
@@ -94,15 +94,15 @@ impl Sums {
 pub struct Rests {
     params: RestParams,
     window: Sums,
-    /// The window before, if it was at rest: it is part of the rest once another follows.
+    /// The previous window, if it was at rest: it is part of the rest once another follows.
     last: Option<Sums>,
-    /// Whether a window at rest came before the last.
+    /// Whether a window at rest preceded the last one.
     has_begun: bool,
     rest: Option<Sums>,
 }
 
 impl Rests {
-    /// One without a sample.
+    /// A detector without samples.
     ///
     /// # Errors
     ///
@@ -112,8 +112,8 @@ impl Rests {
         Ok(Self { params, window: Sums::default(), last: None, has_begun: false, rest: None })
     }
 
-    /// Takes a sample; gives the rest that ended, if one did. A sample that is not finite, or not later than the last, is
-    /// left out.
+    /// Adds a sample; returns the rest that ended, if any. A sample that is not finite, or not later than the last,
+    /// is ignored.
     pub fn add(&mut self, sample: &ImuSample) -> Option<Rest> {
         let is_finite = (sample.specific_force + sample.angular_velocity).iter().all(|value| value.is_finite());
         if !is_finite || (self.window.count > 0.0 && sample.time_ns <= self.window.end_ns) {
@@ -134,7 +134,7 @@ impl Rests {
         if !self.is_rest(&window) {
             return self.end();
         }
-        // Without the first window and the last.
+        // Without the first and the last window.
         if let Some(last) = self.last.replace(window) {
             if self.has_begun {
                 match &mut self.rest {
@@ -147,7 +147,7 @@ impl Rests {
         None
     }
 
-    /// The rest that the samples end with, if they do.
+    /// The rest at the end of the samples, if any.
     pub fn finish(&mut self) -> Option<Rest> {
         self.end()
     }
@@ -156,7 +156,7 @@ impl Rests {
         self.last = None;
         self.has_begun = false;
         let rest = self.rest.take().filter(|rest| rest.seconds() >= self.params.time)?;
-        // The noise of a component in the mean.
+        // The noise of a component, averaged.
         let deviation = |moments: &Moments| ComplexField::sqrt(moments.squares.sum() / (3.0 * rest.count));
         Some(Rest {
             start_ns: rest.start_ns,
@@ -169,7 +169,7 @@ impl Rests {
         })
     }
 
-    /// Whether a window is rest, and of the same pose as the window before.
+    /// Whether a window is a rest, with the same pose as the previous window.
     fn is_rest(&self, window: &Sums) -> bool {
         let RestParams { rotation, force, .. } = self.params;
         let is_still = window.force.largest_variance(window.count) < force * force

@@ -44,7 +44,7 @@ impl Random {
     }
 }
 
-/// What a sensor with these errors reads.
+/// The reading of a sensor with these errors.
 fn reading(sensor: &Linear, truth: &Vector3<f64>) -> Vector3<f64> {
     sensor.matrix.try_inverse().expect("near 1") * truth + sensor.offset
 }
@@ -54,7 +54,7 @@ fn rest(force: Vector3<f64>, force_deviation: f64, samples: u64) -> Rest {
     Rest { start_ns: 0, end_ns: 0, samples, force, rate, force_deviation, rate_deviation }
 }
 
-/// Squared errors over the variances that the fit tells, of the elements that have one.
+/// Squared errors over the variances reported by the fit, for elements that have one.
 fn squared_errors(fit: &Linear, truth: &Linear, offset: &Vector3<f64>, matrix: &Matrix3<f64>) -> Vec<f64> {
     let offsets = (0..3).map(|axis| (fit.offset[axis] - truth.offset[axis]) / offset[axis]);
     let elements = (0..3).flat_map(|row| (row..3).map(move |column| (row, column)));
@@ -86,7 +86,7 @@ fn an_accelerometers_errors_are_found_as_well_as_the_fit_says() {
     }
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     let worst = squares.iter().copied().fold(0.0, f64::max).sqrt();
-    // 900 errors of one deviation: their mean square is 1 ± 0.05, less what a bad fit's deviations are raised by.
+    // 900 errors of one deviation: their mean square is 1 ± 0.05, minus the increase of a bad fit's deviations.
     assert!((0.8..1.15).contains(&mean), "mean square {mean}");
     assert!(worst < 4.5, "worst {worst}");
 }

@@ -40,12 +40,12 @@ pub struct MoveJointsOptions {
     pub patience: Duration,
 }
 
-/// Where the joints are to go.
+/// The targets of the joints.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub struct JointTargets {
     /// The joints.
     pub joints: Vec<String>,
-    /// The positions that they pass through; at the last they come to rest.
+    /// The positions to pass through; the joints come to rest at the last one.
     pub points: Vec<JointTarget>,
 }
 
@@ -56,16 +56,16 @@ pub struct JointTarget {
     pub positions: Vec<f64>,
 }
 
-/// How far a motion has come.
+/// The progress of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct MotionProgress {
-    /// Share of the planned time that is over, 0 to 1.
+    /// Fraction of the planned time that has passed, 0 to 1.
     pub progress: f64,
     /// s
     pub elapsed: f64,
     /// s
     pub remaining: f64,
-    /// How many joints have reached their targets.
+    /// The number of joints that have reached their targets.
     pub reached: u32,
 }
 
@@ -92,7 +92,7 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 const POINT_PERIOD: Duration = Duration::from_millis(10);
 
 impl MoveJoints {
-    /// What the command does, for other commands: moves `joints` through `points`.
+    /// The command's motion, for other commands: moves `joints` through `points`.
     ///
     /// # Errors
     /// A joint is unknown, has no actuator or no known position, there is no trajectory, an actuator refuses its part, or a
@@ -127,7 +127,7 @@ impl MoveJoints {
     }
 }
 
-/// The trajectory from where the joints are.
+/// The trajectory from the current positions.
 fn planned(
     bus: &Bus,
     joints: &[String],
@@ -143,7 +143,7 @@ fn planned(
         let position = state.as_ref().and_then(|state| state.position.first().copied());
         let position =
             position.ok_or_else(|| Fault::new(format!("the position of the joint `{name}` is not known")))?;
-        // A joint that a sensor sees just beyond its limit may move back; the solver refuses a start outside.
+        // A joint measured just beyond its limit may move back; the solver refuses a start outside.
         let mut limit = JointMotionLimits::of(joint, f64::INFINITY, options.acceleration, options.jerk);
         if !limit.velocity.is_finite() {
             return Err(Fault::new(format!("the joint `{name}` declares no limit of its velocity")));

@@ -6,7 +6,7 @@ use bb_core::run::{ActuatorError, ActuatorLink};
 use bb_core::{Fault, MonotonicTime, Options, Overflow, Payload, Reading, Service, ServiceContext, Subscription};
 use std::time::Duration;
 
-/// What a [`PidController`] drives with its output.
+/// The quantity driven by the output of a [`PidController`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Drive {
     /// A velocity: rad/s or m/s.
@@ -76,9 +76,9 @@ pub struct PidControllerOptions {
 /// A step of a [`PidController`], after `control_msgs/PidState`: rad or m, and the unit of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct PidState {
-    /// Where the joint is to be.
+    /// The setpoint.
     pub setpoint: f64,
-    /// Where it is.
+    /// The measured position.
     pub measurement: f64,
     /// The difference.
     pub error: f64,
@@ -88,7 +88,7 @@ pub struct PidState {
     pub integral: f64,
     /// The derivative term.
     pub derivative: f64,
-    /// What was commanded.
+    /// The commanded value.
     pub output: f64,
 }
 
@@ -227,7 +227,7 @@ pub struct ThresholdControllerOptions {
 /// A change of a [`ThresholdController`].
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct ThresholdState {
-    /// The position that it follows from, rad or m.
+    /// The position that caused it, rad or m.
     pub measurement: f64,
     /// Whether it is on.
     pub is_on: bool,

@@ -1,4 +1,4 @@
-//! The position of a joint that nothing measures, from what its actuator reports.
+//! The position of an unmeasured joint, from its actuator's reports.
 
 use super::{Easing, Pace, Profile};
 use bb_core::payload::{BeginMotion, EndMotion, JointState};
@@ -7,13 +7,13 @@ use bb_core::{
     DynamicMessage, DynamicSubscription, Fault, MonotonicTime, Options, Overflow, Reading, Sensor, SensorContext,
 };
 
-/// The position of a joint without an encoder, such as that of a hobby servo: it follows the motions that the actuator of the joint
-/// reports with [`BeginMotion`] and [`EndMotion`], and takes their easing to be known.
+/// The position of a joint without an encoder, such as that of a hobby servo. It follows the motions that the joint's
+/// actuator reports with [`BeginMotion`] and [`EndMotion`], and assumes their easing to be known.
 ///
-/// Declare it in the joint, as `sensor position: OpenLoopPosition(easing = Easing::SCurve) { rate: 50 Hz; }`. It publishes a
-/// [`JointState`] of the time of its reading, so that the joint counts as one with a source of its position. Until the
-/// actuator has reported a motion, the position is that of the option `initial`; without it, it is not known, and nothing is
-/// published.
+/// Declare it in the joint, as `sensor position: OpenLoopPosition(easing = Easing::SCurve) { rate: 50 Hz; }`. It
+/// publishes a [`JointState`] at the time of its reading, so the joint counts as having a source of its position.
+/// Until the actuator has reported a motion, the position is that of the option `initial`; without it, the position
+/// is unknown, and nothing is published.
 #[derive(Debug)]
 pub struct OpenLoopPosition {
     options: OpenLoopOptions,
@@ -81,7 +81,7 @@ impl OpenLoopPosition {
 }
 
 impl Current {
-    /// An arrival that is known says more than a speed: it includes that the joint speeds up and slows down.
+    /// A known arrival time is better than a speed: it includes acceleration and deceleration.
     fn of(begin: &BeginMotion, start: MonotonicTime, options: &OpenLoopOptions) -> Self {
         let duration = begin.expected_arrival.map(|arrival| Pace::Duration(arrival.seconds_since(start)));
         // With a speed of zero it never arrives, which no profile says.
@@ -91,7 +91,7 @@ impl Current {
                 let (initial, target) = (begin.initial_position, begin.target_position);
                 Profile::new(options.easing, initial, target, pace, options.acceleration)
             }
-            // How fast it is, nobody says: it is there when it reports so.
+            // Its speed is unknown: it arrives when it reports so.
             None => {
                 Profile::new(options.easing, begin.initial_position, begin.initial_position, Pace::Speed(1.0), None)
             }

@@ -1,11 +1,12 @@
-//! What a trajectory asks of one joint.
+//! The part of a trajectory for one joint.
 
 use super::JointPoint;
 use bb_core::Fault;
 use bb_core::payload::JointTrajectory;
 
-/// The part of a [`JointTrajectory`] that belongs to one joint, at any time since its start. Between two points it is a
-/// polynomial: of fifth degree if both have velocities and accelerations, of third if both have velocities, else a straight line.
+/// The part of a [`JointTrajectory`] that belongs to one joint, at any time since its start. Between two points it is
+/// a polynomial: of fifth degree if both have velocities and accelerations, of third if both have velocities,
+/// otherwise a straight line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointPath {
     points: Vec<Knot>,
@@ -21,7 +22,7 @@ struct Knot {
 
 impl JointPath {
     /// # Errors
-    /// The joint is not named, there are no points, a point has no position of it, or times do not increase.
+    /// The joint is not named, there are no points, a point lacks its position, or times do not increase.
     pub fn of(trajectory: &JointTrajectory, joint: &str) -> Result<Self, Fault> {
         let column = trajectory.joint_names.iter().position(|name| name == joint);
         let column =
@@ -64,7 +65,8 @@ impl JointPath {
         self.points.iter().filter_map(|point| point.velocity).fold(0.0, |most, velocity| most.max(velocity.abs()))
     }
 
-    /// Where the joint is to be `time_s` after the start. Before the first point, it is at that; after the last, it rests there.
+    /// The state of the joint `time_s` after the start. Before the first point, it is at that point; after the last,
+    /// it rests there.
     pub fn at(&self, time_s: f64) -> JointPoint {
         let next = self.points.partition_point(|point| point.time_s <= time_s);
         let at_rest = |point: &Knot| JointPoint { position: point.position, ..JointPoint::default() };

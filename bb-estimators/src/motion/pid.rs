@@ -1,6 +1,6 @@
 //! A PID controller.
 
-/// The gains of a [`Pid`], and its limits. The output is in the unit of what it drives.
+/// The gains of a [`Pid`], and its limits. The output is in the unit of the driven quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PidParams {
     /// Output for each unit of the error.
@@ -15,16 +15,17 @@ pub struct PidParams {
     pub minimum: f64,
     /// Largest output.
     pub maximum: f64,
-    /// How fast the integral gives way while the output is at a limit, s: a small time follows the limit closely. 0: at
-    /// once.
+    /// How fast the integral is reduced while the output is at a limit, s: a small time follows the limit closely. 0:
+    /// at once.
     pub tracking_s: f64,
 }
 
 /// A PID controller with back-calculation against windup and a filtered derivative.
 ///
-/// u = P e + I ∫ e dt − D dy/dt, where e = setpoint − y; Åström and Hägglund, *Advanced PID Control*, 2006, sections 3.5 and 13.
-/// The derivative is that of the measurement, so that a setpoint that jumps causes no kick, through a low pass of first order.
-/// While the output is at a limit, the integral is drawn to where the output is just there. Steps may have any length.
+/// u = P e + I ∫ e dt − D dy/dt, where e = setpoint − y; Åström and Hägglund, *Advanced PID Control*, 2006, sections
+/// 3.5 and 13. The derivative is that of the measurement, so a setpoint jump causes no kick, through a first-order
+/// low-pass. While the output is at a limit, the integral is drawn to the value at which the output is just there.
+/// Steps may have any length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pid {
     params: PidParams,
@@ -34,7 +35,7 @@ pub struct Pid {
     measurement: Option<f64>,
 }
 
-/// What a step of a [`Pid`] gave: `output` is the sum of the three terms within the limits.
+/// The result of a step of a [`Pid`]: `output` is the sum of the three terms within the limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PidTerms {
     /// setpoint − measurement.
@@ -45,28 +46,28 @@ pub struct PidTerms {
     pub integral: f64,
     /// The derivative term.
     pub derivative: f64,
-    /// What to apply.
+    /// The value to apply.
     pub output: f64,
 }
 
 impl Pid {
-    /// A controller that has integrated nothing.
+    /// A controller with a zero integral.
     pub fn new(params: PidParams) -> Self {
         Self { params, integral: 0.0, rate: 0.0, measurement: None }
     }
 
-    /// Changes the gains; what is integrated stays, so that the output does not jump with the integral gain.
+    /// Changes the gains; the integral is kept, so that the output does not jump with the integral gain.
     pub fn set_params(&mut self, params: PidParams) {
         self.params = params;
     }
 
-    /// Forgets what it has integrated and measured.
+    /// Resets the integral and the last measurement.
     pub fn reset(&mut self) {
         *self = Self::new(self.params);
     }
 
-    /// The output for a measurement, `step_s` after the last one. A step that is not positive, and values that are not finite,
-    /// change nothing that is kept: the output is then that of the proportional and the kept terms.
+    /// The output for a measurement, `step_s` after the last one. A step that is not positive, and values that are
+    /// not finite, do not change the state: the output is then that of the proportional and the kept terms.
     pub fn update(&mut self, setpoint: f64, measurement: f64, step_s: f64) -> PidTerms {
         let params = &self.params;
         let is_step = step_s > 0.0 && (setpoint + measurement + step_s).is_finite();
@@ -99,8 +100,8 @@ impl PidParams {
         output.max(self.minimum).min(self.maximum)
     }
 
-    /// How much of what is beyond the limit the integral is blamed for: never more than it holds, so that a proportional term
-    /// that saturates alone does not wind it up the other way.
+    /// How much of the excess over the limit is attributed to the integral: never more than its value, so that a
+    /// proportional term that saturates alone does not wind it up in the other direction.
     fn windup(&self, beyond: f64, integral: f64) -> f64 {
         if beyond * integral > 0.0 { beyond.abs().min(integral.abs()).copysign(integral) } else { 0.0 }
     }

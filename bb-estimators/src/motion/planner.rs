@@ -8,7 +8,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a joint may do: rad, rad/s, rad/s², rad/s³ where it turns; m, m/s, m/s², m/s³ where it slides.
+/// The limits of a joint: rad, rad/s, rad/s², rad/s³ where it turns; m, m/s, m/s², m/s³ where it slides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotionLimits {
     /// Smallest position; minus infinity if it has none.
@@ -47,8 +47,8 @@ impl fmt::Display for PlanError {
 impl std::error::Error for PlanError {}
 
 impl JointMotionLimits {
-    /// Those that a joint declares, with an acceleration and a jerk, which URDF does not know. A joint without a declared
-    /// velocity gets `velocity`.
+    /// The declared limits of a joint, with an acceleration and a jerk, which URDF does not have. A joint without a
+    /// declared velocity gets `velocity`.
     pub fn of(joint: &Joint, velocity: f64, acceleration: f64, jerk: f64) -> Self {
         let limit = joint.limit;
         let declared = limit.and_then(|limit| limit.velocity).unwrap_or(velocity);
@@ -62,10 +62,10 @@ impl JointMotionLimits {
     }
 }
 
-/// A trajectory of the joints `names` from the state `from` through the positions `through` to rest at the last of them, with a
-/// point each `period`. All joints arrive at the same time.
+/// A trajectory of the joints `names` from the state `from` through the positions `through`, ending at rest at the
+/// last of them, with one point per `period`. All joints arrive at the same time.
 ///
-/// The points keep the limits. Between two points in which the acceleration jumps, because a jerk is infinite, a
+/// The points keep the limits. If the acceleration jumps between two points, because the jerk is infinite, a
 /// [`JointPath`](super::JointPath) exceeds the velocity by at most a fourteenth of acceleration times period.
 ///
 /// With one target it takes the shortest time that the limits allow (Berscheid and Kröger, *Jerk-limited Real-time

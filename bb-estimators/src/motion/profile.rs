@@ -1,9 +1,9 @@
-//! How a joint goes from one position to another.
+//! Profiles of a joint's motion from one position to another.
 
 /// The shape of a motion's velocity over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Easing {
-    /// One velocity from the start to the end.
+    /// A constant velocity from the start to the end.
     Linear,
     /// Constant acceleration, constant velocity, constant deceleration.
     #[default]
@@ -12,7 +12,7 @@ pub enum Easing {
     SCurve,
 }
 
-/// How long a motion takes.
+/// The pace of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
     /// From start to end, s.
@@ -29,11 +29,11 @@ pub struct Profile {
     initial: f64,
     target: f64,
     duration_s: f64,
-    /// How long it speeds up, and slows down, s; at most half of the duration.
+    /// The duration of each ramp, acceleration and deceleration, s; at most half of the whole.
     ramp_s: f64,
 }
 
-/// Where a joint is and how it moves: rad, rad/s, rad/s²; m, m/s, m/s² where it slides.
+/// The position and motion of a joint: rad, rad/s, rad/s²; m, m/s, m/s² where it slides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointPoint {
     /// rad or m
@@ -44,15 +44,16 @@ pub struct JointPoint {
     pub acceleration: f64,
 }
 
-/// The share of a motion in which it speeds up, and of that in which it slows down, if no acceleration is given.
+/// The fraction of a motion spent in each ramp, if no acceleration is given.
 const RAMP: f64 = 0.25;
 
 impl Profile {
-    /// A motion at rest at both ends. `acceleration` is that of a trapezoidal ramp and the mean one of a smooth ramp, whose
-    /// largest is 1.5 times that; without it, a quarter of the motion speeds up and a quarter slows down. If there is no time
-    /// or way to reach the full speed, half of the motion speeds up.
+    /// A motion at rest at both ends. `acceleration` is that of a trapezoidal ramp, or the mean of a smooth ramp,
+    /// whose maximum is 1.5 times that. Without it, a quarter of the motion is acceleration and a quarter
+    /// deceleration. If there is not enough time or distance to reach the full speed, half of the motion is
+    /// acceleration.
     ///
-    /// A pace that is not positive and finite, and a distance of zero, make a motion that is over at once.
+    /// A pace that is not positive and finite, or a distance of zero, gives a motion that is over at once.
     pub fn new(easing: Easing, initial: f64, target: f64, pace: Pace, acceleration: Option<f64>) -> Self {
         let distance = (target - initial).abs();
         let acceleration = acceleration.filter(|acceleration| *acceleration > 0.0);
@@ -99,7 +100,7 @@ impl Profile {
         }
         let left_s = self.duration_s - time_s;
         let cruise = (self.target - self.initial) / (self.duration_s - self.ramp_s);
-        // The end is the start in reverse: computed from the target, so that it is met.
+        // The end is the start in reverse: computed from the target, so that it is reached exactly.
         if time_s < self.ramp_s {
             let ramp = self.ramp(cruise, time_s);
             JointPoint { position: self.initial + ramp.position, ..ramp }
@@ -113,7 +114,7 @@ impl Profile {
         }
     }
 
-    /// The way, velocity and acceleration `time_s` after a ramp has begun at rest.
+    /// The distance, velocity and acceleration `time_s` after a ramp has begun at rest.
     fn ramp(&self, cruise: f64, time_s: f64) -> JointPoint {
         let u = time_s / self.ramp_s;
         match self.easing {
@@ -131,13 +132,14 @@ impl Profile {
     }
 }
 
-/// The ramps with which a motion takes so long: `distance = speed · (duration − ramp)` with `speed = acceleration · ramp`.
+/// The ramps for which a motion takes this long: `distance = speed · (duration − ramp)` with `speed = acceleration ·
+/// ramp`.
 fn ramp_within(distance: f64, duration_s: f64, acceleration: f64) -> f64 {
     let root = duration_s * duration_s - 4.0 * distance / acceleration;
     if root <= 0.0 { duration_s / 2.0 } else { (duration_s - root.sqrt()) / 2.0 }
 }
 
-/// The duration and the ramps of a motion of that speed.
+/// The duration and the ramps of a motion with that speed.
 fn ramps_at(distance: f64, speed: f64, acceleration: Option<f64>) -> (f64, f64) {
     let Some(acceleration) = acceleration else {
         let duration_s = distance / (speed * (1.0 - RAMP));

@@ -1,7 +1,7 @@
 //! A switch with hysteresis.
 
-/// On at or above one threshold, off at or below a lower one, and between them as it was: a fan, a heater turned round, a
-/// pump.
+/// On at or above one threshold, off at or below a lower one, and unchanged between them: for a fan, a heater
+/// (reversed), a pump.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold {
     on_at: f64,
@@ -10,7 +10,7 @@ pub struct Threshold {
 }
 
 impl Threshold {
-    /// Off at first. `None` unless `off_at` is at most `on_at`.
+    /// Initially off. `None` unless `off_at` is at most `on_at`.
     pub fn new(on_at: f64, off_at: f64) -> Option<Self> {
         (off_at <= on_at).then_some(Self { on_at, off_at, is_on: false })
     }

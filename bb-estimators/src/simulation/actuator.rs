@@ -10,8 +10,8 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A motor that moves its joint in the [`SimulatedWorld`] as the joint's `limit` and `dynamics`, an inertia and an acceleration allow,
-/// at most at the declared velocity and effort.
+/// A motor that moves its joint in the [`SimulatedWorld`] within the joint's `limit` and `dynamics`, an inertia and
+/// an acceleration, at most at the declared velocity and effort.
 ///
 /// It takes all standard commands; as `SimulatedActuator<VelocityCommand>` it takes the place of a driver that takes only some. It
 /// reports its motions: a position or a trajectory ends when the joint rests at the target (`Reached`), a velocity at the end of the
@@ -24,9 +24,9 @@ pub struct SimulatedActuator<C = ActuatorCommand> {
     world: Arc<SimulatedWorld>,
     joint: usize,
     drivetrain: Drivetrain,
-    /// Whether a motion was reported to have begun and not to have ended.
+    /// Whether a motion was reported as begun but not as ended.
     is_reported: bool,
-    /// When it looks again, while there is something to report.
+    /// The time of its next check, while there is something to report.
     next: Option<MonotonicTime>,
     commands: PhantomData<fn(C)>,
 }
@@ -54,7 +54,7 @@ pub struct SimulatedActuatorOptions {
     pub period: Duration,
 }
 
-/// What is near enough a position to be there, rad or m.
+/// The distance at which a position counts as reached, rad or m.
 const NEAR: f64 = 1e-9;
 
 impl<C: Payload + Into<ActuatorCommand>> Actuator for SimulatedActuator<C> {
@@ -79,7 +79,7 @@ impl<C: Payload + Into<ActuatorCommand>> Actuator for SimulatedActuator<C> {
         let initial = options.initial.max(drivetrain.lower).min(drivetrain.upper);
         let now = context.clock().now();
         let joint = world.add(context.joint(), drivetrain, initial, now)?;
-        // One that is restarted has lost what it was told.
+        // A restarted one has lost its command.
         world.set_goal(joint, Goal::Stop, now);
         Ok(Self {
             options,
@@ -135,7 +135,7 @@ impl<C: Payload + Into<ActuatorCommand>> Actuator for SimulatedActuator<C> {
 }
 
 impl<C> SimulatedActuator<C> {
-    /// What a command asks for.
+    /// The goal of a command.
     fn goal(&self, command: ActuatorCommand, now: MonotonicTime) -> Result<Goal, Fault> {
         Ok(match command {
             ActuatorCommand::Position(command) => {
@@ -154,7 +154,7 @@ impl<C> SimulatedActuator<C> {
         })
     }
 
-    /// Reports that a motion begins, if it has a target.
+    /// Reports the beginning of a motion, if it has a target.
     fn begin(&mut self, goal: &Goal, state: &PlantState, now: MonotonicTime) {
         let point = state.point;
         let arrival = |duration_s: f64| Some(now + Duration::try_from_secs_f64(duration_s).ok()?);
@@ -163,7 +163,7 @@ impl<C> SimulatedActuator<C> {
                 let pace = Pace::Speed(speed.min(self.drivetrain.velocity));
                 let acceleration = Some(self.drivetrain.acceleration);
                 let profile = Profile::new(Easing::Trapezoidal, point.position, *target, pace, acceleration);
-                // One that moves already needs another time.
+                // A joint that already moves takes a different time.
                 let arrival = if point.velocity == 0.0 { arrival(profile.duration_s()) } else { None };
                 (*target, profile.speed(), arrival)
             }

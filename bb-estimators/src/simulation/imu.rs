@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-/// The magnetic field of the simulated world in T: that of middle Europe, its horizontal part due north.
+/// The magnetic field of the simulated world in T: that of central Europe, its horizontal part due north.
 const MAGNETIC_FIELD: Vector3<f64> = Vector3::new(0.0, 20e-6, -44e-6);
 
 /// A gyroscope, an accelerometer and a magnetometer on a body that moves by [`Motion`], mounted where the robot
@@ -65,7 +65,7 @@ impl Sensor for SimulatedImu {
         if time_s > self.options.duration {
             return Ok(Reading::finished());
         }
-        // The first sample has no time before it: its noise and its mean are those of a short while.
+        // The first sample has no predecessor: its noise and its mean are those of a short interval.
         let step_s = if time_s > self.previous_s { time_s - self.previous_s } else { 5e-3 };
         let angular_velocity = self.bias
             + Motion.mean_angular_velocity(&self.root_from_frame, time_s - step_s, time_s)

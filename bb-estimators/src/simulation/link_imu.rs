@@ -12,16 +12,16 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A gyroscope and an accelerometer on a link in the [`SimulatedWorld`]: they measure the angular velocity of the link and its
-/// specific force, from position, velocity and acceleration of the joints between it and the root, which is at rest with its
-/// z axis up.
+/// A gyroscope and an accelerometer on a link in the [`SimulatedWorld`]. They measure the angular velocity of the
+/// link and its specific force, from position, velocity and acceleration of the joints between it and the root, which
+/// is at rest with its z axis up.
 pub struct SimulatedLinkImu {
     options: SimulatedLinkImuOptions,
     path: &'static str,
     world: Arc<SimulatedWorld>,
     frames: Frames,
     link: LinkId,
-    /// Which joint of the topology each coordinate belongs to.
+    /// The joint of the topology for each coordinate.
     coordinates: Vec<(usize, Range<usize>, Range<usize>)>,
     positions: Vec<f64>,
     velocities: Vec<f64>,
@@ -66,7 +66,7 @@ impl Sensor for SimulatedLinkImu {
         let mut coordinates = Vec::new();
         for (number, joint) in topology.joints.iter().enumerate() {
             let Some(own) = kinematics.joint(joint.name) else { continue };
-            // Those of a joint that mimics another are that one's.
+            // A joint that mimics another has that joint's.
             if joint.mimic.is_none() && own.positions.len() == 1 {
                 coordinates.push((number, own.positions.clone(), own.velocities.clone()));
             }
@@ -103,7 +103,7 @@ impl Sensor for SimulatedLinkImu {
         self.frames.update_motion(&self.positions, &self.velocities, &self.accelerations)?;
         let motion = self.frames.motion(self.link)?;
         let link_from_root = self.frames.root_from_link(self.link)?.rotation.inverse();
-        // The first sample has no time before it: its noise is that of a short while.
+        // The first sample has no predecessor: its noise is that of a short interval.
         let step_s = self.previous.map_or(5e-3, |previous| now.seconds_since(previous)).max(1e-6);
         self.previous = Some(now);
         let per_root_hz = 1.0 / step_s.sqrt();

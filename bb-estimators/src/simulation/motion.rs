@@ -1,4 +1,4 @@
-//! How a simulated body moves: smooth, analytic, and the same for every sensor on it.
+//! The motion of a simulated body: smooth, analytic, and the same for every sensor on it.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -27,7 +27,7 @@ impl Motion {
     /// Half the step of the central second difference, s: its error is far below any sensor's noise.
     const STEP_S: f64 = 1e-3;
 
-    /// Where the root link is at `time_s` and how it is turned: `world_from_root`.
+    /// The pose of the root link at `time_s`: `world_from_root`.
     pub fn world_from_root(self, time_s: f64) -> Isometry3<f64> {
         let moving = (time_s - Self::REST_S).max(0.0);
         // Goes from 0 to 1 within a second, with a continuous second derivative.

@@ -1,11 +1,11 @@
-//! A simulated joint with its motor: how it moves as limits, inertia and friction allow.
+//! A simulated joint with its motor, moving within limits, inertia and friction.
 
 use crate::motion::{JointPath, JointPoint};
 use bb_core::MonotonicTime;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a joint and its motor can do. Rad, N·m and kg·m² where it turns; m, N and kg where it slides.
+/// The properties of a joint and its motor. Rad, N·m and kg·m² where it turns; m, N and kg where it slides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Drivetrain {
     /// Smallest position.
@@ -18,7 +18,7 @@ pub(super) struct Drivetrain {
     pub(super) effort: f64,
     /// Largest acceleration that the servo asks for.
     pub(super) acceleration: f64,
-    /// Of all that the joint moves.
+    /// Inertia of everything that the joint moves.
     pub(super) inertia: f64,
     /// Viscous friction.
     pub(super) damping: f64,
@@ -26,32 +26,32 @@ pub(super) struct Drivetrain {
     pub(super) friction: f64,
 }
 
-/// What the servo is told.
+/// The goal of the servo.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Goal {
-    /// Nothing: the motor gives no effort.
+    /// Nothing: the motor applies no effort.
     Free,
     /// An effort.
     Effort(f64),
     /// A velocity.
     Velocity(f64),
-    /// Rest at a position, at no more than a speed on the way.
+    /// Rest at a position, with a speed limit on the way.
     Position { target: f64, speed: f64 },
     /// A trajectory from a time on.
     Path { start: MonotonicTime, path: Arc<JointPath> },
-    /// Rest, as soon as possible, and stay.
+    /// Come to rest as soon as possible, and hold.
     Hold,
-    /// Rest, as soon as possible, and then nothing.
+    /// Come to rest as soon as possible, and then apply no effort.
     Stop,
 }
 
-/// A joint at a time.
+/// The state of a joint at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PlantState {
     pub(super) point: JointPoint,
     /// Of the motor.
     pub(super) effort: f64,
-    /// How long the motor has given all it may while the joint did not move, s.
+    /// How long the motor has applied its maximum while the joint did not move, s.
     pub(super) stalled_s: f64,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct PlantState {
 const STEP: Duration = Duration::from_millis(1);
 const STEP_S: f64 = 1e-3;
 
-/// A joint that is slower rests, rad/s or m/s.
+/// A slower joint counts as at rest, rad/s or m/s.
 const AT_REST: f64 = 1e-12;
 
 /// How fast a deviation from a trajectory decays, 1/s.
@@ -70,11 +70,11 @@ const TRACKING: f64 = 50.0;
 pub(super) struct Plant {
     pub(super) drivetrain: Drivetrain,
     pub(super) goal: Goal,
-    /// Between which positions an obstacle leaves it.
+    /// The range that obstacles leave free.
     free: (f64, f64),
     time: MonotonicTime,
     state: PlantState,
-    /// Where it holds, once it is at rest.
+    /// The position it holds, once it is at rest.
     hold_at: Option<f64>,
 }
 
@@ -91,8 +91,8 @@ impl Plant {
         }
     }
 
-    /// The state at `now`; one that is asked for earlier than it was before is the later one. What is asked for does not change
-    /// how it moves.
+    /// The state at `now`; for a time before the latest one, the latest state. Reading the state does not change how
+    /// it moves.
     pub(super) fn at(&mut self, now: MonotonicTime) -> PlantState {
         while self.time + STEP <= now {
             self.state = self.after(STEP_S);
@@ -118,7 +118,7 @@ impl Plant {
         self.goal = goal;
     }
 
-    /// The largest deceleration that the motor is sure to manage.
+    /// The largest deceleration that the motor can always reach.
     fn deceleration(&self) -> f64 {
         let Drivetrain { acceleration, effort, friction, inertia, .. } = self.drivetrain;
         // A motor that cannot overcome the friction does not move at all.
@@ -126,8 +126,8 @@ impl Plant {
         if most > 0.0 { acceleration.min(most) } else { acceleration }
     }
 
-    /// The velocity to have after a step, so as to come to rest at a position `error` away: the largest from which the way that
-    /// is left suffices, also after the step has been travelled.
+    /// The velocity after a step, in order to come to rest at a position `error` away: the largest for which the
+    /// remaining distance suffices after the step.
     fn approach(&self, error: f64, speed: f64) -> f64 {
         let d = self.deceleration();
         let direction = if error < 0.0 { -1.0 } else { 1.0 };
@@ -138,8 +138,8 @@ impl Plant {
         wanted.min(speed).min(self.drivetrain.velocity) * direction
     }
 
-    /// Whether the next step brings it to rest at a position, but for what the length of the steps leaves: an eighth of the way
-    /// that the deceleration makes in a step.
+    /// Whether the next step brings it to rest at a position, up to the error of the step length: an eighth of the
+    /// distance that the deceleration covers in a step.
     fn is_at(&self, target: f64) -> bool {
         let d = self.deceleration();
         let JointPoint { position, velocity, .. } = self.state.point;
@@ -147,7 +147,7 @@ impl Plant {
         velocity.abs() <= d * STEP_S * (1.0 + 1e-9) && left.abs() <= d * STEP_S * STEP_S / 4.0
     }
 
-    /// The velocity that the servo wants after the next step; none if it gives an effort instead.
+    /// The velocity that the servo wants after the next step; `None` if it applies an effort instead.
     fn wanted(&self) -> Result<f64, f64> {
         let point = self.state.point;
         match &self.goal {
@@ -168,7 +168,7 @@ impl Plant {
         }
     }
 
-    /// A velocity that comes to rest at the limits of the position.
+    /// A velocity from which it comes to rest at the limits of the position.
     fn within_limits(&self, velocity: f64) -> f64 {
         let Drivetrain { lower, upper, velocity: most, .. } = self.drivetrain;
         let end = if velocity < 0.0 { lower } else { upper };
@@ -205,7 +205,7 @@ impl Plant {
         let (effort, mut accelerated) = match self.wanted() {
             Ok(wanted) => {
                 let asked = ((wanted - velocity) / STEP_S).clamp(-acceleration, acceleration);
-                // The servo makes up for the friction that it knows, as far as the motor can.
+                // The servo compensates for the known friction, as far as the motor can.
                 let needed = inertia * asked - drag(0.0, asked);
                 let effort = needed.clamp(-most, most);
                 let accelerated = if effort == needed { asked } else { pushed(effort, effort) };
@@ -213,7 +213,7 @@ impl Plant {
             }
             Err(effort) => (effort.clamp(-most, most), pushed(effort.clamp(-most, most), effort)),
         };
-        // Dry friction holds what does not move, and stops what does; it never turns it round.
+        // Dry friction holds a joint at rest, and stops a moving one; it never reverses it.
         let is_held = velocity == 0.0 && effort.abs() <= friction;
         if is_held {
             accelerated = 0.0;
@@ -229,7 +229,7 @@ impl Plant {
         let after = velocity + accelerated * step_s;
         let next = JointPoint {
             position: position + velocity * step_s + accelerated * step_s * step_s / 2.0,
-            // What rounding leaves of a velocity that was to become zero is none.
+            // A velocity that was to become zero counts as zero despite rounding.
             velocity: if after.abs() < AT_REST { 0.0 } else { after },
             acceleration: accelerated,
         };
@@ -260,7 +260,7 @@ impl Plant {
             return state;
         }
         let before = self.state.point.position;
-        // Where it is pushed against, it stays; an obstacle does not move it.
+        // It stays where it is pushed against; an obstacle does not move it.
         let position = position.clamp(lower.min(before), upper.max(before));
         let pushes = state.effort.abs() > self.drivetrain.friction || velocity != 0.0;
         let stalled_s =
@@ -269,7 +269,7 @@ impl Plant {
         PlantState { point, stalled_s, ..state }
     }
 
-    /// What a goal becomes when its end is reached.
+    /// The successor of a goal whose end is reached.
     fn settle(&mut self) {
         let point = self.state.point;
         match &self.goal {

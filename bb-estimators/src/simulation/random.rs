@@ -1,4 +1,4 @@
-//! Noise that is the same on every machine.
+//! Noise that is identical on every machine.
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;

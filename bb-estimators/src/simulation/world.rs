@@ -1,4 +1,4 @@
-//! The world in which simulated components are: how the joints move.
+//! The world of simulated components: the motion of the joints.
 
 use super::plant::{Drivetrain, Goal, Plant, PlantState};
 use crate::motion::JointPoint;
@@ -8,18 +8,19 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// The joints of a simulated robot, as [`SimulatedActuator`](super::SimulatedActuator)s move them and simulated sensors measure them.
+/// The joints of a simulated robot, moved by [`SimulatedActuator`](super::SimulatedActuator)s and measured by
+/// simulated sensors.
 ///
-/// The simulated components of a run share it: `context.shared(|| SimulatedWorld::new(context.topology()))`, and from outside
-/// `simulation.shared(|| SimulatedWorld::new(Arm::TOPOLOGY))`. A joint without an actuator rests at zero. Each joint moves by
-/// itself: what one does is not felt by the others, nor is gravity.
+/// The simulated components of a run share it: `context.shared(|| SimulatedWorld::new(context.topology()))`, and from
+/// outside `simulation.shared(|| SimulatedWorld::new(Arm::TOPOLOGY))`. A joint without an actuator rests at zero.
+/// Each joint moves independently: neither the other joints nor gravity affect it.
 pub struct SimulatedWorld {
     topology: &'static Topology,
     state: Mutex<State>,
 }
 
 struct State {
-    /// By joint; none where nothing moves it.
+    /// By joint; `None` if nothing moves it.
     plants: Vec<Option<Plant>>,
     unplugged: BTreeSet<String>,
 }
@@ -27,7 +28,7 @@ struct State {
 /// A simulated joint: its true state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SimulatedJoint {
-    /// Where it is and how it moves.
+    /// Its position and motion.
     pub point: JointPoint,
     /// Effort of its motor, N·m or N.
     pub effort: f64,
@@ -102,8 +103,8 @@ impl SimulatedWorld {
         Ok(())
     }
 
-    /// Adds a motor to a joint, at `position`; one that has been there before, of an actuator that is restarted, is left where
-    /// it is.
+    /// Adds a motor to a joint, at `position`. A motor already there, from an actuator that is restarted, is left
+    /// where it is.
     pub(super) fn add(
         &self,
         name: &str,
@@ -129,7 +130,7 @@ impl SimulatedWorld {
         }
     }
 
-    /// The state of a motor, and whether it has come to the end of its goal by itself.
+    /// The state of a motor, and whether it has reached the end of its goal by itself.
     pub(super) fn motor(&self, joint: usize, now: MonotonicTime) -> (PlantState, Goal) {
         let mut state = self.lock();
         let plant = state.plants.get_mut(joint).and_then(Option::as_mut);

@@ -1,4 +1,4 @@
-//! What the derives share: named fields, their docs, and what a generic type wraps.
+//! Helpers shared by the derives: named fields, their docs, and the argument of a generic type.
 
 use crate::diagnostics::Diagnostics;
 use syn::punctuated::Punctuated;

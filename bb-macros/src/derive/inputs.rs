@@ -1,4 +1,4 @@
-//! `#[derive(Inputs)]`: the cache of a struct of several inputs, and how the struct is made from it.
+//! `#[derive(Inputs)]`: the cache of a struct of several inputs, and building the struct from it.
 
 use super::fields;
 use crate::diagnostics::Diagnostics;
@@ -76,15 +76,15 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
     }
 }
 
-/// The field that the sensor of a nested estimator feeds: the only one that the estimator cannot do without.
+/// The field fed by the sensor of a nested estimator: the only required one.
 fn nested(inputs: &[Field<'_>]) -> Option<usize> {
     let mut needed = inputs.iter().enumerate().filter(|(_, field)| !field.optional || inputs.len() == 1);
     let (first, _) = needed.next()?;
     needed.next().is_none().then_some(first)
 }
 
-/// What happens when field number `driver` is the driver: nothing counts as seen before all others are known to be
-/// there.
+/// The arrival of the driver, field number `driver`: no input is marked as seen before all others are known to be
+/// present.
 fn input_at(name: &Ident, inputs: &[Field<'_>], driver: usize) -> TokenStream {
     let Some(Field { slot, payload, .. }) = inputs.get(driver) else {
         return TokenStream::new();

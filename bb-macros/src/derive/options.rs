@@ -130,7 +130,7 @@ impl Attribute {
         quote!(#index => ::core::option::Option::Some(#setting),)
     }
 
-    /// What checks the range at run time.
+    /// The range check at run time.
     fn check(&self, field: &Field) -> TokenStream {
         let (Some(name), Some((start, end, range))) = (&field.ident, &self.range) else {
             return TokenStream::new();
@@ -145,7 +145,7 @@ impl Attribute {
     }
 }
 
-/// Texts become what the field is: `String`, `PathBuf`, `&'static str`.
+/// Converts strings to the type of the field: `String`, `PathBuf`, `&'static str`.
 pub(crate) fn into_if_text(value: &Expr) -> TokenStream {
     match value {
         Expr::Lit(literal) if matches!(literal.lit, Lit::Str(_)) => {

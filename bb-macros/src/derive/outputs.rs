@@ -1,4 +1,4 @@
-//! `#[derive(Outputs)]`: how the outputs of an estimator are taken out of what it emitted.
+//! `#[derive(Outputs)]`: takes the outputs of an estimator out of an emitted value.
 
 use super::fields;
 use crate::diagnostics::Diagnostics;

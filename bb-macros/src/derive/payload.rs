@@ -1,4 +1,4 @@
-//! `#[derive(Payload)]`: its name, whether all its numbers are finite, and how it is written and read.
+//! `#[derive(Payload)]`: its name, whether all its numbers are finite, and its encoding.
 
 mod codec;
 
@@ -8,18 +8,18 @@ use quote::{ToTokens, format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
 use syn::{Data, DeriveInput, Field, Fields, Generics, LitStr};
 
-/// What `#[payload(…)]` says.
+/// The contents of `#[payload(…)]`.
 #[derive(Default)]
 struct Attributes {
     /// ROS has a message for it.
     is_ros: bool,
-    /// It tells the position of a joint.
+    /// It reports the position of a joint.
     tells_position: bool,
     /// It commands a joint.
     commands_joint: bool,
-    /// It is the same from every frame.
+    /// It is the same in every frame.
     has_no_frame: bool,
-    /// The name of its definition, where that is not its own.
+    /// The name of its definition, if different from its own.
     name: Option<LitStr>,
 }
 
@@ -157,7 +157,7 @@ fn arm(head: &TokenStream, fields: &Fields, diagnostics: &mut Diagnostics) -> To
             true => quote!(is_any),
             false => quote!(is_finite),
         };
-        // The only place that requires the type to be a field, so that one that is not is reported once.
+        // The only place that requires the type to be a field, so that a type that is not one is reported once.
         checks.extend(quote_spanned!(kind.span()=> && ::bb_core::__private::#check::<#kind>(#bound)));
     }
     quote!(#head { #patterns } => #checks,)

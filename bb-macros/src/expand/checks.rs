@@ -1,4 +1,4 @@
-//! Constants that check type facts: each calls a function of `bb_core` at the user's token, and a fault is a panic
+//! Constants that check facts about types. Each calls a function of `bb_core` at the user's token; a fault is a panic
 //! there while rustc evaluates it.
 
 use super::literal::{option, spanned_call};
@@ -85,13 +85,13 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenS
             let unit = quantity.has_unit.then(|| quantity.dimension.to_token_stream());
             (quantity.place, option(unit), quantity.value)
         }
-        // Its default is checked in its place.
+        // Its default is checked where it is declared.
         OptionValue::Parameter(path) => {
             let default = &robot.parameters[robot.parameter(path)?].default;
             let unit = default.has_unit.then(|| default.dimension.to_token_stream());
             let number = match default.value {
                 Value::Number(number) => number,
-                // Whether an integer fits is rustc's to say, and the range the start's.
+                // rustc checks whether an integer fits, and the start checks the range.
                 Value::Integer(_) | Value::Bool(_) | Value::Text(_) => return None,
             };
             (path.place(), option(unit), number)
@@ -132,7 +132,7 @@ fn outputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     known.collect()
 }
 
-/// No input spans a moving joint, unless the algorithm handles that or the payload is the same from every frame.
+/// No input spans a moving joint, unless the algorithm handles that or the payload is the same in every frame.
 fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let robot = verified.robot;
     let mut checks = TokenStream::new();
@@ -161,7 +161,7 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     checks
 }
 
-/// The position of a joint with an actuator is measured, as payloads tell.
+/// The position of a joint with an actuator is measured, according to the payloads.
 fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
     let checks = robot.actuators.iter().filter_map(|actuator| {
         let sources = robot.position_sources(actuator.joint)?;
@@ -179,7 +179,7 @@ fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
     checks.collect()
 }
 
-/// At most one command arms and one disarms, each in a state that allows it.
+/// At most one command arms and one disarms, each allowed in a suitable state.
 fn roles(robot: &Robot, types: &Types<'_>) -> TokenStream {
     let mut checks = TokenStream::new();
     let mut before: Vec<TokenStream> = Vec::new();

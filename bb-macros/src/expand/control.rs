@@ -72,7 +72,7 @@ fn parameter(parameter: &Parameter) -> TokenStream {
     };
     let range = option(parameter.range.as_ref().and_then(|range| {
         let (start, end) = (number(&range.start)?, number(&range.end)?);
-        // In SI, as the values that it is held against.
+        // In SI, like the values that it is compared with.
         let text =
             if unit.is_empty() { format!("{start:?}..={end:?}") } else { format!("{start:?}..={end:?} {unit}") };
         Some(quote!(__private::Range { start: #start, end: #end, text: #text }))

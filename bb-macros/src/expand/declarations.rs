@@ -1,4 +1,4 @@
-//! What was declared, as constant data: sensors, and estimators with their inputs.
+//! Declarations as constant data: sensors, and estimators with their inputs.
 
 use super::islands::Islands;
 use super::literal::{nanos, option, transform};
@@ -55,7 +55,7 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: Estimat
     let (path, frame) = (path_text(&estimator.path), robot.frame_name(mount));
     let island = islands.of[id];
     let supervisor = supervisor(robot, mount);
-    // All of it is declared to the runtime.
+    // The full declaration, for the runtime.
     let Timing { sync_tolerance_s, latency_budget_s, lost_after_s, recover_after } = estimator.timing;
     let health = health(&estimator.health, latency_budget_s, lost_after_s, recover_after);
     let worker = worker(robot, id);
@@ -75,7 +75,7 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: Estimat
                 let tolerance = nanos(tolerance_s);
                 quote!(#tolerance)
             }));
-            // The driver has nothing to be compared with but the clock.
+            // The driver can only be compared with the clock.
             let stale = option(within_s.filter(|_| driver).map(|limit_s| {
                 let limit = nanos(limit_s);
                 quote!(#limit)
@@ -98,7 +98,7 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: Estimat
     })
 }
 
-/// The number of the supervisor that looks after what is mounted there: the robot's, then the links', then the joints'.
+/// The number of the supervisor for components mounted there: the robot's, then the links', then the joints'.
 pub(super) fn supervisor(robot: &Robot, mount: Mount) -> usize {
     match mount {
         Mount::Robot => 0,
@@ -173,7 +173,7 @@ pub(super) fn worker(robot: &Robot, id: EstimatorId) -> TokenStream {
     }))
 }
 
-/// The one input of a nested estimator: its sensor.
+/// The only input of a nested estimator: its sensor.
 fn nested_input(robot: &Robot, sensor: &Sensor) -> TokenStream {
     let name = crate::names::text(&sensor.name);
     let path = path_text(&robot.publishers[sensor.publisher].path);

@@ -1,5 +1,5 @@
-//! Structs with many fields, split into groups, each made by its own function: the time that rustc takes for one function
-//! grows with the square of the number of fields.
+//! Structs with many fields, split into groups, each created by its own function: the time that rustc takes for one
+//! function grows with the square of the number of fields.
 //!
 //! ```text
 //! struct __Topics { g0: __Topics0, g1: __Topics1, … }
@@ -29,7 +29,7 @@ pub(super) fn path(position: usize, name: &Ident) -> TokenStream {
     quote!(#group.#name)
 }
 
-/// The structs, and the functions `make` that make them of `parameters`, called with `arguments`.
+/// The structs, and the functions `make` that create them from `parameters`, called with `arguments`.
 pub(super) fn structs(
     name: &str,
     make: &str,

@@ -19,16 +19,16 @@ use quote::quote;
 use std::collections::{HashMap, HashSet};
 use syn::Attribute;
 
-/// A module with handles and modules below it, in the order of declaration.
+/// A module with handles and submodules, in the order of declaration.
 #[derive(Default)]
 struct Module {
     constants: Vec<(Ident, Handle)>,
     modules: Vec<(String, Module)>,
-    /// Which constants there are, and where each module is in the list.
+    /// The constants, and the index of each submodule in the list.
     known: HashSet<String>,
     places: HashMap<String, usize>,
     docs: Vec<Attribute>,
-    /// Where its name was declared, if it was: an editor jumps there.
+    /// Where its name was declared, if it was: editors jump there.
     span: Option<Span>,
 }
 
@@ -87,7 +87,7 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
     for group in &robot.parameter_groups {
         root.describe(&group.path, &group.name, &group.attributes);
     }
-    // Those of a sensor and of an estimator of several outputs are beside their handles.
+    // The functions of a sensor and of an estimator with several outputs are beside their handles.
     for sensor in &robot.sensors {
         root.describe(&robot.publishers[sensor.publisher].path, &sensor.name, &[]);
     }
@@ -102,7 +102,7 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
         let path = ["category".to_owned(), crate::names::text(&category.name)];
         root.add(&path, &category.name, Handle::Category(id));
     }
-    // Where the robot's name is, so that a second one is reported there.
+    // At the robot's name, so that a second one is reported there.
     let module = ident(module);
     let module = respan(quote!(mod #module), name.span());
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
@@ -147,7 +147,7 @@ impl Module {
         }
     }
 
-    /// Gives the module at a path the place and doc comments of a name; a module without handles does not exist.
+    /// Gives the module at a path the span and doc comments of a name; a module without handles does not exist.
     fn describe(&mut self, path: &[String], name: &Ident, attributes: &[Attribute]) {
         let mut module = self;
         for segment in path {
@@ -272,7 +272,7 @@ impl Handle {
     }
 }
 
-/// How a caller reaches an estimator.
+/// Lets a caller reach an estimator.
 fn visit(types: &Types<'_>, id: EstimatorId, accessors: Accessors) -> TokenStream {
     match accessors {
         Accessors::Wired => {

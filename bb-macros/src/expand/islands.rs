@@ -1,7 +1,7 @@
-//! Which estimators always run together, behind one lock: see `bb_core::run::Island`.
+//! Estimators that always run together, under one lock: see `bb_core::run::Island`.
 //!
-//! An estimator belongs to the island of what feeds it, if all of its inputs come from there; one that several islands or
-//! sensors feed begins an island of its own, as does one with `runs_on: worker`.
+//! An estimator belongs to the island that feeds it, if all of its inputs come from there. An estimator fed by
+//! several islands or sensors begins its own island, as does one with `runs_on: worker`.
 
 use super::order;
 use crate::model::{EstimatorId, From, Home, Id as _, PublisherId, Robot, Table, ids};
@@ -10,10 +10,10 @@ use std::collections::HashMap;
 
 ids! { IslandId }
 
-/// Estimators behind one lock, in the order in which a message reaches them.
+/// Estimators under one lock, in the order in which a message reaches them.
 #[derive(Clone, Debug)]
 pub(super) struct Island {
-    /// The first of them, which the island is named by.
+    /// The first of them, which gives the island its name.
     pub(super) first: EstimatorId,
     pub(super) estimators: Vec<EstimatorId>,
 }
@@ -26,7 +26,7 @@ pub(super) struct Islands {
     pub(super) of: Table<EstimatorId, IslandId>,
 }
 
-/// What feeds an input.
+/// The source of an input.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Feed {
     /// A sensor or a service, by its publisher.
@@ -40,7 +40,7 @@ impl Islands {
         let depths = order::depths(verified);
         let mut order: Vec<EstimatorId> = robot.estimators.ids().collect();
         order.sort_by_key(|id| (depths[*id], *id));
-        // Each gets its own before what it feeds is looked at.
+        // Each gets its own island before its consumers are examined.
         let of = robot.estimators.map(|_| IslandId::new(0));
         let mut islands = Self { all: Table::new(), of };
         let mut begun: HashMap<Feed, IslandId> = HashMap::new();
@@ -75,7 +75,7 @@ impl Islands {
     }
 }
 
-/// The publishers of all inputs of an estimator; that of a nested one is its sensor's.
+/// The publishers of all inputs of an estimator; for a nested one, its sensor's.
 pub(super) fn sources<'a>(
     verified: &'a Verified<'_>,
     id: EstimatorId,

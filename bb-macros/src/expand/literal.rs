@@ -17,38 +17,38 @@ pub(super) fn transform(rigid: Rigid) -> TokenStream {
     if rigid == Rigid::IDENTITY {
         return quote!(__private::Transform::IDENTITY);
     }
-    // Tokens of negative numbers are a minus and a literal; quote does that for floats by itself.
+    // The tokens of a negative number are a minus sign and a literal; quote handles that only for floats.
     let Rigid { translation, rotation } = rigid;
     quote!(__private::Transform { translation: [#(#translation),*], rotation: [#(#rotation),*] })
 }
 
 /// Nanoseconds of a time in seconds.
 pub(super) fn nanos(seconds: f64) -> i64 {
-    // Verified to fit; a cast saturates all the same.
+    // Verified to fit; otherwise the cast saturates.
     (seconds * 1e9).round() as i64
 }
 
-/// An identifier of the expansion's own.
+/// An identifier used only by the expansion.
 pub(super) fn ident(text: &str) -> Ident {
     match syn::parse_str::<Ident>(text) {
         Ok(ident) => ident,
-        // A keyword, which was written with `r#`.
+        // A keyword, written with `r#`.
         Err(_) => Ident::new_raw(text, Span::call_site()),
     }
 }
 
 /// `const _: () = function(arguments);`, spanned so that rustc underlines all of `place`.
 ///
-/// It has no local names, so that it may be as if the user had written it: rustc then leaves out that the error
-/// originates in a macro.
+/// It has no local names, so it may have the span of user code: rustc then does not say that the error originates in
+/// a macro.
 pub(super) fn spanned_call(place: Place, function: TokenStream, arguments: TokenStream) -> TokenStream {
     let head = at(quote!(const _: () = #function), place.start);
     let tail = at(quote!((#arguments);), place.end);
     quote!(#head #tail)
 }
 
-/// The same tokens, all at `span`. Names are looked up as in the expansion, wherever `span` comes from: a robot may be
-/// declared through a `macro_rules!` of the user's.
+/// The same tokens, all at `span`. Names are resolved as in the expansion, wherever `span` comes from: a robot may be
+/// declared through a user's `macro_rules!`.
 pub(super) fn respan(tokens: TokenStream, span: Span) -> TokenStream {
     at(tokens, span.resolved_at(Span::call_site()))
 }

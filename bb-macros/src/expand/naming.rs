@@ -1,9 +1,9 @@
 //! The names of items in the expansion: each contains the path of its part, so that the expansion is readable.
 //!
-//! `sensor/base/imu` is `sensor_base_imu`. Where two paths would give one name, the second has a number at its end.
+//! `sensor/base/imu` is `sensor_base_imu`. If two paths would give the same name, a number is appended to the second.
 //!
-//! Items beside the robot's type have the line and the column of its name in theirs. So two robots with the same name in one
-//! module collide only in what the user knows, their types and modules.
+//! Items beside the robot's type contain the line and the column of its name. So two robots with the same name in one
+//! module collide only in items known to the user: their types and modules.
 
 use super::part::Part;
 use crate::diagnostics::Place;

@@ -1,4 +1,4 @@
-//! `struct __Options`: the options of every component, at first as declared, and which parameters they are bound to.
+//! `struct __Options`: the options of every component, initially as declared, and the parameters they are bound to.
 
 use super::group::{self, Field};
 use super::literal::respan;
@@ -24,7 +24,7 @@ pub(super) fn options(types: &Types<'_>) -> TokenStream {
             let defaults = quote!(<#given as ::bb_core::Options>::defaults());
             respan(quote!(__private::as_known(#defaults)), Place::of(&component.kind).start)
         } else {
-            // Values are expressions of the user's, so the names in scope must not be ones that a user writes.
+            // Values are user expressions, so the names in scope must not be ones that a user writes.
             let function = format_ident!("__declared_{name}");
             functions.extend(filled(&function, &options, &given, component));
             quote!(#function())
@@ -53,7 +53,7 @@ pub(super) fn bound(robot: &Robot) -> TokenStream {
 
 /// `fn __declared_sensor_base_imu() -> … { let mut options = defaults(); options.beta = 0.1; options }`
 ///
-/// Only this names the type as the user wrote it, so that a type of another kind is reported here.
+/// Only this uses the type as the user wrote it, so a type of another kind is reported here.
 fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
     let settings: Vec<TokenStream> = component
         .options
@@ -67,10 +67,10 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
                     respan(quote!(__private::FromQuantity::from_quantity(#number)), place)
                 }
                 OptionValue::Expression { expression, .. } => into_if_text(expression),
-                // It has the parameter's value from the start on, see `binding`.
+                // It has the parameter's value from the start, see `binding`.
                 OptionValue::Parameter(_) => return None,
             };
-            // What does not fit is reported at the value; the option's name is pointed at beside it.
+            // A value that does not fit is reported at the value, with a note at the option's name.
             let receiver = respan(quote!(__options.), name.span());
             Some(quote!(#receiver #name = #value;))
         })
@@ -88,7 +88,7 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
     }
 }
 
-/// A `bb_core::component::binding::Binding`: which parameters the options of a part are bound to.
+/// A `bb_core::component::binding::Binding`: the parameters that a part's options are bound to.
 pub(super) fn binding(types: &Types<'_>, part: Part) -> TokenStream {
     let robot = types.model();
     let bound = part.component(robot).options.iter();

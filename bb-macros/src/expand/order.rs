@@ -3,8 +3,8 @@
 use crate::model::{EstimatorId, From, PublisherId, Robot, SensorId, Table, Trigger};
 use crate::verify::Verified;
 
-/// The number of estimators on the longest path from each one to a sensor. Consumers of one publisher are called in this order,
-/// so that one that also takes another's output for the same message comes after it.
+/// The number of estimators on the longest path from each one to a sensor. Consumers of one publisher are called in
+/// this order: one that also takes another's output for the same message comes after it.
 pub(super) fn depths(verified: &Verified<'_>) -> Table<EstimatorId, usize> {
     let mut known = verified.robot.estimators.map(|_| None);
     verified.robot.estimators.map(|id| depth(verified, id, &mut known))
@@ -24,8 +24,8 @@ fn depth(verified: &Verified<'_>, id: EstimatorId, known: &mut Table<EstimatorId
     deepest
 }
 
-/// The sensors in the order in which they are read when several are due at once: one whose message makes an estimator
-/// run comes after those that the estimator takes besides it. Otherwise, and in a cycle, by declaration.
+/// The sensors in the order in which they are read when several are due at once: a sensor whose message triggers an
+/// estimator is read after the estimator's other sensors. Otherwise, and in a cycle, by declaration.
 pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
     let robot = verified.robot;
     let mut before: Table<SensorId, Vec<SensorId>> = robot.sensors.map(|_| Vec::new());
@@ -39,7 +39,7 @@ pub(super) fn sensors(verified: &Verified<'_>) -> Vec<SensorId> {
     let mut left: Vec<SensorId> = robot.sensors.ids().collect();
     while !left.is_empty() {
         let is_free = |id: &SensorId| before[*id].iter().all(|other| !left.contains(other));
-        // Round a circle none is free; the first goes first.
+        // In a cycle none is free; the first goes first.
         let next = left.iter().position(is_free).unwrap_or_default();
         order.push(left.remove(next));
     }

@@ -1,4 +1,4 @@
-//! The parts of a robot that are declared by a type of the user's, numbered through.
+//! The parts of a robot declared with a user's type, numbered consecutively.
 
 use crate::model::Id as _;
 use crate::model::{ActuatorId, CommandId, EstimatorId, Robot, SensorId, ServiceId};
@@ -6,7 +6,7 @@ use crate::parse::Component;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// One of them.
+/// One of the parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     Sensor(SensorId),
@@ -52,7 +52,7 @@ impl Part {
         }
     }
 
-    /// The trait that its type implements, and the constant of `bb_core::stub::Probe` that says so.
+    /// The trait that its type implements, and the constant of `bb_core::stub::Probe` that tells whether it does.
     pub(super) fn contract(self) -> (TokenStream, TokenStream) {
         match self {
             Self::Sensor(_) => (quote!(::bb_core::Sensor), quote!(IS_SENSOR)),

@@ -1,5 +1,5 @@
-//! Every name that the user refers to, repeated at its place, so that an editor finds its declaration: jump and rename
-//! work on paths, commands, states, categories, parameters and on the names of inputs.
+//! Every name that the user refers to, repeated at its place, so that editors find its declaration: go to definition
+//! and rename work on paths, commands, states, categories, parameters and on the names of inputs.
 //!
 //! ```text
 //! const _: () = { use rover::sensor::base::imu as _; use rover::command::stop as _; … };
@@ -67,7 +67,7 @@ fn control(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     reactions.chain(states).chain(categories)
 }
 
-/// The names of `whole`, of which `written` is the end.
+/// The names of `whole`, whose end is `written`.
 fn spelt(whole: &[String], written: &Path) -> Vec<Ident> {
     let missing = whole.len().saturating_sub(written.0.len());
     let above = whole.iter().take(missing).map(|name| at_none(name));

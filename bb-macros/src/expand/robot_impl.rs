@@ -1,4 +1,4 @@
-//! `impl Robot`: how its parts are made, started and listed.
+//! `impl Robot`: creates, starts and lists its parts.
 
 use super::options::{binding, bound};
 use super::part::Part;
@@ -9,7 +9,7 @@ use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
-/// Sources that one function opens.
+/// The number of sources opened by one function.
 const SIZE: usize = 16;
 
 pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
@@ -22,7 +22,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
         source(types, Part::Service(id), service.publisher, quote!(AsService), quote!(&__SERVICES[#id]))
     });
     let sources: Vec<TokenStream> = sensors.chain(services).collect();
-    // In groups: rustc takes longer for one function of all.
+    // In groups: rustc takes longer for one function with all of them.
     let groups = sources.chunks(SIZE).enumerate().map(|(number, sources)| {
         let group = format_ident!("__open_group_{number}");
         quote! {
@@ -143,7 +143,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
     }
 }
 
-/// Makes one sensor or service, whose readings go to its publisher.
+/// Creates one sensor or service, whose readings go to its publisher.
 fn source(
     types: &Types<'_>,
     part: Part,

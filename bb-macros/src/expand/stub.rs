@@ -1,4 +1,4 @@
-//! A robot that is not valid: only its type and handles, so that code which uses them causes no further errors.
+//! An invalid robot: only its type and handles, so that code which uses them causes no further errors.
 
 use super::handles::handles;
 use super::types::Accessors;
@@ -17,7 +17,7 @@ pub(crate) fn stub(robot: &Robot) -> TokenStream {
     let naming = naming::Naming::of(robot, name);
     let types = types::Types::new(robot, &naming, name, 0);
     let aliases = types::aliases(&types);
-    // A name that leaves none for the module is what failed.
+    // The error was a name from which no module name can be made.
     let module = module_name(name);
     let handles = module.as_ref().map(|module| handles(&types, name, module, Accessors::Stub));
     let export = super::export(robot, name, module.as_deref());

@@ -1,9 +1,9 @@
-//! What was declared, as tables of constants.
+//! Declarations as tables of constants.
 
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
-/// Values of one constant: the time that rustc takes for one grows with its square.
+/// Number of values in one constant: rustc's time for one grows with its square.
 const SIZE: usize = 16;
 
 /// `static __SENSORS: [SensorDeclaration; 20] = join(&[&__SENSORS_0, &__SENSORS_1]);`

@@ -39,7 +39,7 @@ fn link(robot: &Robot, id: LinkId, link: &Link) -> TokenStream {
     })
 }
 
-/// A reduction of 1 and no offset, where they are not given.
+/// Defaults to a reduction of 1 and no offset.
 fn transmission(given: &Transmission) -> TokenStream {
     let value = |quantity: &Option<Quantity>, default: f64| quantity.as_ref().map_or(default, |given| given.value);
     let (reduction, offset) = (value(&given.reduction, 1.0), value(&given.offset, 0.0));
@@ -137,7 +137,7 @@ fn collision(shape: &Shape) -> TokenStream {
     quote!(__private::Collision { link_from_shape: #link_from_shape, geometry: #geometry })
 }
 
-/// A verified shape has exactly one geometry, with all that it needs.
+/// A verified shape has exactly one geometry, with all its sizes.
 fn geometry(shape: &Shape) -> TokenStream {
     let none = Geometry::Sphere { radius: None };
     match shape.geometries.first().map_or(&none, |(_, geometry)| geometry) {

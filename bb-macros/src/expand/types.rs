@@ -1,6 +1,6 @@
 //! The names of components' types in the expansion, and of the types derived from them.
 //!
-//! Each type that the user wrote is aliased once. The alias is used at the span of the user's type, so that rustc reports
+//! Each type that the user wrote is aliased once. The alias is used at the span of the user's type, so rustc reports
 //! errors there, once.
 
 use super::group;
@@ -14,12 +14,12 @@ use quote::{ToTokens, format_ident, quote, quote_spanned};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-/// `type __Rover_2_11__sensor_base_imu = Bmi270;`, if it is a sensor, else `Unknown`; as the user wrote it,
+/// `type __Rover_2_11__sensor_base_imu = Bmi270;`, if it is a sensor, otherwise `Unknown`; as the user wrote it,
 /// `__Rover_2_11__given__sensor_base_imu`; and the payload of each estimator's output,
 /// `__Rover_2_11__payload__sensor_base_imu_tilt`.
 ///
-/// Parts of one kind and one type are probed once. A type that fails is still reported at each part, since its options are
-/// those of the type as written there.
+/// Parts with the same kind and type are probed once. A type that fails is still reported at each part, since its
+/// options are those of the type as written there.
 pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let mut probed = HashMap::new();
@@ -65,8 +65,8 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     aliases.collect()
 }
 
-/// `enum __Rover_2_11__member__sensor_base_imu_tilt {}`: the marker of an estimator in its island; and an alias by which the
-/// robot's module, which exports what it imports, can import it.
+/// `enum __Rover_2_11__member__sensor_base_imu_tilt {}`: the marker of an estimator in its island; and an alias
+/// through which the robot's module, which exports its imports, can import it.
 pub(super) fn members(types: &Types<'_>) -> TokenStream {
     let names = || types.robot.estimators.ids().map(|id| types.names(Part::Estimator(id)));
     let (members, aliases) = (names().map(|names| &names.member), names().map(|names| &names.exported));
@@ -81,12 +81,12 @@ pub(super) fn members(types: &Types<'_>) -> TokenStream {
     }
 }
 
-/// How handles reach what they name.
+/// How handles reach the parts they name.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Accessors {
     /// Into the wiring.
     Wired,
-    /// Nowhere: the robot is not valid, and its handles only have names and types.
+    /// No access: the robot is invalid, and its handles have only names and types.
     Stub,
 }
 
@@ -95,8 +95,8 @@ pub(super) const ROBOT: &str = "__Robot";
 
 /// `pub use super::{__Rover_2_11::Rover as __Robot, __Rover_2_11__sensor_base_imu, …};` in the robot's module.
 ///
-/// A single import, so that it is one error in a function, whose items a module cannot name. Its first name explains the error,
-/// since rustc prints it.
+/// A single import, so that it causes a single error inside a function, whose items a module cannot name. Its first
+/// name explains the error, since rustc prints it.
 pub(super) fn imports(types: &Types<'_>, accessors: Accessors) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let parts = Part::all(robot).map(|part| &types.names(part).alias);
@@ -139,7 +139,7 @@ pub(super) struct Types<'a> {
     robot: &'a Robot,
     naming: &'a Naming,
     name: &'a Ident,
-    /// `super::super::`, up to the robot's module, which imports what is named here.
+    /// `super::super::`, up to the robot's module, which imports these names.
     above: TokenStream,
     is_in_module: bool,
 }
@@ -169,12 +169,12 @@ impl<'a> Types<'a> {
         self.naming.part(self.robot, part)
     }
 
-    /// Where the options of a part are in `__Options`.
+    /// The place of a part's options in `__Options`.
     pub(super) fn options_place(&self, part: Part) -> TokenStream {
         group::path(part.position(self.robot), self.name_of(part))
     }
 
-    /// Where the topic of a publisher is in `__Topics`.
+    /// The place of a publisher's topic in `__Topics`.
     pub(super) fn topic_place(&self, id: PublisherId) -> TokenStream {
         group::path(id.number(), self.publisher(id))
     }
@@ -255,7 +255,8 @@ impl<'a> Types<'a> {
         }
     }
 
-    /// A declared output as a field of the algorithm's output type, looked up by name at compile time; or its only one.
+    /// A declared output as a field of the algorithm's output type, looked up by name at compile time; or its only
+    /// output.
     pub(super) fn output_field(&self, id: EstimatorId, output: Option<usize>) -> TokenStream {
         let (emitted, span) = (self.estimator_output(id), self.span(Part::Estimator(id)));
         match output.and_then(|output| self.robot.estimators[id].outputs.get(output)) {

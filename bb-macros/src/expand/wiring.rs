@@ -1,4 +1,4 @@
-//! `struct __Topics`, `struct __Wiring`, the islands, and what is downstream of each publisher, by direct calls.
+//! `struct __Topics`, `struct __Wiring`, the islands, and the direct calls to the consumers of each publisher.
 //!
 //! ```text
 //! impl __Wiring {
@@ -31,12 +31,12 @@ use crate::verify::Verified;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{format_ident, quote};
 
-/// What all functions here are made of.
+/// The context of all functions here.
 struct Wiring<'a> {
     types: &'a Types<'a>,
     islands: &'a Islands,
     consumers: &'a Table<PublisherId, Vec<Consumer>>,
-    /// What comes into each island from outside.
+    /// The messages that enter each island from outside.
     inlets: Table<IslandId, Vec<(PublisherId, Visit<'a>)>>,
 }
 
@@ -136,13 +136,13 @@ fn actuators(types: &Types<'_>) -> TokenStream {
 pub(super) struct Consumer {
     estimator: EstimatorId,
     input: Option<usize>,
-    /// Whether its message makes the estimator run; else it is kept until another does.
+    /// Whether its message makes the estimator run; otherwise it is kept until another one does.
     runs: bool,
-    /// Where rustc is to report that payloads do not match: the path of the input, or the type of a nested estimator.
+    /// Where rustc reports a payload mismatch: the path of the input, or the type of a nested estimator.
     span: Span,
 }
 
-/// Who takes what each publisher publishes, in the order in which they are called.
+/// The consumers of each publisher, in the order in which they are called.
 fn consumers(verified: &Verified<'_>) -> Table<PublisherId, Vec<Consumer>> {
     let robot = verified.robot;
     let mut consumers: Table<PublisherId, Vec<Consumer>> = robot.publishers.map(|_| Vec::new());
@@ -162,8 +162,8 @@ fn consumers(verified: &Verified<'_>) -> Table<PublisherId, Vec<Consumer>> {
             consumers[*source].push(Consumer { estimator: id, input: Some(number), runs, span });
         }
     }
-    // What is kept for later comes first; then the estimators run, those that take what others make of the same message
-    // after these.
+    // Messages kept for later come first; then the estimators run. Those that take other estimators' outputs for the
+    // same message come after them.
     let depths = order::depths(verified);
     for list in &mut consumers {
         list.sort_by_key(|consumer| (consumer.runs, depths[consumer.estimator], consumer.estimator));
@@ -171,8 +171,8 @@ fn consumers(verified: &Verified<'_>) -> Table<PublisherId, Vec<Consumer>> {
     consumers
 }
 
-/// The consumers of a publisher that belong to one island and are reached in one go: first what islands keep for later,
-/// then what runs.
+/// The consumers of a publisher that belong to one island and are reached in one call: first those that keep the
+/// message for later, then those that run.
 struct Visit<'a> {
     island: IslandId,
     runs: bool,
@@ -213,19 +213,19 @@ impl<'a> Wiring<'a> {
         self.types.name_of(Part::Estimator(self.islands.all[number].first))
     }
 
-    /// The messages that may wait for an island: an enum, unless all come from one publisher.
+    /// The messages that may be queued for an island: an enum, unless all come from one publisher.
     fn message_enum(&self, number: IslandId) -> Ident {
         format_ident!("__Message_{}", self.island_name(number))
     }
 
-    /// `sensor_base_imu`, or `sensor_base_imu__kept` for those that keep the message for later: what delivers it in an
-    /// island, and the variant of the island's messages.
+    /// `sensor_base_imu`, or `sensor_base_imu__kept` for consumers that keep the message for later: the function that
+    /// delivers it in an island, and the variant of the island's messages.
     fn inlet_name(&self, publisher: PublisherId, runs: bool) -> Ident {
         let name = self.types.publisher(publisher);
         if runs { name.clone() } else { format_ident!("{name}__kept") }
     }
 
-    /// `fn sensor_base_imu` of the wiring, for a sensor or a service: publishes, then runs what is downstream,
+    /// `fn sensor_base_imu` of the wiring, for a sensor or a service: publishes, then runs the consumers downstream,
     /// island by island.
     fn published(&self, id: PublisherId) -> TokenStream {
         if island_of(self.types, self.islands, id).is_some() {
@@ -307,7 +307,7 @@ impl<'a> Wiring<'a> {
         format_ident!("{kind}{}{name}", self.types.name_of(Part::Estimator(id)))
     }
 
-    /// `impl Member`: where an estimator is, and where its outputs go.
+    /// `impl Member`: the place of an estimator, and the destinations of its outputs.
     fn member(&self, id: EstimatorId) -> TokenStream {
         let (types, estimator) = (self.types, &self.types.model().estimators[id]);
         let (member, name) = (types.member(id), types.name_of(Part::Estimator(id)));
@@ -323,7 +323,7 @@ impl<'a> Wiring<'a> {
                 type #payload = <#field as __private::TakenAt<#taken>>::Payload;
             }
         });
-        // One input is the driver's, which is not kept.
+        // The driver's input is not kept.
         let cache = (numbers.len() > 1).then(|| {
             let fields = numbers.iter().map(|input| self.field(id, *input));
             let numbers = 0..numbers.len();
@@ -385,8 +385,9 @@ impl<'a> Wiring<'a> {
         }
     }
 
-    /// Publishes one output, then runs what is downstream of it: what other islands keep for later goes first, then its own
-    /// estimators run, then those of the others. What others take came at the time of the turn.
+    /// Publishes one output, then runs the consumers downstream of it: first those in other islands that keep it for
+    /// later, then its own estimators, then those of other islands. For other islands, the message arrives at the
+    /// time of the turn.
     fn emitted(&self, id: EstimatorId, publisher: PublisherId) -> TokenStream {
         let (types, own) = (self.types, self.islands.of[id]);
         let (field, payload, topic) =
@@ -411,7 +412,7 @@ impl<'a> Wiring<'a> {
         }
     }
 
-    /// The struct of an island, the messages that may wait for it, and how entries are processed.
+    /// The struct of an island, the messages that may be queued for it, and the processing of entries.
     fn island(&self, number: IslandId) -> TokenStream {
         let (types, island) = (self.types, &self.islands.all[number]);
         let (kind, place) = (self.island_struct(number), group::path(number.number(), self.island_name(number)));
@@ -475,7 +476,7 @@ impl<'a> Wiring<'a> {
         }
     }
 
-    /// The type of an island's messages, its items, and what is done with one.
+    /// The type of an island's messages, its items, and their handling.
     fn deliver(
         &self,
         number: IslandId,
@@ -537,7 +538,7 @@ fn island_of(types: &Types<'_>, islands: &Islands, publisher: PublisherId) -> Op
     }
 }
 
-/// The number by which the journal knows a publisher outside of an island.
+/// The journal's number for a publisher outside of an island.
 fn entry(publisher: PublisherId, runs: bool) -> usize {
     2 * publisher.number() + usize::from(runs)
 }

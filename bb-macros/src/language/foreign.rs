@@ -1,6 +1,6 @@
-//! Words of other languages and tools, and of other places of this one: what to write instead.
+//! Words from other languages and tools, and from other places of this one, with what to write instead.
 
-/// The places in which words are (none: in all), the words, and the way out.
+/// The places for which an entry applies (empty: all), the words, and the suggestion.
 type Row = (&'static [&'static str], &'static [&'static str], &'static str);
 
 const ROWS: [Row; 40] = [
@@ -120,7 +120,7 @@ const ROWS: [Row; 40] = [
     (&["`origin`"], &["position", "translation", "x", "y", "z"], "write `xyz: [0.1 m, 0 m, 0 m]`"),
     (&["`origin`"], &["roll", "pitch", "yaw"], "write `rpy: [0 deg, 0 deg, 90 deg]`"),
     (&["`inertia`"], &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"], "leave the `i` out, as in `xx: 0.1 kg*m^2`"),
-    // Programs.
+    // Programming languages.
     (
         &[],
         &["if", "else", "for", "while", "match", "loop", "switch", "elif"],

@@ -1,9 +1,9 @@
-//! What a number of the language measures, and within which bounds.
+//! The quantity of a number in the language, and its bounds.
 
 use super::JointKind;
 use crate::units::Dimension;
 
-/// A dimension, or one that depends on how the joint moves in which it is written.
+/// A dimension, or one that depends on the kind of the enclosing joint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Measure {
     Of(Dimension),
@@ -15,8 +15,8 @@ pub(crate) enum Measure {
 }
 
 impl Measure {
-    /// The dimension and an example where it depends on the joint; `None` outside of joints and where the joint is fixed,
-    /// since that it then has none is a fault of its own.
+    /// The dimension and an example, if it depends on the joint. `None` outside of joints and for a fixed joint,
+    /// where the number itself is reported by another rule.
     pub(crate) fn in_joint(self, joint: Option<JointKind>) -> Option<(Dimension, Option<&'static str>)> {
         if let Self::Of(dimension) = self {
             return Some((dimension, None));
@@ -37,27 +37,27 @@ impl Measure {
     }
 }
 
-/// Which numbers are allowed.
+/// The allowed numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Bounds {
     Any,
-    /// A number that is divided by.
+    /// A number used as a divisor.
     NotZero,
     /// More than 0.
     Positive,
-    /// A time that nanoseconds can hold.
+    /// A time that fits in nanoseconds.
     Time,
-    /// A frequency whose period nanoseconds can hold.
+    /// A frequency whose period fits in nanoseconds.
     Rate,
 }
 
-/// Beyond it a period is less than a nanosecond.
+/// A period beyond it is less than a nanosecond.
 const HIGHEST_RATE_HZ: f64 = 1e9;
-/// 292 years: beyond it nanoseconds do not fit.
+/// 292 years: longer times do not fit in nanoseconds.
 const LONGEST_TIME_S: f64 = 9.2e9;
 
 impl Bounds {
-    /// What is wrong with a number, in SI.
+    /// The fault of a number, in SI.
     pub(crate) fn fault(self, value: f64) -> Option<&'static str> {
         let fault = match self {
             Self::Any => return None,

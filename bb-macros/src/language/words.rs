@@ -45,7 +45,7 @@ words! {
         "angles about the fixed axes x, y, z. Default: zero";
     AXIS: "axis", Value::Other, Once, ": z;",
         "of a joint that moves: `x`, `y`, `z`, `-x`, `-y`, `-z` or `[a, b, c]`; for `planar` the plane's normal";
-    // A component of one that is written as `[a, b, c]`.
+    // A component of a vector written as `[a, b, c]`.
     AXIS_COMPONENT: "axis", Value::Number(Measure::Of(Dimension::NONE), Bounds::Any), Once, ": 1",
         "";
     LIMIT: "limit", Value::Other, Once, ": { lower: -90 deg, upper: 90 deg };",

@@ -20,7 +20,7 @@ pub(crate) const DEFAULT_CATEGORY: &str = "default";
 pub(crate) struct Category {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// How many of its commands run at once.
+    /// How many of its commands may run at once.
     pub(crate) concurrency: u32,
 }
 
@@ -48,7 +48,7 @@ pub(crate) enum Cancel {
 }
 
 impl CategoryId {
-    /// That of commands that name none.
+    /// The category of commands that name none.
     pub(crate) const DEFAULT: Self = Self(0);
 }
 
@@ -113,7 +113,7 @@ impl std::convert::From<parse::Category> for Category {
         let mut concurrency = 1;
         for (setting, quantity) in settings.each() {
             match setting {
-                // Another value is refused by a rule; the cast saturates.
+                // A rule refuses other values; the cast saturates.
                 CategorySetting::Concurrency => concurrency = quantity.value as u32,
             }
         }

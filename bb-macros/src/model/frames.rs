@@ -11,12 +11,12 @@ use syn::Attribute;
 pub(crate) struct Route {
     /// `target_from_source`; with moving joints at position zero.
     pub(crate) transform: Rigid,
-    /// The joints on the way that move.
+    /// The moving joints on the way.
     pub(crate) moving: Vec<JointId>,
 }
 
 impl Robot {
-    /// The publishers at a joint that may tell its position; `None` if none is needed.
+    /// The publishers at a joint that may report its position; `None` if none is needed.
     pub(crate) fn position_sources(&self, id: JointId) -> Option<Vec<PublisherId>> {
         let joint = &self.joints[id];
         if joint.kind == JointKind::Fixed || !joint.properties.mimics.is_empty() {
@@ -33,7 +33,7 @@ impl Robot {
             return Route { transform: Rigid::IDENTITY, moving: Vec::new() };
         };
         let (mut up, mut down) = (self.ancestry(source), self.ancestry(target));
-        // The part from the root that both have in common is not on the route.
+        // The common part from the root is not on the route.
         while up.last().is_some() && up.last() == down.last() {
             up.pop();
             down.pop();
@@ -44,7 +44,7 @@ impl Robot {
         Route { transform: common_from_target.inverse().then(common_from_source), moving }
     }
 
-    /// The way from a frame to the root's.
+    /// The route from a frame to the root's.
     pub(crate) fn route_to_root(&self, source: Mount) -> Option<Route> {
         let root = self.links.ids().next()?;
         (source != Mount::Robot).then(|| self.route(source, Mount::Link(root)))

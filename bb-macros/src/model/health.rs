@@ -1,4 +1,4 @@
-//! When an estimator is degraded or lost, and which commands that starts.
+//! When an estimator is degraded or lost, and the commands this starts.
 
 use super::{CommandId, Robot};
 use crate::language::EstimatorSetting;
@@ -14,7 +14,7 @@ pub(crate) struct Timing {
     pub(crate) recover_after: u32,
 }
 
-/// The commands that changes of its health start: `None` if none is declared, or no command has the name.
+/// The commands started by changes of its health: `None` if none is declared, or no command has the name.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Health {
     pub(crate) on_degraded: Option<CommandId>,
@@ -22,7 +22,7 @@ pub(crate) struct Health {
     pub(crate) on_recovered: Option<CommandId>,
 }
 
-/// A thread of its own.
+/// A separate thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Worker {
     /// 1 to 99, of the operating system's real-time class.
@@ -41,7 +41,7 @@ impl Timing {
                 EstimatorSetting::SyncTolerance => timing.sync_tolerance_s = Some(value),
                 EstimatorSetting::LatencyBudget => timing.latency_budget_s = Some(value),
                 EstimatorSetting::LostAfter => timing.lost_after_s = Some(value),
-                // Another value is refused by a rule; the cast saturates.
+                // A rule refuses other values; the cast saturates.
                 EstimatorSetting::RecoverAfter => timing.recover_after = value as u32,
             }
         }

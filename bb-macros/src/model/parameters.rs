@@ -15,10 +15,10 @@ pub(crate) struct Parameter {
     pub(crate) name: Ident,
     /// `param`, the groups, the name.
     pub(crate) path: Vec<String>,
-    /// Its group; none in `parameters` itself.
+    /// Its group; empty in `parameters` itself.
     pub(crate) group: Option<ParameterGroupId>,
     pub(crate) kind: ParameterKind,
-    /// Of a verified robot it is of this kind, as are the ends of the range.
+    /// In a verified robot it is of this kind, and so are the ends of the range.
     pub(crate) default: Literal,
     pub(crate) range: Option<ParameterRange>,
 }
@@ -77,7 +77,7 @@ fn below(above: &[String], name: &Ident) -> Vec<String> {
     above.iter().cloned().chain([text(name)]).collect()
 }
 
-/// `3` is a number too.
+/// `3` is a valid float too.
 fn of_kind(mut literal: Literal, kind: ParameterKind) -> Literal {
     if let (Value::Integer(integer), ParameterKind::Number) = (&literal.value, kind) {
         literal.value = Value::Number(*integer as f64);

@@ -51,7 +51,7 @@ pub(crate) fn resolve(tree: parse::Robot) -> Robot {
         repeated,
         complete,
     };
-    // Before what refers to them.
+    // Before anything that refers to them.
     robot.add_parameters(parameters);
     robot.add_commands(commands);
     for sensor in sensors {
@@ -183,7 +183,7 @@ impl Robot {
         self.publishers.push(Publisher { path, from })
     }
 
-    /// Finds what each input names: by its whole path, or by the end of one that no other has.
+    /// Finds the publisher of each input: by its whole path, or by a suffix that no other has.
     fn resolve_inputs(&mut self) {
         let mut by_path: HashMap<String, Vec<PublisherId>> = HashMap::new();
         let mut whole: HashMap<String, PublisherId> = HashMap::new();
@@ -205,7 +205,7 @@ impl Robot {
     }
 }
 
-/// `[a, b]` overrides, `out` is the estimator's own path, any other name is below it.
+/// `[a, b]` overrides the path, `out` is the estimator's own path, any other name is below it.
 fn output_path(estimator: &[String], output: &parse::Output) -> Vec<String> {
     match &output.path {
         Some(path) => path.iter().map(text).collect(),

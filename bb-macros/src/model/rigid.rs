@@ -1,6 +1,6 @@
-//! Rigid transforms: just enough to multiply fixed joints out at compile time.
+//! Rigid transforms: just enough to multiply out fixed joints at compile time.
 
-/// Rotates, then translates.
+/// A rotation followed by a translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rigid {
     /// m

@@ -1,5 +1,5 @@
-//! Lists whose items are numbered by a type of their own: an id of one list does not index another, and one that a list has
-//! given out has its item.
+//! Lists with their own types of ids: an id of one list does not index another, and an id returned by a list always
+//! has its item.
 
 use std::marker::PhantomData;
 use std::ops::{Index, IndexMut};
@@ -65,7 +65,7 @@ impl<I: Id, T> Table<I, T> {
         self.items.iter().position(is).map(I::new)
     }
 
-    /// A list of as many items, under the same ids.
+    /// A list of the same length, with the same ids.
     pub(crate) fn map<U>(&self, item: impl FnMut(I) -> U) -> Table<I, U> {
         self.ids().map(item).collect()
     }
@@ -109,7 +109,7 @@ impl<'a, I: Id, T> IntoIterator for &'a mut Table<I, T> {
     }
 }
 
-/// Declares types of ids. In an expansion an id is its number, in a name and as a `usize`.
+/// Declares id types. In an expansion, an id is its number, as part of a name and as a `usize`.
 macro_rules! ids {
     ($($(#[$doc:meta])* $id:ident)*) => { $(
         $(#[$doc])*

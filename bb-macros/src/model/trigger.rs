@@ -1,8 +1,8 @@
-//! What triggers a publisher, traced back through estimators, and how often.
+//! The trigger of a publisher, traced back through estimators, and its period.
 
 use super::{From, Home, PublisherId, Robot, SensorId, ServiceId};
 
-/// Where a chain of messages starts.
+/// The start of a chain of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trigger {
     Sensor(SensorId),

@@ -1,4 +1,4 @@
-//! The contents of braces, item by item, and recovery after one that cannot be read.
+//! The contents of braces, item by item, and recovery after an item that cannot be read.
 
 use super::Notes;
 use super::name::{is_keyword, whole};
@@ -16,7 +16,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// The first word as a name, where items start with a name instead of a word of the language.
+    /// The first word as a name, in places where items start with a name instead of a word of the language.
     pub(super) fn name(&self, input: ParseStream<'_>) -> syn::Result<Ident> {
         let text = self.word.to_string();
         if NO_WORDS.contains(&&*text) && input.peek(Ident::peek_any) {
@@ -32,11 +32,11 @@ impl Head {
     }
 }
 
-/// Words that people write before a name, as other blocks require one there.
+/// Words that people write before a name, because other blocks require one.
 const NO_WORDS: [&str; 5] = ["command", "state", "parameter", "param", "group"];
 
-/// Reads items until the end, each by its head; `expected` is the error for what starts none. An item that cannot be read is
-/// reported and skipped.
+/// Reads items until the end, each by its head; `expected` is the error for tokens that start no item. An item that
+/// cannot be read is reported and skipped.
 pub(super) fn items_of(
     input: ParseStream<'_>,
     expected: &str,
@@ -51,7 +51,7 @@ pub(super) fn items_of(
         }
         let result = match head(input, expected, notes) {
             Ok(Some(head)) => item(head, input, notes),
-            // Nothing can be read after a comment in another language's notation.
+            // Nothing can be read after a comment in another language's syntax.
             Ok(None) => return,
             Err(error) => Err(error),
         };
@@ -71,7 +71,7 @@ pub(super) fn braced<'a>(input: ParseStream<'a>, word: &Word) -> syn::Result<Par
     opened(input)
 }
 
-/// Opens a `{ … }` that is known to come next.
+/// Opens a `{ … }` that is known to follow.
 pub(super) fn opened<'a>(input: ParseStream<'a>) -> syn::Result<ParseBuffer<'a>> {
     let content;
     syn::braced!(content in input);

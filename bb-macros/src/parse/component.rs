@@ -1,4 +1,4 @@
-//! What is declared by name and type: `imu: Bmi270(bus = 1) { … }`.
+//! Items declared by name and type: `imu: Bmi270(bus = 1) { … }`.
 
 mod mistaken;
 mod options;
@@ -12,7 +12,7 @@ use proc_macro2::Ident;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{AngleBracketedGenericArguments, Attribute, Token};
 
-/// A type of the user's with its options.
+/// A user's type with its options.
 #[derive(Clone, Debug)]
 pub(crate) struct Component {
     /// A path with generic arguments: `bb_estimators::Madgwick<Marg>`.
@@ -35,7 +35,7 @@ impl<'a> Declared<'a> {
         Self::named(&head.word.to_string(), head.attributes, name, input, notes)
     }
 
-    /// Reads what follows the name of what `word` declares.
+    /// Reads the tokens after the name that `word` declares.
     pub(super) fn named(
         word: &str,
         attributes: Vec<Attribute>,
@@ -63,7 +63,7 @@ impl<'a> Declared<'a> {
 }
 
 impl Component {
-    /// Also whether its braces have ended it, so that no `;` is missing.
+    /// Also returns whether its braces have ended it, so that no `;` is missing.
     fn parse(word: &str, name: &Ident, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<(Self, bool)> {
         let mut kind = path_of_type(name, input)?;
         let is_made_here = mistaken::constructor(&mut kind, notes);
@@ -73,10 +73,10 @@ impl Component {
         if input.peek(syn::token::Paren) {
             let content;
             syn::parenthesized!(content in input);
-            // Options that cannot be read leave the component known.
+            // If the options cannot be read, the component is still known.
             match content.parse_terminated(ComponentOption::parse, Token![,]) {
                 Ok(parsed) => options.extend(parsed),
-                // What a constructor takes has no names; that is reported already.
+                // A constructor's arguments have no names; that is already reported.
                 Err(_) if is_made_here => drop(content.parse::<proc_macro2::TokenStream>()),
                 Err(error) => notes.syntax(&error),
             }
@@ -88,7 +88,7 @@ impl Component {
     }
 }
 
-/// Reads a path whose last parentheses are not taken for the arguments of a function's type.
+/// Reads a path whose last parentheses are not parsed as the arguments of a function type.
 fn path_of_type(name: &Ident, input: ParseStream<'_>) -> syn::Result<syn::Path> {
     mistaken::type_of(name, input).map_or(Ok(()), Err)?;
     let leading_colon = input.parse()?;

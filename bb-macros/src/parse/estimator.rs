@@ -1,6 +1,6 @@
 //! `estimator pose: Eskf(gravity = 9.81 m/s^2) { input …; output …; sync_tolerance: 20 ms; }`
 //!
-//! Both forms are read alike; that a nested one takes no `input` is a rule, so that the error can say why.
+//! Both forms are parsed alike. A rule refuses an `input` in a nested one, so that the error can say why.
 
 use super::Notes;
 use super::block::Head;

@@ -1,4 +1,4 @@
-//! Which commands a change of health calls: `on_lost: stop;`
+//! Commands called by a change of health: `on_lost: stop;`
 
 use super::Notes;
 use super::block::{Head, colon, semicolon};
@@ -6,7 +6,7 @@ use super::name::{one_name, whole};
 use proc_macro2::Ident;
 use syn::parse::ParseStream;
 
-/// All that were written; a rule reports a second one.
+/// All occurrences; a rule reports a second one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reactions {
     pub(crate) on_degraded: Vec<Reaction>,

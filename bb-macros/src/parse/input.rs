@@ -16,7 +16,7 @@ pub(crate) struct Input {
     pub(crate) word: Ident,
     pub(crate) name: Ident,
     pub(crate) path: Path,
-    /// The word `driver`; more than one is harmless, as is more than one `optional`.
+    /// The word `driver`; repeating it is harmless, as is repeating `optional`.
     pub(crate) driver: Option<Ident>,
     pub(crate) optional: Option<Ident>,
     pub(crate) within: Option<Quantity>,

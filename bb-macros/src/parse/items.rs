@@ -1,4 +1,4 @@
-//! The items of a place whose words the language knows, settings among them.
+//! The items of a place whose words the language defines, including settings.
 
 use super::block::{Head, items_of};
 use super::{Notes, Setting, Settings};
@@ -9,8 +9,8 @@ use syn::Token;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
-/// Reads the items of a place until the end. Settings are added to `settings`; `item` gets the head of any other item and reads
-/// the rest. An item that cannot be read is reported and skipped.
+/// Reads the items of a place until the end. Settings are added to `settings`; `item` gets the head of any other item
+/// and reads the rest. An item that cannot be read is reported and skipped.
 pub(super) fn items<I: Words, S: Words>(
     input: ParseStream<'_>,
     notes: &mut Notes<'_>,

@@ -19,7 +19,7 @@ use proc_macro2::{Ident, TokenTree};
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
-/// What a link weighs and looks like. Each is kept as often as it is written.
+/// The mass and appearance of a link. Every occurrence of each is kept.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LinkBody {
     pub(crate) inertials: Vec<Inertial>,
@@ -31,7 +31,7 @@ pub(crate) struct LinkBody {
 pub(crate) struct Link {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// Its name as a URDF has it, which need not be an identifier.
+    /// Its name in the URDF, which need not be an identifier.
     pub(crate) label: Option<String>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) estimators: Vec<Estimator>,

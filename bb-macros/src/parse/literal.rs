@@ -1,4 +1,4 @@
-//! What is written out: a number with or without its unit, a text, `true` or `false`.
+//! Literal values: a number with or without its unit, a string, `true` or `false`.
 
 use super::Quantity;
 use super::quantity::decimal_comma;
@@ -20,7 +20,7 @@ pub(crate) struct Literal {
     pub(crate) place: Place,
 }
 
-/// A value of one of the types that a parameter has.
+/// A value of one of the parameter types.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
     Bool(bool),
@@ -57,7 +57,7 @@ impl Literal {
     }
 }
 
-/// The error for `True` and `False`, as Python writes them, if one starts here.
+/// The error for Python's `True` and `False`, if one starts here.
 pub(super) fn capitalized(input: ParseStream<'_>) -> Option<syn::Error> {
     let word: Ident = input.parse().ok()?;
     let lower = match &*word.to_string() {
@@ -68,7 +68,7 @@ pub(super) fn capitalized(input: ParseStream<'_>) -> Option<syn::Error> {
     Some(syn::Error::new(word.span(), format!("`{word}` is written `{lower}`")))
 }
 
-/// The integer that comes next, if it has no unit and fits.
+/// The next integer, if it has no unit and fits.
 fn integer(input: ParseStream<'_>) -> Option<i64> {
     let ahead = input.fork();
     let sign = if ahead.parse::<Option<Token![-]>>().ok()?.is_some() { "-" } else { "" };

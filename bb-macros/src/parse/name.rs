@@ -1,4 +1,4 @@
-//! Names that a robot declares, and what is written in place of one.
+//! Names that a robot declares, and errors for other tokens in their place.
 
 use crate::diagnostics::Place;
 use proc_macro2::{Ident, TokenStream, TokenTree};
@@ -6,7 +6,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{Lit, LitStr, Token};
 
-/// Reads a name; `word` is what it is the name of.
+/// Reads a name; `word` declares it.
 pub(super) fn name(input: ParseStream<'_>, word: &Ident) -> syn::Result<Ident> {
     let place = input.span();
     if input.peek(Lit) {
@@ -40,7 +40,7 @@ pub(super) fn one_name(input: ParseStream<'_>, expected: &str) -> syn::Result<Id
     input.parse().map_err(|_| syn::Error::new(place, expected))
 }
 
-/// That the name that was just read ends here: `left-wheel` does not.
+/// Checks that the name just read ends here: `left-wheel` does not.
 pub(super) fn whole(input: ParseStream<'_>, name: &Ident) -> syn::Result<()> {
     whole_of(input, name, false)
 }
@@ -80,7 +80,7 @@ fn no_name(literal: &Lit) -> Option<String> {
     }
 }
 
-/// Reads the next part of a name that is joined by characters which names do not have.
+/// Reads the next part of a name that is joined by characters not allowed in names.
 fn joined_part(input: ParseStream<'_>) -> Option<TokenTree> {
     if input.peek(Token![->]) {
         return None;
@@ -96,7 +96,7 @@ fn joined_part(input: ParseStream<'_>) -> Option<TokenTree> {
     input.parse().ok()
 }
 
-/// The words of a name with blanks in it, `left wheel`: what follows them is what follows a name.
+/// The words of a name with spaces in it, `left wheel`, if the tokens after them could follow a name.
 fn spaced(input: ParseStream<'_>, name: &Ident, word: &Ident) -> Option<Vec<TokenTree>> {
     let ahead = input.fork();
     let mut words = vec![TokenTree::from(name.clone())];

@@ -1,4 +1,4 @@
-//! Facts that are collected while a robot is read, for the rules that concern all words.
+//! Facts collected while a robot is parsed, for the rules that concern all words.
 
 use super::{JointKind, Quantity};
 use crate::diagnostics::Diagnostics;
@@ -7,11 +7,11 @@ use proc_macro2::Ident;
 use std::ops::{Deref, DerefMut};
 use syn::parse::ParseStream;
 
-/// A number, and the word that it was given to.
+/// A number, and the word it was given to.
 #[derive(Clone, Debug)]
 pub(crate) struct Given {
     pub(crate) word: &'static Word,
-    /// The joint in which it is written: its dimension may depend on that.
+    /// The enclosing joint, since the dimension may depend on it.
     pub(crate) joint: Option<JointKind>,
     pub(crate) quantity: Quantity,
 }
@@ -21,7 +21,7 @@ pub(super) struct Notes<'a> {
     diagnostics: &'a mut Diagnostics,
     given: Vec<Given>,
     repeated: Vec<Ident>,
-    /// The kind of the joint that is being read, if it is known.
+    /// The kind of the joint being parsed, if it is known.
     pub(super) joint: Option<JointKind>,
 }
 
@@ -30,12 +30,12 @@ impl<'a> Notes<'a> {
         Self { diagnostics, given: Vec::new(), repeated: Vec::new(), joint: None }
     }
 
-    /// All numbers, and all words that were written too often.
+    /// All numbers, and all words written too often.
     pub(super) fn into_given(self) -> (Vec<Given>, Vec<Ident>) {
         (self.given, self.repeated)
     }
 
-    /// Reads the number that is given to a word; the rules say whether it is one that the word takes.
+    /// Reads the number given to a word; the rules check whether the word accepts it.
     pub(super) fn number(&mut self, word: &'static Word, input: ParseStream<'_>) -> syn::Result<Quantity> {
         if matches!(word.value, Value::Count { .. }) && !Quantity::peek(input) {
             return Err(input.error(format!("expected a whole number, as in `{}{}`", word.text, word.example)));

@@ -108,7 +108,7 @@ impl ParameterKind {
     const ALL: [(&'static str, Self); 4] =
         [("bool", Self::Bool), ("i64", Self::Integer), ("f64", Self::Number), ("String", Self::Text)];
 
-    /// What other languages call them.
+    /// Their names in other languages.
     const ELSEWHERE: [(&'static [&'static str], Self); 4] = [
         (&["boolean", "Bool"], Self::Bool),
         (&["int", "integer", "long", "i32", "u32", "u64", "usize"], Self::Integer),
@@ -116,7 +116,7 @@ impl ParameterKind {
         (&["str", "string"], Self::Text),
     ];
 
-    /// As it is written.
+    /// Its spelling.
     pub(crate) fn name(self) -> &'static str {
         Self::ALL.into_iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }

@@ -1,4 +1,4 @@
-//! Names with `::` between them.
+//! Names separated by `::`.
 
 use super::tokens::place_since;
 use crate::diagnostics::Place;
@@ -34,7 +34,8 @@ impl Path {
         Ok(Self(segments))
     }
 
-    /// Reads the path of a publisher; one in another notation, `sensor/base/imu`, is an error that gives it in this one.
+    /// Reads the path of a publisher; a path in another notation, `sensor/base/imu`, is an error that shows it in
+    /// this one.
     pub(super) fn parse_publisher(input: ParseStream<'_>) -> syn::Result<Self> {
         if let Some((names, place)) = other_notation(&input.fork()) {
             // A robot has no `self` that its paths would start at.
@@ -50,7 +51,7 @@ impl Path {
     }
 }
 
-/// The names and the place of a path with other separators: those of topics, of fields, of files, or a text.
+/// The names and the place of a path with other separators: of topics, of fields, of files, or a string.
 fn other_notation(input: ParseStream<'_>) -> Option<(Vec<String>, Place)> {
     let (start, place) = (input.cursor(), input.span());
     if let Ok(text) = input.parse::<LitStr>() {

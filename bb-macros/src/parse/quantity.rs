@@ -1,4 +1,4 @@
-//! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also glued, `20ms`.
+//! Numbers with units: `20 ms`, `-90 deg`, `9.81 m/s^2`, also without a space, `20ms`.
 
 use super::tokens::{place_since, starts_item};
 use crate::diagnostics::Place;
@@ -19,9 +19,9 @@ pub(crate) struct Quantity {
     pub(crate) place: Place,
 }
 
-/// What people who think in radians write for π.
+/// Spellings of π by people who think in radians.
 const PI: [&str; 6] = ["pi", "PI", "M_PI", "math", "np", "std"];
-/// What people write for a setting that does not apply.
+/// Spellings of a setting that does not apply.
 const NO_NUMBER: [&str; 9] = ["None", "none", "null", "nil", "inf", "infinity", "infinite", "never", "unlimited"];
 const ANGLES: &str = "expected a number with its unit; nothing is computed here, write `90 deg` for π / 2";
 
@@ -95,7 +95,7 @@ impl Quantity {
     }
 }
 
-/// The error for a number that is written with a comma, `0,5`, if one starts here.
+/// The error for a decimal comma, `0,5`, if such a number starts here.
 pub(super) fn decimal_comma(input: ParseStream<'_>) -> Option<syn::Error> {
     let start = input.cursor();
     input.parse::<Option<Token![-]>>().ok()?;
@@ -109,7 +109,7 @@ pub(super) fn decimal_comma(input: ParseStream<'_>) -> Option<syn::Error> {
     Some(place_since(start, input).syntax(message))
 }
 
-/// Divides where the factor is the inverse of a whole number, so that `20 ms` is the double nearest to 0.02.
+/// Divides if the factor is the inverse of a whole number, so that `20 ms` is the double nearest to 0.02.
 fn scaled(number: f64, factor: f64) -> f64 {
     let inverse = (1.0 / factor).round();
     if factor < 1.0 && (1.0 / inverse - factor).abs() <= f64::EPSILON * factor {

@@ -12,8 +12,8 @@ use syn::Token;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
-/// Reads the `{ field: value, … }` of a word; each field may be written once, in any order. `value` gets each field, its
-/// word and the identifier as written.
+/// Reads the `{ field: value, … }` of a word; each field may be written once, in any order. `value` gets each field,
+/// its word and the identifier as written.
 pub(super) fn record<F: Words>(
     word: &Word,
     input: ParseStream<'_>,
@@ -50,7 +50,7 @@ pub(super) fn record<F: Words>(
     Ok(())
 }
 
-/// Reads `, field` and `, field: value` up to the end of an item; `value` is called as that of a record.
+/// Reads `, field` and `, field: value` up to the end of an item; `value` is called as for a record.
 pub(super) fn properties<F: Words>(
     input: ParseStream<'_>,
     notes: &mut Notes<'_>,
@@ -103,7 +103,7 @@ pub(super) fn array<const N: usize>(
         content.parse_terminated(Quantity::parse_element, Token![,])?.into_iter().collect();
     let count = quantities.len();
     let quantities: [Quantity; N] = quantities.try_into().map_err(|_| {
-        // Of too many values, two without a blank between them are one.
+        // If there are too many values, two without a space between them are one.
         let comma = if count > N { glued_comma(&ahead) } else { None };
         comma.unwrap_or_else(|| syn::Error::new(bracket.span.join(), format!("expected {N} values, found {count}")))
     })?;
@@ -111,7 +111,7 @@ pub(super) fn array<const N: usize>(
     Ok(quantities)
 }
 
-/// The error for the first number that is written with a comma.
+/// The error for the first number with a decimal comma.
 fn glued_comma(input: ParseStream<'_>) -> Option<syn::Error> {
     while !input.is_empty() {
         if let Some(error) = decimal_comma(&input.fork())
@@ -124,7 +124,7 @@ fn glued_comma(input: ParseStream<'_>) -> Option<syn::Error> {
     None
 }
 
-/// Whether a comma and a number follow a number without blanks.
+/// Whether a comma and a number directly follow a number, without spaces.
 fn is_glued(input: ParseStream<'_>) -> bool {
     let _: syn::Result<Option<Token![-]>> = input.parse();
     let tokens: Vec<Place> =
@@ -132,7 +132,7 @@ fn is_glued(input: ParseStream<'_>) -> bool {
     tokens.windows(2).all(|pair| matches!(pair, [first, second] if first.touches(second.start)))
 }
 
-/// Reads `[idle, executing]`: one name or more; `expected` is the error for none.
+/// Reads `[idle, executing]`: one or more names; `expected` is the error for none.
 pub(super) fn names(input: ParseStream<'_>, expected: &str) -> syn::Result<Vec<Ident>> {
     if !input.peek(syn::token::Bracket) {
         return Err(input.error(expected));

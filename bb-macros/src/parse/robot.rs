@@ -17,7 +17,7 @@ use syn::{Attribute, Token, Visibility};
 pub(crate) struct Robot {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) visibility: Option<Visibility>,
-    /// None if it could not be read.
+    /// `None` if it could not be read.
     pub(crate) name: Option<Ident>,
     pub(crate) parameters: Vec<ParameterItem>,
     pub(crate) states: Vec<State>,
@@ -27,11 +27,11 @@ pub(crate) struct Robot {
     pub(crate) links: Vec<Link>,
     /// `topology: urdf("…");`
     pub(crate) topologies: Vec<Topology>,
-    /// What is declared at joints of the URDF.
+    /// Declarations at joints of the URDF.
     pub(crate) joints: Vec<JointAddition>,
-    /// All numbers that are given to words of the language.
+    /// All numbers given to words of the language.
     pub(crate) given: Vec<Given>,
-    /// All words that are repeated where they may not be.
+    /// All words repeated where they may not be.
     pub(crate) repeated: Vec<Ident>,
     /// Whether everything could be read. If not, missing parts may have been declared.
     pub(crate) complete: bool,

@@ -9,7 +9,7 @@ use proc_macro2::Ident;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
-/// A thread of its own.
+/// A separate thread.
 #[derive(Clone, Debug)]
 pub(crate) struct RunsOn {
     pub(crate) priority: Option<Quantity>,

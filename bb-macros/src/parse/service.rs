@@ -1,4 +1,4 @@
-//! `controller stability: Stability() { rate: 100 Hz; }`, and a `bridge` alike: what runs beside the topology.
+//! `controller stability: Stability() { rate: 100 Hz; }`, and likewise a `bridge`: components beside the topology.
 
 use super::Notes;
 use super::block::{Head, braced};
@@ -26,7 +26,7 @@ pub(crate) enum ServiceKind {
 }
 
 impl ServiceKind {
-    /// The word that declares one, which is the first of its path too.
+    /// The word that declares one, which is also the first name of its path.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Controller => "controller",

@@ -13,7 +13,7 @@ pub(crate) struct Setting {
     pub(crate) quantity: Quantity,
 }
 
-/// The settings of a block, each with its word, as they are written.
+/// The settings of a block, each with its word, in the order written.
 #[derive(Clone, Debug)]
 pub(crate) struct Settings<S>(Vec<(S, Setting)>);
 
@@ -43,7 +43,7 @@ impl<S: Copy + PartialEq> Settings<S> {
         self.0.push((word, setting));
     }
 
-    /// All that are written, by their words; a rule reports one that is written twice.
+    /// All settings, by their words; a rule reports one that is written twice.
     pub(crate) fn each(&self) -> impl Iterator<Item = (S, &Quantity)> {
         self.0.iter().map(|(word, setting)| (*word, &setting.quantity))
     }

@@ -6,7 +6,7 @@ use proc_macro2::Ident;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
-/// An operational state of the robot, beside those that every robot has.
+/// An operational state of the robot, in addition to those that every robot has.
 #[derive(Clone, Debug)]
 #[allow(dead_code, reason = "the expansion does not read its docs so far")]
 pub(crate) struct State {

@@ -1,4 +1,4 @@
-//! `topology: urdf("robot.urdf");`, and what is declared onto the joints that it brings: `joint elbow { sensor … }`.
+//! `topology: urdf("robot.urdf");`, and declarations at the joints of the URDF: `joint elbow { sensor … }`.
 
 use super::Notes;
 use super::block::{Head, braced, semicolon};
@@ -12,7 +12,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{LitStr, Token};
 
-/// Where links and joints come from.
+/// The source of links and joints.
 #[derive(Clone, Debug)]
 #[cfg_attr(not(feature = "urdf"), allow(dead_code, reason = "without the feature only the place is needed"))]
 pub(crate) struct Topology {
@@ -23,7 +23,7 @@ pub(crate) struct Topology {
     pub(crate) place: Place,
 }
 
-/// What is declared onto a joint of the URDF.
+/// Declarations at a joint of the URDF.
 #[derive(Clone, Debug)]
 pub(crate) struct JointAddition {
     pub(crate) name: Ident,

@@ -1,4 +1,4 @@
-//! Rules of states, of commands and of what names them.
+//! Rules about states, commands and references to them.
 
 use super::{places, right, wrong};
 

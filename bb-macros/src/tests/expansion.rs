@@ -1,4 +1,4 @@
-//! The expansion of a robot: it is Rust that can be read, it says what is to be checked of types, and its size is linear.
+//! The expansion of a robot: it is readable Rust, it contains all type checks, and its size is linear.
 
 use super::{diagnostics, sensing, tokens};
 use crate::pipeline;
@@ -107,7 +107,7 @@ pub(super) const ACTING: &str = r#"
 /// One of everything that a robot may have.
 const EVERYTHING: &str = include_str!("expansion/everything.txt");
 
-/// Where its expansion is stored, so that a change of the macro can be read as a change of what it writes.
+/// Where its expansion is stored, so that a change of the macro can be reviewed as a change of its output.
 const EXPANDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests/expansion/everything.rs");
 
 #[test]
@@ -129,12 +129,12 @@ fn the_expansion_is_as_stored() {
     );
 }
 
-/// Everything in the expansion is called by a path, a field or a role, so that one can read what it is for.
+/// Everything in the expansion is named by a path, a field or a role, so that its purpose is readable.
 #[test]
 fn no_name_in_the_expansion_is_a_number() {
     let expansion = pipeline(tokens(EVERYTHING)).to_string();
     let words = expansion.split(|c: char| !c.is_alphanumeric() && c != '_');
-    // The groups of fields of `__Options`, `__Topics` and `__Islands`, of which each has its number.
+    // The groups of fields of `__Options`, `__Topics` and `__Islands`, which are numbered.
     let is_numbered = |word: &&str| {
         let letters = word.trim_start_matches('_').trim_end_matches(|c: char| c.is_ascii_digit());
         letters.len() == 1 && letters.len() < word.trim_start_matches('_').len() && letters != "g"

@@ -1,4 +1,4 @@
-//! Rules of the health of estimators, of how often their inputs come, and of what moves joints.
+//! Rules about the health of estimators, the rates of their inputs, and actuated joints.
 
 use super::{base, places, right, wrong};
 
@@ -61,7 +61,7 @@ fn input_periods() {
     right(&fused(", within: 100 ms", "sync_tolerance: 1 ms;"));
     right(&fused(", optional", "sync_tolerance: 20 ms;"));
     right(&fused("", "sync_tolerance: 100 ms;"));
-    // Nobody knows how often `any` comes; `tilt` comes with the driver.
+    // The rate of `any` is unknown; `tilt` comes with the driver.
     right(&fused(", optional", "input a: any; input tilt: tilt; sync_tolerance: 0.1 ms;"));
     wrong(
         &fused("", "sync_tolerance: 20 ms;"),
@@ -77,7 +77,7 @@ fn input_periods() {
             "`gnss` comes every 100 ms but may be no older than 20 ms, so runs of `pose` would be dropped all the time; give it `within: 100 ms` or more, or make it `optional`",
         )],
     );
-    // Through the driver of another estimator; and one tolerance is one mistake.
+    // Through the driver of another estimator; a single tolerance is a single mistake.
     assert_eq!(places(&fused("", "input s: slow, within: 50 ms; sync_tolerance: 1 s;")), ["50 ms"]);
     wrong(
         &fused("", "input s: slow; sync_tolerance: 50 ms;"),

@@ -1,8 +1,8 @@
-//! What people write who know another language or another tool: each robot with the errors that it gets.
+//! Mistakes by people who know another language or another tool: each robot with the errors it gets.
 //!
-//! `mistakes/mistakes.txt` is the table: after `===` what the mistake is, then the robot, and after `---` its errors as
-//! `line:column text | message`. `UPDATE_MISTAKES=1 cargo test -p bb-macros mistakes` rewrites the errors; read them as the
-//! one who made the mistake would.
+//! `mistakes/mistakes.txt` is the table: after `===` a description of the mistake, then the robot, and after `---`
+//! its errors as `line:column text | message`. `UPDATE_MISTAKES=1 cargo test -p bb-macros mistakes` rewrites the
+//! errors; read them as the author of the mistake would.
 
 use super::{diagnostics, tokens};
 use crate::diagnostics::Diagnostic;
@@ -24,7 +24,7 @@ fn mistakes(table: &str) -> Vec<Mistake> {
     table.split("=== ").skip(1).map(mistake).collect()
 }
 
-/// `2:10 imu | what is wrong`, a line for each.
+/// `2:10 imu | what is wrong`, one line each.
 fn errors(robot: &str) -> String {
     let line = |Diagnostic { place, message }: Diagnostic| {
         let (start, under) = (place.start.start(), place.start.byte_range().start..place.end.byte_range().end);

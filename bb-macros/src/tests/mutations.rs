@@ -1,4 +1,4 @@
-//! Whatever stands in the macro: it does not panic, it gives tokens that parse, and it points at what was written.
+//! For any tokens, the macro does not panic, returns tokens that parse, and points at what was written.
 
 use super::expansion::{ACTING, WHOLE};
 use super::{diagnostics, tokens};
@@ -9,7 +9,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 const ROUNDS: u64 = 5_000;
 
-/// Tokens that are put where they do not belong.
+/// Tokens inserted where they do not belong.
 const STRAY: &str = r#"
     robot link joint sensor sensors estimator input output rate sync_tolerance origin axis limit driver optional
     within fixed revolute continuous prismatic planar floating xyz rpy lower upper velocity effort x z imu base
@@ -40,7 +40,7 @@ impl Random {
         [Delimiter::Brace, Delimiter::Parenthesis, Delimiter::Bracket, Delimiter::None][self.below(4)]
     }
 
-    /// A stray token, or now and then a group of them.
+    /// A stray token, or occasionally a group of them.
     fn tree(&mut self, stray: &[TokenTree], depth: usize) -> TokenTree {
         if depth > 0 && self.below(5) == 0 {
             let count = self.below(8);
@@ -73,7 +73,7 @@ impl Random {
     }
 }
 
-/// Expands as the macro does; then checks the places, on tokens that all stand in one text.
+/// Expands as the macro does; then checks the places, on tokens from one text.
 fn check(stream: &TokenStream) {
     let expansion = pipeline(stream.clone());
     if let Err(error) = syn::parse2::<syn::File>(expansion) {

@@ -1,4 +1,4 @@
-//! What is written as another language or another tool has it: one error, which shows how it is written here.
+//! Syntax of other languages and tools: one error, which shows the syntax of this language.
 
 use super::{base, faults, sensing, wrong};
 
@@ -118,7 +118,7 @@ fn decimal_commas() {
     wrong(&base("sensor i: A(x = -0,5);"), &[("-0,5", point)]);
     wrong("robot R; parameters { a: f64 = 0,5; } link b;", &[("0,5", point)]);
     wrong(&base("joint j: continuous { axis: [0,5, 0,5, 0]; link l; }"), &[("0,5", point)]);
-    // With blanks they are several.
+    // With spaces they are several.
     wrong(
         &base("joint j: continuous { axis: [1, 0, 0, 0]; link l; }"),
         &[("[1, 0, 0, 0]", "expected 3 values, found 4")],
@@ -138,7 +138,7 @@ fn components_made_as_in_rust() {
     for arguments in ["(\"x\", 5)", "()", ""] {
         wrong(&base(&format!("sensor e: my::Encoder::new{arguments};")), &[("new", function)]);
     }
-    // The words of a sensor are its settings, with or without parentheses.
+    // A sensor's words are its settings, with or without parentheses.
     assert_eq!(faults(&base("sensor e: E { rate: 5 Hz; }")), []);
     wrong(
         &base("sensor e: E { rat: 5 Hz; }"),

@@ -1,4 +1,4 @@
-//! Rules of parameters and of the options that are bound to them.
+//! Rules about parameters and the options that are bound to them.
 
 use super::{right, wrong};
 
@@ -72,7 +72,7 @@ fn names() {
 fn references() {
     right(&bound("param::imu::beta"));
     right(&bound("param::imu::deep::on, y = param::rate"));
-    // A function is of a module of the user's.
+    // A function belongs to a user's module.
     right(&bound("param::f(3)"));
     for (path, near) in [
         ("param::imu::beat", "param::imu::beta"),

@@ -1,4 +1,4 @@
-//! Parse errors, and that one mistake hides no other and makes no other.
+//! Parse errors: one mistake neither hides nor causes another.
 
 use super::{base, faults, places, sensing, tokens, wrong};
 
@@ -54,7 +54,7 @@ fn headers() {
         "robot Rover { link base; }",
         &[("{", "what a robot holds follows without braces, after `robot Rover;`")],
     );
-    // What is missing at the end is missing at the last token, of which a group is known by its last character.
+    // Missing tokens at the end are reported at the last token; a group is represented by its last character.
     for robot in ["robot", "robot Rover", "pub", "#[doc = \"\"]", "robot Rover; link"] {
         let places = places(robot);
         assert!(
@@ -154,7 +154,8 @@ fn geometry() {
 
 #[test]
 fn what_is_not_read_makes_no_further_faults() {
-    // The unread sensor may be what the input names, the unread link what the joint lacks, the unread limit its limit.
+    // The unread sensor may be the publisher of the input, the unread link the joint's child, and the unread limit
+    // the joint's limit.
     for content in [
         "sensor imu Imu(); estimator t: T() { input imu: sensor::base::imu; }",
         "joint pan: fixed { lnk head { } }",
@@ -207,7 +208,7 @@ fn a_robot_with_mistakes_keeps_its_type_and_handles() {
 
 #[test]
 fn a_mistake_in_a_block_leaves_the_rest_of_it_known() {
-    // One typo in each; what it hides makes no further fault, and what stands beside it is read.
+    // One typo in each; the hidden parts cause no further fault, and their siblings are read.
     for (robot, place) in [
         ("paramters { a: f64 = 1; }", "paramters"),
         ("parameters { a: f46 = 1; kept: i64 = 1; }", "f46"),

@@ -1,4 +1,4 @@
-//! The language reference against the grammar: what is read is described, and what is described is read.
+//! The language reference against the grammar: everything parsed is documented, and everything documented is parsed.
 
 use super::{diagnostics, tokens};
 use crate::language::{FIELDS, ITEMS, Value, Word};
@@ -31,7 +31,7 @@ fn places() -> Vec<(&'static str, Vec<&'static Word>)> {
     places
 }
 
-/// A place as it is named in the column `where`: `link` of `a link`.
+/// A place as named in the column `where`: `link` for `a link`.
 fn short(place: &str) -> &str {
     place.trim_start_matches("a ").trim_start_matches("an ")
 }
@@ -59,7 +59,7 @@ fn table(of: &[&str]) -> String {
     table
 }
 
-/// The reference with its tables made of the language, and the places whose words they have.
+/// The reference with its tables generated from the language, and the places whose words they have.
 fn generated(reference: &str) -> (String, Vec<String>) {
     const START: &str = "<!-- words: ";
     const END: &str = "<!-- end of words -->";
@@ -113,7 +113,7 @@ fn every_number_has_an_example_that_it_takes() {
 fn every_robot_of_the_reference_verifies() {
     let mut robots = 0;
     for block in reference().split("```").skip(1).step_by(2) {
-        // Hidden lines are compiled as well; here it is the robots alone.
+        // Hidden lines are compiled as well; here they are only the robots.
         let code: String =
             block.lines().map(|line| line.strip_prefix("# ").unwrap_or(line).to_owned() + "\n").collect();
         let Some(start) = code.find("robot! {") else { continue };

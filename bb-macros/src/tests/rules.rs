@@ -1,4 +1,4 @@
-//! Every rule of the language: what it refuses, where it points, and what it lets pass.
+//! Every rule of the language: invalid and valid examples, and the places of its errors.
 
 use super::{base, places, right, sensing, wrong};
 
@@ -70,7 +70,7 @@ fn joint_geometry() {
         &base("joint j: prismatic { axis: x; limit: { lower: 1 m, upper: 1 m }; link a; }"),
         &[("1 m", "the upper limit must be above the lower one")],
     );
-    // A joint without end needs no limit; one that it has is no other way round for that.
+    // A continuous joint needs no limit; if it has one, it must not be reversed either.
     wrong(
         &base("joint j: continuous { axis: x; limit: { lower: 1 deg, upper: -2 deg }; link a; }"),
         &[("-2 deg", "the upper limit must be above the lower one")],
@@ -211,7 +211,7 @@ fn single_input_tolerance() {
 fn declared_publishers() {
     let tilt = |path| sensing(&format!("estimator t: T() {{ input imu: {path}; }}"));
     right(&tilt("sensor::base::imu"));
-    // The end of a path will do where no other has it.
+    // A path suffix is enough if no other path has it.
     right(&tilt("base::mag"));
     right(&tilt("imu"));
     let two = "sensor imu: A() { estimator t: T(); } sensor mag: B() { estimator t: T(); }";

@@ -60,7 +60,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
     }
 
-    /// None if its type cannot be read.
+    /// `None` if its type cannot be read.
     pub(super) fn joint(&mut self, node: Node<'_, '_>, robot: Node<'_, '_>) -> Option<Joint> {
         let label = self.attribute(node, "name").unwrap_or_default().to_owned();
         let kind_text = self.attribute(node, "type")?;
@@ -75,7 +75,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         let velocity = if turns { Dimension::ANGULAR_VELOCITY } else { Dimension::VELOCITY };
         let damping = if turns { Dimension::ANGULAR_DAMPING } else { Dimension::LINEAR_DAMPING };
 
-        // URDF's axis is x where none is written; what a fixed joint says of its motion has no meaning.
+        // URDF's default axis is x; a fixed joint's motion elements have no meaning.
         let axes = if has_axis { vec![self.axis(node)] } else { Vec::new() };
         let needs_limit = matches!(kind, JointKind::Revolute | JointKind::Prismatic);
         let limits = self.children(node, "limit").into_iter().filter(|_| has_axis).map(|limit| Limit {
@@ -176,13 +176,13 @@ impl<'a, 'input> Reader<'a, 'input> {
             let reduction = Some(self.quantity(reduction, Dimension::NONE));
             Transmission { reduction, offset: None, reversed: false }
         });
-        // A joint has one; further ones of other interfaces say the same.
+        // A joint has one; further ones for other interfaces repeat it.
         reductions.take(1).collect()
     }
 
     fn inertial(&mut self, node: Node<'_, '_>) -> Inertial {
         let mass = self.only(node, "mass").and_then(|mass| self.needed(mass, "value", Dimension::MASS));
-        // Many files leave the moments out, or some of them: they are 0 then.
+        // Many files leave out the moments, or some of them; they are then 0.
         let inertia = self.children(node, "inertia").into_iter().next();
         let inertia = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(|moment| {
             let written = inertia.and_then(|inertia| self.number(inertia, moment, Dimension::MOMENT_OF_INERTIA));
@@ -273,7 +273,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         const NEVER_NEGATIVE: [&str; 9] =
             ["value", "ixx", "iyy", "izz", "velocity", "effort", "radius", "length", "damping"];
         if number < 0.0 && NEVER_NEGATIVE.contains(&name) {
-            // Moments that come out of a computation may miss 0 by a rounding.
+            // Computed moments may deviate from 0 by rounding.
             if number > -1e-12 {
                 return Some(self.quantity(0.0, dimension));
             }
@@ -312,7 +312,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         Ident::new(word, self.place.start)
     }
 
-    /// The identifier of a joint. A link and a joint may share a name in URDF, and may not here.
+    /// The identifier of a joint. A link and a joint may share a name in URDF, but not here.
     fn joint_name(&self, label: &str, robot: Node<'_, '_>) -> Ident {
         let name = self.name(label);
         let mut links = self.children(robot, "link").into_iter().filter_map(|link| link.attribute("name"));

@@ -65,7 +65,7 @@ fn add_to_link(tree: &mut Robot, addition: Link, diagnostics: &mut Diagnostics) 
         tree.complete = false;
         return;
     };
-    // Identifiers keep the span of the declaration, so that an editor finds it.
+    // Identifiers keep the span of the declaration, so that editors find it.
     link.name = addition.name;
     link.attributes.extend(addition.attributes);
     link.sensors.extend(addition.sensors);

@@ -1,4 +1,4 @@
-//! A URDF's text to the tree of its links.
+//! Parses a URDF's text to the tree of its links.
 
 use super::elements::Reader;
 use crate::parse::{Joint, Link, Topology};
@@ -58,14 +58,14 @@ pub(super) fn root(text: &str, topology: &Topology) -> Result<Link, Vec<String>>
     reader.done()?;
     let label = root.map(|(label, _)| label.clone()).unwrap_or_default();
     let root = assemble(&label, &mut links, &mut joints);
-    // A circle of links hangs on no root.
+    // A cycle of links has no root.
     match (root, links.keys().next()) {
         (Some(root), None) => Ok(root),
         (_, lost) => Err(vec![format!("1:1: the links around {lost:?} hang on each other in a circle")]),
     }
 }
 
-/// Takes a link out of the list, with the joints that are mounted on it and their links.
+/// Removes a link from the list, with the joints mounted on it and their links.
 fn assemble(
     label: &str,
     links: &mut HashMap<String, Link>,

@@ -1,4 +1,4 @@
-//! What is wrong with a URDF, with its line and column.
+//! Faults of a URDF, with line and column.
 
 use super::read;
 use crate::parse::{Link, Topology};

@@ -1,16 +1,16 @@
-//! A joint with an actuator has a source of its position: a sensor of its own, or an estimator in one, that publishes a
-//! payload which tells it, or another joint that it follows. (A fixed one has no position.)
+//! A joint with an actuator has a source of its position: its own sensor, or an estimator in one, that publishes a
+//! payload reporting it; or another joint that it follows. (A fixed joint has no position.)
 //!
 //! Right: `joint pan: revolute { …; actuator servo: Servo(); sensor encoder: Encoder(); link head { } }`
 //! Wrong: `joint pan: revolute { …; actuator servo: Servo(); link head { } }`
 //!
-//! What a sensor publishes is a fact about its type: `expand::checks` has `bb_core` compare that.
+//! The payload of a sensor is a fact about its type: `expand::checks` makes `bb_core` check that.
 
 use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    // The sensor may be what could not be read.
+    // The sensor may be among the unread items.
     for actuator in robot.actuators.iter().filter(|_| robot.complete) {
         let joint = &robot.joints[actuator.joint];
         if robot.position_sources(actuator.joint).is_none_or(|sources| !sources.is_empty()) {

@@ -1,4 +1,4 @@
-//! `category` and `cancel` name categories that are declared, or `default`; none is called `all`.
+//! `category` and `cancel` name declared categories, or `default`; none is called `all`.
 //!
 //! Right: `commands { category motion; go: Go { category: motion; } halt: Halt { cancel: [motion]; } }`
 //! Wrong: `halt: Halt { cancel: [motoin]; }`
@@ -31,7 +31,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// Whether there is such a category; if not, that is reported.
+/// Whether there is such a category; if not, reports it.
 fn declared(robot: &Robot, name: &Ident, diagnostics: &mut Diagnostics) -> bool {
     // Unread items may have declared the missing ones.
     if robot.category(name).is_some() || !robot.complete {

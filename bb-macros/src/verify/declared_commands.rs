@@ -1,4 +1,4 @@
-//! `on_degraded`, `on_lost` and `on_recovered` name commands that are declared.
+//! `on_degraded`, `on_lost` and `on_recovered` name declared commands.
 //!
 //! Right: `on_lost: stop;` where `commands` has `stop: Stop;`
 //! Wrong: `on_lost: sotp;`

@@ -1,4 +1,4 @@
-//! An option that starts with `param::` names a parameter that is declared, by its whole path.
+//! An option that starts with `param::` names a declared parameter, by its whole path.
 //!
 //! Right: `Madgwick(beta = param::imu::beta)` where `parameters` has `imu { beta: f64 = 0.1; }`
 //! Wrong: `Madgwick(beta = param::imu::gain)`
@@ -74,7 +74,7 @@ fn inside(expression: TokenStream) -> Option<Place> {
                     let path =
                         rest.take_while(|token| is_colon(Some(token)) || matches!(token, TokenTree::Ident(_)));
                     let (count, end) = path.fold((0, word.span()), |(count, _), token| (count + 1, token.span()));
-                    // A function is of a module of the user's.
+                    // A function belongs to a user's module.
                     if !matches!(tokens.get(index + 1 + count), Some(TokenTree::Group(_))) {
                         return Some(Place { start: word.span(), end });
                     }

@@ -1,4 +1,4 @@
-//! An input names a publisher that is declared, by its whole path or by the end of one that no other has.
+//! An input names a declared publisher, by its whole path or by a suffix that no other has.
 //!
 //! Right: `input imu: sensor::base::imu;` or `input imu: imu;` where `base` has the only sensor `imu`
 //! Wrong: `input imu: sensor::base::inu;`
@@ -9,7 +9,7 @@ use crate::names::{nearest, nearest_path, some_of, text};
 use crate::parse::Path;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    // Inputs of nested estimators are a fault of their own; unread items may have declared the missing ones.
+    // Inputs of nested estimators are reported by another rule; unread items may have declared the missing ones.
     let estimators = robot.estimators.enumerate();
     let estimators = estimators.filter(|(_, estimator)| !estimator.is_nested() && robot.complete);
     let inputs = estimators.flat_map(|(id, estimator)| estimator.inputs.iter().map(move |input| (id, input)));
@@ -43,7 +43,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// The message for a path below an estimator: the output may be missing there or misspelt, which only its type tells.
+/// The message for a path below an estimator: the output may be undeclared or misspelt, which only its type can tell.
 fn undeclared_output(robot: &Robot, path: &Path) -> Option<String> {
     let (output, above) = path.0.split_last()?;
     let above: Vec<String> = above.iter().map(text).collect();

@@ -1,4 +1,4 @@
-//! `allowed_states` names states that are built in or declared, each once; a declared state is not built in.
+//! `allowed_states` names built-in or declared states, each once; a declared state is not built in.
 //!
 //! Right: `states { degraded; }` and `allowed_states: [idle, degraded];`
 //! Wrong: `allowed_states: [idle, degarded];`

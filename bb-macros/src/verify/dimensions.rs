@@ -1,9 +1,9 @@
-//! Every quantity has the dimension that its place expects.
+//! Every quantity has the dimension expected in its place.
 //!
 //! Right: `sync_tolerance: 20 ms;`
 //! Wrong: `sync_tolerance: 20 m;`
 //!
-//! The dimensions are those of the table of the language. The options of components are checked against their types by
+//! The dimensions come from the table of the language. The options of components are checked against their types by
 //! `bb_core`.
 
 use crate::diagnostics::Diagnostics;
@@ -41,7 +41,7 @@ fn fault(given: &Given) -> Option<String> {
     })
 }
 
-/// The ends of a range are of the default's dimension.
+/// The ends of a range have the default's dimension.
 fn range(parameter: &Parameter, diagnostics: &mut Diagnostics) {
     let default = &parameter.default;
     for end in parameter.range.iter().flat_map(|range| [&range.start, &range.end]) {

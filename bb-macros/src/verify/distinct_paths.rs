@@ -1,4 +1,5 @@
-//! No two publishers have one path, nor one that something else of the robot has, and no two inputs of an estimator one name.
+//! No two publishers have the same path, or the path of another part of the robot; no two inputs of an estimator have
+//! the same name.
 //!
 //! Right: `output pose; output velocity: [nav, velocity];`
 //! Wrong: `output pose; output velocity: [estimator, base, fused, pose];`
@@ -15,8 +16,8 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let Some(first) = taken.insert(&publisher.path, publisher) else {
             continue;
         };
-        // Where one of the two has been put there by its output's path, that path is the one to change. Two that are
-        // there by their names are outputs of one estimator; or siblings of one name, which are reported as such.
+        // If one of the two has this path because of its output's path, that path is the one to change. Two that have
+        // it by their names are outputs of one estimator, or siblings with one name, which are reported as such.
         match (explicit(robot, publisher).or(explicit(robot, first)), output(robot, publisher)) {
             (Some(place), _) => {
                 let path = publisher.path.join("::");
@@ -29,7 +30,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             (None, _) => {}
         }
     }
-    // An estimator has a handle at its own path, even if it publishes below that path only.
+    // An estimator has a handle at its own path, even if it publishes only below that path.
     for publisher in &robot.publishers {
         let own = robot.estimators.enumerate().find(|(_, estimator)| estimator.path == publisher.path);
         if let (Some((id, own)), Some(place)) = (own, explicit(robot, publisher))
@@ -58,7 +59,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// What has a path without being a declared publisher: the path, and its name in messages.
+/// Paths of parts that are not declared publishers, with their names in messages.
 fn others(robot: &Robot) -> HashMap<&[String], String> {
     let actuators = robot.actuators.iter().map(|it| (&it.path[..], format!("the actuator `{}`", it.name)));
     let parameters = robot.parameters.iter().map(|it| (&it.path[..], format!("the parameter `{}`", it.name)));
@@ -75,7 +76,7 @@ fn output<'a>(robot: &'a Robot, publisher: &Publisher) -> Option<&'a Output> {
     robot.estimators[estimator].outputs.get(output)
 }
 
-/// Where the path of a publisher is written out, if it is.
+/// The place where a publisher's path is written out, if it is.
 fn explicit(robot: &Robot, publisher: &Publisher) -> Option<Place> {
     let path = output(robot, publisher)?.path.as_ref()?;
     Some(Place { start: path.first()?.span(), end: path.last()?.span() })

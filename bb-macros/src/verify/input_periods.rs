@@ -1,5 +1,5 @@
-//! An input comes at least as often as its tolerance demands, unless it is `optional`: else runs
-//! would be dropped all the time. (Inputs in step with the driver are as new as they can be.)
+//! An input arrives at least as often as its tolerance demands, unless it is `optional`; otherwise runs would be
+//! dropped all the time. (Inputs in step with the driver are as new as they can be.)
 //!
 //! Right: `input gnss: sensor::base::gnss, within: 250 ms;` where `gnss` has `rate: 10 Hz;`
 //! Wrong: `input gnss: sensor::base::gnss, within: 20 ms;`
@@ -11,7 +11,7 @@ use crate::parse::Quantity;
 use crate::units::{Dimension, time_text};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    // What could not be read may be an `optional` or a `within`.
+    // An `optional` or a `within` may be among the unread items.
     let estimators = robot.estimators.iter().filter(|estimator| !estimator.is_nested() && robot.complete);
     for estimator in estimators {
         let (own, shared): (Vec<_>, Vec<_>) =
@@ -39,8 +39,8 @@ fn inputs<'a>(robot: &'a Robot, estimator: &'a Estimator) -> impl Iterator<Item 
     })
 }
 
-/// Whether there is a message with each of the driver's: both are made of the same one, or each time that the driver's
-/// sensor is due the other's is due too, which is then read before it.
+/// Whether each message of the driver comes with one of this input: both derive from the same message, or whenever
+/// the driver's sensor is due, the other's is due too and read before it.
 fn is_in_step(robot: &Robot, source: PublisherId, driver: PublisherId) -> bool {
     if robot.trigger(source) == robot.trigger(driver) {
         return true;
@@ -50,14 +50,14 @@ fn is_in_step(robot: &Robot, source: PublisherId, driver: PublisherId) -> bool {
     messages.round() >= 1.0 && (messages - messages.round()).abs() < 1e-9 * messages
 }
 
-/// A tolerance that is not positive is reported by another rule. The rounding of `1.0 / rate` is not a fault.
+/// A tolerance that is not positive is reported by another rule. Rounding of `1.0 / rate` is not a fault.
 fn is_exceeded(tolerance: &Quantity, period_s: f64) -> bool {
     tolerance.dimension == Dimension::TIME
         && tolerance.value > 0.0
         && period_s > tolerance.value * (1.0 + 4.0 * f64::EPSILON)
 }
 
-/// One message for a tolerance that is too short, however many inputs it is too short for.
+/// One message for a tolerance that is too short, regardless of how many inputs it affects.
 fn report(estimator: &Estimator, tolerance: &Quantity, inputs: &[(&Input, f64)], diagnostics: &mut Diagnostics) {
     let late: Vec<_> = inputs.iter().filter(|(_, period_s)| is_exceeded(tolerance, *period_s)).collect();
     let come =

@@ -1,6 +1,7 @@
-//! Revolute, prismatic, continuous and planar joints have an axis; revolute and prismatic ones a limit with `lower` and
-//! `upper`; a fixed joint has neither. A lower limit is below the upper one, whatever the joint. (A floating joint moves freely: no axis either.) An origin is not so far
-//! away that the transforms between joints could no longer be multiplied out.
+//! Revolute, prismatic, continuous and planar joints have an axis; revolute and prismatic ones a limit with `lower`
+//! and `upper`; a fixed joint has neither. (A floating joint moves freely, and has no axis either.) For every kind of
+//! joint, a lower limit is below the upper one. An origin is not so far away that the transforms between joints could
+//! no longer be multiplied out.
 //!
 //! Right: `joint pan: revolute { axis: z; limit: { lower: -90 deg, upper: 90 deg }; link head { } }`
 //! Wrong: `joint pan: revolute { link head { } }`
@@ -39,7 +40,7 @@ fn axis(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
         }
         Some(axis) => {
             let length = axis.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
-            // A unit is a fault of its own.
+            // A unit is reported by another rule.
             let is_plain = axis.components.iter().all(|component| !component.has_unit);
             if is_plain && !(length.is_finite() && length > 1e-9) {
                 diagnostics.at(axis.place, "this axis has no direction; give it a component that is not 0".into());
@@ -78,7 +79,7 @@ fn limit(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// Whatever the kind of the joint: also where nothing needs a limit, one that excludes every position is a mistake.
+/// For every kind of joint: even if no limit is needed, one that excludes every position is a mistake.
 fn range(limit: &Limit, diagnostics: &mut Diagnostics) {
     if let (Some(lower), Some(upper)) = (&limit.lower, &limit.upper)
         && lower.dimension == upper.dimension

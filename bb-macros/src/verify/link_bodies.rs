@@ -1,5 +1,5 @@
-//! An inertial has a mass and its three main moments; a visual or a collision has exactly one shape with its sizes. None
-//! of them is negative.
+//! An inertial has a mass and its three main moments; a visual or a collision has exactly one shape with its sizes.
+//! None of these values is negative.
 //!
 //! Right: `inertial: { mass: 2 kg, inertia: { xx: 0.1 kg*m^2, yy: 0.1 kg*m^2, zz: 0.1 kg*m^2 } };`
 //! Wrong: `visual: { cylinder: { radius: 0.1 m } };`

@@ -1,4 +1,4 @@
-//! A mimicking joint names another joint that is declared, moves as that one does, and follows it without a circle.
+//! A mimicking joint names another declared joint, moves as that one does, and does not follow itself in a cycle.
 //!
 //! Right: `joint right: prismatic { …; mimic: { joint: left, multiplier: -1 }; … }` where `left` is prismatic
 //! Wrong: `mimic: { joint: lift };` where there is none
@@ -50,7 +50,7 @@ fn find<'a>(robot: &'a Robot, name: &Ident) -> Option<(JointId, &'a Joint)> {
     robot.joints.enumerate().find(|(_, joint)| joint.name == *name)
 }
 
-/// Whether following leads back to the start; each circle is reported at its first joint only.
+/// Whether following leads back to the start; each cycle is reported only at its first joint.
 fn is_circle(robot: &Robot, start: JointId) -> bool {
     let mut id = start;
     for _ in robot.joints.ids() {

@@ -1,4 +1,4 @@
-//! No estimator depends on itself, directly or round a cycle.
+//! No estimator depends on itself, directly or through a cycle.
 //!
 //! Wrong: `estimator a: A() { input b: estimator::base::b; } estimator b: B() { input a: estimator::base::a; }`
 
@@ -15,12 +15,13 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum State {
     New,
-    /// On the path that is being followed.
+    /// On the current path.
     Open,
     Done,
 }
 
-/// Follows the inputs of an estimator to the estimators that publish them; one that is open already closes a cycle.
+/// Follows the inputs of an estimator to the estimators that publish them; reaching one that is already open closes a
+/// cycle.
 fn visit(
     robot: &Robot,
     id: EstimatorId,
@@ -44,7 +45,7 @@ fn visit(
             let message = if source == id {
                 format!("`{name}` takes what it publishes; name another publisher")
             } else {
-                // The path leads from consumer to publisher; messages flow the other way.
+                // The path goes from consumer to publisher; messages flow the other way.
                 let cycle = cycle(robot, path.iter().skip_while(|open| **open != source).copied().collect());
                 format!("`{name}` depends on itself: {cycle}; leave out one of these inputs")
             };

@@ -1,4 +1,4 @@
-//! Of several inputs exactly one is the `driver`.
+//! Exactly one of several inputs is the `driver`.
 //!
 //! Right: `input imu: sensor::base::imu, driver; input odom: sensor::base::wheels;`
 //! Wrong: `input imu: sensor::base::imu; input odom: sensor::base::wheels;`

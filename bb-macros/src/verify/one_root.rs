@@ -10,7 +10,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     let mut roots = robot.links.iter().filter(|link| link.joint.is_none());
     match (roots.next(), &robot.name) {
         (Some(root), _) => {
-            // Where something could not be read, it may be no root.
+            // A link that seems to be a root may be the child of an unread item.
             for extra in roots.filter(|_| robot.complete) {
                 let (root, name) = (&root.name, &extra.name);
                 diagnostics.error(

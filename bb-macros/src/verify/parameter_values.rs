@@ -1,4 +1,4 @@
-//! The default of a parameter is of its type and inside its range; only numbers have a range, and it is not empty.
+//! The default of a parameter has its type and is within its range; only numbers have a range, and it is not empty.
 //!
 //! Right: `beta: f64 = 0.1, range: 0.0..=1.0;`
 //! Wrong: `beta: f64 = 2.0, range: 0.0..=1.0;`
@@ -24,7 +24,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// Whether a value is of the parameter's type; if not, that is reported.
+/// Whether a value has the parameter's type; if not, reports it.
 fn of_type(parameter: &Parameter, literal: &Literal, diagnostics: &mut Diagnostics) -> bool {
     let (name, kind) = (&parameter.name, parameter.kind);
     let found = match (&literal.value, kind) {
@@ -60,7 +60,7 @@ fn article(kind: ParameterKind) -> &'static str {
     }
 }
 
-/// Values of several dimensions are a fault of their own.
+/// Values of several dimensions are reported by another rule.
 fn bounds(parameter: &Parameter, range: &ParameterRange, fits: bool, diagnostics: &mut Diagnostics) {
     let (start, end, default) = (&range.start, &range.end, &parameter.default);
     if is_above(start, end) {

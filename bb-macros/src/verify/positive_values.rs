@@ -1,9 +1,9 @@
-//! Rates, times and the limits of speed and effort are positive, and what is counted is a whole number in its range.
+//! Rates, times and the limits of speed and effort are positive, and counts are whole numbers in their range.
 //!
 //! Right: `rate: 200 Hz;`
 //! Wrong: `rate: 0 Hz;`
 //!
-//! The bounds are those of the table of the language. A URDF's limits of speed and effort may be 0.
+//! The bounds come from the table of the language. A URDF's limits of speed and effort may be 0.
 
 use crate::diagnostics::Diagnostics;
 use crate::language::Value;
@@ -18,7 +18,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// What is wrong with a number; another dimension is a fault of its own.
+/// The fault of a number; a wrong dimension is reported by another rule.
 fn fault(given: &Given) -> Option<String> {
     let Given { word, joint, quantity } = given;
     match word.value {

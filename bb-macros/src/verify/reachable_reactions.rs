@@ -9,7 +9,7 @@ use crate::diagnostics::Diagnostics;
 use crate::model::Robot;
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
-    // The time may be what could not be read.
+    // The time may be among the unread items.
     for estimator in robot.estimators.iter().filter(|_| robot.complete) {
         if estimator.timing.lost_after_s.is_some() {
             continue;

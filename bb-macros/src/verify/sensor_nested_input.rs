@@ -1,4 +1,4 @@
-//! An estimator in a sensor has no `input` and no `sync_tolerance`: its one input is that sensor.
+//! An estimator in a sensor has no `input` and no `sync_tolerance`: its only input is that sensor.
 //!
 //! Right: `sensor imu: A() { estimator tilt: Madgwick(); }`
 //! Wrong: `sensor imu: A() { estimator tilt: Madgwick() { input imu: sensor::base::imu; } }`

@@ -1,4 +1,4 @@
-//! Names are unique among siblings; names of links and joints in the whole robot.
+//! Names are unique among siblings, and names of links and joints in the whole robot.
 //!
 //! Right: `link base { sensor imu: A(); sensor mag: B(); }`
 //! Wrong: `link base { sensor imu: A(); sensor imu: B(); }`
@@ -28,7 +28,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
     let mut siblings: HashMap<Siblings, Names> = HashMap::new();
     // Joints are siblings of the sensors and estimators of their link, links of the sensors of their joint, and the
-    // root of the sensors of the robot: what is below them shares their path.
+    // root of the sensors of the robot: their children share a path.
     for joint in &robot.joints {
         siblings.entry(Siblings::Link(joint.parent)).or_insert_with(Names::of_siblings).know(&joint.name);
     }
@@ -57,7 +57,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// Where siblings are declared.
+/// The scope of siblings.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Siblings {
     Robot,
@@ -103,7 +103,7 @@ impl<'a> Names<'a> {
         Self::new("its siblings")
     }
 
-    /// Takes a name without a check: another set reports it.
+    /// Adds a name without a check: another set reports it.
     fn know(&mut self, name: &'a Ident) {
         self.first.entry(name.to_string()).or_insert(name);
     }

@@ -1,9 +1,9 @@
-//! Where the other side is reached.
+//! The address of the other side.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Where the other side is reached, as the crate `mavlink` and most ground stations write it.
+/// The address of the other side, in the notation of the crate `mavlink` and most ground stations.
 ///
 /// ```
 /// use bb_mavlink::Address;
@@ -15,12 +15,13 @@ use std::str::FromStr;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Address {
-    /// `udpin:HOST:PORT`: waits there, and answers whoever sent the newest frame.
+    /// `udpin:HOST:PORT`: waits there, and answers the sender of the newest frame.
     UdpIn {
         /// Address of this machine, and port.
         local: String,
     },
-    /// `udpout:HOST:PORT`: sends there, and hears only that peer, which learns of us by our heartbeats.
+    /// `udpout:HOST:PORT`: sends there, and receives only from that peer, which learns our address from our
+    /// heartbeats.
     UdpOut {
         /// Host and port of the peer.
         remote: String,
@@ -34,7 +35,7 @@ pub enum Address {
     },
 }
 
-/// Why a text is no [`Address`].
+/// Why a string is not an [`Address`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the link `{text}` {reason}; write `udpin:HOST:PORT`, `udpout:HOST:PORT` or `serial:DEVICE:BAUD`")]
 pub struct AddressError {

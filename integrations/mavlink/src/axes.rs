@@ -1,11 +1,11 @@
-//! Between the axes of MAVLink and those of the framework.
+//! Converts between the axes of MAVLink and those of the framework.
 //!
 //! | | MAVLink | here |
 //! |---|---|---|
 //! | world | north, east, down | east, north, up |
 //! | body | forward, right, down | forward, left, up |
 //!
-//! Both exchanges are half turns: the world about the horizontal axis to the north-east, the body about the forward
+//! Both conversions are half turns: the world about the horizontal axis to the north-east, the body about the forward
 //! axis. So each is its own inverse.
 
 use bb_core::nalgebra::{Matrix3, Matrix6, Quaternion, UnitQuaternion, Vector3};
@@ -21,12 +21,12 @@ pub(crate) fn swap_body(vector: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(vector.x, -vector.y, -vector.z)
 }
 
-/// `world_from_body` from what takes forward, right, down to north, east, down.
+/// `world_from_body` from the rotation from forward, right, down to north, east, down.
 pub(crate) fn world_from_body(ned_from_frd: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     world_half_turn() * ned_from_frd * body_half_turn()
 }
 
-/// What takes forward, right, down to north, east, down, from `world_from_body`.
+/// The rotation from forward, right, down to north, east, down, from `world_from_body`.
 pub(crate) fn ned_from_frd(world_from_body: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     world_half_turn() * world_from_body * body_half_turn()
 }

@@ -1,7 +1,8 @@
 //! Frames in a stream of bytes.
 //!
-//! The crate's own reader tells neither noise from frames of other dialects nor the end of a datagram, and counts neither. A
-//! frame of another dialect has to be told, since its sequence number would otherwise count as lost.
+//! The crate's own reader distinguishes neither noise from frames of other dialects nor the end of a datagram, and
+//! counts neither. A frame of another dialect has to be recognised, since its sequence number would otherwise count
+//! as lost.
 
 use mavlink::consts::{self, v1, v2};
 use mavlink::dialects::common::MavMessage;
@@ -12,9 +13,9 @@ use mavlink::{MAV_STX, MAV_STX_V2, MavHeader, MavlinkVersion, Message, calculate
 pub(crate) enum Item {
     /// A message of the dialect.
     Message(MavHeader, Box<MavMessage>),
-    /// A frame of another dialect, whose checksum nobody can check.
+    /// A frame of another dialect, whose checksum cannot be verified.
     Unknown(MavHeader),
-    /// A frame with a good checksum whose content is not of the dialect: an enumeration without that value, say.
+    /// A frame with a good checksum whose content is not in the dialect, for example an unknown enumeration value.
     Invalid(MavHeader),
 }
 
@@ -22,18 +23,18 @@ pub(crate) enum Item {
 #[derive(Debug, Default)]
 pub(crate) struct Framer {
     buffer: Vec<u8>,
-    /// What of the buffer is done with.
+    /// How much of the buffer has been processed.
     start: usize,
-    /// Before this, no message begins, other than at `start`. It keeps the work linear in the bytes, whatever noise they are.
+    /// No message begins before this, except at `start`. It keeps the work linear in the bytes, for any noise.
     clean: usize,
     skipped: u64,
 }
 
-/// What the bytes after a marker are.
+/// The meaning of the bytes after a marker.
 enum Candidate {
     /// They may become a frame.
     Partial,
-    /// They are none.
+    /// They are not a frame.
     Noise,
     Frame(usize, Item),
 }
@@ -44,7 +45,7 @@ impl Framer {
         self.skipped
     }
 
-    /// Takes more bytes. Call [`Self::next`] until there is none before the next bytes.
+    /// Adds bytes. Call [`Self::next`] until it returns `None` before adding more.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         self.buffer.drain(..self.start);
         self.start = 0;
@@ -52,17 +53,17 @@ impl Framer {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// Whether bytes wait that may become a frame.
+    /// Whether bytes are waiting that may become a frame.
     pub(crate) fn is_waiting(&self) -> bool {
         self.start < self.buffer.len()
     }
 
-    /// The next frame, if it is whole.
+    /// The next frame, if it is complete.
     pub(crate) fn next(&mut self) -> Option<Item> {
         self.find(false)
     }
 
-    /// The next frame, if no more bytes are to come: one that is not whole is none.
+    /// The next frame if no more bytes will come: an incomplete one is discarded.
     pub(crate) fn next_at_end(&mut self) -> Option<Item> {
         self.find(true)
     }
@@ -106,7 +107,7 @@ fn is_marker(byte: u8) -> bool {
     byte == MAV_STX || byte == MAV_STX_V2
 }
 
-/// `bytes` begins with a marker; before `clean`, no message begins behind it.
+/// `bytes` begins with a marker; no further message begins before `clean`.
 fn examine(bytes: &[u8], clean: &mut usize) -> Candidate {
     if let Some(known) = examine_known(bytes) {
         return known;
@@ -115,7 +116,8 @@ fn examine(bytes: &[u8], clean: &mut usize) -> Candidate {
     if bytes.len() < layout.length {
         return Candidate::Partial;
     }
-    // Of another dialect, or noise: it ends where another frame begins or nothing follows, and holds no frame that is known.
+    // Of another dialect, or noise: it ends where another frame begins or nothing follows, and contains no known
+    // frame.
     if bytes.get(layout.length).is_some_and(|byte| !is_marker(*byte)) {
         return Candidate::Noise;
     }
@@ -127,7 +129,7 @@ fn examine(bytes: &[u8], clean: &mut usize) -> Candidate {
     }
 }
 
-/// None if the message is of another dialect.
+/// `None` if the message is of another dialect.
 fn examine_known(bytes: &[u8]) -> Option<Candidate> {
     if bytes.first() == Some(&MAV_STX_V2)
         && bytes.get(v2::INCOMPAT_FLAGS_OFFSET).is_some_and(|flags| flags & !v2::SUPPORTED_IFLAGS != 0)
@@ -154,7 +156,7 @@ fn examine_known(bytes: &[u8]) -> Option<Candidate> {
     Some(Candidate::Frame(layout.length, item))
 }
 
-/// Where the parts of a frame are.
+/// The offsets of a frame's parts.
 struct Layout {
     version: MavlinkVersion,
     header: MavHeader,
@@ -165,7 +167,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// None if the header is not whole.
+    /// `None` if the header is incomplete.
     fn of(bytes: &[u8]) -> Option<Self> {
         let at = |index: usize| bytes.get(index).copied();
         let payload_length = usize::from(at(consts::PAYLOAD_LEN_OFFSET)?);
@@ -261,7 +263,7 @@ mod tests {
     }
 
     proptest! {
-        /// What is known not to be a frame is not looked at again, which changes nothing.
+        /// Bytes known not to be a frame are not examined again, which changes nothing.
         #[test]
         fn a_frame_within_noise_is_found_where_it_is(pieces in proptest::collection::vec(pieces(), 1..12), cut in 1..200_usize) {
             let bytes = pieces.concat();

@@ -9,16 +9,17 @@
 //! | [`MavlinkHeartbeat`] | [`FlightController`], with the counts of the link | `HEARTBEAT` |
 //! | [`MavlinkSender`], a bridge | sends estimates and texts | `GPS_INPUT` or `ODOMETRY`, `STATUSTEXT`, `HEARTBEAT` |
 //!
-//! All who name the same [`Address`] share one connection, which one thread reads. It sends a heartbeat once a second:
-//! that of each [`MavlinkSender`], or of the onboard computer (1, 191) if there is none, so that a peer that waits to
-//! be spoken to answers.
+//! All components that name the same [`Address`] share one connection, which one thread reads. It sends a heartbeat
+//! once a second: that of each [`MavlinkSender`], or of the onboard computer (1, 191) if there is none, so that a
+//! peer that waits for a first message answers.
 //!
 //! Declare the drivers without a `rate`: they wait for their messages.
 //!
 //! # Axes
 //!
 //! MAVLink has north, east, down, and forward, right, down; the framework has east, north, up, and forward, left, up.
-//! All that is published is in the framework's axes, and `world_from_body` takes forward, left, up to east, north, up.
+//! All published messages are in the framework's axes, and `world_from_body` rotates forward, left, up to east,
+//! north, up.
 //!
 //! # What goes wrong
 //!
@@ -29,9 +30,9 @@
 //!   more than a second behind for two seconds,
 //! - the link fails, because the serial device was unplugged, for example.
 //!
-//! A flood fills the 64 places of a driver's queue; then the oldest message makes room, and a warning is logged at most
-//! every 10 s. What was dropped, noise and damaged frames, frames of other dialects, and gaps in the sequence numbers
-//! are counted in [`LinkStatistics`], which [`MavlinkHeartbeat`] publishes.
+//! A flood fills the 64 places of a driver's queue; then the oldest message is dropped, and a warning is logged at
+//! most every 10 s. Dropped messages, noise and damaged frames, frames of other dialects, and gaps in the sequence
+//! numbers are counted in [`LinkStatistics`], which [`MavlinkHeartbeat`] publishes.
 //!
 //! # Limits
 //!

@@ -1,8 +1,8 @@
-//! One connection, shared by all who name its address.
+//! One connection, shared by all users of its address.
 //!
-//! A thread reads it until the last user drops it: reads wait for 50 ms at most, so that the thread ends soon after.
-//! Every user has an inbox of a bounded number of messages of its own; a user who is slow loses the oldest, which is
-//! counted, and holds up nobody.
+//! A thread reads it until the last user drops it: reads wait for 50 ms at most, so the thread ends soon after. Every
+//! user has its own inbox of a bounded number of messages. A slow user loses the oldest, which is counted, and does
+//! not delay others.
 
 mod inbox;
 mod reading;
@@ -22,52 +22,52 @@ use std::io;
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Why a link cannot be opened, or cannot be used any more.
+/// Why a link cannot be opened, or can no longer be used.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum LinkError {
     /// The address is malformed.
     #[error(transparent)]
     Address(#[from] AddressError),
-    /// It cannot be opened: the port is taken, or the device is not there.
+    /// It cannot be opened: the port is taken, or the device does not exist.
     #[error("the link `{address}` cannot be opened: {source}")]
     Open {
-        /// Of the link.
+        /// The address of the link.
         address: Address,
         /// Why.
         source: Arc<io::Error>,
     },
-    /// It has worked, and does so no more: the device was unplugged.
+    /// It worked, but no longer does: the device was unplugged.
     #[error("the link `{address}` has failed: {source}")]
     Failed {
-        /// Of the link.
+        /// The address of the link.
         address: Address,
         /// Why.
         source: Arc<io::Error>,
     },
 }
 
-/// What has come over a link, and been sent, since it was opened.
+/// Counts of a link since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub struct LinkStatistics {
     /// Messages of the dialect `common`.
     pub messages: u64,
     /// Frames of other dialects.
     pub unknown: u64,
-    /// Frames with a good checksum and a content that the dialect does not have.
+    /// Frames with a good checksum and a content that is not in the dialect.
     pub invalid: u64,
     /// Bytes that belong to no frame: noise, and frames with a bad checksum.
     pub bytes_skipped: u64,
     /// Messages that drivers lost because they came faster than they were read.
     pub dropped: u64,
-    /// Frames that senders have numbered and that have not come.
+    /// Frames missing from the senders' numbering.
     pub lost: u64,
     /// Frames sent.
     pub sent: u64,
-    /// Frames that could not be sent, or that nobody was known to hear.
+    /// Frames that could not be sent, or had no known receiver.
     pub unsent: u64,
 }
 
-/// Whom to listen to.
+/// The peer to listen to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Peer {
     /// 0 for any.
@@ -83,7 +83,7 @@ impl Peer {
     }
 }
 
-/// A use of a connection. The last one that is dropped closes it.
+/// A user's handle of a connection. Dropping the last one closes it.
 #[derive(Debug)]
 pub(crate) struct Link {
     shared: Arc<Shared>,
@@ -96,7 +96,7 @@ struct Open {
     users: usize,
 }
 
-/// All open connections. It is locked while one is opened or closed, so that no address is opened twice.
+/// All open connections. Locked while one is opened or closed, so that no address is opened twice.
 static LINKS: LazyLock<Mutex<HashMap<Address, Open>>> = LazyLock::new(Mutex::default);
 
 fn links() -> MutexGuard<'static, HashMap<Address, Open>> {
@@ -111,7 +111,7 @@ impl Link {
     pub(crate) fn open(address: &str) -> Result<Self, LinkError> {
         let address: Address = address.parse()?;
         let mut links = links();
-        // One that has failed is left to those who still hold it.
+        // A failed one is left to its remaining users.
         if let Some(open) = links.get_mut(&address).filter(|open| !open.shared.has_failed()) {
             open.users += 1;
             return Ok(Self { shared: Arc::clone(&open.shared) });
@@ -131,12 +131,12 @@ impl Link {
         self.shared.listen(peer, ids, capacity)
     }
 
-    /// Speaks as a component of a system, which sends heartbeats for as long as the voice is kept.
+    /// Registers a sender with these ids, which sends heartbeats until the voice is dropped.
     pub(crate) fn voice(&self, system_id: u8, component_id: u8) -> Arc<Voice> {
         self.shared.voice((system_id, component_id))
     }
 
-    /// Sends a message. Returns `false` if nobody is known who would hear it.
+    /// Sends a message. Returns `false` if no receiver is known.
     ///
     /// # Errors
     /// The link has failed.
@@ -169,7 +169,7 @@ impl Drop for Link {
     fn drop(&mut self) {
         let mut links = links();
         let address = self.shared.address();
-        // A link that has failed may have a successor at its address; its thread has ended.
+        // A failed link may have a successor at its address; its thread has ended.
         let Some(open) = links.get_mut(address).filter(|open| Arc::ptr_eq(&open.shared, &self.shared)) else {
             return;
         };

@@ -22,7 +22,7 @@ use std::time::Duration;
 /// How long an update without a rate waits.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// What a [`MavlinkSender`] has done since it started; published with each change.
+/// Counts of a [`MavlinkSender`] since its start; published with each change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub struct MavlinkSent {
     /// Estimates sent.
@@ -33,15 +33,15 @@ pub struct MavlinkSent {
     pub refused: u64,
     /// Status texts sent, each in one or several messages.
     pub texts: u64,
-    /// Messages that nobody was known to hear.
+    /// Messages without a known receiver.
     pub unheard: u64,
 }
 
 /// Sends the newest estimate as `GPS_INPUT` or `ODOMETRY`, status texts as `STATUSTEXT`, and heartbeats.
 ///
-/// With a `rate`, it looks that often, and sends the newest estimate if it has not been sent yet; without one, it sends
-/// each estimate as it is emitted, at the rate of the estimator's output. Without an estimate, or with one that is too
-/// old, it sends none.
+/// With a `rate`, it checks at that rate, and sends the newest estimate if it has not been sent yet. Without one, it
+/// sends each estimate as it is emitted, at the rate of the estimator's output. If there is no estimate, or it is too
+/// old, none is sent.
 ///
 /// `GPS_INPUT` takes the [`FlightEstimate`](bb_estimators::navigation::state_estimator::FlightEstimate) of the state estimator;
 /// `ODOMETRY` takes that, or [`Odometry`](bb_core::payload::Odometry) of any estimator.

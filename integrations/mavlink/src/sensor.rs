@@ -1,4 +1,4 @@
-//! What the flight controller measures and says, as sensors.
+//! Measurements and reports of the flight controller, as sensors.
 
 mod attitude;
 mod gnss;

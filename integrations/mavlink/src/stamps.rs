@@ -1,15 +1,15 @@
-//! From the flight controller's stamps to the robot's time.
+//! Converts the flight controller's stamps to the robot's time.
 
 use bb_core::MonotonicTime;
 use bb_core::time::DeviceClock;
 use std::time::Duration;
 
-/// By how much stamps and arrivals may disagree from one message to the next.
+/// How much stamps and arrivals may disagree from one message to the next.
 const TOLERANCE: Duration = Duration::from_secs(1);
-/// For how long stamps may stay behind by more than that.
+/// How long stamps may be behind by more than that.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What the stamps of one stream are.
+/// The unit of a stream's stamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unit {
     /// 64 bits of microseconds, since the start or since 1970.
@@ -18,7 +18,7 @@ pub(crate) enum Unit {
     Millis,
 }
 
-/// A clock that cannot be believed.
+/// A clock that cannot be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum ClockFault {
     #[error("its clock went back by {by_s:.3} s: the flight controller may have started again")]
@@ -35,12 +35,12 @@ pub(crate) enum ClockFault {
 
 /// Converts the stamps of one stream, with a [`DeviceClock`], and checks them.
 ///
-/// A stamp of zero is none: the arrival takes its place.
+/// A stamp of zero means none: the arrival is used instead.
 #[derive(Clone, Debug)]
 pub(crate) struct Stamps {
     clock: DeviceClock,
     unit: Unit,
-    /// How long the same stamp may come.
+    /// How long the same stamp may repeat.
     still: Duration,
     last: Option<Last>,
     late_since: Option<MonotonicTime>,
@@ -63,10 +63,10 @@ impl Stamps {
         Self { clock, unit, still, last: None, late_since: None }
     }
 
-    /// When the measurement was taken; none if it is a repetition, or was overtaken by a newer one.
+    /// The time of the measurement; `None` if it is a repetition, or was overtaken by a newer one.
     ///
     /// # Errors
-    /// The clock cannot be believed. What it says afterwards is for a new `Stamps`.
+    /// The clock cannot be trusted. Use a new `Stamps` for later messages.
     pub(crate) fn time_of(
         &mut self,
         ticks: u64,
@@ -90,7 +90,7 @@ impl Stamps {
             if step_s < 0.0 {
                 return Ok(None);
             }
-            // Messages that were held up arrive together, so that what one is ahead of the last tells nothing by itself.
+            // Delayed messages arrive together, so a single one ahead of the last proves nothing.
             let by_s = step_s - passed_s;
             if by_s > TOLERANCE.as_secs_f64() && self.late_since.is_none() {
                 return Err(ClockFault::JumpedAhead { by_s });

@@ -1,4 +1,4 @@
-//! A socket or a serial port, split into the end that the link's thread reads and the end that everybody writes.
+//! A socket or a serial port, split into a reading end for the link's thread and a writing end for all users.
 
 use crate::Address;
 use std::io;
@@ -6,7 +6,7 @@ use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// How long a read waits at most: after so long, a link that is dropped has stopped.
+/// The longest wait of a read: a dropped link stops within this time.
 pub(crate) const READ_TIMEOUT: Duration = Duration::from_millis(50);
 
 /// How long a write to a serial port may take.
@@ -22,7 +22,7 @@ pub(crate) enum Reader {
         socket: UdpSocket,
         /// Where the last datagram came from.
         from: Option<SocketAddr>,
-        /// Where to answer, if that is whoever sends.
+        /// Where to answer, if that is the sender.
         peer: Option<Arc<Mutex<Option<SocketAddr>>>>,
     },
     #[cfg(feature = "serial")]
@@ -40,7 +40,7 @@ pub(crate) enum Writer {
 pub(crate) enum Peer {
     /// The socket is connected.
     Known,
-    /// Whoever sent the newest frame.
+    /// The sender of the newest frame.
     Newest(Arc<Mutex<Option<SocketAddr>>>),
 }
 
@@ -83,7 +83,7 @@ fn udp(socket: UdpSocket, peer: Option<Arc<Mutex<Option<SocketAddr>>>>, to: Peer
 }
 
 impl Reader {
-    /// Waits for bytes; 0 if none have come in time. Of UDP, it gives one datagram.
+    /// Waits for bytes; returns 0 on a timeout. For UDP, it reads one datagram.
     pub(crate) fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = match self {
             Self::Udp { socket, from, .. } => socket.recv_from(buffer).map(|(length, address)| {
@@ -106,7 +106,7 @@ impl Reader {
         matches!(self, Self::Udp { .. })
     }
 
-    /// What was read last held a frame: its sender is to be answered.
+    /// The last bytes read contained a frame: its sender will be answered.
     pub(crate) fn accept_peer(&self) {
         if let Self::Udp { from: Some(from), peer: Some(peer), .. } = self {
             *peer.lock().unwrap_or_else(PoisonError::into_inner) = Some(*from);
@@ -114,14 +114,14 @@ impl Reader {
     }
 }
 
-/// Nothing has come; or, of a connected socket, nobody listens at the other side yet.
+/// A timeout; or, for a connected socket, nobody listens at the other side yet.
 fn is_passing(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionRefused, ConnectionReset, Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused | ConnectionReset)
 }
 
 impl Writer {
-    /// Writes a frame. Returns `false` if nobody is known who would hear it.
+    /// Writes a frame. Returns `false` if no receiver is known.
     pub(crate) fn write(&mut self, frame: &[u8]) -> io::Result<bool> {
         let written = match self {
             Self::Udp(socket, Peer::Known) => socket.send(frame).map(|_| true),

@@ -66,7 +66,7 @@ fn a_port_that_is_unplugged_is_opened_again_for_all_its_users() {
     assert!(fault.path.starts_with("sensor/base/"), "{}", fault.path);
     let (mut device, _line) = plug_in(&link);
     assert!(arrives(&mut device), "both come back");
-    // The bridge has nothing to send, and has opened the port again all the same: its heartbeats come.
+    // The bridge has nothing to send, but has opened the port again nevertheless: its heartbeats arrive.
     device.set_timeout(Duration::from_secs(30)).expect("it can be set");
     let mut reader = MavlinkReader::new(&mut device);
     let is_of_bridge = |frame: (MavHeader, MavMessage)| frame.0.component_id == 220;

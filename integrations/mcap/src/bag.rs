@@ -32,19 +32,19 @@ use std::sync::Arc;
 pub struct Topic {
     /// The name, as `/imu`.
     pub name: Arc<str>,
-    /// The type in its full spelling, as `sensor_msgs/msg/Imu` even where the file says `sensor_msgs/Imu`; empty
-    /// if the file gives none.
+    /// The type in its full spelling, such as `sensor_msgs/msg/Imu` even if the file says `sensor_msgs/Imu`; empty if
+    /// the file gives none.
     pub schema: Arc<str>,
-    /// How the messages are encoded, `cdr` mostly.
+    /// The encoding of the messages, usually `cdr`.
     pub encoding: Arc<str>,
     /// The definition of the type in the file; empty if there is none.
     pub definition: Arc<str>,
-    /// How the definition is written: `ros2msg`, say.
+    /// The format of the definition, for example `ros2msg`.
     pub definition_encoding: Arc<str>,
     /// Whether it is from a recording of a robot of this project. Its poses may be estimates, so they are not
     /// used as truth by default.
     pub is_own: bool,
-    /// How many messages there are, in a broken bag before the break; `None` if a summary leaves it out.
+    /// The number of messages, in a damaged bag before the damage; `None` if a summary leaves it out.
     pub messages: Option<u64>,
 }
 
@@ -69,8 +69,8 @@ pub struct Bag {
 impl Bag {
     /// Opens a bag and finds its topics: from its summary, or by reading it once if there is none.
     ///
-    /// A bag that breaks off opens if it has topics before the break; [`messages`](Self::messages) reports the
-    /// break when it comes to it.
+    /// A bag that is cut off opens if it has topics before the cut; [`messages`](Self::messages) reports the cut when
+    /// it reaches it.
     ///
     /// # Errors
     ///
@@ -110,7 +110,7 @@ impl Bag {
         Err(RecordingError::new(&self.path, kind))
     }
 
-    /// The topic of this name, if one is given, which must then be of the type; else the only one of the type.
+    /// The topic of this name, if one is given; it must be of the type. Otherwise the only one of the type.
     ///
     /// # Errors
     ///
@@ -132,8 +132,8 @@ impl Bag {
         Err(RecordingError::new(&self.path, kind))
     }
 
-    /// The topic of the magnetometer that belongs to an IMU: the one of this name, if one is given; else the one that a
-    /// recorder of this crate has written beside the IMU; else the only one of its type.
+    /// The topic of the magnetometer that belongs to an IMU: the one of this name, if given; otherwise the one
+    /// written beside the IMU by a recorder of this crate; otherwise the only one of its type.
     ///
     /// # Errors
     ///
@@ -146,7 +146,7 @@ impl Bag {
         }
     }
 
-    /// The messages of the named topics, read as they are asked for and in the order of the file.
+    /// The messages of the named topics, read lazily, in the order of the file.
     ///
     /// Recorders write messages as they arrive, so the order of the file is, with small exceptions, that of the log times;
     /// it need not be that of the stamps. Without names there are no messages. The iterator opens the file
@@ -237,7 +237,7 @@ fn scan(
     Ok(())
 }
 
-/// The topics of these channels, with how many messages each has if `counts` (by channel) are known.
+/// The topics of these channels, with the number of messages of each if `counts` (by channel) are known.
 fn topics_of(channels: &Channels, counts: Option<&BTreeMap<u16, u64>>) -> Vec<Topic> {
     let mut topics: Vec<Topic> = Vec::new();
     for (id, channel) in channels.iter() {

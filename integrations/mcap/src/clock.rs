@@ -1,4 +1,4 @@
-//! The clocks of a recording: what its times have in common.
+//! The clocks of a recording: the offsets common to its times.
 
 use bb_core::WallTime;
 use bb_core::message::Stamp;
@@ -10,17 +10,17 @@ pub(crate) const CLOCK: &str = "bb.clock";
 const OFFSET: &str = "wall_minus_monotonic_ns";
 const SHIFT: &str = "date_shift_ns";
 
-/// A virtual clock starts within this time after 1970, and no robot ran then: 1 year.
+/// A virtual clock starts within this time after 1970, when no robots ran: 1 year.
 const VIRTUAL_NS: i64 = 365 * DAY_NS;
 const DAY_NS: i64 = 86_400_000_000_000;
 
-/// What the times of a recording have in common, written once.
+/// The offsets common to the times of a recording, written once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Clock {
     /// Wall time minus monotonic time, as published, at the first message.
     wall_minus_monotonic_ns: i64,
-    /// What was added to all wall times: a run on virtual time from zero is given today's date, since viewers show dates,
-    /// and tools sort by them.
+    /// The offset added to all wall times: a run on virtual time from zero is given today's date, since viewers show
+    /// dates, and tools sort by them.
     shift_ns: i64,
 }
 
@@ -36,18 +36,18 @@ impl Clock {
         }
     }
 
-    /// The wall time as it is recorded.
+    /// The wall time as recorded.
     // Wrapping, so that every time is read back.
     pub(crate) fn recorded(&self, time: WallTime) -> WallTime {
         WallTime::from_unix_nanos(time.as_unix_nanos().wrapping_add(self.shift_ns))
     }
 
-    /// The wall time as it was published.
+    /// The wall time as published.
     pub(crate) fn published(&self, time: WallTime) -> WallTime {
         WallTime::from_unix_nanos(time.as_unix_nanos().wrapping_sub(self.shift_ns))
     }
 
-    /// The monotonic time that belongs to a wall time as it was published.
+    /// The monotonic time at a published wall time.
     pub(crate) fn monotonic(&self, wall_time: WallTime) -> MonotonicTime {
         MonotonicTime::from_nanos(wall_time.as_unix_nanos().wrapping_sub(self.wall_minus_monotonic_ns))
     }

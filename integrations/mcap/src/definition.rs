@@ -13,12 +13,12 @@ pub use value::Value;
 use bb_core::message::{DecodeError, Schema};
 use std::sync::Arc;
 
-/// The fields of a type of messages, to read any message of it, by [`Topic::message_definition`](crate::Topic::message_definition):
-/// from the definition in the file (`ros2msg`), or else, as
-/// bags in SQLite have none, of the types that [`bb_core::message::codec::ros`] has.
+/// The fields of a message type, to read any message of it; see
+/// [`Topic::message_definition`](crate::Topic::message_definition). They come from the definition in the file
+/// (`ros2msg`); bags in SQLite have none, so otherwise from the types in [`bb_core::message::codec::ros`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MessageDefinition {
-    /// The type itself, then those that it is made of.
+    /// The type itself, then its component types.
     messages: Vec<Message>,
 }
 
@@ -53,7 +53,7 @@ enum Kind {
     F32,
     F64,
     Text,
-    /// The number of an enum's variant, whose names the message of this index has.
+    /// The number of an enum's variant; the message of this index has the variants' names.
     Variant(usize),
     /// By index.
     Message(usize),
@@ -63,7 +63,7 @@ enum Kind {
 enum Count {
     One,
     Exactly(usize),
-    /// A length comes first.
+    /// Preceded by a length.
     Any,
 }
 
@@ -71,7 +71,7 @@ enum Count {
 const DEEPEST: usize = 32;
 
 impl MessageDefinition {
-    /// Of a type in the full spelling, by what the file has of it: a text, and how that is written. Both may be empty.
+    /// For a type in the full spelling, from its definition in the file: a text, and its format. Both may be empty.
     ///
     /// # Errors
     /// The text cannot be read, and the type is not a known one; in words.
@@ -89,7 +89,8 @@ impl MessageDefinition {
         }
     }
 
-    /// Parses a definition, followed by those of all types that it names, as ROS 2 writes it to bags (`ros2msg`).
+    /// Parses a definition, followed by those of all types that it refers to, as written to bags by ROS 2
+    /// (`ros2msg`).
     ///
     /// # Errors
     /// The line that is wrong; or a type that is not defined, or contains itself.
@@ -97,7 +98,7 @@ impl MessageDefinition {
         parse::definition(name, text).map_err(|fault| format!("the definition of {name} is malformed: {fault}"))
     }
 
-    /// Whether a message begins with a `std_msgs/Header`, which has the time of its values.
+    /// Whether a message begins with a `std_msgs/Header`, which contains the time of its values.
     pub fn has_header(&self) -> bool {
         let first = self.messages.first().and_then(|message| message.fields.first());
         first.is_some_and(|field| match (field.kind, field.count) {

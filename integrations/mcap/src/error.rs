@@ -1,18 +1,18 @@
-//! What can go wrong with a file, said so that the reader can act on it.
+//! Errors of a file, worded so that the reader can act on them.
 
 use bb_core::message::DecodeError;
 use mcap::McapError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What went wrong with a file.
+/// An error of a file.
 ///
-/// `Display` gives the file, the fault and its place, then the way out, on one line.
+/// `Display` gives the file, the fault and its place, then how to solve it, on one line.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {kind}", path.display())]
 pub struct RecordingError {
     path: PathBuf,
-    // Boxed, for this travels in the `Result` of every message.
+    // Boxed, since it is part of the `Result` of every message.
     #[source]
     kind: Box<RecordingErrorKind>,
 }
@@ -27,7 +27,7 @@ impl RecordingError {
         &self.path
     }
 
-    /// What went wrong, for code that treats some faults apart: a truncated file is often good enough.
+    /// The kind of error, for code that distinguishes faults: a truncated file is often good enough.
     pub fn kind(&self) -> &RecordingErrorKind {
         &self.kind
     }
@@ -39,7 +39,7 @@ impl RecordingError {
     }
 }
 
-/// What is wrong with a file; see [`RecordingError`].
+/// The kinds of errors of a file; see [`RecordingError`].
 ///
 /// Offsets are in bytes from the start of the file: of the record, or of the chunk that holds it. `messages`
 /// counts the messages of all topics read before the place.
@@ -105,7 +105,7 @@ pub enum RecordingErrorKind {
         byte: u64,
         /// Its length in bytes, unpacked.
         length: u64,
-        /// The longest taken, in bytes.
+        /// The longest accepted, in bytes.
         limit: u64,
     },
     /// A chunk is packed with an unknown method.
@@ -200,7 +200,7 @@ pub enum RecordingErrorKind {
     /// The file cannot be created.
     #[error("cannot be created: {0}")]
     Create(#[source] io::Error),
-    /// The file cannot be written to: the disk is full, say.
+    /// The file cannot be written to, for example because the disk is full.
     #[error("cannot be written to after {messages} messages, the rest is not recorded: {cause}")]
     Write {
         /// How many messages had been written.
@@ -208,7 +208,7 @@ pub enum RecordingErrorKind {
         /// Why.
         cause: io::Error,
     },
-    /// Writing failed before.
+    /// An earlier write failed.
     #[error("was given up at an earlier error")]
     GivenUp,
     /// The thread that writes could not be started, or has panicked.
@@ -256,7 +256,7 @@ pub enum RecordingErrorKind {
         /// What that is.
         now: String,
     },
-    /// A message is not what its channel says.
+    /// A message does not match its channel.
     #[error("a message of `{path}` is damaged: {cause}")]
     Message {
         /// The path.
@@ -283,7 +283,7 @@ pub(crate) fn write_error(messages: u64, error: McapError) -> RecordingErrorKind
     }
 }
 
-/// Nanoseconds as seconds with three digits, enough to find a message by.
+/// Nanoseconds as seconds with three digits, enough to find a message.
 fn seconds(ns: u64) -> String {
     format!("{}.{:03}", ns / 1_000_000_000, ns / 1_000_000 % 1000)
 }

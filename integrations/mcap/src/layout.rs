@@ -1,4 +1,4 @@
-//! The channels of a recording: what they say of all their messages.
+//! The channels of a recording, with properties common to all their messages.
 
 use crate::clock::Clock;
 use bb_core::message::{Schema, Stamp};
@@ -12,16 +12,17 @@ const ROBOT: &str = "bb.robot";
 const NODE: &str = "bb.node";
 const FRAME: &str = "bb.frame";
 
-/// How the messages of a channel are written.
+/// The layout of a channel's messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
-    /// As ROS writes them; what is not in it is the same for all of the channel, or is in the channel beside.
+    /// As written by ROS; other data is the same for the whole channel, or is in the channel beside it.
     Ros,
-    /// With all there is.
+    /// With all data.
     Exact,
-    /// Likewise: those of a `Ros` channel that differ from the rest, each just before the message it goes with.
+    /// Likewise: the messages of a `Ros` channel that differ from the rest, each just before the message it belongs
+    /// to.
     Beside,
-    /// The second message of a payload that ROS has two for, just before the first.
+    /// The second message of a payload with two ROS messages, just before the first.
     Companion,
 }
 
@@ -38,7 +39,7 @@ impl Layout {
     }
 }
 
-/// What the messages of a channel share, beside ROS's header.
+/// Properties common to the messages of a channel, besides ROS's header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Shared {
     pub(crate) robot: String,
@@ -52,7 +53,7 @@ impl Shared {
         Self { robot: origin.robot.to_owned(), node: origin.node.to_owned(), frame: frame.name().to_owned() }
     }
 
-    /// Whether a stamp follows from its wall time.
+    /// Whether a stamp can be derived from its wall time.
     pub(crate) fn gives(&self, clock: &Clock, stamp: &Stamp) -> bool {
         clock.monotonic(stamp.wall_time) == stamp.monotonic_time
             && self.frame == stamp.frame.name()
@@ -60,7 +61,7 @@ impl Shared {
             && self.node == stamp.origin.node
     }
 
-    /// The stamp that follows from a wall time; names are those that are kept.
+    /// The stamp derived from a wall time, with the stored names.
     pub(crate) fn stamp(clock: &Clock, wall_time: WallTime, names: &Names) -> Stamp {
         Stamp {
             monotonic_time: clock.monotonic(wall_time),
@@ -126,7 +127,7 @@ impl Description {
             (ROBOT, &shared.robot),
             (NODE, &shared.node),
             (FRAME, &shared.frame),
-            // ROS's player wants it to be there.
+            // ROS's player requires it.
             ("offered_qos_profiles", ""),
         ];
         let metadata = entries.map(|(key, value)| (key.to_owned(), value.to_owned())).into();

@@ -46,11 +46,11 @@
 //!
 //! # What is lost when the process dies
 //!
-//! Everything that was flushed is kept. At most the last [`flush_messages`](RecorderOptions::flush_messages) messages or those of the
-//! last [`flush_interval`](RecorderOptions::flush_interval), whichever is less, are lost, and those that still wait in the
-//! subscription. Such a file is truncated; [`Recording::open`] reads it up to the break, and [`recover`] makes a complete file
-//! of that part. When the machine loses power, what the operating system had not yet written is lost too, unless
-//! [`sync`](RecorderOptions::sync) is set.
+//! Everything that was flushed is kept. At most the last [`flush_messages`](RecorderOptions::flush_messages) messages
+//! or those of the last [`flush_interval`](RecorderOptions::flush_interval), whichever is less, are lost, and those
+//! still queued in the subscription. Such a file is truncated; [`Recording::open`] reads it up to the cut, and
+//! [`recover`] makes a complete file of that part. When the machine loses power, data not yet written by the
+//! operating system is lost too, unless [`sync`](RecorderOptions::sync) is set.
 //!
 //! # Memory and trust
 //!

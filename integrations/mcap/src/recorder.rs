@@ -1,4 +1,4 @@
-//! Writes what subscriptions receive.
+//! Writes the messages of subscriptions.
 
 mod background;
 mod frames;
@@ -33,24 +33,24 @@ use std::time::{Duration, Instant, SystemTime};
 use viewers::{describe, latched, view};
 pub(crate) use viewers::{nanos, view_as};
 
-/// Where a recording goes.
+/// The destination of a recording.
 pub(crate) trait Output: Write + Seek + Send {}
 impl<T: Write + Seek + Send> Output for T {}
 
 /// The name of the attachment with the robot as URDF.
 pub(crate) const URDF: &str = "robot.urdf";
-/// The name of the metadata that tell which robot it is.
+/// The name of the metadata that identify the robot.
 pub(crate) const ROBOT: &str = "bb.robot";
 /// The name of the metadata at the end.
 pub(crate) const END: &str = "bb.recorder";
 
-/// What has been recorded.
+/// Counts of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RecorderReport {
     /// Messages written.
     pub messages: u64,
-    /// Messages that were handed to the operating system: they survive the end of the process.
+    /// Messages handed to the operating system: they survive the end of the process.
     pub flushed: u64,
     /// Messages lost because the recorder was too slow for the capacity of its subscriptions.
     pub lost: u64,
@@ -58,15 +58,15 @@ pub struct RecorderReport {
     pub too_large: u64,
 }
 
-/// Writes what a subscription receives to a file, either when [`drain`](Self::drain) is called, as for a simulation, or on
-/// its own thread ([`spawn`](Self::spawn)). Dropping it completes the file.
+/// Writes the messages of a subscription to a file, either when [`drain`](Self::drain) is called, as for a
+/// simulation, or on its own thread ([`spawn`](Self::spawn)). Dropping it completes the file.
 pub struct Recorder {
     path: PathBuf,
-    /// None once the file has its end, or an error came.
+    /// `None` once the file is complete, or after an error.
     writer: Option<Box<FileWriter>>,
     /// The same file, to wait for the disk.
     to_sync: Option<File>,
-    /// The first is waited for, the others are looked at.
+    /// The first is waited for, the others are polled.
     subscriptions: Vec<DynamicSubscription>,
     options: RecorderOptions,
     channels: HashMap<&'static str, Channel>,
@@ -74,7 +74,7 @@ pub struct Recorder {
     last_flush: Instant,
     names: Names,
     frames: Option<Frames>,
-    /// Known from the first message on; the frames and the URDF are written with it, since they have its time.
+    /// Known from the first message on. The frames and the URDF are written with it, since they have its time.
     clock: Option<Clock>,
     transforms: Option<Viewed>,
     bytes: Bytes,
@@ -95,7 +95,7 @@ struct Viewed {
     sequence: u32,
 }
 
-/// A message as bytes; kept for the room that they have.
+/// A message as bytes; kept to reuse the allocations.
 #[derive(Default)]
 struct Bytes {
     main: Vec<u8>,
@@ -103,7 +103,8 @@ struct Bytes {
     companion: Vec<u8>,
 }
 
-/// The largest message that is written, in bytes: with what is beside it, a chunk must not exceed what is read.
+/// The largest message that is written, in bytes: together with accompanying data, a chunk must not exceed the
+/// readers' limit.
 const LARGEST: usize = LIMIT as usize / 2;
 
 impl Recorder {
@@ -159,8 +160,9 @@ impl Recorder {
         })
     }
 
-    /// Also records what this subscription receives. Each subscription has its own queue, so that frequent messages do not push
-    /// out rare ones when the disk is slow. A message that several subscriptions receive is recorded several times.
+    /// Also records the messages of this subscription. Each subscription has its own queue, so frequent messages do
+    /// not displace rare ones when the disk is slow. A message that several subscriptions receive is recorded several
+    /// times.
     ///
     /// # Errors
     /// A path publishes a type that would have the same name in the file as a different one.
@@ -168,7 +170,7 @@ impl Recorder {
         if let Err(kind) = take_names(&mut self.names, &subscription) {
             let path = self.path.clone();
             drop(self);
-            // As `new` leaves no file behind.
+            // Like `new`, leave no file.
             let _ = std::fs::remove_file(&path);
             return Err(RecordingError::new(&path, kind));
         }
@@ -236,7 +238,7 @@ impl Recorder {
         &self.path
     }
 
-    /// Waits for a message, and writes it and all that wait after it.
+    /// Waits for a message, and writes it and all that are queued after it.
     pub(crate) fn work(&mut self, wait: Duration) -> Result<(), RecordingError> {
         let wait = wait.min(self.options.flush_interval);
         if let Some(message) = self.subscriptions.first().and_then(|first| first.recv_timeout(wait)) {
@@ -261,7 +263,7 @@ impl Recorder {
         if is_due { self.flush() } else { Ok(()) }
     }
 
-    /// Calls `write` unless an error came before; after one, nothing more is written.
+    /// Calls `write` unless an earlier call failed; after an error, nothing more is written.
     fn guarded<T>(
         &mut self,
         write: impl FnOnce(&mut Self, &mut FileWriter) -> Result<T, WriteFault>,
@@ -281,7 +283,7 @@ impl Recorder {
         }
     }
 
-    /// Writes a message, and what viewers are told by it; false, and nothing, if it is too large.
+    /// Writes a message, and the derived messages for viewers; returns false and writes nothing if it is too large.
     fn write(&mut self, message: &DynamicMessage, writer: &mut FileWriter) -> Result<bool, WriteFault> {
         let stamp = message.stamp();
         let clock = match self.clock {
@@ -349,7 +351,7 @@ impl Recorder {
         Ok(true)
     }
 
-    /// What comes before the first message, with its time.
+    /// Writes the data that precedes the first message, with its time.
     fn begin(&mut self, first: &Stamp, writer: &mut FileWriter) -> Result<Clock, WriteFault> {
         let today = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let today = WallTime::from_unix_nanos(i64::try_from(today.as_nanos()).unwrap_or(0));
@@ -414,7 +416,7 @@ impl Recorder {
 impl Drop for Recorder {
     fn drop(&mut self) {
         if self.writer.is_some() {
-            // There is nobody to tell.
+            // The error cannot be reported to anyone.
             let _ = self.end();
         }
     }
@@ -446,7 +448,8 @@ impl From<io::Error> for WriteFault {
     }
 }
 
-/// Refuses two types of one name before the run rather than at the first message: nobody looks at a recorder's errors then.
+/// Refuses two types with one name before the run rather than at the first message, when nobody watches a recorder's
+/// errors.
 fn take_names(names: &mut Names, subscription: &DynamicSubscription) -> Result<(), RecordingErrorKind> {
     for (path, schemas) in subscription.schemas() {
         schemas.iter().try_for_each(|schema| names.take(path, schema))?;

@@ -1,4 +1,4 @@
-//! A recording: what is in it.
+//! The contents of a recording.
 
 mod messages;
 
@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What was recorded at one path.
+/// The messages recorded at one path.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct RecordedChannel {
@@ -27,13 +27,13 @@ pub struct RecordedChannel {
     pub schema: String,
     /// Its definition.
     pub definition: String,
-    /// How many messages there are, in a broken file before the break.
+    /// The number of messages, in a damaged file before the damage.
     pub messages: u64,
     pub(crate) id: u16,
     pub(crate) layout: Layout,
     pub(crate) names: Names,
     pub(crate) clock: Clock,
-    /// The channel of those that ROS's layout does not hold, and its definition.
+    /// The channel of messages that ROS's layout cannot represent, and its definition.
     pub(crate) beside: Option<(u16, String)>,
     /// The channel of the second message, and its definition.
     pub(crate) companion: Option<(u16, String)>,
@@ -51,11 +51,10 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads a recording through once, to know what is in it. One that breaks off opens as well; see
-    /// [`broken`](Self::broken).
+    /// Reads a recording once, to find its contents. One that is cut off opens as well; see [`broken`](Self::broken).
     ///
     /// # Errors
-    /// The file is missing, unreadable, no MCAP, or was written by another program.
+    /// The file is missing, unreadable, not MCAP, or was written by another program.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let path = path.as_ref();
         let fail = |kind| RecordingError::new(path, kind);
@@ -99,32 +98,32 @@ impl Recording {
         &self.path
     }
 
-    /// The paths that messages were recorded of.
+    /// The paths with recorded messages.
     pub fn channels(&self) -> &[Arc<RecordedChannel>] {
         &self.channels
     }
 
-    /// The robot's name, if the recorder was told.
+    /// The robot's name, if the recorder knew it.
     pub fn robot(&self) -> Option<&str> {
         self.robot.as_deref()
     }
 
-    /// The robot as URDF, if the recorder was told.
+    /// The robot as URDF, if the recorder knew it.
     pub fn urdf(&self) -> Option<&str> {
         self.urdf.as_deref()
     }
 
-    /// How many messages were lost since the recorder was too slow; unknown in a file without an end.
+    /// The number of messages lost because the recorder was too slow; unknown in a file without an end.
     pub fn lost(&self) -> Option<u64> {
         self.lost
     }
 
-    /// Where and why the file breaks off, if it does.
+    /// Where and why the file is cut off, if it is.
     pub fn broken(&self) -> Option<&RecordingError> {
         self.broken.as_deref()
     }
 
-    /// The messages that were published at `path`, bit for bit; the last item of a file that breaks off is the break.
+    /// The messages published at `path`, bit for bit; the last item of a file that is cut off is the error.
     ///
     /// # Errors
     /// Nothing was recorded there, or another payload, or the payload had other fields then.
@@ -140,7 +139,7 @@ impl Recording {
         Ok(Messages::new(AllMessages::open(&self.path, wanted).map_err(fail)?))
     }
 
-    /// All messages in the order in which they were written; the last item of a file that breaks off is the break.
+    /// All messages in the order in which they were written; the last item of a file that is cut off is the error.
     ///
     /// # Errors
     /// The file can no longer be opened.
@@ -188,7 +187,7 @@ impl Scan {
 }
 
 impl RecordedChannel {
-    /// What a robot published; none if the channel is there for viewers only.
+    /// A channel published by a robot; `None` if the channel exists only for viewers.
     fn of(id: u16, channel: &Channel) -> Result<Option<Self>, String> {
         let Channel { topic, schema, definition, metadata, .. } = channel;
         let Some(path) = metadata.get(PATH) else { return Ok(None) };

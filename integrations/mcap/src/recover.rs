@@ -1,4 +1,4 @@
-//! A whole file of what is before the break of a broken one.
+//! Makes a complete file of the part of a damaged one before the damage.
 
 use crate::error::{create_error, write_error};
 use crate::file::{Record, Records};
@@ -10,18 +10,18 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// What [`recover`] has saved.
+/// The result of [`recover`].
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Recovered {
-    /// How many messages.
+    /// The number of messages.
     pub messages: u64,
-    /// Where and why the file was broken; none if it was whole.
+    /// Where and why the file was damaged; `None` if it was complete.
     pub broken: Option<RecordingError>,
 }
 
-/// Writes all that is before the break of `broken` into a new, whole file `repaired`. It need not be a recording of this
-/// crate: any MCAP file will do.
+/// Writes everything before the damage in `broken` to a new, complete file `repaired`. It need not be a recording of
+/// this crate: any MCAP file will do.
 ///
 /// # Errors
 /// `broken` cannot be read at all, or `repaired` exists or cannot be written.
@@ -50,7 +50,7 @@ pub fn recover(broken: impl AsRef<Path>, repaired: impl AsRef<Path>) -> Result<R
                     Err(error @ (McapError::Io(_) | McapError::AttemptedWriteAfterFailure)) => {
                         return Err(fail(messages, error));
                     }
-                    // A message of no channel, say: damage.
+                    // For example a message without a channel: damage.
                     Err(error) => break Some(records.corrupt(error.to_string())),
                 }
                 next = records.advance();

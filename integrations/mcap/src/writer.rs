@@ -1,4 +1,4 @@
-//! Bags made of payloads, of what other programs have measured.
+//! Writes bags of payloads, for measurements from other programs.
 
 use crate::error::{RecordingError, create_error, write_error};
 use crate::recorder::{FileWriter, nanos, view_as};
@@ -12,10 +12,10 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes payloads as the messages that ROS has for them into a new bag, which ROS 2 and this crate read. What a robot
-/// publishes is written by a [`Recorder`](crate::Recorder).
+/// Writes payloads as their ROS messages to a new bag, which ROS 2 and this crate read. The messages of a robot are
+/// written by a [`Recorder`](crate::Recorder).
 ///
-/// A bag that is dropped without [`finish`](Self::finish) is whole, but nobody is told if its end could not be written.
+/// A bag dropped without [`finish`](Self::finish) is complete, but an error at its end is not reported.
 pub struct BagWriter {
     path: PathBuf,
     writer: Box<FileWriter>,
@@ -32,7 +32,7 @@ struct Channel {
 }
 
 impl BagWriter {
-    /// Creates the file, of the chunks that the options say.
+    /// Creates the file, with the chunks described by the options.
     ///
     /// # Errors
     /// The file exists already, or cannot be created.
@@ -48,7 +48,7 @@ impl BagWriter {
     /// Writes a payload as ROS's message, logged at its wall time.
     ///
     /// # Errors
-    /// ROS has no message for it, the topic has another type, or the file cannot be written on.
+    /// ROS has no message for it, the topic has another type, or the file can no longer be written.
     pub fn payload<T: Payload>(&mut self, topic: &str, message: &Stamped<T>) -> Result<(), RecordingError> {
         self.bytes.clear();
         let shape = T::ROS.map_or(T::SHAPE, |layout| layout.shape());
@@ -58,10 +58,10 @@ impl BagWriter {
         self.write(topic, shape, message.wall_time)
     }
 
-    /// Writes a type that has ROS's fields and, by `#[payload(name = "package/Name")]`, ROS's name.
+    /// Writes a type with ROS's fields and, by `#[payload(name = "package/Name")]`, ROS's name.
     ///
     /// # Errors
-    /// The topic has another type, or the file cannot be written on.
+    /// The topic has another type, or the file can no longer be written.
     pub fn message<M: Field>(
         &mut self,
         topic: &str,
@@ -73,7 +73,7 @@ impl BagWriter {
         self.write(topic, M::SHAPE, log_time)
     }
 
-    /// Writes the end of the file; how many messages it has.
+    /// Writes the end of the file. Returns the number of messages.
     ///
     /// # Errors
     /// Writing failed.

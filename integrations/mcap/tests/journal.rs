@@ -10,7 +10,7 @@ use std::error::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct Number(f64);
 
-/// Gives numbers, now and then a NaN.
+/// Returns numbers, and occasionally a NaN.
 #[derive(Debug)]
 pub struct Numbers(u32);
 
@@ -29,7 +29,7 @@ impl Sensor for Numbers {
     }
 }
 
-/// Sums up; fails at every hundredth number.
+/// Adds numbers up; fails at every hundredth number.
 #[derive(Debug)]
 pub struct Sum(f64, u32);
 

@@ -1,4 +1,4 @@
-//! A report as metrics. One family after the other: the text format wants each in one piece.
+//! A report as metrics, one family after the other: the text format requires each family to be contiguous.
 
 use bb_core::pubsub::TopicStatistics;
 use bb_core::run::CommandStatistics;
@@ -14,7 +14,7 @@ use std::fmt;
 /// The states that every robot has.
 const BUILT_IN_STATES: [&str; 3] = ["disarmed", "idle", "executing"];
 
-/// Takes a report at each scrape.
+/// Creates a report at each scrape.
 pub(crate) struct Counts<R: Robot>(pub(crate) Live<R>);
 
 impl<R: Robot> fmt::Debug for Counts<R> {
@@ -187,7 +187,7 @@ fn one_if(condition: bool) -> f64 {
     f64::from(u8::from(condition))
 }
 
-/// A reason as a label reads: `inbox_full`.
+/// A reason as a label: `inbox_full`.
 fn reason_label(reason: DropReason) -> &'static str {
     match reason {
         DropReason::SyncMiss => "sync_miss",
@@ -197,7 +197,7 @@ fn reason_label(reason: DropReason) -> &'static str {
         DropReason::Stopped => "stopped",
         DropReason::Overflow => "inbox_full",
         DropReason::NoTransform => "no_transform",
-        // A reason that is newer than this crate.
+        // A reason added after this version of the crate.
         _ => reason.name(),
     }
 }
@@ -230,7 +230,7 @@ impl Families<'_> {
     }
 }
 
-/// Writes the members of a family.
+/// Writes the samples of a family.
 struct Family<'a>(MetricEncoder<'a>);
 
 impl Family<'_> {
@@ -242,7 +242,7 @@ impl Family<'_> {
         self.0.encode_family(&labels)?.encode_gauge(&value)
     }
 
-    /// Nothing if nothing was measured.
+    /// Empty if nothing was measured.
     fn quantiles(&mut self, labels: &[Label<'_>], measured: &LatencyStatistics) -> fmt::Result {
         let quantiles =
             [("0.5", measured.median), ("0.99", measured.p99), ("0.999", measured.p999), ("1", measured.longest)];

@@ -1,4 +1,4 @@
-//! What users hold: a robot that runs, and its counts as text.
+//! The handle for users: a running robot, and its counts as text.
 
 use crate::collector::Counts;
 use crate::server::{ServeError, Server};
@@ -9,14 +9,14 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::net::ToSocketAddrs;
 
-/// The counts of a robot that runs. It keeps them readable when the robot has stopped.
+/// The counts of a running robot. They stay readable after the robot has stopped.
 pub struct Exporter<R: Robot> {
     registry: Registry,
     robot: PhantomData<fn() -> R>,
 }
 
 impl<R: Robot> Exporter<R> {
-    /// `live` comes from `live()` of what runs the robot.
+    /// `live` comes from `live()` of the running robot.
     pub fn new(live: Live<R>) -> Self {
         let labels = [("robot".into(), R::NAME.into())];
         let mut registry = Registry::with_prefix_and_labels("bb", labels.into_iter());
@@ -27,7 +27,7 @@ impl<R: Robot> Exporter<R> {
     /// All counts as they are now, in the text format of OpenMetrics 1.0.
     pub fn render(&self) -> String {
         let mut text = String::new();
-        // A string takes everything. A text cut short would lack its `# EOF`, and be refused by who reads it.
+        // Writing to a string cannot fail. A truncated text would lack its `# EOF`, and be refused by its reader.
         let _ = encode(&mut text, &self.registry);
         text
     }

@@ -1,4 +1,4 @@
-//! One request on one connection: the head is read within limits, and answered.
+//! One request on one connection: its head is read within limits, and answered.
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// What a head may be long. Prometheus' is below 500 bytes.
 const LONGEST_HEAD: usize = 8 * 1024;
 const MOST_HEADERS: usize = 64;
-/// How long a client may take to send its head, and to take the answer.
+/// How long a client may take to send its head, and to receive the answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// What becomes of a request.
@@ -21,10 +21,10 @@ enum Answer {
     TooSlow,
 }
 
-/// Reads one request and answers it; the connection is closed behind it.
+/// Reads one request and answers it; the connection is then closed.
 ///
 /// # Errors
-/// The client has gone, or does not take the answer.
+/// The client has gone, or does not accept the answer.
 pub(crate) fn serve(mut stream: TcpStream, render: &dyn Fn() -> String) -> io::Result<()> {
     stream.set_write_timeout(Some(PATIENCE))?;
     let answer = read(&mut stream)?;
@@ -59,7 +59,7 @@ fn read(stream: &mut TcpStream) -> io::Result<Answer> {
     }
 }
 
-/// The answer to a head; none if it is not whole yet.
+/// The answer to a head; `None` if it is incomplete.
 fn answer(head: &[u8]) -> Option<Answer> {
     let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
     let mut request = httparse::Request::new(&mut headers);

@@ -1,7 +1,7 @@
-//! The thread that answers.
+//! The thread that answers requests.
 //!
-//! One request after the other, each with a second at most: a scrape comes every few seconds, and a client that misbehaves
-//! costs a second, not a thread.
+//! One request after the other, each with a second at most: a scrape comes every few seconds, and a misbehaving
+//! client costs a second, not a thread.
 
 use crate::request;
 use std::fmt;
@@ -29,7 +29,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Where it listens.
+    /// The address it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -55,7 +55,7 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.is_stopping.store(true, Ordering::Release);
-        // The thread waits for a connection, so it gets one. If none can be made, it ends at the next that comes.
+        // The thread waits for a connection, so it gets one. If none can be made, it ends at the next incoming one.
         let woken = TcpStream::connect_timeout(&reachable(self.address), Duration::from_secs(1)).is_ok();
         if let Some(thread) = self.thread.take()
             && woken
@@ -74,13 +74,13 @@ fn answer(listener: &TcpListener, is_stopping: &AtomicBool, render: &dyn Fn() ->
         let served = connection.and_then(|(stream, _)| request::serve(stream, render));
         if let Err(error) = served {
             tracing::debug!(%error, "a scrape was not answered");
-            // Out of file handles, say: the next attempt would fail at once.
+            // For example, out of file handles: the next attempt would fail at once.
             thread::sleep(Duration::from_millis(10));
         }
     }
 }
 
-/// An address at which a listener of `address` is reached from here.
+/// An address at which a listener of `address` can be reached from this machine.
 fn reachable(address: SocketAddr) -> SocketAddr {
     let ip = match address.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),

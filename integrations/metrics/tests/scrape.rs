@@ -7,7 +7,7 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::{Mutex, PoisonError};
 
-/// Passes on what it gets; fails, or says that it has diverged, when told so.
+/// Forwards its input; fails, or reports divergence, when told to.
 struct Judge;
 
 impl Estimator for Judge {
@@ -73,7 +73,7 @@ fn ask(address: SocketAddr, request: &[u8]) -> (String, String) {
     (head.to_owned(), body.to_owned())
 }
 
-/// A series, with the robot's label left out, to its value. Checks what the format asks for on the way.
+/// Series, without the robot's label, with their values. Checks the format's requirements on the way.
 fn scrape(server: &Server) -> BTreeMap<String, f64> {
     let (head, body) = ask(server.address(), b"GET /metrics HTTP/1.1\r\nHost: robot\r\n\r\n");
     assert!(head.starts_with("HTTP/1.1 200 OK\r\n") && head.contains("application/openmetrics-text"), "{head}");
@@ -227,7 +227,7 @@ fn it_stops_when_dropped_and_names_an_address_that_is_taken() {
     simulation.stop();
 }
 
-/// Whoever holds it keeps `Stuck` in its callback.
+/// Its holder keeps `Stuck` in its callback.
 static HELD: Mutex<()> = Mutex::new(());
 
 struct Stuck;

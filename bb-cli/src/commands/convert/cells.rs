@@ -6,10 +6,10 @@ use crate::filters::near;
 use csv::StringRecord;
 use std::path::Path;
 
-/// The last time of a stamp of ROS, whose seconds have 32 bits, nanoseconds.
+/// The last time of a ROS stamp, whose seconds have 32 bits, nanoseconds.
 const LAST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
 
-/// Where the times of rows come from.
+/// The source of the rows' times.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Times {
     Column,
@@ -17,7 +17,7 @@ pub(super) enum Times {
     Rate(f64),
 }
 
-/// What a row holds.
+/// The contents of a row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Row {
     pub(super) time_ns: i64,
@@ -27,14 +27,14 @@ pub(super) struct Row {
     pub(super) specific_force: Option<[f64; 3]>,
     /// T
     pub(super) magnetic_field: Option<[f64; 3]>,
-    /// w, x, y, z; NaN where it is not known.
+    /// w, x, y, z; NaN if unknown.
     pub(super) orientation: Option<[f64; 4]>,
-    /// m; NaN where it is not known.
+    /// m; NaN if unknown.
     pub(super) position: Option<[f64; 3]>,
     pub(super) moving: Option<bool>,
 }
 
-/// A CSV that is being read.
+/// A CSV being read.
 pub(super) struct Table {
     source: Source,
     times: Times,
@@ -42,12 +42,12 @@ pub(super) struct Table {
     /// Lines before the first row, and that row with its line.
     head: usize,
     first: Option<(u64, StringRecord)>,
-    /// Rows given.
+    /// The number of rows returned.
     rows: u64,
 }
 
 impl Table {
-    /// Reads the head, and finds the columns. A file `-` is the standard input.
+    /// Reads the header, and finds the columns. A file `-` is the standard input.
     pub(super) fn open(file: &Path, columns: &Columns, times: Times) -> Result<Self, String> {
         let mut source = Source::open(file)?;
         let mut head: Vec<StringRecord> = Vec::new();
@@ -75,17 +75,17 @@ impl Table {
         Ok(Self { source, times, quantities, head: head.len(), first: Some(first), rows: 0 })
     }
 
-    /// The length of the file; none of a pipe.
+    /// The length of the file; `None` for a pipe.
     pub(super) fn bytes(&self) -> Option<u64> {
         self.source.bytes()
     }
 
-    /// How far it is read.
+    /// The current position in the file.
     pub(super) fn byte(&self) -> u64 {
         self.source.byte()
     }
 
-    /// How many lines are before the first row.
+    /// The number of lines before the first row.
     pub(super) fn head(&self) -> usize {
         self.head
     }
@@ -108,7 +108,7 @@ impl Table {
     }
 }
 
-/// A column's index; by its name in any line of the head, which may have a unit in brackets at its end.
+/// A column's index; found by its name in any line of the header, which may end with a unit in brackets.
 fn find(column: &Column, head: &[StringRecord]) -> Result<usize, String> {
     let name = match column {
         Column::Number(index) => return Ok(*index),
@@ -139,7 +139,7 @@ fn take(record: &StringRecord, quantity: &Quantity, indices: &[usize], row: &mut
         What::AngularVelocity => row.angular_velocity = Some(cells.measured()?),
         What::SpecificForce => row.specific_force = Some(cells.measured()?),
         What::MagneticField => {
-            // Slower than the IMU, it has no value in many rows.
+            // A sensor slower than the IMU has no value in many rows.
             let field = cells.known_or_nan()?;
             row.magnetic_field = field.iter().all(|value: &f64| value.is_finite()).then_some(field);
         }
@@ -197,7 +197,7 @@ impl Cells<'_> {
         }
     }
 
-    /// Numbers in SI that must be there.
+    /// Required numbers in SI.
     fn measured<const N: usize>(&self) -> Result<[f64; N], String> {
         let mut values = [0.0; N];
         for (component, value) in values.iter_mut().enumerate() {
@@ -206,7 +206,7 @@ impl Cells<'_> {
         Ok(values)
     }
 
-    /// Numbers in SI; NaN for cells that are empty.
+    /// Numbers in SI; NaN for empty cells.
     fn known_or_nan<const N: usize>(&self) -> Result<[f64; N], String> {
         let mut values = [f64::NAN; N];
         for (component, value) in values.iter_mut().enumerate() {
@@ -219,12 +219,12 @@ impl Cells<'_> {
 
     fn time_ns(&self) -> Result<i64, String> {
         let cell = self.cell(0)?;
-        // A float of nanoseconds since 1970 has no nanoseconds.
+        // A float of nanoseconds since 1970 cannot resolve single nanoseconds.
         let time_ns = match exact_ns(cell, self.quantity.factor) {
             Some(time_ns) => time_ns,
             None => match self.number(0)? {
                 nan if nan.is_nan() => return Err(self.fault(0, format!("`{cell}` is not a time"))),
-                // Beyond the range it saturates, and is refused below.
+                // Out of range it saturates, and is refused below.
                 time => (time * self.quantity.factor * 1e9).round() as i64,
             },
         };
@@ -237,8 +237,8 @@ impl Cells<'_> {
     }
 }
 
-/// A decimal number of a unit as nanoseconds, rounded down, without the detour by a float; none if the number or the unit
-/// is not decimal.
+/// A decimal number with a unit as nanoseconds, rounded down, without conversion to a float; `None` if the number or
+/// the unit is not decimal.
 fn exact_ns(cell: &str, factor: f64) -> Option<i64> {
     let units = [(1.0, 9), (1e-3, 6), (1e-6, 3), (1e-9, 0)];
     let (_, digits) = units.into_iter().find(|(unit, _)| *unit == factor)?;

@@ -1,11 +1,11 @@
-//! What the columns contain.
+//! The contents of the columns.
 
 use super::units::{self, Units};
 use crate::filters::near;
 use std::fmt;
 use std::str::FromStr;
 
-/// What a CSV may hold.
+/// The quantities that a CSV may contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum What {
     Time,
@@ -28,7 +28,7 @@ const WHATS: [(&str, What); 7] = [
 ];
 
 impl What {
-    /// What `*` matches, one for each column.
+    /// The text matched by `*`, one for each column.
     fn components(self) -> &'static [&'static str] {
         match self {
             Self::Time | Self::Moving => &[""],
@@ -56,7 +56,7 @@ impl fmt::Display for What {
     }
 }
 
-/// A column as the command line names it.
+/// A column as named on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Column {
     /// From 0.
@@ -108,7 +108,7 @@ impl FromStr for Quantity {
         let factor = match (what, unit) {
             (_, None) | (What::Orientation, Some("wxyz")) => 1.0,
             (What::Orientation, Some("xyzw")) => {
-                // A `*` is in the quantity's own order already.
+                // A `*` is already in the quantity's own order.
                 if !rest.contains('*') {
                     columns.rotate_right(1);
                 }
@@ -150,7 +150,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Checks that there is a time, or a rate instead, and no quantity twice.
+    /// Checks that there is a time, or a rate instead, and that no quantity is given twice.
     pub(super) fn new(quantities: &[Quantity], rate: Option<f64>) -> Result<Self, String> {
         let columns = Self { quantities: quantities.to_vec() };
         for (index, quantity) in quantities.iter().enumerate() {

@@ -1,13 +1,13 @@
-//! A CSV that is being read: once, from its beginning to its end, so that it may be a pipe.
+//! A CSV being read, once from beginning to end, so that it may be a pipe.
 
 use csv::{ReaderBuilder, StringRecord, Terminator};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
-/// Lines before the first one of numbers.
+/// The largest number of lines before the first numeric one.
 pub(super) const LONGEST_HEAD: usize = 100;
-/// Bytes that are looked at for it, if a file has no lines.
+/// The number of bytes searched for it, if a file has no lines.
 const LONGEST_START: u64 = 1 << 20;
 
 /// The lines of a CSV as cells.
@@ -29,7 +29,7 @@ impl Source {
             }
         };
         let (start, delimiter) = start(&mut input).map_err(failed)?;
-        // The last line may have no end, and the line of a record is counted by ends.
+        // The last line may lack a line end, and the line of a record is counted by line ends.
         let whole = Cursor::new(start).chain(input).chain(&b"\n"[..]);
         let reader = ReaderBuilder::new()
             .has_headers(false)
@@ -42,12 +42,12 @@ impl Source {
         Ok(Self { reader, bytes })
     }
 
-    /// The length of the file, if it is one.
+    /// The length, if it is a regular file.
     pub(super) fn bytes(&self) -> Option<u64> {
         self.bytes
     }
 
-    /// How far it is read.
+    /// The current position in the file.
     pub(super) fn byte(&self) -> u64 {
         self.reader.position().byte()
     }
@@ -74,13 +74,13 @@ fn said(error: csv::Error) -> String {
     }
 }
 
-/// Whether a cell is a number, be it one with a decimal comma.
+/// Whether a cell is a number, possibly with a decimal comma.
 pub(super) fn is_number(cell: &str) -> bool {
     cell.replace(',', ".").parse::<f64>().is_ok()
 }
 
-/// Reads up to the first line that begins with a number; the delimiter is that line's, since a head may have others in its
-/// words.
+/// Reads up to the first line that begins with a number. The delimiter comes from that line, since a header may
+/// contain others in its words.
 fn start(input: &mut dyn BufRead) -> std::io::Result<(Vec<u8>, u8)> {
     let mut input = input.take(LONGEST_START);
     let mut start = Vec::new();
@@ -98,11 +98,11 @@ fn start(input: &mut dyn BufRead) -> std::io::Result<(Vec<u8>, u8)> {
         }
         delimiters.push(delimiter);
     }
-    // There will be an error that names the head.
+    // The header will be reported in an error.
     Ok((start, delimiters.first().map_or(b',', |delimiter| *delimiter as u8)))
 }
 
-/// A line with tabs or semicolons has its commas in its numbers.
+/// In a line with tabs or semicolons, commas belong to its numbers.
 fn delimiter(line: &str) -> char {
     ['\t', ';'].into_iter().find(|delimiter| line.contains(*delimiter)).unwrap_or(',')
 }

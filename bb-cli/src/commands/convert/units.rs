@@ -1,12 +1,12 @@
-//! Units by the names that headers of CSV have.
+//! Units by their names in CSV headers.
 
-/// What a quantity is measured in: names and factors to SI, the default first.
+/// The units of a quantity: names and factors to SI, the default first.
 pub(super) type Units = &'static [(&'static str, f64)];
 
 pub(super) const TIME: Units = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("µs", 1e-6), ("μs", 1e-6), ("ns", 1e-9)];
 pub(super) const RATE: Units =
     &[("rad/s", 1.0), ("deg/s", std::f64::consts::PI / 180.0), ("dps", std::f64::consts::PI / 180.0)];
-/// The standard gravity that data sheets mean by g, m/s².
+/// The standard gravity denoted by g in data sheets, m/s².
 const GRAVITY: f64 = 9.80665;
 pub(super) const FORCE: Units =
     &[("m/s2", 1.0), ("m/s^2", 1.0), ("m/s²", 1.0), ("g", GRAVITY), ("mg", GRAVITY * 1e-3)];

@@ -13,7 +13,7 @@ use std::path::Path;
 /// The frame of the measurements, and that of the truth.
 const IMU: Frame = Frame::new("imu");
 
-/// A bag that is being written.
+/// A bag being written.
 pub(super) struct Bag {
     writer: BagWriter,
     counts: Counts,
@@ -21,7 +21,7 @@ pub(super) struct Bag {
     moving: Option<bool>,
 }
 
-/// How many messages of what.
+/// The number of messages of each kind.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
     imu: u64,

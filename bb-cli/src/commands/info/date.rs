@@ -2,8 +2,8 @@
 
 use std::time::{Duration, UNIX_EPOCH};
 
-/// Nanoseconds since 1970 as `2026-03-01 12:00:00 UTC`, or as seconds where that is no date of this age: a clock that
-/// began with the machine.
+/// Nanoseconds since 1970 as `2026-03-01 12:00:00 UTC`, or as seconds if that is not a plausible date: a clock that
+/// started with the machine.
 pub(super) fn date(time_ns: i64) -> String {
     /// 1990 and 2100.
     const DATES_S: std::ops::Range<u64> = 631_152_000..4_102_444_800;

@@ -7,7 +7,7 @@ use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, RecordingError};
 
 const PRESSURE: &str = "sensor_msgs/msg/FluidPressure";
 
-/// Takes in a message, if its type is one whose units can be judged.
+/// Adds a message, if its type has units that can be judged.
 pub(super) fn take(units: &mut Units, message: &BagMessage) -> Result<(), RecordingError> {
     if units.is_full() {
         return Ok(());
@@ -24,7 +24,7 @@ pub(super) fn take(units: &mut Units, message: &BagMessage) -> Result<(), Record
     Ok(())
 }
 
-/// What looks wrong.
+/// Remarks on units that look wrong.
 pub(super) fn remarks(units: &Units) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if units.not_finite() > 0 {

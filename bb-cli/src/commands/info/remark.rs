@@ -1,8 +1,8 @@
-//! What looks wrong with a topic.
+//! Remarks on a topic.
 
 use serde::Serialize;
 
-/// What a remark is about.
+/// The subject of a remark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Subject {
@@ -13,7 +13,7 @@ pub(crate) enum Subject {
     Messages,
 }
 
-/// What looks wrong with a topic.
+/// A remark on something that looks wrong with a topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Remark {
     pub(crate) subject: Subject,

@@ -12,11 +12,11 @@ use serde::Serialize;
 struct Row<'a> {
     file: String,
     bytes: u64,
-    /// The first time of the log, and the time from the first to the last.
+    /// The first log time, and the time from the first to the last.
     start_ns: Option<i64>,
     duration_s: Option<f64>,
     messages: usize,
-    /// Where and why the file breaks off; `messages` is how many are before, which `bb recover` saves.
+    /// Where and why the file is cut off; `messages` is the number before that, which `bb recover` saves.
     damage: Option<&'a str>,
     topics: Vec<TopicRow<'a>>,
 }

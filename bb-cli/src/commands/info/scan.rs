@@ -1,4 +1,4 @@
-//! Reads a file through once.
+//! Reads a file once, from beginning to end.
 
 use super::quantities;
 use super::remark::{Remark, Subject};
@@ -10,20 +10,20 @@ use bb_mcap::Bag;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// What is in a file.
+/// The contents of a file.
 pub(super) struct Content {
     pub(super) file: PathBuf,
     pub(super) bytes: u64,
-    /// The first and the last time of the log, nanoseconds.
+    /// The first and the last log time, nanoseconds.
     pub(super) span_ns: Option<(i64, i64)>,
     pub(super) messages: usize,
     /// In the order of the file.
     pub(super) topics: Vec<TopicContent>,
-    /// Where and why the file cannot be read on.
+    /// Where and why the file cannot be read further.
     pub(super) damage: Option<String>,
 }
 
-/// What is on a topic.
+/// The contents of a topic.
 pub(super) struct TopicContent {
     pub(super) name: String,
     pub(super) schema: String,
@@ -33,7 +33,7 @@ pub(super) struct TopicContent {
     pub(super) remarks: Vec<Remark>,
 }
 
-/// A topic while it is read.
+/// A topic while it is being read.
 #[derive(Default)]
 struct Open {
     reader: Option<TopicReader>,
@@ -43,7 +43,7 @@ struct Open {
     fault: Option<String>,
 }
 
-/// Reads a file through; the error says why not even its beginning can be read.
+/// Reads a whole file; the error says why not even its beginning can be read.
 pub(super) fn scan(file: &Path) -> Result<Content, String> {
     let opening = crate::Progress::spinner("opening");
     let bag = Bag::open(file);
@@ -77,7 +77,7 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
         topic.times.push(log, topic.reader.as_ref().and_then(|reader| reader.stamp_ns(&message)));
         let read = quantities::take(&mut topic.units, &message).map_err(|error| error.to_string());
         let read = read.and_then(|()| match &topic.reader {
-            // Once is enough for those that tell nothing of units.
+            // One message is enough for topics without units to judge.
             Some(reader) if topic.times.count() == 1 => reader.read(&message).map(drop),
             _ => Ok(()),
         });

@@ -1,4 +1,4 @@
-//! What looks wrong with the times of a topic.
+//! Remarks on the times of a topic.
 
 use super::remark::{Remark, Subject};
 use crate::periods::Periods;
@@ -9,11 +9,11 @@ pub(super) struct Times {
     /// Whether messages come only when something happens.
     of_events: bool,
     log_ns: Vec<i64>,
-    /// Those in the headers, as long as all messages have one.
+    /// The times in the headers, as long as all messages have one.
     stamp_ns: Vec<i64>,
 }
 
-/// The clocks of the log and of the stamps agree within this; beyond, one of them has jumped.
+/// The clocks of the log and of the stamps agree within this; if not, one of them has jumped.
 const JUMP_S: f64 = 1.0;
 
 impl Times {
@@ -30,7 +30,7 @@ impl Times {
         self.log_ns.len()
     }
 
-    /// When messages were measured, where their headers say so.
+    /// The measurement times, if the headers have them.
     fn measured(&self) -> &[i64] {
         if self.stamp_ns.len() == self.log_ns.len() { &self.stamp_ns } else { &self.log_ns }
     }
@@ -90,7 +90,7 @@ impl Times {
         remarks
     }
 
-    /// Whether the clock of the log and that of the stamps are one.
+    /// Whether the log and the stamps use the same clock.
     fn clocks(&self, at: &dyn Fn(usize) -> f64) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let offset = |index: usize| seconds(self.log_ns[index].saturating_sub(self.stamp_ns[index]));

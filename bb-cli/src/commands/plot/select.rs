@@ -1,13 +1,13 @@
-//! Which numbers of a message are plotted, and in which panel.
+//! Selects the numbers of a message to plot, and their panels.
 
 use crate::filters::near;
 use bb_mcap::Value;
 use std::fmt;
 
-/// Lists of more are plotted only by index.
+/// Longer lists are plotted only by index.
 const MOST_ELEMENTS: usize = 16;
 
-/// The way to a field: `pose.position`, `ranges[3]`.
+/// The path to a field: `pose.position`, `ranges[3]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Path(Vec<Step>);
 
@@ -17,7 +17,7 @@ enum Step {
     Index(usize),
 }
 
-/// Numbers that have one panel: the fields of one message, or the elements of one list.
+/// Numbers that share a panel: the fields of one message, or the elements of one list.
 #[derive(Debug, PartialEq)]
 pub(super) struct Group {
     pub(super) path: Path,
@@ -51,7 +51,7 @@ impl Path {
         Self(self.0.iter().cloned().chain([step]).collect())
     }
 
-    /// The last name on the way, and the one before it.
+    /// The last name on the path, and the one before it.
     pub(super) fn names(&self) -> (Option<&str>, Option<&str>) {
         let mut names = self.0.iter().rev().filter_map(|step| match step {
             Step::Field(name) => Some(&**name),
@@ -84,14 +84,14 @@ impl fmt::Display for Path {
 }
 
 impl Group {
-    /// What is at the axis.
+    /// The label of the axis.
     pub(super) fn axis(&self) -> String {
         let (last, _) = self.path.names();
         last.unwrap_or("value").to_owned()
     }
 }
 
-/// The numbers at and below a path, by a message; of a whole message without header and covariances.
+/// The numbers at and below a path, in a message; for a whole message, without header and covariances.
 pub(super) fn groups(message: &Value, path: &Path) -> Result<Vec<Group>, String> {
     let mut at = message;
     let mut way = Path::default();
@@ -156,7 +156,7 @@ fn collect(value: &Value, path: &Path, is_whole: bool, groups: &mut Vec<Group>) 
     }
 }
 
-/// Whether ROS says that a field is not known: by -1 as the first element of its covariance.
+/// Whether a field is marked as unknown, in ROS by −1 as the first element of its covariance.
 fn is_unknown(name: &str, message: &Value) -> bool {
     match message.field(&format!("{name}_covariance")) {
         Some(Value::List(values)) => values.first().and_then(Value::as_f64) == Some(-1.0),
@@ -164,7 +164,7 @@ fn is_unknown(name: &str, message: &Value) -> bool {
     }
 }
 
-/// Whether a field is a time of a message of a payload that ROS has none for: these are what is plotted over.
+/// Whether a field is a time in a message without a ROS definition: such times are the horizontal axis.
 fn is_time_of_payload(name: &str, message: &Value) -> bool {
     ["monotonic_time", "wall_time"].contains(&name) && message.field("payload").is_some()
 }

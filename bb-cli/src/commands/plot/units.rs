@@ -1,4 +1,4 @@
-//! The units of fields of ROS's messages, as their definitions say.
+//! The units of fields of ROS messages, from their definitions.
 
 use super::select::Path;
 
@@ -27,7 +27,7 @@ const UNITS: [(&str, &str); 21] = [
     ("max_range", "m"),
 ];
 
-/// The unit of the numbers at a path in a message of this type, if ROS says it.
+/// The unit of the numbers at a path in a message of this type, if ROS defines it.
 pub(super) fn of(schema: &str, path: &Path) -> Option<&'static str> {
     let package = schema.split('/').next().unwrap_or("");
     if !["sensor_msgs", "geometry_msgs", "nav_msgs", "tf2_msgs"].contains(&package) {
@@ -47,7 +47,7 @@ pub(super) fn of(schema: &str, path: &Path) -> Option<&'static str> {
         (Some("angular"), true) => Some("rad/s²"),
         _ => None,
     };
-    // A single component is called `x`, and its vector says what it is.
+    // A single component is called `x`; the vector's name says what it is.
     let is_component = matches!(last, Some("x" | "y" | "z"));
     let name = if is_component { before } else { last };
     named(name).or_else(|| velocity(name))

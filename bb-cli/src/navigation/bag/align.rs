@@ -1,4 +1,4 @@
-//! A start from rest, or from the course in motion, as the declared filter does it.
+//! A start from rest, or from the course in motion, like that of the declared filter.
 
 use super::messages::Inertial;
 use super::sensors::Sensors;
@@ -10,7 +10,7 @@ use bb_estimators::navigation::{
 /// How far the motion may differ from the IMU's x axis, rad.
 const SLIP: f64 = 0.1;
 
-/// Where the world begins is known by definition, m.
+/// The origin of the world is known by definition, m.
 const ORIGIN: f64 = 0.01;
 
 /// The first start that the samples allow, with its time since the epoch.

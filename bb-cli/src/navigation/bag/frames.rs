@@ -1,4 +1,4 @@
-//! Where the sensors are on the body, which is the IMU.
+//! The places of the sensors on the body, whose frame is the IMU's.
 
 use super::messages::Messages;
 use super::notes::Notes;
@@ -7,7 +7,7 @@ use super::topics::TF_STATIC;
 use bb_core::nalgebra::Isometry3;
 use std::collections::HashMap;
 
-/// Frames that do not move against each other.
+/// Frames at rest relative to each other.
 #[derive(Debug)]
 pub(super) struct Frames {
     /// Parent, child, and what takes coordinates of the child to the parent.
@@ -34,7 +34,7 @@ impl Frames {
         Ok(Self { edges, mounts: options.mount.clone(), of_topics })
     }
 
-    /// Takes coordinates of what `topic` is about to those of the IMU.
+    /// Transforms coordinates from the frame of `topic`'s data to the IMU's.
     ///
     /// # Errors
     ///
@@ -81,7 +81,7 @@ impl Frames {
         self.mounts.iter().find(is_it).map(|mount| &mount.at)
     }
 
-    /// Takes coordinates of `from` to `to`, over as few frames as possible.
+    /// Transforms coordinates from `from` to `to`, over as few frames as possible.
     fn path(&self, to: &str, from: &str) -> Option<Isometry3<f64>> {
         let mut reached: Vec<(&str, Isometry3<f64>)> = vec![(to, Isometry3::identity())];
         let mut next = 0;

@@ -14,7 +14,7 @@ use std::collections::HashMap;
 /// Nanoseconds since the Unix epoch.
 pub(super) type Time = i64;
 
-/// What was read, each with the time in its header.
+/// The messages read, each with the time in its header.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
     pub(super) imu: Vec<Inertial>,
@@ -23,12 +23,12 @@ pub(super) struct Messages {
     pub(super) relative: Vec<(Time, Odometry)>,
     pub(super) pose: Vec<(Time, Pose)>,
     pub(super) truth: Vec<(Time, Told)>,
-    /// The first of its topic, with the velocity if it tells that.
+    /// The first of its topic, with the velocity if it contains one.
     pub(super) start: Option<(Time, Pose, Option<Twist>)>,
     pub(super) transforms: Vec<TransformStamped>,
-    /// The frames of the sensors by topic; of odometry that of the body.
+    /// The frames of the sensors by topic; for odometry, that of the body.
     pub(super) frames: HashMap<String, String>,
-    /// What broke the bag off.
+    /// The damage that cut the bag off.
     pub(super) broken: Option<String>,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct Inertial {
     pub(super) specific_force: Vector3<f64>,
 }
 
-/// What a message of the truth tells.
+/// The contents of a message of the truth.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Told {
     Pose(Isometry3<f64>),
@@ -66,7 +66,8 @@ impl Messages {
             read.take(&message, topics).map_err(fault)?;
             progress.add(1);
         }
-        // By the time of measurement; those of the IMU stay as they came, so that a clock that runs back is seen.
+        // By the time of measurement; IMU messages stay in order of arrival, so that a clock that runs backwards is
+        // seen.
         read.gnss.sort_by_key(|(time, _)| *time);
         read.odometry.sort_by_key(|(time, _)| *time);
         read.relative.sort_by_key(|(time, _)| *time);
@@ -125,7 +126,7 @@ impl Messages {
         Ok(())
     }
 
-    /// The messages of the IMU, each after the one before.
+    /// The messages of the IMU, each later than the previous one.
     pub(super) fn samples(&self, topic: &str, notes: &mut Notes) -> Result<Vec<Inertial>, String> {
         let mut samples: Vec<Inertial> = Vec::with_capacity(self.imu.len());
         let mut back = 0;
@@ -147,7 +148,7 @@ impl Messages {
     }
 }
 
-/// Unknown, as ROS has it, is zero.
+/// ROS writes zero for unknown.
 fn pose_of(pose: PoseWithCovariance) -> Pose {
     let is_known = pose.covariance != bb_core::nalgebra::Matrix6::zeros();
     let covariance = is_known.then_some(pose.covariance);
@@ -182,7 +183,7 @@ fn told(message: &BagMessage) -> Result<(Time, Told), RecordingError> {
     Ok((time_ns, told))
 }
 
-/// The frame on the robot that a message is of; empty if it says none.
+/// The robot's frame that a message refers to; empty if it names none.
 fn frame(message: &BagMessage) -> Result<String, RecordingError> {
     let header = message.header()?;
     Ok(match &*message.schema {

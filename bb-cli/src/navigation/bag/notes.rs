@@ -1,8 +1,8 @@
-//! What there is to say of a data set beside its figures.
+//! Remarks on a data set.
 
 use crate::navigation::doubt::{distrusted, is_most};
 
-/// What was assumed, and what was left out.
+/// Assumptions made, and data left out.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
     pub(super) notes: Vec<String>,
@@ -14,7 +14,7 @@ impl Notes {
         self.notes.push(note);
     }
 
-    /// Says that a part was left out. Where that is more than half, the figures are those of something else.
+    /// Records that a part was left out. If that is more than half, the figures are misleading.
     pub(super) fn left_out(&mut self, part: usize, all: usize, note: String) {
         if is_most(part as u64, all as u64) {
             self.doubts.push(distrusted(&note));

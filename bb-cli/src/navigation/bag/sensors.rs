@@ -1,4 +1,4 @@
-//! What was measured, of the body and in the world.
+//! The measurements, on the body and in the world.
 
 use super::NavigationBag;
 use super::messages::{Inertial, Time, Told};
@@ -21,11 +21,11 @@ pub(super) struct Sensors {
     pub(super) truth: TrueTrack,
     /// The point of the body whose position a truth without an orientation tells, m.
     pub(super) antenna: Vector3<f64>,
-    /// The pose that filters start from, by the topic that tells it; with velocity in the body and its deviation.
+    /// The initial pose of the filters, by its topic; with velocity in the body and its deviation.
     pub(super) start: Option<StartPose>,
 }
 
-/// The first message of the topic that tells where filters start.
+/// The first message of the topic for the initial pose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StartPose {
     pub(super) time_ns: Time,
@@ -34,15 +34,15 @@ pub(super) struct StartPose {
     pub(super) velocity: Option<(Vector3<f64>, f64)>,
 }
 
-/// A pose, with the variances of translation and rotation if it tells them.
+/// A pose, with the variances of translation and rotation if available.
 type Drifting = (Time, Isometry3<f64>, Option<(f64, f64)>);
 
-/// A pose of the body by an odometry that drifts.
+/// A pose of the body from drifting odometry.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pose {
     pub(super) time_ns: Time,
     pub(super) world_from_imu: Isometry3<f64>,
-    /// Of translation and rotation relative to the one before, m and rad.
+    /// Deviations of translation and rotation relative to the previous one, m and rad.
     pub(super) deviation: (f64, f64),
 }
 
@@ -109,7 +109,7 @@ impl NavigationBag {
         })
     }
 
-    /// Where the world begins, if there are positions on the Earth.
+    /// The origin of the world, if there are positions on the Earth.
     fn world(&self, deviation: f64, notes: &mut Notes) -> Option<LocalFrame> {
         let messages = &self.messages;
         let mut of_truth = messages.truth.iter().filter_map(|(_, told)| match told {
@@ -117,7 +117,7 @@ impl NavigationBag {
             _ => None,
         });
         let is_number = |at: &Geodetic| [at.latitude, at.longitude, at.height].iter().all(|x| x.is_finite());
-        // A receiver may begin with zeros, or with where it was switched off.
+        // A receiver may begin with zeros, or with the place where it was switched off.
         let mut course = Course::within(None);
         for (time, fix) in &messages.gnss {
             course.add(*time, fix, deviation);
@@ -142,7 +142,7 @@ impl NavigationBag {
         Some(LocalFrame::new(first))
     }
 
-    /// The poses of the odometry that drifts, each with how well it is known relative to the one before.
+    /// The poses of the drifting odometry, each with its deviation relative to the previous one.
     fn relative(&self, imu_from_camera: &Isometry3<f64>) -> Result<Vec<Pose>, String> {
         let mut poses: Vec<Drifting> = Vec::new();
         for (time, odometry) in &self.messages.relative {
@@ -193,7 +193,7 @@ impl NavigationBag {
     }
 }
 
-/// How many fixes have a position that is none, and the first of these.
+/// The number of fixes with an invalid position, and the first of these.
 fn nowhere(fixes: &[(Time, GnssFix)]) -> (usize, Option<GeodeticPosition>) {
     let is_nowhere = |fix: &GnssFix| fix.status != GnssStatus::NoFix && Geodetic::of_fix(fix, 0.0).is_none();
     let mut positions = fixes.iter().filter(|(_, fix)| is_nowhere(fix)).filter_map(|(_, fix)| fix.position);

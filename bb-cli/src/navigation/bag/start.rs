@@ -1,4 +1,4 @@
-//! Where the filters start.
+//! The start of the filters.
 
 use super::NavigationBag;
 use super::align::align;
@@ -10,16 +10,16 @@ use crate::navigation::data::Truth;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::navigation::{EskfParams, Start};
 
-/// How well a true pose is known to a filter that starts there: m, rad.
+/// The assumed deviation of a true pose for a filter that starts there: m, rad.
 const POSITION: f64 = 0.1;
 const ROTATION: f64 = 0.02;
 
-/// The same of a velocity that the truth tells, that its positions tell, and that nothing tells, m/s.
+/// The same for a velocity from the truth, from its positions, and for an unknown one, m/s.
 const TOLD: f64 = 0.1;
 const FROM_POSITIONS: f64 = 0.5;
 const UNKNOWN: f64 = 5.0;
 
-/// Over which true positions tell a velocity, ns.
+/// The time over which true positions give a velocity, ns.
 const BASELINE_NS: i64 = 100_000_000;
 
 impl NavigationBag {

@@ -8,13 +8,13 @@ use crate::navigation::data::{DataSet, Keyframe, Sample};
 use bb_estimators::navigation::{RelativePose, Start};
 use std::collections::{BTreeSet, HashMap};
 
-/// Less than a tenth of a second, so that a truth at 10 Hz is scored at each message though its clock jitters.
+/// Less than a tenth of a second, so that a truth at 10 Hz is scored at each message even if its clock jitters.
 const SCORED_PERIOD_NS: i64 = 90_000_000;
 
 /// Keyframes by their time.
 type Numbers = HashMap<Time, u64>;
 
-/// `longest_s`: what is longer between two messages of the IMU is a gap, and nothing is measured in it.
+/// `longest_s`: a longer time between two messages of the IMU is a gap, in which no measurement is used.
 pub(super) fn data_set(
     bag: &NavigationBag,
     imu: &[Inertial],
@@ -98,7 +98,7 @@ pub(super) fn data_set(
     Ok(data.referred())
 }
 
-/// The instants of the truth that are scored.
+/// The times of the truth that are scored.
 fn scored(sensors: &Sensors, start_ns: Time) -> BTreeSet<Time> {
     let mut scored = BTreeSet::new();
     let mut last = start_ns;
@@ -111,7 +111,7 @@ fn scored(sensors: &Sensors, start_ns: Time) -> BTreeSet<Time> {
     scored
 }
 
-/// Samples of the IMU, split where something was measured.
+/// Samples of the IMU, split at measurements.
 struct Walk {
     start_ns: Time,
     now_ns: Time,
@@ -151,10 +151,10 @@ impl Walk {
     }
 }
 
-/// Where measurements go whose keyframe a smoother cannot have.
+/// The new keyframes of measurements whose own keyframe a smoother cannot have.
 struct Moved {
     nodes: Vec<Time>,
-    /// The longest way that is gone.
+    /// The largest move.
     period_ns: i64,
     farthest_ns: i64,
     dropped: usize,
@@ -208,7 +208,7 @@ fn numbered<T: Copy>(measured: &[(Time, T)], numbers: &Numbers) -> HashMap<u64, 
     measured.iter().filter_map(|(time, of)| Some((*numbers.get(time)?, *of))).collect()
 }
 
-/// Each pose relative to the one before.
+/// Each pose relative to the previous one.
 fn relative(sensors: &Sensors, numbers: &Numbers) -> HashMap<u64, RelativePose> {
     let pairs = sensors.relative.windows(2).filter_map(|pair| {
         let [from, to] = pair else { return None };

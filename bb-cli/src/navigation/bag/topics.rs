@@ -1,4 +1,4 @@
-//! Which topics of a bag are taken for what.
+//! The roles of a bag's topics.
 
 use super::options::{BagOptions, StartFrom};
 use crate::recording::said;
@@ -9,16 +9,16 @@ pub(super) const POSE_WITH_COVARIANCE: &str = "geometry_msgs/msg/PoseWithCovaria
 pub(super) const TRANSFORM: &str = "geometry_msgs/msg/TransformStamped";
 const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 
-/// Where frames that do not move are told.
+/// The topic of static frames.
 pub(super) const TF_STATIC: &str = "/tf_static";
 
-/// Where ROS's tools tell where a robot starts.
+/// The topic on which ROS tools publish a robot's initial pose.
 const INITIAL_POSE: &str = "/initialpose";
 
-/// What turns a topic off.
+/// The word that turns a topic off.
 const NONE: &str = "none";
 
-/// The topics that are taken, by name.
+/// The chosen topics, by name.
 #[derive(Clone, Debug)]
 pub(super) struct Topics {
     pub(super) imu: String,
@@ -68,7 +68,7 @@ impl Topics {
         all
     }
 
-    /// How many messages there are about.
+    /// The approximate number of messages.
     pub(super) fn expected(&self, bag: &Bag) -> u64 {
         let names = self.all();
         let taken = bag.topics().iter().filter(|topic| names.contains(&&*topic.name));
@@ -80,7 +80,7 @@ fn is_of(topic: &Topic, schema: &str) -> bool {
     *topic.schema == *schema
 }
 
-/// The topic of this name, or the only one of the type that is not taken for something else; none if there is none.
+/// The topic of this name, or the only one of the type that has no other role; `None` if there is none.
 fn only(
     bag: &Bag,
     schema: &str,
@@ -109,7 +109,7 @@ fn only(
     }
 }
 
-/// The topic that tells where the filters start.
+/// The topic of the filters' initial pose.
 fn start(bag: &Bag, options: &BagOptions) -> Result<Option<String>, String> {
     let name = match &options.start {
         Some(StartFrom::Topic(name)) => name,

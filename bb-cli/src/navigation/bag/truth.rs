@@ -15,8 +15,8 @@ pub(super) struct TrueTrack {
 }
 
 impl TrueTrack {
-    /// Of what was told of a part of the body at `imu_from_part`. What is no number, or no rotation, is left out. Positions on the
-    /// Earth are those in the frame, of the part.
+    /// From messages about a part of the body at `imu_from_part`. Values that are not finite, or not a rotation, are
+    /// left out. Positions on the Earth are those in the frame, of the part.
     pub(super) fn new(told: &[(Time, Told)], imu_from_part: &Isometry3<f64>, frame: Option<&LocalFrame>) -> Self {
         // A program that does not know the velocity leaves it zero.
         let tells_velocity = told.iter().any(|(_, told)| match told {
@@ -50,7 +50,7 @@ impl TrueTrack {
         &self.points
     }
 
-    /// At a time; none before the first and after the last, and in gaps.
+    /// The truth at a time; `None` before the first, after the last, and in gaps.
     pub(super) fn at(&self, time: Time) -> Option<Truth> {
         let next = self.points.partition_point(|(known, _)| *known < time);
         let (after_ns, after) = self.points.get(next)?;
@@ -79,7 +79,7 @@ fn of_pose(world_from_part: &Isometry3<f64>, imu_from_part: &Isometry3<f64>) -> 
     Some(Truth { position: world_from_imu.translation.vector, world_from_body, velocity: None })
 }
 
-/// A pose, if it is one.
+/// A pose, if it is valid.
 pub(super) fn isometry(pose: &Isometry3<f64>) -> Option<Isometry3<f64>> {
     let (position, quaternion) = (pose.translation, pose.rotation.into_inner());
     let is_rotation = (quaternion.norm() - 1.0).abs() < 0.1;

@@ -1,4 +1,4 @@
-//! nalgebra's types. Matrices are written row by row, as ROS has them; quaternions x, y, z, w.
+//! nalgebra's types. Matrices are written row by row, as in ROS; quaternions as x, y, z, w.
 
 use super::collections::heap_bytes_of;
 use super::{DecodeError, Field, FieldShape, Reader, Shape, StructShape, Writer};
@@ -28,7 +28,7 @@ impl<T: Field> Named<T> {
     };
 }
 
-/// Three in a column are `geometry_msgs/Vector3`; any other matrix is its elements row by row.
+/// A column of three is `geometry_msgs/Vector3`; any other matrix is its elements row by row.
 impl<T: Field + Scalar, const R: usize, const C: usize> Field for SMatrix<T, R, C> {
     const SHAPE: Shape = match R * C {
         0 => Shape::Option(&T::SHAPE),
@@ -62,7 +62,7 @@ where
     S: RawStorage<T, R, C>,
 {
     if matrix.is_empty() {
-        // Thousands of millions of rows without columns take no bytes, so they may come from anywhere.
+        // Billions of rows without columns take no bytes, so any input may claim them.
         return;
     }
     for row in 0..matrix.nrows() {
@@ -114,7 +114,7 @@ impl<T: Field + Scalar> Field for DMatrix<T> {
             return Err(reader.error("as many elements as rows and columns make", found).within("data"));
         }
         match data.is_empty() {
-            // As for writing: nalgebra would go through the rows.
+            // As for writing: nalgebra would iterate over the rows.
             true => Ok(Self::from_vec(rows as usize, columns as usize, data)),
             false => Ok(Self::from_row_iterator(rows as usize, columns as usize, data)),
         }

@@ -3,7 +3,7 @@
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::sync::Arc;
 
-/// Bytes that the values hold on the heap, beside their own `size_of`.
+/// Bytes that the values hold on the heap, in addition to their `size_of`.
 pub(super) fn heap_bytes_of<'a, T: Field + 'a>(values: impl IntoIterator<Item = &'a T>) -> usize {
     if T::IS_INLINE { 0 } else { values.into_iter().map(T::heap_bytes).sum() }
 }

@@ -1,8 +1,8 @@
-//! The messages that a shape is made of, in the words of ROS.
+//! The ROS message definitions for a shape.
 //!
-//! What ROS 2 does not have is replaced by what has the same bytes. An optional value becomes a list of at most one. An
-//! inner list becomes a message with one field `data`. An enum becomes the number of its variant, with constants for the
-//! names, and a list of at most one for the fields of each variant that has fields.
+//! Types that ROS 2 does not have are replaced by types with the same bytes. An optional value becomes a list of at
+//! most one. An inner list becomes a message with one field `data`. An enum becomes the number of its variant, with
+//! constants for the names, and a list of at most one for the fields of each variant that has fields.
 
 use super::shape::{EnumShape, FieldShape, Shape, StructShape};
 
@@ -56,14 +56,14 @@ pub(super) enum Count {
 pub(super) fn definitions(name: &str, shape: Shape) -> Vec<Definition> {
     let mut known = Known { sources: vec![(full_name(name), Source::Message(shape))] };
     let mut definitions = Vec::new();
-    // A definition may name further ones.
+    // A definition may refer to others.
     while let Some((name, source)) = known.sources.get(definitions.len()).cloned() {
         definitions.push(known.definition(name, source));
     }
     definitions
 }
 
-/// What a definition is made of.
+/// The source of a definition.
 #[derive(Clone, Copy, PartialEq)]
 enum Source {
     /// A struct or an enum; anything else is one field `data`.
@@ -183,7 +183,7 @@ fn full_name(name: &str) -> String {
     }
 }
 
-/// What ROS takes as the name of a type: letters and digits, a capital first.
+/// A valid ROS type name: letters and digits, a capital first.
 fn type_name(name: &str) -> String {
     let name = name.rsplit('/').next().unwrap_or(name);
     let mut result = String::new();
@@ -216,7 +216,7 @@ fn snake(name: &str) -> String {
     field_name(&result)
 }
 
-/// What ROS takes as the name of a field: small letters, digits and single underscores, a letter first, none last.
+/// A valid ROS field name: lower-case letters, digits and single underscores, a letter first, no underscore last.
 fn field_name(name: &str) -> String {
     let mut result = String::new();
     for letter in name.chars().flat_map(char::to_lowercase) {

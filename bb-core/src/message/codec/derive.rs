@@ -1,4 +1,4 @@
-//! What the derive calls for each field of a payload, so that a type that is not a field is reported once.
+//! Functions that the derive calls for each field of a payload, so that a type that is not a field is reported once.
 
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::marker::PhantomData;
@@ -13,15 +13,15 @@ pub fn is_any<T: Field>(_: &T) -> bool {
     true
 }
 
-/// Calls `T`'s implementation of [`Field`], if it has one, else [`NotField`]: inherent functions take precedence.
+/// Calls `T`'s implementation of [`Field`] if it has one, otherwise [`NotField`]: inherent functions take precedence.
 #[derive(Debug)]
 pub struct FieldOf<T>(PhantomData<fn() -> T>);
 
 impl<T: Field> FieldOf<T> {
-    /// What its bytes mean.
+    /// The meaning of its bytes.
     pub const SHAPE: Shape = T::SHAPE;
 
-    /// Whether no value holds anything on the heap.
+    /// Whether no value uses the heap.
     pub const IS_INLINE: bool = T::IS_INLINE;
 
     /// Bytes that it holds on the heap.
@@ -48,10 +48,10 @@ impl<T: Field> FieldOf<T> {
 
 /// Fallback for a type that is not a field. It never runs, since such a payload does not compile.
 pub trait NotField<T> {
-    /// Any.
+    /// Any shape.
     const SHAPE: Shape = Shape::Bool;
 
-    /// Any.
+    /// Any value.
     const IS_INLINE: bool = true;
 
     /// None.

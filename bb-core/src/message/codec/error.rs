@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
-/// Bytes that are not what was written for a type: the field, the place, what was expected there, and what is there.
+/// Bytes that do not encode a value of the type: the field, the place, what was expected there, and what was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DecodeError(Box<Fault>);
 
@@ -16,12 +16,12 @@ struct Fault {
 }
 
 impl DecodeError {
-    /// At a byte, counted from the beginning of the data, where something else was expected.
+    /// An error at a byte, counted from the beginning of the data, where something else was expected.
     pub fn new(at: usize, expected: impl Into<Cow<'static, str>>, found: impl Into<Cow<'static, str>>) -> Self {
         Self(Box::new(Fault { path: Path::default(), at, expected: expected.into(), found: found.into() }))
     }
 
-    /// The same, in the field `name` of what is read; `[2]` is the third of a list.
+    /// The same error, in the field `name` of a larger value; `[2]` is the third of a list.
     pub fn within(mut self, name: impl Into<Cow<'static, str>>) -> Self {
         self.0.path.enter(name);
         self
@@ -60,7 +60,7 @@ impl fmt::Display for DecodeError {
 
 impl std::error::Error for DecodeError {}
 
-/// Where in a value: `pose.position[1]`. Built from the inside out, as an error travels up.
+/// The place in a value: `pose.position[1]`. Built from the inside out, as an error propagates.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Path(Vec<Cow<'static, str>>);
 

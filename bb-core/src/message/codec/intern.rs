@@ -1,10 +1,10 @@
-//! `&'static str` read from bytes: each distinct text is kept for ever, so their sum is bounded.
+//! `&'static str` read from bytes: each distinct text is kept forever, so their total size is bounded.
 
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
 
-/// How many bytes all distinct texts that are read as `&'static str`, and all paths made at run time, may have together, in
-/// one process. They are names of robots, links, components and states; recordings of a fleet stay far below it.
+/// The total size, in one process, of all distinct texts read as `&'static str` and all paths created at run time.
+/// They are names of robots, links, components and states; recordings of a fleet stay far below it.
 pub const MAX_NAME_BYTES: usize = 1 << 20;
 
 struct Names {
@@ -14,7 +14,7 @@ struct Names {
 
 static NAMES: Mutex<Option<Names>> = Mutex::new(None);
 
-/// The same text, kept; none if there are too many.
+/// The same text, kept forever; `None` if the limit is reached.
 pub(crate) fn intern(text: &str) -> Option<&'static str> {
     if text.is_empty() {
         return Some("");

@@ -2,7 +2,7 @@
 //!
 //! | value | JSON |
 //! |---|---|
-//! | integer | a number, exact, also beyond what JavaScript holds |
+//! | integer | a number, exact, even beyond JavaScript's range |
 //! | float | a number that reads back the same, or `"NaN"`, `"Infinity"`, `"-Infinity"` |
 //! | `char`, text | a string |
 //! | `Option` | `null` or the value |

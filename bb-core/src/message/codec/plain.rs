@@ -49,7 +49,7 @@ impl Field for u8 {
     }
 }
 
-/// Numbers that are written as another type, which holds them all.
+/// Numbers written as another type that can represent all of them.
 macro_rules! as_other {
     ($($kind:ty, $other:ty, $expected:literal;)*) => { $(
         impl Field for $kind {
@@ -142,7 +142,8 @@ impl Field for String {
     }
 }
 
-/// Each distinct text that is read stays in memory; when they are [`MAX_NAME_BYTES`] together, no further one is read.
+/// Each distinct text that is read stays in memory. When their total size reaches [`MAX_NAME_BYTES`], no further one
+/// is read.
 impl Field for &'static str {
     const IS_INLINE: bool = true;
     const SHAPE: Shape = Shape::Text;

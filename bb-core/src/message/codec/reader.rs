@@ -1,8 +1,8 @@
-//! Reads plain CDR. Lengths are checked against the bytes that are left before anything is allocated.
+//! Reads plain CDR. Lengths are checked against the remaining bytes before anything is allocated.
 
 use super::{DecodeError, Field};
 
-/// Encodings by their numbers: plain CDR.
+/// Encoding identifiers: plain CDR.
 const BIG_ENDIAN: u16 = 0x0000;
 const LITTLE_ENDIAN: u16 = 0x0001;
 
@@ -16,15 +16,15 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Reads `bytes`, which begin after those that name the encoding, in little endian.
+    /// Reads `bytes`, which begin after the encoding header, in little endian.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0, is_big_endian: false }
     }
 
-    /// Reads a message, which begins with the four bytes that name the encoding: plain CDR, in either byte order.
+    /// Reads a message, which begins with the four-byte encoding header: plain CDR, in either byte order.
     ///
     /// # Errors
-    /// They are missing, or name another encoding.
+    /// The header is missing, or names another encoding.
     pub fn of_message(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let Some((header, data)) = bytes.split_first_chunk::<4>() else {
             let found = format!("{} bytes", bytes.len());
@@ -43,7 +43,7 @@ impl<'a> Reader<'a> {
         Err(DecodeError::new(0, "the encoding 0x0000 or 0x0001, plain CDR", format!("{encoding:#06x}{name}")))
     }
 
-    /// The number of bytes left.
+    /// The number of remaining bytes.
     pub fn left(&self) -> usize {
         self.bytes.len() - self.at
     }
@@ -53,7 +53,7 @@ impl<'a> Reader<'a> {
         DecodeError::new(self.at, expected, found)
     }
 
-    /// A number, which is at a multiple of its size. Its bytes are returned in little endian.
+    /// A number, aligned to a multiple of its size. Its bytes are returned in little endian.
     ///
     /// # Errors
     /// The bytes end early.
@@ -69,7 +69,7 @@ impl<'a> Reader<'a> {
         Ok(number)
     }
 
-    /// Bytes as they are.
+    /// Bytes, unchanged.
     ///
     /// # Errors
     /// There are fewer bytes.
@@ -79,10 +79,11 @@ impl<'a> Reader<'a> {
         Ok(raw)
     }
 
-    /// The number of values that follow. Every value has at least one byte, so that there are at most as many as bytes are left.
+    /// The number of values that follow. Every value has at least one byte, so there are at most as many as remaining
+    /// bytes.
     ///
     /// # Errors
-    /// The bytes end early, or are too few for that number.
+    /// The bytes end early, or are too few for that number of values.
     pub fn length(&mut self) -> Result<usize, DecodeError> {
         let length = u32::from_le_bytes(self.number("a length")?);
         match usize::try_from(length) {
@@ -107,15 +108,15 @@ impl<'a> Reader<'a> {
     /// The field `name`.
     ///
     /// # Errors
-    /// What is wrong with it, by its name.
+    /// The field's error, with its name.
     pub fn field<T: Field>(&mut self, name: &'static str) -> Result<T, DecodeError> {
         T::read(self).map_err(|error| error.within(name))
     }
 
-    /// A list of at most one element: whether it has one.
+    /// Reads a list of at most one element. Returns whether it has one.
     ///
     /// # Errors
-    /// It has more.
+    /// It has more than one.
     pub fn is_present(&mut self) -> Result<bool, DecodeError> {
         match u32::from_le_bytes(self.number("a length of 0 or 1")?) {
             0 => Ok(false),
@@ -130,13 +131,13 @@ impl<'a> Reader<'a> {
         self.raw(1, "a byte").map(drop)
     }
 
-    /// Which variant of an enum.
+    /// The variant number of an enum.
     #[doc(hidden)]
     pub fn variant(&mut self) -> Result<u32, DecodeError> {
         self.number("the number of a variant").map(u32::from_le_bytes)
     }
 
-    /// The error for a number that no variant has.
+    /// The error for a number without a variant.
     #[doc(hidden)]
     pub fn no_variant<T>(&self, number: u32) -> Result<T, DecodeError> {
         Err(self.error("the number of a variant", number.to_string()))

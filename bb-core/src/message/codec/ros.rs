@@ -1,5 +1,5 @@
-//! Messages in the layout that ROS has for them, so that viewers and other tools know them. The payloads are those of
-//! [`payload`](crate::payload), which says how each is written.
+//! Messages in their ROS layout, so that viewers and other tools understand them. The payloads are those of
+//! [`payload`](crate::payload), which implements the conversions.
 //!
 //! | payload | message | what it does not keep |
 //! |---|---|---|
@@ -24,16 +24,17 @@
 //! | `Odometry` | `nav_msgs/msg/Odometry` | a covariance of zeros, which reads as unknown |
 //! | `Path` | `nav_msgs/msg/Path` | – |
 //!
-//! As in ROS, an unknown covariance is all zeros, and an orientation that is not there has −1 as the first element of its
-//! covariance. What a receiver or a battery does not measure is NaN. A header's stamp has 32 bits for the seconds; times
-//! before 1901 and after 2038 do not fit. [`is_exact_as_ros`](super::is_exact_as_ros) tells whether a message reads back
-//! the same; one that does not needs the exact layout as well. Poses are given in the frame [`WORLD`], not the body's.
+//! As in ROS, an unknown covariance is all zeros, and an absent orientation has −1 as the first element of its
+//! covariance. Values that a receiver or a battery does not measure are NaN. A header's stamp has 32 bits for the
+//! seconds; times before 1901 and after 2038 do not fit. [`is_exact_as_ros`](super::is_exact_as_ros) tells whether a
+//! message reads back unchanged; one that does not needs the exact layout as well. Poses are given in the frame
+//! [`WORLD`], not the body's.
 
-/// Declares a ROS message with a header, and how a payload is written as one and read back.
+/// Declares a ROS message with a header, and the conversions between it and a payload.
 ///
 /// The expressions of `write` see the `Stamped` payload by the name in parentheses; those of `read` see the message's
-/// fields by their names and may return a `DecodeError` with `?`. The header has the message's frame, or that of `in`.
-/// Without types the message is one that is declared already.
+/// fields by their names and may return a `DecodeError` with `?`. The header has the message's frame, or that of
+/// `in`. Without types, the message is one that is already declared.
 ///
 /// ```text
 /// ros_message! {
@@ -110,7 +111,7 @@ use crate::time::WallTime;
 /// The frame that poses and orientations are given in: east, north, up.
 pub const WORLD: &str = "world";
 
-/// A payload that ROS has a message for. Name it at the derive, `#[payload(ros)]`, for it to be recorded that way.
+/// A payload with a ROS message. State it at the derive, `#[payload(ros)]`, to record the payload that way.
 ///
 /// The message is a struct of fields in ROS's order, with ROS's name:
 ///
@@ -151,20 +152,20 @@ pub trait RosMessage: Sized {
     /// The message, with its header.
     type Message: Field;
 
-    /// A second message, where ROS divides the payload into two.
+    /// A second message, if ROS splits the payload into two.
     const COMPANION: Option<RosCompanion<Self>> = None;
 
-    /// Converts a message to that of ROS.
+    /// Converts a message to ROS's.
     fn to_ros(message: &Stamped<Self>) -> Self::Message;
 
     /// Converts it back to a payload and a time.
     ///
     /// # Errors
-    /// The message is not one that [`to_ros`](Self::to_ros) makes.
+    /// The message is not one that [`to_ros`](Self::to_ros) produces.
     fn from_ros(message: Self::Message) -> Result<(Self, WallTime), DecodeError>;
 }
 
-/// A second message of ROS for a payload, recorded on a topic below that of the first. It is optional for each payload.
+/// A second ROS message for a payload, recorded on a topic below that of the first. Each payload may have it or not.
 #[derive(Debug)]
 pub struct RosCompanion<T> {
     /// The last part of the topic: `magnetic_field`.
@@ -177,7 +178,7 @@ pub struct RosCompanion<T> {
     pub read: fn(&mut T, &mut Reader<'_>) -> Result<(), DecodeError>,
 }
 
-/// How messages of a payload are written in ROS's layout.
+/// Writes messages of a payload in ROS's layout, and reads them.
 #[derive(Debug)]
 pub struct RosLayout<T> {
     /// The layout of the bytes.

@@ -5,19 +5,19 @@ use super::definitions::{Count, Definition, Element, definitions};
 use super::type_description::type_name;
 use std::fmt::Write;
 
-/// What a program that does not know a type needs to read its bytes.
+/// The information a program needs to read the bytes of a type it does not know.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schema {
     /// The type's full name: `sensor_msgs/msg/Imu`.
     pub name: String,
-    /// The definition, and those of all types it names.
+    /// The definition, and those of all types it refers to.
     pub text: String,
 }
 
 impl Schema {
-    /// How [`text`](Self::text) is written, as MCAP names it.
+    /// The format of [`text`](Self::text), as named by MCAP.
     pub const ENCODING: &'static str = "ros2msg";
-    /// How messages are encoded, as MCAP names it.
+    /// The encoding of messages, as named by MCAP.
     pub const MESSAGE_ENCODING: &'static str = "cdr";
 
     /// Of the type `name` with the given shape.

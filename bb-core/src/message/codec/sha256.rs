@@ -75,7 +75,7 @@ mod tests {
         sha256(message).iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// NIST's examples, then lengths around that of a block, computed with Python's hashlib.
+    /// NIST's examples, then lengths around the block size, computed with Python's hashlib.
     #[test]
     fn hashes_are_those_of_the_standard() {
         assert_eq!(hex(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");

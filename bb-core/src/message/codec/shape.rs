@@ -1,27 +1,27 @@
-//! What the bytes of a type mean, as constant data.
+//! The meaning of a type's bytes, as constant data.
 
-/// What the bytes of a type mean.
+/// The meaning of a type's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// One byte, 0 or 1.
     Bool,
     /// A Unicode scalar value, four bytes.
     Char,
-    /// An integer with a sign.
+    /// A signed integer.
     I8,
-    /// An integer with a sign.
+    /// A signed integer.
     I16,
-    /// An integer with a sign.
+    /// A signed integer.
     I32,
-    /// An integer with a sign.
+    /// A signed integer.
     I64,
-    /// An integer.
+    /// An unsigned integer.
     U8,
-    /// An integer.
+    /// An unsigned integer.
     U16,
-    /// An integer.
+    /// An unsigned integer.
     U32,
-    /// An integer.
+    /// An unsigned integer.
     U64,
     /// IEEE 754, four bytes.
     F32,
@@ -29,22 +29,22 @@ pub enum Shape {
     F64,
     /// UTF-8.
     Text,
-    /// A list of none or one.
+    /// A list of at most one.
     Option(&'static Shape),
-    /// A length and so many.
+    /// A length and that many values.
     List(&'static Shape),
-    /// So many; at least one.
+    /// A fixed number of values, at least one.
     Array(&'static Shape, usize),
     /// Fields one after the other.
     Struct(&'static StructShape),
-    /// The number of the variant as `u32`; then for each variant with fields a list of none or one of them.
+    /// The number of the variant as `u32`; then, for each variant with fields, a list of at most one.
     Enum(&'static EnumShape),
 }
 
 /// See [`Shape::Struct`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StructShape {
-    /// `Imu`; that of a ROS message with its package: `sensor_msgs/Imu`.
+    /// `Imu`; for a ROS message, with its package: `sensor_msgs/Imu`.
     pub name: &'static str,
     /// In the order of the bytes.
     pub fields: &'static [FieldShape],
@@ -53,7 +53,7 @@ pub struct StructShape {
 /// A field of a struct.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldShape {
-    /// Its name; that of a field without a name is its number.
+    /// Its name; for an unnamed field, its number.
     pub name: &'static str,
     /// What its bytes mean.
     pub shape: Shape,
@@ -77,7 +77,7 @@ impl FieldShape {
         Self { name, shape }
     }
 
-    /// What a struct without fields holds.
+    /// The content of a struct without fields.
     #[doc(hidden)]
     pub const NOTHING: Self = Self { name: NOTHING, shape: Shape::U8 };
 }

@@ -6,9 +6,9 @@ use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
 
 impl<T: Payload> Stamped<T> {
-    /// What a program that does not know the payload needs to read a message in the exact layout.
+    /// The information a program needs to read a message in the exact layout without knowing the payload.
     pub fn schema() -> Schema {
-        // The name that the derive was told, if it was: two types of one name need two.
+        // The name given to the derive, if any: two types with the same name need two.
         let name = match T::SHAPE {
             Shape::Struct(shape) => shape.name,
             Shape::Enum(shape) => shape.name,
@@ -97,7 +97,7 @@ impl<T: Payload> Field for Stamped<T> {
     }
 }
 
-/// Appends a message in ROS's layout; false, and nothing, if ROS has none for its payload.
+/// Appends a message in ROS's layout; returns false and appends nothing if ROS has none for its payload.
 pub fn encode_as_ros<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> bool {
     let Some(layout) = T::ROS else { return false };
     encode_with(bytes, |writer| (layout.write)(message, writer));
@@ -115,7 +115,7 @@ pub fn encode_companion<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -
     is_there
 }
 
-/// Puts what [`encode_companion`] wrote into the payload that [`decode_as_ros`] has read.
+/// Adds the contents of a message written by [`encode_companion`] to the payload read by [`decode_as_ros`].
 ///
 /// # Errors
 /// ROS has no second message for the payload, or the bytes are wrong.
@@ -126,21 +126,22 @@ pub fn decode_companion<T: Payload>(payload: &mut T, bytes: &[u8]) -> Result<(),
     }
 }
 
-/// The payload and the wall time of a message in ROS's layout. Its frame, origin and monotonic time are not there.
+/// The payload and the wall time of a message in ROS's layout. It does not contain its frame, origin and monotonic
+/// time.
 ///
 /// # Errors
 /// ROS has no layout for the payload, or the bytes are wrong.
 pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeError> {
     match T::ROS {
-        // Bytes after the message are ignored: ROS counts padding for empty lists that it does not write, so some of its own
-        // messages end with bytes that mean nothing.
+        // Bytes after the message are ignored: ROS counts padding for empty lists that it does not write, so some of
+        // its own messages end with meaningless bytes.
         Some(layout) => (layout.read)(&mut Reader::of_message(bytes)?),
         None => Err(DecodeError::new(0, "a payload that ROS has a message for", T::NAME)),
     }
 }
 
-/// Whether payload and wall time of a message are read back from ROS's layout, with the second message where there is one,
-/// as they are, bit for bit.
+/// Whether payload and wall time of a message read back from ROS's layout bit for bit, including the second message
+/// if there is one.
 pub fn is_exact_as_ros<T: Payload>(message: &Stamped<T>) -> bool {
     let mut bytes = Vec::new();
     if !encode_as_ros(message, &mut bytes) {

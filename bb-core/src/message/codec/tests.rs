@@ -155,7 +155,7 @@ pub(super) fn bytes_of<T: Field>(value: &T) -> Vec<u8> {
     bytes
 }
 
-/// Written, read, and written again it is the same; so it is after other bytes.
+/// Writing, reading and writing again gives the same bytes, also after other bytes.
 pub(super) fn round_trip<T: Field>(value: &T) {
     let bytes = bytes_of(value);
     let read: T = decode(&bytes).expect("it was written just now");
@@ -281,7 +281,7 @@ fn both_byte_orders_are_read() {
     assert_eq!(decode::<Vec<u16>>(&big), Ok(vec![1, 3]));
 }
 
-/// Four bytes that promise four thousand million values allocate nothing for them.
+/// Four bytes that claim four billion values allocate nothing for them.
 #[test]
 fn a_length_is_believed_as_far_as_the_bytes_reach() {
     let mut bytes = vec![0, 1, 0, 0];

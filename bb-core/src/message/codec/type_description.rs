@@ -5,8 +5,8 @@ use super::definitions::{Count, Definition, Element, MessageField, definitions};
 use super::sha256::sha256;
 use std::fmt::Write;
 
-/// The hash of a type with the given name and shape: `RIHS01_` and 64 hexadecimal digits. For a ROS message it is the
-/// hash that ROS 2 has used since Iron.
+/// The hash of a type with the given name and shape: `RIHS01_` and 64 hexadecimal digits. For a ROS message, it is
+/// the hash that ROS 2 has used since Iron.
 ///
 /// ```
 /// use bb_core::message::codec::{ros::Time, type_hash};

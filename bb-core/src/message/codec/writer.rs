@@ -1,4 +1,4 @@
-//! Plain CDR out: every number at a multiple of its own size.
+//! Writes plain CDR: every number is aligned to a multiple of its size.
 
 use super::Field;
 
@@ -6,18 +6,18 @@ use super::Field;
 #[derive(Debug)]
 pub struct Writer<'a> {
     bytes: &'a mut Vec<u8>,
-    /// Where alignment counts from: after the four bytes that name the encoding.
+    /// The origin of alignment: after the four-byte encoding header.
     start: usize,
 }
 
 impl<'a> Writer<'a> {
-    /// Appends to `bytes`; alignment counts from here.
+    /// Appends to `bytes`; alignment is relative to the current end.
     pub fn new(bytes: &'a mut Vec<u8>) -> Self {
         let start = bytes.len();
         Self { bytes, start }
     }
 
-    /// Appends a number at a multiple of its size.
+    /// Appends a number aligned to a multiple of its size.
     pub fn number<const SIZE: usize>(&mut self, little_endian: [u8; SIZE]) {
         let length = self.bytes.len() - self.start;
         let padding = length.next_multiple_of(SIZE) - length;
@@ -27,17 +27,17 @@ impl<'a> Writer<'a> {
         self.bytes.extend(little_endian);
     }
 
-    /// Appends bytes as they are.
+    /// Appends bytes unchanged.
     pub fn raw(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Appends how many values follow. Lengths of CDR have 32 bits; what is longer cannot be read back.
+    /// Appends the number of values that follow. CDR lengths have 32 bits; longer data cannot be read back.
     pub fn length(&mut self, length: usize) {
         self.number(u32::try_from(length).unwrap_or(u32::MAX).to_le_bytes());
     }
 
-    /// Appends text: its length with the zero that ends it, and both.
+    /// Appends text: its length including the terminating zero, then both.
     pub fn text(&mut self, text: &str) {
         self.length(text.len() + 1);
         self.raw(text.as_bytes());
@@ -57,7 +57,7 @@ impl<'a> Writer<'a> {
         self.absent(before);
     }
 
-    /// Appends so many empty lists.
+    /// Appends `count` empty lists.
     #[doc(hidden)]
     pub fn absent(&mut self, count: usize) {
         for _ in 0..count {
@@ -65,7 +65,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Begins the fields of the variant that there is: a list of one.
+    /// Begins the fields of the variant that is present: a list of one.
     #[doc(hidden)]
     pub fn present(&mut self) {
         self.length(1);

@@ -1,4 +1,4 @@
-//! Covariances as ROS has them: row by row; all zeros if unknown.
+//! Covariances in ROS's format: row by row; all zeros if unknown.
 
 use nalgebra::SMatrix;
 
@@ -20,7 +20,7 @@ pub(super) fn from_ros<const N: usize, const ELEMENTS: usize>(
 /// Row by row.
 pub(super) fn rows<const N: usize, const ELEMENTS: usize>(matrix: &SMatrix<f64, N, N>) -> [f64; ELEMENTS] {
     let mut elements = [0.0; ELEMENTS];
-    // nalgebra goes column by column.
+    // nalgebra iterates column by column.
     elements.iter_mut().zip(matrix.transpose().iter()).for_each(|(element, value)| *element = *value);
     elements
 }

@@ -1,4 +1,4 @@
-//! `geometry_msgs`; covariances are six by six, of the linear part, then of the angular one.
+//! `geometry_msgs`; covariances are six by six: linear part first, then angular.
 
 use super::{WORLD, covariance, ros_message};
 use crate::Payload;

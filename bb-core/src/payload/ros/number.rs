@@ -5,12 +5,12 @@ pub(super) fn unless_zero<T: Default + PartialEq>(variance: T) -> Option<T> {
     (variance != T::default()).then_some(variance)
 }
 
-/// ROS writes NaN for what is not measured.
+/// ROS writes NaN for values that are not measured.
 pub(super) fn or_nan(value: Option<f64>) -> f32 {
     value.map_or(f32::NAN, |value| value as f32)
 }
 
-/// ROS writes NaN for what is not measured.
+/// ROS writes NaN for values that are not measured.
 pub(super) fn unless_nan(value: f64) -> Option<f64> {
     (!value.is_nan()).then_some(value)
 }
@@ -21,7 +21,7 @@ pub(super) fn code<T: PartialEq>(all: &[T], value: T) -> u8 {
     u8::try_from(index).unwrap_or_default()
 }
 
-/// The value with a number; the default, which says nothing, for a number that a later ROS may have added.
+/// The value with a number; for a number that a later ROS may have added, the default, which means unknown.
 pub(super) fn of_code<T: Copy + Default>(all: &[T], code: u8) -> T {
     all.get(usize::from(code)).copied().unwrap_or_default()
 }

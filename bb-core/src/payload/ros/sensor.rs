@@ -15,12 +15,12 @@ use crate::time::WallTime;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector4};
 use std::sync::Arc;
 
-/// The covariance of what is not measured: −1 first, as `sensor_msgs/Imu` documents.
+/// The covariance of a value that is not measured: −1 first, as `sensor_msgs/Imu` documents.
 const NO_ORIENTATION: [f64; 9] = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
-/// An orientation is absent where `sensor_msgs/Imu` says that it is: where the first element of its covariance is −1.
-/// A quaternion of zeros is not a rotation, and is absent as well: drivers that do not set the field send it. Any other
-/// quaternion is read as it is.
+/// An orientation is absent if the first element of its covariance is −1, as `sensor_msgs/Imu` documents. A
+/// quaternion of zeros is not a rotation, and is absent as well: drivers that do not set the field send it. Any other
+/// quaternion is read unchanged.
 fn orientation_from_ros(
     orientation: UnitQuaternion<f64>,
     covariance: &[f64; 9],
@@ -31,8 +31,8 @@ fn orientation_from_ros(
     }
 }
 
-/// The covariance of a rate or an acceleration. One that is marked as absent is unknown; the value beside it is kept, since
-/// drivers also write the mark where they mean that the covariance is unknown.
+/// The covariance of a rate or an acceleration. If marked as absent, it is unknown. The value beside it is kept,
+/// since drivers also use the mark for an unknown covariance.
 fn measured(covariance: &[f64; 9]) -> Option<Matrix3<f64>> {
     covariance::from_ros(covariance).filter(|_| covariance[0] != NO_ORIENTATION[0])
 }

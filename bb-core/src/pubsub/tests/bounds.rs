@@ -1,4 +1,4 @@
-//! A subscription is bounded in messages and in bytes, whatever is published and read in whatever order.
+//! A subscription is bounded in messages and in bytes, for any messages and any order of reads.
 
 use super::super::queue::Queue;
 use super::super::wakers::Wakers;
@@ -38,7 +38,7 @@ enum Several {
     Both { texts: Vec<String>, pixels: Arc<[u16]> },
 }
 
-/// A field with an implementation of its own that says nothing about the heap.
+/// A field with its own implementation that does not report its heap bytes.
 #[derive(Clone, Debug)]
 struct Silent(Vec<u8>);
 
@@ -186,7 +186,7 @@ fn publishers_that_meet_at_a_full_queue_never_exceed_its_bound_and_count_every_l
         let publish = |publisher: usize| {
             let mut wakers = Wakers::default();
             for number in 0..EACH {
-                // Sizes of which a large one takes the room of many.
+                // Sizes where one large message takes the room of many.
                 let size = if number % 7 == 0 { 150 } else { number % 20 };
                 queue.push((publisher, number), size, &mut wakers);
                 assert!(queue.statistics(true).bytes <= BYTES);

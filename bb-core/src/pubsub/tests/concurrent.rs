@@ -1,4 +1,4 @@
-//! Topics that are made while others subscribe: nothing is lost, and nothing comes twice.
+//! Topics created while others subscribe: nothing is lost, and nothing is delivered twice.
 
 use super::super::{DynamicSubscription, Overflow, Payloads, Registry, Select, Topic};
 use crate::message::Stamped;
@@ -35,8 +35,8 @@ fn subscribe(registry: &Registry) -> DynamicSubscription {
     registry.subscribe(&[], Select::All, &Payloads::from(["JointState"]), roomy)
 }
 
-/// How many messages have come; of each path and publisher without a gap and without a repetition, from the first one on
-/// if `from_the_start`.
+/// The number of messages received. Checks that those of each path and publisher have no gap and no repetition, from
+/// the first one on if `from_the_start`.
 fn check(subscription: &DynamicSubscription, from_the_start: bool) -> usize {
     let mut next: HashMap<(&str, u64), f64> = HashMap::new();
     let mut received = 0;
@@ -88,7 +88,7 @@ fn whoever_subscribes_at_any_time_receives_every_later_message_once() {
     assert!(registry.topics().len() <= (PUBLISHERS + 1) * PATHS);
 }
 
-/// Also one that comes while others publish: what it gets is in the order of the lines, whatever it does not get.
+/// Also a subscriber that joins while others publish: the messages it gets are in the order of the lines.
 #[test]
 fn subscribers_receive_messages_in_the_order_of_their_lines() {
     const EACH: u32 = 20_000;

@@ -1,4 +1,4 @@
-//! A user's `Drop` and wakers may use the topic and the subscription that runs them: no lock is held.
+//! User code in `Drop` and wakers may use the topic and the subscription that run it: no lock is held.
 
 use super::super::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription, Topic};
 use crate::Payload;

@@ -1,10 +1,10 @@
-//! Which actuators the calling thread is inside, and which it waits for: their code must not wait for itself, be it through
-//! another actuator.
+//! Which actuators the calling thread is inside, and which it waits for: their code must not wait for itself, not
+//! even through another actuator.
 //!
-//! A thread that finds an actuator taken while it is inside another one says what it waits for, under one lock, and looks
-//! whether the thread inside that one waits for an actuator whose thread waits for … an actuator that it is inside itself. Each
-//! thread of such a circle has entered its actuator before it says what it waits for; so the last one sees the whole circle,
-//! and gets an error instead of waiting. Without a circle nobody gets an error.
+//! A thread that is inside one actuator and finds another one taken registers its wait, under one lock. It then looks
+//! for a cycle: whether the thread inside the other waits for an actuator whose thread waits for … an actuator that
+//! this thread is inside. Each thread of such a cycle has entered its actuator before it registers its wait, so the
+//! last one sees the whole cycle and gets an error instead of waiting. Without a cycle, no thread gets an error.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -21,21 +21,21 @@ thread_local! {
 static NEXT: AtomicU64 = AtomicU64::new(NOBODY + 1);
 const NOBODY: u64 = 0;
 
-/// What threads that are inside an actuator wait for.
+/// The actuators that threads inside another actuator wait for.
 static WAITING: Mutex<Option<HashMap<u64, Awaited>>> = Mutex::new(None);
 
-/// An actuator that a thread waits for: who is inside. The pointer is not followed once the thread has ceased to wait.
+/// An awaited actuator, with the thread inside it. The pointer is not followed after the thread has ceased to wait.
 type Awaited = std::sync::Arc<AtomicU64>;
 
-/// An actuator's state, which one thread at a time is inside.
+/// An actuator's state, which one thread at a time may enter.
 pub(super) struct Guarded<S> {
     state: Mutex<S>,
     inside: Awaited,
 }
 
-/// The calling thread is inside an actuator as long as this lives.
+/// The calling thread is inside an actuator until this is dropped.
 pub(super) struct Held<'a, S> {
-    // Before the lock is released, nobody is inside any more.
+    // Declared before the lock: before it is released, nobody is inside any more.
     _left: Left<'a>,
     state: MutexGuard<'a, S>,
 }
@@ -47,7 +47,7 @@ impl<S> Guarded<S> {
         Self { state: Mutex::new(state), inside: Awaited::default() }
     }
 
-    /// Waits until no other thread is inside; none if that would be waited for by the calling thread's own code.
+    /// Waits until no other thread is inside. Returns `None` if the calling thread would wait for its own code.
     pub(super) fn enter(&self) -> Option<Held<'_, S>> {
         let this = self.address();
         let (is_here, is_within) = HELD.with_borrow(|held| (held.contains(&this), !held.is_empty()));
@@ -85,7 +85,7 @@ impl<S> Guarded<S> {
             let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
             let waiting = waiting.get_or_insert_default();
             let mut inside = self.inside.load(Ordering::SeqCst);
-            // A thread that has just got what it waited for is inside that.
+            // A thread that has just got the actuator it waited for is inside it.
             while let Some(awaited) = waiting.get(&inside).filter(|_| inside != this) {
                 let next = awaited.load(Ordering::SeqCst);
                 if next == inside {
@@ -136,8 +136,8 @@ mod tests {
     use super::*;
     use std::sync::Barrier;
 
-    /// Threads that each enter one of so many and then, while the others are inside theirs, the next one: how many were told
-    /// that they would wait for themselves.
+    /// Each of the threads enters one of the actuators and then, while the others are inside theirs, the next one.
+    /// Returns how many were told that they would wait for themselves.
     fn circle(guarded: &[Guarded<()>]) -> usize {
         let barrier = Barrier::new(guarded.len());
         std::thread::scope(|scope| {

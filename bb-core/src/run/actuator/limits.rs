@@ -1,4 +1,4 @@
-//! How an actuator's commands are held to the limits of its joint, and what was counted of that.
+//! Holds an actuator's commands to the limits of its joint, and counts how often it did.
 
 use crate::component::ActuatorContext;
 use crate::joints::Joints;
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 const QUANTITIES: usize = LimitedQuantity::ALL.len();
 
-/// What was counted of one actuator.
+/// The counts of one actuator.
 #[derive(Debug, Default)]
 pub(super) struct Counts {
     commands: AtomicU64,
@@ -16,7 +16,7 @@ pub(super) struct Counts {
     refused: [AtomicU64; QUANTITIES],
 }
 
-/// What an actuator has done since the start.
+/// Counts of an actuator since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ActuatorStatistics {
@@ -29,7 +29,7 @@ pub struct ActuatorStatistics {
 }
 
 impl ActuatorStatistics {
-    /// How many commands exceeded the joint's limit of that quantity, and were brought back to it.
+    /// How many commands exceeded the joint's limit of that quantity, and were clamped to it.
     pub fn limited(&self, quantity: LimitedQuantity) -> u64 {
         self.limited[quantity as usize]
     }
@@ -41,7 +41,7 @@ impl ActuatorStatistics {
 }
 
 impl Counts {
-    /// Brings a command back to the limits of its joint.
+    /// Clamps a command to the limits of its joint.
     pub(super) fn limit<T: Payload>(
         &self,
         command: &mut T,
@@ -91,7 +91,7 @@ impl Counts {
     }
 }
 
-/// The declared limits of the joint, and where it is.
+/// The declared limits of the joint, and its position.
 fn bounds(context: &ActuatorContext, joints: &Joints) -> JointBounds {
     let bounds = JointBounds { joint: context.joint(), ..JointBounds::NONE };
     let Some(limit) = context.topology().joint(context.joint()).and_then(|joint| joint.limit) else {

@@ -1,4 +1,4 @@
-//! Where an actuator reports its motions: at `begin_motion` and `end_motion` below its path.
+//! Publishes an actuator's reports of its motions, at `begin_motion` and `end_motion` below its path.
 
 use crate::component::{ActuatorContext, Host, MotionReport};
 use crate::journal::{Event, Recorded};
@@ -8,8 +8,8 @@ use crate::payload::{BeginMotion, EndMotion};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic, Wakers};
 use std::sync::{Arc, OnceLock};
 
-/// The topics are made with the first report, or at the start for an actuator of standard commands, so that subscriptions
-/// find them.
+/// The topics are created with the first report, or at the start for an actuator of standard commands, so that
+/// subscriptions find them.
 #[derive(Debug, Default)]
 pub(super) struct Reports {
     begin: OnceLock<Option<Arc<Topic<BeginMotion>>>>,

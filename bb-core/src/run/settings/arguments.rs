@@ -17,7 +17,7 @@ impl<R: Robot> Builder<R> {
     /// | `--list` | prints all settings as a TOML file; `None` is returned |
     /// | `--schema` | prints their JSON Schema; `None` is returned |
     ///
-    /// What follows `--` is returned as it is.
+    /// Arguments after `--` are returned unchanged.
     ///
     /// ```no_run
     /// use bb_core::prelude::*;
@@ -42,7 +42,7 @@ impl<R: Robot> Builder<R> {
     /// ```
     ///
     /// # Errors
-    /// All settings of a file that are wrong; else all of the arguments. Nothing of those is set.
+    /// All wrong settings of a file; if the files are right, all wrong arguments. None of these is set.
     pub fn take_arguments(
         &mut self,
         arguments: impl IntoIterator<Item = OsString>,
@@ -127,7 +127,7 @@ fn setting(argument: OsString) -> Result<Assignment, SettingsError> {
     Ok(Assignment::from_text(Place::Argument, path.trim(), value))
 }
 
-/// A reader that has read enough (`| head`) is no mistake.
+/// A reader that stops reading early (`| head`) is no mistake.
 fn say(text: &str) -> Result<(), SettingsError> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(wrong(format!("cannot print: {error}"))),

@@ -1,4 +1,4 @@
-//! Settings to options and parameters: all of them, or none.
+//! Applies settings to options and parameters: all of them, or none.
 
 use super::error::{Place, SettingProblem, SettingsError};
 use crate::component::{AnyOptions, quantity};
@@ -10,10 +10,10 @@ use crate::run::bound::{bound_to, component_paths, fields, refused_by_bound};
 use crate::run::{Builder, Robot};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How a file says that an option which may be `None` is.
+/// How a file writes `None` for an option that may be `None`.
 pub(super) const NULL_TEXT: &str = "\"null\"";
 
-/// How many of the names that there are not are held against all there are.
+/// How many unknown names are compared with all known ones.
 const HINTS: usize = 32;
 
 /// A setting as written.
@@ -22,7 +22,7 @@ pub(super) struct Assignment {
     pub(super) path: String,
     /// Its value.
     pub(super) json: String,
-    /// What it may be meant to be instead: a text without quotation marks.
+    /// Another possible meaning: a string without quotation marks.
     pub(super) text: Option<String>,
 }
 
@@ -58,7 +58,7 @@ pub(super) fn is_beginning(names: &BTreeSet<String>, path: &str) -> bool {
     names.range(start.clone()..).next().is_some_and(|name| name.starts_with(&start))
 }
 
-/// Sets all of `assignments`; none, if one of them is wrong.
+/// Sets all of `assignments`, or none if one of them is wrong.
 pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignment]) -> Result<(), SettingsError> {
     let names = names(builder);
     let paths = component_paths::<R>();
@@ -96,7 +96,8 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
     }
     if problems.is_empty() {
         for (component, (copy, by)) in &changed {
-            // Ranges were looked at above: this is what the options say of each other, or what code has set.
+            // Ranges were checked above: this error is about options that contradict each other, or a value set by
+            // code.
             if let Err(message) = copy.validate()
                 && let Some(first) = by.first()
             {
@@ -136,7 +137,7 @@ fn target<R: Robot>(paths: &[&str], options: &mut R::Options, path: &str) -> Opt
     Some(Target::Option { component, field })
 }
 
-/// Whether an option that is a number keeps its range.
+/// Whether a numeric option is within its range.
 fn in_range(options: &mut dyn AnyOptions, field: usize) -> Result<(), String> {
     let Some(declared) = options.fields().get(field).copied() else { return Ok(()) };
     let number = options.setting(field).and_then(|setting| setting.number());
@@ -156,7 +157,7 @@ fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -
     let set = setting.set(&assignment.json);
     match (&set, &assignment.text) {
         (Err(_), Some(text)) if setting.set(text).is_ok() => Ok(()),
-        // TOML has no null: the text means it, unless the option is a text.
+        // TOML has no null: this string means it, unless the option is a string.
         (Err(_), None) if assignment.json == NULL_TEXT && setting.set("null").is_ok() => Ok(()),
         _ => set,
     }

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
-/// All that is wrong with the settings of a robot, a line each. `Debug` prints the same as `Display`, since that is what a
-/// `main` that returns it shows.
+/// All that is wrong with the settings of a robot, a line each. `Debug` prints the same as `Display`, since a `main`
+/// that returns it shows `Debug`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct SettingsError {
     problems: Vec<SettingProblem>,
@@ -25,7 +25,7 @@ pub(super) enum Place {
     #[cfg_attr(not(feature = "toml"), expect(dead_code, reason = "no file is read without the feature"))]
     File {
         name: Arc<str>,
-        /// Line and column, from 1; none if the file itself is meant.
+        /// Line and column, from 1; `None` for the file itself.
         position: Option<(usize, usize)>,
     },
     /// On the command line.
@@ -64,7 +64,7 @@ impl SettingProblem {
         &self.path
     }
 
-    /// What is wrong, and the way out.
+    /// The problem, and how to solve it.
     pub fn message(&self) -> &str {
         &self.message
     }

@@ -1,4 +1,4 @@
-//! A TOML file to settings.
+//! Reads settings from a TOML file.
 
 use super::assign::Assignment;
 use super::error::{Place, SettingProblem, SettingsError};
@@ -8,15 +8,15 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// What a path is.
+/// What a path refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Known {
     /// A setting: a table there is its value.
     Setting,
     /// The beginning of one: a table there holds settings.
     Table,
-    /// Both: an option has the name of an estimator nested in its sensor. A table is the value of the first where it is nested
-    /// by its names, and holds the settings of the second where its whole path is one name.
+    /// Both: an option has the name of an estimator nested in its sensor. A table is the option's value if written
+    /// with nested names, and holds the estimator's settings if its whole path is one name.
     Both,
     /// Neither.
     No,
@@ -84,7 +84,7 @@ impl<F: Fn(&str) -> Known> Reader<'_, F> {
     }
 
     fn setting(&mut self, path: String, start: usize, value: &Spanned<DeValue<'_>>) {
-        // What is wrong with a name is shown at the name, and what is wrong with a value at the value.
+        // An error about a name points at the name, and an error about a value at the value.
         let is_name_known = matches!((self.is_known)(&path), Known::Setting | Known::Both);
         let start = if is_name_known { value.span().start } else { start };
         let place = self.place(start);
@@ -101,13 +101,13 @@ impl<F: Fn(&str) -> Known> Reader<'_, F> {
     }
 }
 
-/// A value as JSON. Floats that JSON has no number for are texts, as everywhere here.
+/// A value as JSON. Floats that JSON cannot represent as numbers are strings, as everywhere here.
 fn json(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => to_json(&text.to_string()),
         DeValue::Integer(integer) => match i128::from_str_radix(integer.as_str(), integer.radix()) {
             Ok(integer) => integer.to_string(),
-            // Larger than any: as a text it is refused with what was expected.
+            // Larger than any: as a string it is refused with a message of what was expected.
             Err(_) => to_json(&integer.to_string()),
         },
         DeValue::Float(float) => to_json(&float.as_str().parse().unwrap_or(f64::NAN)),

@@ -26,7 +26,7 @@ struct Table {
 struct Line {
     name: &'static str,
     doc: &'static str,
-    /// In TOML; else why it cannot be written.
+    /// In TOML, or why it cannot be written.
     value: Result<String, String>,
     /// Range and unit.
     limits: String,
@@ -34,7 +34,7 @@ struct Line {
 
 pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
     let names = names(builder);
-    // A table of the same name as a setting would define that twice.
+    // A table with the same name as a setting would define that name twice.
     let header = |path: &str| {
         let is_in_the_way =
             path.match_indices('/').any(|(end, _)| names.contains(&path[..end])) || names.contains(path);
@@ -62,7 +62,7 @@ pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
                     (Some(parameter), ..) => Err(format!("is bound to {parameter}")),
                     (None, SettingKind::Code, _) => Err("can be set in code only".to_owned()),
                     (None, _, None) => Err("has a value that cannot be written".to_owned()),
-                    // A comment would leave it as declared.
+                    // If commented out, the option would stay as declared.
                     (None, _, Some(json)) if json == "null" && !is_declared_none(index) => {
                         let is_text = setting.set(NULL_TEXT).is_ok();
                         let is_none = setting.set("null");
@@ -131,7 +131,7 @@ fn of_value(value: &serde_json::Value) -> Option<String> {
             Some(format!("[{}]", items?.join(", ")))
         }
         Value::Object(members) => {
-            // What is null is left out: it is optional.
+            // A null value is left out: it is optional.
             let members = members.iter().filter(|(_, value)| !value.is_null());
             let members: Option<Vec<String>> =
                 members.map(|(name, value)| Some(format!("{} = {}", quoted(name), of_value(value)?))).collect();
@@ -140,7 +140,7 @@ fn of_value(value: &serde_json::Value) -> Option<String> {
     }
 }
 
-/// A text in quotation marks, as in JSON; TOML allows no DEL in it either.
+/// A string in quotation marks, as in JSON, but TOML does not allow DEL in it either.
 fn quoted(text: &str) -> String {
     to_json(&text.to_owned()).replace('\u{7f}', "\\u007F")
 }

@@ -35,8 +35,9 @@ enum Node {
     Table(BTreeMap<String, Node>),
 }
 
-/// Puts a schema in its place: `sensor/base/imu/rate` in the tables `sensor`, `base` and `imu`. Where one of these is a setting
-/// itself, as an option that has the name of a nested estimator, the whole path is one name, as `SettingsList` writes it.
+/// Puts a schema in its place: `sensor/base/imu/rate` in the tables `sensor`, `base` and `imu`. If one of these is
+/// itself a setting, such as an option with the name of a nested estimator, the whole path is one name, as
+/// `SettingsList` writes it.
 fn insert(root: &mut BTreeMap<String, Node>, path: &str, schema: String) {
     let (above, last) = path.rsplit_once('/').unwrap_or(("", path));
     let above: Vec<&str> = if is_through_setting(root, above) { vec![above] } else { above.split('/').collect() };
@@ -49,7 +50,7 @@ fn insert(root: &mut BTreeMap<String, Node>, path: &str, schema: String) {
     table.insert(last.to_owned(), Node::Setting(schema));
 }
 
-/// Whether a table at this path would be where a setting is.
+/// Whether a table at this path would collide with a setting.
 fn is_through_setting(root: &BTreeMap<String, Node>, path: &str) -> bool {
     let mut table = root;
     for name in path.split('/') {
@@ -123,9 +124,9 @@ fn with_notes(keywords: String, doc: &str, unit: &str, range: Option<Range>, def
     format!("{{{}}}", all.join(","))
 }
 
-/// A text of a number and a unit; that the unit is of the right dimension is checked when it is read.
+/// A string of a number and a unit; whether the unit has the right dimension is checked when it is read.
 fn quantity(unit: &str) -> String {
-    // What follows the number is a unit, of which none begins as a number goes on.
+    // The number is followed by a unit; no unit begins with a character that could continue the number.
     let pattern = r"^\s*[-+]?([0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?\s*[^\s0-9._+\-eE].*$";
     format!(
         "{},{},\"examples\":[{}]",

@@ -1,38 +1,38 @@
-//! What waits, and who takes it.
+//! The waiting jobs, and the threads that take them.
 
 use super::threads::{Thread, current};
 use super::{FULL_AFTER, Job, Lane, READY};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// How long jobs wait, while no thread takes one, before another thread is started.
+/// How long jobs wait without any being taken before another thread is started.
 pub(super) const PATIENCE: Duration = Duration::from_millis(2);
 
 /// How long jobs of a later lane wait before they overtake those of an earlier one.
 const OVERDUE: Duration = Duration::from_millis(50);
 
-/// When it is tried again to start a thread after there was none to be had.
+/// Delay before another attempt to start a thread after one failed.
 const RETRY: Duration = Duration::from_millis(20);
 
 /// The jobs and the threads of a pool.
 ///
-/// Every job that a thread may take is taken. When there is one, [`Crew::call`] says who is told: a thread without work, which
-/// is then counted as starting until it looks; or else the thread that keeps time, which looks as long as jobs wait, and has a
-/// thread started unless one is starting or some were taken lately. It is asked when a job was added, when a job of a full
-/// lane returned, and when no thread could be started. A thread that has no more work looks before it ends, under the same
-/// lock.
+/// Every job that a thread may take is taken. When there is one, [`Crew::call`] says which thread to tell: an idle
+/// one, then counted as starting until it looks, or else the timekeeper. The timekeeper looks as long as jobs wait,
+/// and starts a thread unless one is starting or jobs were taken lately. `call` is asked when a job was added, when a
+/// job of a full lane returned, and when no thread could be started. A thread that runs out of work looks once more
+/// before it ends, under the same lock.
 #[derive(Default)]
 pub(super) struct Crew {
     lanes: [Queue; Lane::ALL.len()],
     threads: usize,
-    /// Threads that were started or told of a job and do not run yet. While there are any the machine is busy, and one more
-    /// would not help.
+    /// Threads that were started or told of a job and do not run yet. While there are any, the machine is busy, and
+    /// one more would not help.
     starting: usize,
-    /// Those without work, the one that ran last at the end: it takes the next job, so that those at the beginning can end.
+    /// Idle threads, the most recently active last. That one takes the next job, so those at the front can end.
     idle: Vec<Thread>,
-    /// When a thread took a job last: as long as some do, those that wait do so because the machine is busy.
+    /// When a thread last took a job. While jobs are being taken, the others wait because the machine is busy.
     taken: Option<Instant>,
-    /// There was no thread to be had the last time.
+    /// The last attempt to start a thread failed.
     without_thread: Option<WithoutThread>,
     is_closed: bool,
 }
@@ -88,7 +88,7 @@ impl Crew {
         }
         match (self.is_closed, self.starting) {
             (false, _) => Call::Timekeeper,
-            // Nobody keeps time any more, but each thread that takes a job has this asked again.
+            // Nobody keeps time any more, but each thread that takes a job asks this again.
             (true, 0) => Call::NewThread,
             (true, _) => Call::Nobody,
         }
@@ -136,8 +136,8 @@ impl Crew {
         queue.waiting.front().filter(|_| queue.running < lane.most()).map(|(since, _)| *since)
     }
 
-    /// The lane whose first job is taken next: the first one, unless the job of a later one has waited for too long. What
-    /// disarms the robot is overtaken by nothing.
+    /// The lane whose first job is taken next: the first lane, unless a job of a later one has waited for too long.
+    /// Nothing overtakes the jobs that disarm the robot.
     fn first(&self, now: Instant) -> Option<Lane> {
         if self.front(Lane::Disarming).is_some() {
             return Some(Lane::Disarming);
@@ -148,7 +148,7 @@ impl Crew {
         overdue.or_else(|| waiting().next()).map(|(_, lane)| lane)
     }
 
-    /// How long the jobs that wait may go on doing so; zero if a thread is to be started, none if that would not help.
+    /// How long the waiting jobs may go on waiting: zero to start a thread now, `None` if that would not help.
     pub(super) fn wait(&self, now: Instant) -> Option<Duration> {
         let since = Lane::ALL.into_iter().filter_map(|lane| self.front(lane)).min()?;
         if self.starting > 0 {
@@ -176,14 +176,14 @@ impl Crew {
         })
     }
 
-    /// Why no thread could be started; each time once.
+    /// Why no thread could be started; each failure once.
     pub(super) fn newly_without_thread(&mut self) -> Option<String> {
         let without = self.without_thread.as_mut().filter(|without| !without.is_reported)?;
         without.is_reported = true;
         Some(without.error.to_string())
     }
 
-    /// Counts a thread that is started; its number.
+    /// Counts a thread that is started; returns its number.
     pub(super) fn start(&mut self) -> usize {
         self.threads += 1;
         self.starting += 1;
@@ -220,20 +220,20 @@ impl Crew {
         }
     }
 
-    /// A job has returned; whether its lane was full, so that another one may be taken now.
+    /// A job has returned. Returns whether its lane was full, so another one may be taken now.
     pub(super) fn done(&mut self, lane: Lane) -> bool {
         let queue = &mut self.lanes[lane as usize];
         queue.running -= 1;
         queue.running + 1 == lane.most()
     }
 
-    /// The calling thread has no work; how long it waits for some, unless it is one that is always there.
+    /// The calling thread has no work. Returns how long it waits for some, or `None` for a permanent thread.
     pub(super) fn rest(&mut self, longest: Duration) -> Option<Duration> {
         self.idle.push(current());
         (self.threads > READY).then_some(longest)
     }
 
-    /// The calling thread goes on; whether it was told of a job.
+    /// The calling thread goes on. Returns whether it was told of a job.
     pub(super) fn rise(&mut self) -> bool {
         let this = current().id();
         let position = self.idle.iter().position(|thread| thread.id() == this);
@@ -244,7 +244,7 @@ impl Crew {
         position.is_none()
     }
 
-    /// Threads end once nothing waits that they may take; those to be told so.
+    /// Threads end once no job waits that they may take; returns those to tell.
     pub(super) fn close(&mut self) -> Vec<Thread> {
         self.is_closed = true;
         self.starting += self.idle.len();
@@ -305,7 +305,7 @@ mod tests {
             }
         }
         assert_eq!(taken, [(50, Lane::Wakers)]);
-        // Not even what is overdue overtakes what disarms the robot.
+        // Even an overdue job does not overtake the jobs that disarm the robot.
         let now = start + Duration::from_secs(1);
         crew.add(Lane::Disarming, Box::new(|| {}), now);
         assert!(matches!(crew.next(now), Next::Job(Lane::Disarming, _)));

@@ -1,8 +1,8 @@
-//! Every order in which threads meet in a pool, by a model checker: `RUSTFLAGS="--cfg loom"`.
+//! Model-checks every order in which threads meet in a pool: `RUSTFLAGS="--cfg loom"`.
 //!
-//! In each, every job runs that a thread may take, whatever hangs, and the thread that keeps time looks only when it was told
-//! or jobs wait. Had it not been told, the model would find that it waits for ever. There is one thread that is always there,
-//! and one command may run at once.
+//! In each order, every job that a thread may take runs, even while others hang, and the timekeeper looks only when
+//! it was told or jobs wait. Without being told, it would wait forever, and the model would find that. There is one
+//! permanent thread, and one command may run at once.
 
 use super::threads::{Run, spawn};
 use super::{Lane, Pool};
@@ -58,9 +58,10 @@ impl Model {
         });
     }
 
-    /// Keeps time until so many jobs have run, as the runtime does: it looks while jobs wait, and else when it is told.
+    /// Keeps time until this many jobs have run, as the runtime does: it looks while jobs wait, and otherwise when
+    /// told.
     fn keep_time_until(&self, done: usize) {
-        // Whatever time a thread may still have, it is over.
+        // Any time that a thread may have left is over.
         let late = Instant::now() + Duration::from_secs(3600);
         loop {
             let waits = self.pool.relieve_at(late).is_some();
@@ -92,7 +93,8 @@ fn tell(told: &(Mutex<Told>, Condvar), tell: impl FnOnce(&mut Told)) {
     told.1.notify_all();
 }
 
-/// Runs `run` in all orders with that many preemptions at most, with so many attempts to start a thread that fail.
+/// Runs `run` in all orders with at most this many preemptions, where the first `failing` attempts to start a thread
+/// fail.
 fn check(preemptions: usize, failing: usize, run: fn(&Model)) {
     let mut checker = loom::model::Builder::new();
     checker.preemption_bound = Some(preemptions);
@@ -116,7 +118,7 @@ fn two_jobs_while_the_first_thread_starts() {
 fn a_job_while_the_last_thread_without_work_goes_away() {
     check(2, 0, |model| {
         model.hanging(Lane::Robot);
-        // Another thread takes it, and ends when it has waited for long enough.
+        // Another thread takes it, and ends after it has waited for long enough.
         model.quick(Lane::Robot);
         model.keep_time_until(1);
         model.quick(Lane::Wakers);

@@ -10,7 +10,7 @@ mod real {
         std::thread::Builder::new().name(name).spawn(run).map(drop)
     }
 
-    /// Waits until the thread is unparked, `longest` at most; whether it took so long.
+    /// Waits until the thread is unparked, `longest` at most. Returns whether it timed out.
     pub(in super::super) fn park(longest: Option<Duration>) -> bool {
         let Some(longest) = longest else {
             std::thread::park();
@@ -33,7 +33,7 @@ mod real {
         Ok(())
     }
 
-    /// A model has no time: others go on once.
+    /// A model has no time: let the others run once.
     pub(in super::super) fn park(longest: Option<Duration>) -> bool {
         match longest {
             None => loom::thread::park(),

@@ -1,12 +1,12 @@
-//! What every source of real time must hold, and what wall time does when the date is set.
+//! Requirements on every source of real time, and the behaviour of wall time when the date is set.
 
 use super::*;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Condvar, Mutex};
 use std::time::Duration;
 
-/// The clock's time minus that of `Instant` since `zero`, in nanoseconds: from the try whose two reads of `Instant`, before
-/// and after that of the clock, are closest together.
+/// The clock's time minus that of `Instant` since `zero`, in nanoseconds. Uses the attempt whose two reads of
+/// `Instant`, before and after that of the clock, are closest together.
 fn offset_to_instant(clock: &Clock, zero: Instant) -> i64 {
     let tries = (0..1000).map(|_| {
         let before = nanos_of(zero.elapsed());
@@ -65,7 +65,7 @@ fn a_thread_that_waits_until_a_deadline_finds_that_it_has_come() {
     for millis in [1, 10, 50] {
         let deadline = clock.now() + Duration::from_millis(millis);
         let mut held = nothing.lock().expect("nobody panics with it");
-        // Condition variables may wake early for no reason.
+        // Condition variables may wake spuriously.
         loop {
             let (back, result) =
                 never.wait_timeout(held, deadline.duration_since(clock.now())).expect("nobody panics with it");

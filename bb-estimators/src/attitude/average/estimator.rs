@@ -7,7 +7,7 @@ use nalgebra::UnitQuaternion;
 
 /// Averages the orientations of two sensors of one rigid body.
 ///
-/// Each input is the orientation of its own sensor; the fixed joints between turn it into that of the link where the
+/// Each input is the orientation of its own sensor. The fixed joints between convert it to that of the link where the
 /// average is declared, which it emits.
 #[derive(Debug)]
 pub struct OrientationAverage {
@@ -27,7 +27,7 @@ pub struct OrientationAverageOptions {
 /// Two orientations of one body.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct OrientationPair<'a> {
-    /// The one whose weight is given.
+    /// The one with the given weight.
     pub first: Input<'a, Orientation>,
     /// The other.
     pub second: Input<'a, Orientation>,

@@ -7,14 +7,14 @@ use nalgebra::{Matrix4, Quaternion, SymmetricEigen, Unit, UnitQuaternion};
 use super::{AverageError, check};
 use crate::attitude::Real;
 
-/// Below this relative difference of M's two greatest eigenvalues the average is not defined.
+/// Below this relative difference of M's two largest eigenvalues, the average is undefined.
 const AMBIGUOUS: f64 = 1e-12;
 
 /// The average of orientations with weights, which need not add up to 1.
 ///
-/// For inputs `world_from_body` the result is one, too, on the same half of the unit sphere as the heaviest of
-/// them. Two orientations are quicker by [`average_pair`](super::average_pair), with the same result. Does not
-/// allocate.
+/// For inputs `world_from_body`, the result is one too, on the same half of the unit sphere as the one with the
+/// largest weight. For two orientations, [`average_pair`](super::average_pair) is faster, with the same result. Does
+/// not allocate.
 ///
 /// # Errors
 ///

@@ -13,7 +13,7 @@ use crate::params::Params as _;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
 
-/// Below this squared tangent upside down is an equilibrium, which a lean to one side ends.
+/// Below this squared tangent, upside down is an equilibrium, which a lean to one side ends.
 const UPSIDE_DOWN: f64 = 1e-6;
 
 /// The complementary filter on quaternions.
@@ -76,12 +76,12 @@ impl<T: Real> AttitudeFilter<T> for ComplementaryFilter<T> {
     }
 }
 
-/// One step of the low-pass on the specific force in the world frame, and the turn that makes its output
-/// vertical again.
+/// One step of the low-pass on the specific force in the world frame, and the rotation that makes its output vertical
+/// again.
 ///
-/// The low-pass is `u ← (1 - gain) u + gain f`. Before the step u is vertical, because the step before turned
-/// the world so, and of the length of gravity; so it needs no memory. It takes vectors, not angles: whatever
-/// accelerations the motion has, they are zero in the mean, and the mean of their directions is not.
+/// The low-pass is `u ← (1 - gain) u + gain f`. Before the step, u is vertical, because the previous step turned the
+/// world that way, and has the length of gravity, so it needs no memory. It averages vectors, not angles: the
+/// accelerations of any motion are zero in the mean, but their directions are not.
 fn correct_tilt<T: Real>(
     world_from_body: &UnitQuaternion<T>,
     specific_force: &Vector3<T>,

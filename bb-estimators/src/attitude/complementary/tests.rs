@@ -1,4 +1,4 @@
-//! What the complementary filter alone does; the laws of all filters are checked here for it, too.
+//! Tests of the complementary filter alone; the laws of all filters are also checked here for it.
 
 use nalgebra::{UnitQuaternion, Vector3};
 

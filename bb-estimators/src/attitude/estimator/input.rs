@@ -1,4 +1,4 @@
-//! What an attitude filter takes, and in which frame.
+//! The input of an attitude filter, and its frame.
 
 use crate::attitude::ImuSample;
 use bb_core::message::Stamped;
@@ -6,14 +6,14 @@ use bb_core::payload::{Imu, MagneticField, Marg};
 use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Matrix3, Vector3};
 
-/// An input that an inertial sample can be made from.
+/// An input that provides an inertial sample.
 #[diagnostic::on_unimplemented(
     message = "an attitude filter cannot take `{Self}`",
     label = "not an inertial input",
     note = "it takes `Imu`, `Marg` or `ImuAndMagnetometer`"
 )]
 pub trait InertialInput: Inputs {
-    /// The sample, turned to the frame of the output.
+    /// The sample, rotated to the frame of the output.
     fn sample(view: &Self::View<'_>, frames: &Frames) -> ImuSample;
 }
 
@@ -29,7 +29,7 @@ pub struct InertialInputs<'a> {
 /// [`InertialInputs`], as the parameter of a filter: `Madgwick<ImuAndMagnetometer>`.
 pub type ImuAndMagnetometer = InertialInputs<'static>;
 
-/// How the inputs are turned in the frame of the output; none where they are not.
+/// The rotations from the inputs to the frame of the output; `None` if there is none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Frames {
     frame_from_imu: Option<Matrix3<f64>>,
@@ -45,7 +45,7 @@ impl Frames {
         let turned = |rotation: nalgebra::UnitQuaternion<f64>| {
             (rotation.angle() > 0.0).then(|| rotation.to_rotation_matrix().into_inner())
         };
-        // Without a magnetometer there is nothing to turn.
+        // Without a magnetometer there is nothing to rotate.
         let magnetometer = context.frame_from_input("magnetic_field");
         Ok(Self {
             frame_from_imu: turned(context.frame_from_driver()?.rotation),

@@ -5,18 +5,18 @@ use bb_core::payload::Orientation;
 use bb_core::{Outputs, Payload};
 use nalgebra::Vector3;
 
-/// An output that can be made of a filter after a sample.
+/// An output built from a filter after a sample.
 #[diagnostic::on_unimplemented(
     message = "an attitude filter cannot emit `{Self}`",
     label = "not an output of attitude filters",
     note = "it emits `Orientation`, or `AttitudeOutputs`"
 )]
 pub trait AttitudeOutput: Outputs + Sized {
-    /// What there is to emit; `None` before the filter has started.
+    /// The output; `None` before the filter has started.
     fn of<F: AttitudeFilter>(filter: &F) -> Option<Self>;
 }
 
-/// The other estimates of a filter; `None` where its algorithm has none.
+/// The other estimates of a filter; `None` if its algorithm has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub struct AttitudeStatus {
     /// The gyroscope's bias, rad/s, in the frame of the orientation.
@@ -25,7 +25,7 @@ pub struct AttitudeStatus {
     pub is_at_rest: Option<bool>,
     /// Whether the magnetic field is disturbed.
     pub is_magnetically_disturbed: Option<bool>,
-    /// Whether the heading is known well enough to act on.
+    /// Whether the heading is known well enough to be used.
     pub is_heading_trusted: Option<bool>,
 }
 
@@ -34,7 +34,7 @@ pub struct AttitudeStatus {
 pub struct AttitudeOutputs {
     /// The orientation, with every sample.
     pub orientation: Option<Orientation>,
-    /// What else the filter knows, with every sample.
+    /// The filter's other estimates, with every sample.
     pub status: Option<AttitudeStatus>,
 }
 

@@ -12,7 +12,7 @@ use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
-/// The gain at startup, 1/s, and how long it takes to go down to its value, s. Source: the library's.
+/// The gain at startup, 1/s, and the time over which it decreases to its value, s. Source: the library's.
 const STARTUP_GAIN: f64 = 10.0;
 const STARTUP_S: f64 = 3.0;
 
@@ -22,7 +22,7 @@ const FULL_RANGE: f64 = 0.98;
 /// Beyond a right angle the correction is that of twice the greatest sine. Source: the library's.
 const FAR: f64 = 2.0;
 
-/// Below this norm an error has no direction.
+/// Below this norm, an error has no direction.
 const NO_ERROR: f64 = 1e-12;
 
 /// The revised AHRS algorithm of Madgwick's thesis.
@@ -31,7 +31,7 @@ pub struct FusionFilter<T: Real = f64> {
     params: FusionParams,
     state: AttitudeState<T>,
     offset: Offset<T>,
-    /// What is left of startup, s.
+    /// The remaining startup time, s.
     startup_s: T,
     acceleration: Rejection<T>,
     field: Rejection<T>,
@@ -42,7 +42,7 @@ pub struct FusionFilter<T: Real = f64> {
     since_field_s: T,
 }
 
-/// How far a measured direction is from the expected one.
+/// The deviation of a measured direction from the expected one.
 struct Deviation<T> {
     /// Sine of the angle, times the axis to turn the body about; of length [`FAR`] beyond a right angle.
     error: Vector3<T>,
@@ -125,12 +125,12 @@ impl<T: Real> AttitudeFilter<T> for FusionFilter<T> {
         self.params.offset_correction.then_some(self.offset.offset)
     }
 
-    /// When the gyroscope's offset is being found.
+    /// True while the gyroscope's offset is being estimated.
     fn is_at_rest(&self) -> Option<bool> {
         self.params.offset_correction.then(|| self.offset.is_still(T::of(self.params.rest_time)))
     }
 
-    /// When the last field was rejected.
+    /// True if the last field was rejected.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         let watched = self.params.magnetometer && T::of(self.params.magnetic_rejection) > T::ZERO;
         watched.then_some(self.field.is_ignored())
@@ -146,7 +146,7 @@ impl<T: Real> AttitudeFilter<T> for FusionFilter<T> {
 impl<T: Real> FusionFilter<T> {
     #[cold]
     fn begin(&mut self, startup_s: T) {
-        // Without feedback there is nothing to start up.
+        // Without feedback there is no startup.
         self.startup_s = if T::of(self.params.gain) > T::ZERO { startup_s } else { T::ZERO };
         self.acceleration = Rejection::new();
         self.field = Rejection::new();
@@ -154,7 +154,7 @@ impl<T: Real> FusionFilter<T> {
         self.since_field_s = T::ZERO;
     }
 
-    /// The gain of now, 1/s.
+    /// The current gain, 1/s.
     pub(super) fn gain(&self) -> T {
         let gain = T::of(self.params.gain);
         if self.startup_s > T::ZERO {
@@ -189,7 +189,7 @@ fn squared_sine<T: Real>(threshold: T) -> T {
     if threshold > T::ZERO { sine * sine } else { T::of(f64::INFINITY) }
 }
 
-/// The deviation of two unit vectors; `axis` is what to turn about where they are opposite.
+/// The deviation of two unit vectors; `axis` is the axis of rotation if they are opposite.
 #[inline]
 fn deviation<T: Real>(
     measured: &Vector3<T>,

@@ -21,7 +21,7 @@ impl<T: Real> Offset<T> {
         Self { offset: Vector3::zeros(), still_s: T::ZERO }
     }
 
-    /// Forgets how long the sensor has lain still, not the offset.
+    /// Forgets how long the sensor has been still, but not the offset.
     pub(super) fn forget_motion(&mut self) {
         self.still_s = T::ZERO;
     }
@@ -30,8 +30,8 @@ impl<T: Real> Offset<T> {
         self.still_s >= time_s
     }
 
-    /// Takes an angular velocity, rad/s; returns it without the offset. Below `threshold`, rad/s, for `time_s` it is
-    /// the offset's.
+    /// Takes an angular velocity, rad/s; returns it without the offset. Below `threshold`, rad/s, for `time_s`, it
+    /// counts as the offset.
     #[inline]
     pub(super) fn correct(&mut self, dt_s: T, measured: &Vector3<T>, threshold: T, time_s: T) -> Vector3<T> {
         let rate = measured - self.offset;

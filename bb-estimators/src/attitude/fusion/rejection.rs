@@ -1,9 +1,9 @@
-//! Whether a sensor is ignored, and for how long: rejection and recovery of the library's documentation.
+//! Whether a sensor is ignored, and for how long: rejection and recovery according to the library's documentation.
 
 use crate::attitude::Real;
 
-/// A sample that is taken counts this many times against recovery what one that is rejected counts for it: recovery is
-/// for more than 90 % of rejected samples.
+/// An accepted sample counts this many times as much against recovery as a rejected one counts for it: recovery
+/// starts above 90 % of rejected samples.
 const TAKEN_WEIGHT: f64 = 9.0;
 
 /// Rejection of one sensor.
@@ -25,7 +25,7 @@ impl<T: Real> Rejection<T> {
         self.ignored
     }
 
-    /// Whether to take a sample that is, or is not, `near` what is expected.
+    /// Whether to accept a sample that is, or is not, `near` the expected value.
     #[inline]
     pub(super) fn takes(&mut self, dt_s: T, recovery_time_s: T, near: bool) -> bool {
         self.trigger_s += if near { -T::of(TAKEN_WEIGHT) * dt_s } else { dt_s };

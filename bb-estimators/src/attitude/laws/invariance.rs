@@ -1,4 +1,4 @@
-//! What does not matter: how the sensor is mounted, where north is for six axes, the unit of the field.
+//! Invariances: the mounting of the sensor, the direction of north for six axes, the unit of the field.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -6,7 +6,8 @@ use proptest::prelude::*;
 use super::Filter;
 use crate::attitude::ImuSample;
 
-/// Rotating the sensor in its housing by `turn` rotates all it measures, and the estimate the other way.
+/// Rotating the sensor in its housing by `turn` rotates all its measurements, and the estimate in the opposite
+/// direction.
 pub(in crate::attitude) fn mounting<F: Filter>(
     filter: &F,
     samples: &[ImuSample],

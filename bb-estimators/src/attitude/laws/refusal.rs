@@ -20,7 +20,7 @@ pub(in crate::attitude) fn refused_changes_nothing<F: Filter>(
     Ok(())
 }
 
-/// More than any sensor gives, and a number of either scalar.
+/// More than any sensor reads, and finite in either scalar.
 const HUGE: f64 = (1_u128 << 100) as f64;
 
 pub(in crate::attitude) fn bad_samples<F: Filter>(filter: &F) {

@@ -1,4 +1,4 @@
-//! What the laws feed the filters with.
+//! The input samples of the laws.
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -8,10 +8,10 @@ use super::{FIELD, UP};
 use crate::attitude::initial::initial_orientation;
 use crate::attitude::{ImuSample, Real};
 
-/// How many cases a law is held against, and which.
+/// How many cases a law is checked with, and which.
 ///
-/// In double precision they are others each time. In single precision they are always the same: a filter that decides
-/// at a threshold decides otherwise within rounding of it, which about one case in 100,000 meets. `PROPTEST_RNG_SEED`
+/// In double precision they differ each time. In single precision they are always the same: a filter with a threshold
+/// may decide differently within rounding of it, which happens in about one case in 100,000. `PROPTEST_RNG_SEED`
 /// chooses others, `PROPTEST_CASES` more.
 pub(in crate::attitude) fn cases<T: Real>() -> ProptestConfig {
     let config = ProptestConfig::with_cases(64);
@@ -46,8 +46,8 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-/// Samples that a sensor could give when it is thrown about, some without a field, the first with one that shows a
-/// heading: without it a filter has to choose where it starts, and that depends on how the sensor is mounted.
+/// Possible samples of a sensor that is thrown about, some without a field. The first has a field that gives a
+/// heading: without it, a filter has to choose its start, and that depends on how the sensor is mounted.
 pub(in crate::attitude) fn samples() -> impl Strategy<Value = Vec<ImuSample>> {
     let force = prop_oneof![20 => vector(30.0), 1 => Just(Vector3::zeros())];
     let field = prop_oneof![2 => vector(60e-6).prop_map(Some), 1 => Just(None)];
@@ -71,7 +71,7 @@ pub(in crate::attitude) fn samples() -> impl Strategy<Value = Vec<ImuSample>> {
     })
 }
 
-/// Samples that no sensor gives: any number there is, at any time.
+/// Samples that no sensor gives: any numbers, at any time.
 pub(in crate::attitude) fn wild_samples() -> impl Strategy<Value = Vec<ImuSample>> {
     let number = || prop_oneof![4 => -100.0..100.0, 1 => any::<f64>(), 1 => Just(0.0), 1 => Just(1e300)];
     let tame = || prop_oneof![vector(1e3), vector(1e-160), Just(Vector3::zeros())];
@@ -88,7 +88,7 @@ pub(in crate::attitude) fn wild_samples() -> impl Strategy<Value = Vec<ImuSample
                 magnetic_field,
             })
             .collect();
-        // Mostly in order, so that most are taken.
+        // Mostly in order, so that most are accepted.
         let half = samples.len() / 2;
         samples[half..].sort_by_key(|sample| sample.time_ns);
         samples

@@ -1,4 +1,4 @@
-//! The laws are stated in `f64`; a filter of either scalar is held against them by converting what goes in and out.
+//! The laws are stated in `f64`; a filter of either scalar is checked by converting its inputs and outputs.
 
 use core::marker::PhantomData;
 
@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use super::Filter;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 
-/// A filter that computes with `T`, seen as one of `f64`.
+/// A filter that computes in `T`, with an `f64` interface.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::attitude) struct InScalar<T, F>(F, PhantomData<T>);
 

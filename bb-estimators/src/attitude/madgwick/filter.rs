@@ -10,7 +10,7 @@ use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
-/// Below this norm the gradient is rounding noise, which has no direction to descend in.
+/// Below this norm, the gradient is rounding noise without a direction of descent.
 const NO_GRADIENT: f64 = 1e-12;
 
 /// Madgwick's gradient-descent filter.
@@ -82,8 +82,8 @@ impl<T: Real> MadgwickFilter<T> {
         self.state.store(&turn_by_tangent(&predicted, &(descent * self.tangent(dt_s))), field);
     }
 
-    /// The same without a field, where neither the predicted quaternion nor the specific force has to have unit norm, since
-    /// the gradient's norm does not count.
+    /// The same without a field. Neither the predicted quaternion nor the specific force needs unit norm, since the
+    /// gradient's norm is irrelevant.
     #[inline(always)]
     fn step_to_gravity(&mut self, before: &UnitQuaternion<T>, dt_s: T, sample: &ImuSample<T>) {
         let squared_angle = sample.angular_velocity.norm_squared() * (dt_s * dt_s);
@@ -101,7 +101,7 @@ impl<T: Real> MadgwickFilter<T> {
         }
     }
 
-    /// A turn that is not small, or an orientation that agrees exactly or not at all.
+    /// A rotation that is not small, or an orientation that agrees exactly or not at all.
     #[cold]
     fn step_far(&mut self, dt_s: T, sample: &ImuSample<T>) {
         if let (Some(before), Ok(Directions { up, .. })) = (self.state.world_from_body(), sample.directions(false))
@@ -128,8 +128,7 @@ impl<T: Real> MadgwickFilter<T> {
 /// `∂F/∂δ = -(a × Rᵀẑ + m × Rᵀb) = -e`. On the unit sphere `dq = ½ q ⊗ δ`, hence `∇F = -2 q ⊗ e`: the
 /// papers' `Jᵀ f` less its part along q.
 ///
-/// Zero where there is nothing to gain, except at the top of F, upside down, which is left about the body's
-/// x or y axis.
+/// Zero at the minimum, except at the maximum of F, upside down, which is left about the body's x or y axis.
 #[inline(always)]
 fn descent<T: Real>(
     world_from_body: &UnitQuaternion<T>,

@@ -20,7 +20,7 @@ pub struct MahonyFilter<T: Real = f64> {
     state: AttitudeState<T>,
     /// rad/s.
     bias: Vector3<T>,
-    /// What the last sample missed gravity and field by, rad: it turns the orientation until the next sample.
+    /// The last sample's error in gravity and field, rad: it turns the orientation until the next sample.
     error: Vector3<T>,
 }
 
@@ -98,8 +98,9 @@ impl<T: Real> MahonyFilter<T> {
         up: &Vector3<T>,
         field: Option<&Vector3<T>>,
     ) {
-        // Ṙ = R [Ω - b + k_P ω_mes]×: first the correction, which is known in the body frame of the sample before, then
-        // the gyroscope; the two turns in one, to the third order of what is small (Baker, Campbell, Hausdorff).
+        // Ṙ = R [Ω - b + k_P ω_mes]×: first the correction, known in the body frame of the previous sample, then the
+        // gyroscope. Both rotations are applied as one, to third order in small quantities (Baker, Campbell,
+        // Hausdorff).
         let rotation = (sample.angular_velocity - self.bias) * dt_s;
         let turning = self.error + self.error.cross(&rotation) * T::HALF;
         let both = rotation + turning * self.gain(dt_s);
@@ -111,8 +112,8 @@ impl<T: Real> MahonyFilter<T> {
         }
     }
 
-    /// The same where it is rare: for a turn that is not small, in free fall, with the first field. One after the other, each
-    /// exactly.
+    /// The same for rare cases: for a rotation that is not small, in free fall, with the first field. One after the
+    /// other, each exactly.
     #[cold]
     fn turn_far(&mut self, sample: &ImuSample<T>, dt_s: T) {
         let (Some(before), Ok(Directions { up, field })) =
@@ -123,7 +124,7 @@ impl<T: Real> MahonyFilter<T> {
         let rotation = (sample.angular_velocity - self.bias) * dt_s;
         let corrected = turn(&before, &(self.error * self.gain(dt_s)));
         let turned = renormalised(&turn(&corrected, &rotation));
-        // What the first field turns at once is nothing to correct, and no bias.
+        // Do not re-apply the first heading reset: it is neither an error nor a bias.
         let is_first_field = field.is_some() && !self.state.heading_is_known();
         match up {
             Some(up) if !is_first_field => self.compare(turned, dt_s, &up, field.as_ref()),
@@ -134,7 +135,7 @@ impl<T: Real> MahonyFilter<T> {
         }
     }
 
-    /// What part of an error is corrected in `dt_s`: not beyond it, however late the sample or large the gain.
+    /// The fraction of an error corrected in `dt_s`: at most 1, however late the sample or large the gain.
     #[inline(always)]
     fn gain(&self, dt_s: T) -> T {
         let gain = T::of(self.params.proportional_gain) * dt_s;

@@ -1,4 +1,4 @@
-//! What Mahony's filter alone does; the laws of all filters are checked here for it, too.
+//! Tests of Mahony's filter alone; the laws of all filters are also checked here for it.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -60,7 +60,7 @@ fn a_late_sample_is_turned_by_no_more_than_was_missed() {
     assert!(filter.world_from_body().unwrap().angle_to(&left) < 1e-12);
 }
 
-/// What a sample missed is known in its own body frame, and acts while the body turns on.
+/// The error of a sample is known in its own body frame, and acts while the body continues to turn.
 #[test]
 fn the_correction_turns_with_the_body() {
     let end = |dt_ns: i64| {

@@ -1,4 +1,4 @@
-//! The error state: its mean, its covariance, and the two things a Kalman filter does with them.
+//! The error state: its mean, its covariance, and the two operations of a Kalman filter.
 
 use core::cmp::Ordering;
 
@@ -11,7 +11,7 @@ use crate::attitude::Real;
 /// Bias and calibration, which the rotation error integrates.
 const GYROSCOPE: usize = CALIBRATION + 9 - BIAS;
 
-/// A variance never falls below this fraction of what one update left of it: rounding cannot make it negative.
+/// A variance never falls below this fraction of its value after one update: rounding cannot make it negative.
 const ROUNDING: f64 = 1e-6;
 
 /// Mean and covariance of the error state. The covariance is kept symmetric to the last bit.
@@ -21,7 +21,7 @@ pub(super) struct Errors<T> {
     covariance: [[T; STATES]; STATES],
 }
 
-/// Variances that grow with time, per second or for one window.
+/// Variances that grow with time, per second or per window.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ProcessNoise<T> {
     /// rad².
@@ -33,12 +33,12 @@ pub(super) struct ProcessNoise<T> {
 }
 
 impl<T: Real> Errors<T> {
-    /// Nothing known, and so sure of it.
+    /// Zero mean and covariance.
     pub(super) fn new() -> Self {
         Self { mean: [T::ZERO; STATES], covariance: [[T::ZERO; STATES]; STATES] }
     }
 
-    /// Forgets what is known of `COUNT` states from `first` on, and of their correlation with all others.
+    /// Resets `COUNT` states from `first` on, and their correlations with all others.
     pub(super) fn forget<const COUNT: usize>(&mut self, first: usize, variance: T) {
         for i in first..first + COUNT {
             for j in 0..STATES {
@@ -49,7 +49,7 @@ impl<T: Real> Errors<T> {
         }
     }
 
-    /// Admits that a state may be wrong by more than was thought.
+    /// Increases a state's variance.
     pub(super) fn doubt(&mut self, state: usize, variance: T) {
         self.covariance[state][state] += variance;
     }
@@ -63,13 +63,13 @@ impl<T: Real> Errors<T> {
         Matrix3::from_fn(|i, k| self.covariance[first + i][first + k])
     }
 
-    /// Whether every mean and variance is a number to compute with.
+    /// Whether every mean and variance is usable.
     pub(super) fn are_sane(&self) -> bool {
         let variances = (0..STATES).all(|i| (T::ZERO..T::of(1e12)).contains(&self.covariance[i][i]));
         variances && self.mean.iter().all(|mean| mean.abs() < T::of(1e9))
     }
 
-    /// Takes the errors over a window: `x ← Φ x`, `P ← Φ P Φᵀ + Q`.
+    /// Propagates the errors over a window: `x ← Φ x`, `P ← Φ P Φᵀ + Q`.
     ///
     /// With F the integral of the specific force in the world frame, R that of the rotation and W that of
     /// rotation times angular velocity, all of them of the window:
@@ -112,7 +112,8 @@ impl<T: Real> Errors<T> {
             }
             self.covariance[target + i] = row;
         }
-        // So far the rows of Φ P. The block on the diagonal takes Φᵀ as well; the other columns mirror the rows.
+        // So far the rows of Φ P. The block on the diagonal is multiplied by Φᵀ as well; the other columns mirror the
+        // rows.
         for i in 0..ROWS {
             let row = self.covariance[target + i];
             for (j, factor) in factor.iter().enumerate().skip(i) {
@@ -131,7 +132,7 @@ impl<T: Real> Errors<T> {
         }
     }
 
-    /// Turns the world about the vertical by an angle of this cosine and sine.
+    /// Rotates the world about the vertical by an angle given by cosine and sine.
     pub(super) fn turn_heading(&mut self, [cos, sin]: [T; 2]) {
         let turned = |x: T, y: T| (cos * x - sin * y, sin * x + cos * y);
         for first in [ROTATION, VELOCITY] {
@@ -145,7 +146,7 @@ impl<T: Real> Errors<T> {
                 (row[first], row[first + 1]) = turned(row[first], row[first + 1]);
             }
         }
-        // The halves have rounded each in its own way.
+        // The two halves were rounded differently.
         for i in 0..STATES {
             for j in 0..i {
                 self.covariance[i][j] = self.covariance[j][i];
@@ -153,7 +154,7 @@ impl<T: Real> Errors<T> {
         }
     }
 
-    /// One scalar measurement: `measured` is the states times `observation`, up to `variance`.
+    /// One scalar measurement: `measured` equals the states times `observation`, up to `variance`.
     pub(super) fn update<const COUNT: usize>(
         &mut self,
         observation: [(usize, T); COUNT],
@@ -169,7 +170,7 @@ impl<T: Real> Errors<T> {
             }
         }
         let total: T = variance + observation.iter().map(|(state, factor)| *factor * gain[*state]).sum::<T>();
-        // Nor if it is not a number.
+        // Also rejects NaN.
         if !matches!(total.partial_cmp(&T::ZERO), Some(Ordering::Greater)) {
             return;
         }
@@ -179,7 +180,7 @@ impl<T: Real> Errors<T> {
             self.mean[i] += gain[i] * step;
             let least = self.covariance[i][i] * T::of(ROUNDING);
             for j in 0..STATES {
-                // In this order the two halves round alike.
+                // In this order, both halves round alike.
                 self.covariance[i][j] -= (gain[i] * gain[j]) * scale;
             }
             self.covariance[i][i] = self.covariance[i][i].max(least);

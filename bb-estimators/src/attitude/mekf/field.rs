@@ -1,8 +1,8 @@
-//! What the magnetic field is expected to be, and how far it can be believed.
+//! The expected magnetic field, and its reliability.
 //!
-//! Of a disturbance of the field only two of three components show: the one along the field and the one that
-//! changes the dip. The third, which turns the heading, cannot be told from a wrong heading. But all three are
-//! of one size, so the two that show tell how wrong the heading may be.
+//! Only two of three components of a field disturbance are observable: the one along the field and the one that
+//! changes the dip. The third, which turns the heading, cannot be distinguished from a wrong heading. But all three
+//! have similar sizes, so the two that are observable show how wrong the heading may be.
 
 use nalgebra::Vector3;
 
@@ -13,17 +13,17 @@ use crate::attitude::initial::MIN_HORIZONTAL_FRACTION;
 /// norm. Source: VQF's `magNormTh` of 0.1 and `magDipTh` of 10° in one.
 const SAME: f64 = 0.1;
 
-/// Time constant of the mean over a field that may become the reference, s. Source: VQF's `magCurrentTau` is
-/// 0.05 s, to which it adds a wait of 20 s; here mean and wait are one.
+/// Time constant of the mean over a field that may become the reference, s. VQF's `magCurrentTau` is 0.05 s, with an
+/// additional wait of 20 s; here, mean and wait are one.
 const CANDIDATE_TIME_CONSTANT_S: f64 = 5.0;
 
-/// The reference is the mean of the last so many seconds of undisturbed field. Source: VQF's `magRefTau`.
+/// The reference is the mean of this many seconds of undisturbed field. Source: VQF's `magRefTau`.
 const REFERENCE_TIME_CONSTANT_S: f64 = 20.0;
 
-/// A new field is believed no sooner than this, s.
+/// The shortest time before a new field is accepted, s.
 const LEAST_EVIDENCE_S: f64 = 1.0;
 
-/// A new field is believed when it has lasted this many times as long as the reference was seen.
+/// A new field is accepted after this many times the duration of the reference.
 const EVIDENCE_RATIO: f64 = 2.0;
 
 /// A new field that lasts this long is accepted in any case, s.
@@ -32,24 +32,24 @@ const MOST_EVIDENCE_S: f64 = 40.0;
 /// How soon a disturbance is forgotten, s: passing a piece of iron takes about a second.
 const DISTURBANCE_TIME_CONSTANT_S: f64 = 3.0;
 
-/// A reference seen this long, s, is believed by half when it says that a field is disturbed.
+/// A reference seen this long, s, is half trusted when it says that a field is disturbed.
 const TRUST_TIME_CONSTANT_S: f64 = 10.0;
 
-/// A heading that contradicts an undisturbed field all of this time is wrong, s.
+/// A heading that contradicts an undisturbed field for this long, s, is wrong.
 const CONTRADICTION_S: f64 = 10.0;
 
-/// A field this far beyond the reference, as a multiple of it, is as good as one farther.
+/// A larger deviation from the reference, as a multiple of it, makes no difference.
 const LARGEST: f64 = 10.0;
 
 /// The field in the vertical plane: horizontal and vertical part.
 pub(super) type Plane<T> = [T; 2];
 
-/// What a window's field means for the heading.
+/// The consequence of a window's field for the heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict<T> {
-    /// To be believed but for a disturbance of this variance of each component, as fractions of the norm squared.
+    /// Reliable up to a disturbance with this variance of each component, as a fraction of the norm squared.
     Disturbed(T),
-    /// There is a new reference, or the heading must be wrong: it can be off by all that the field says.
+    /// There is a new reference, or the heading must be wrong: it may be off by the full difference from the field.
     HeadingUnknown,
 }
 
@@ -57,17 +57,17 @@ pub(super) enum Verdict<T> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FieldReference<T> {
     reference: Plane<T>,
-    /// How long the field has been like the reference, s.
+    /// How long the field has agreed with the reference, s.
     seen_s: T,
     candidate: Plane<T>,
     candidate_s: T,
-    /// Squared size of the disturbance: the greatest of late.
+    /// Squared size of the disturbance: the largest recent one.
     disturbance: T,
     contradicted_s: T,
 }
 
 impl<T: Real> FieldReference<T> {
-    /// Takes the first field as reference; it is not zero.
+    /// Sets the first field as reference; it is not zero.
     pub(super) fn new(field: Plane<T>) -> Self {
         Self {
             reference: field,
@@ -79,17 +79,17 @@ impl<T: Real> FieldReference<T> {
         }
     }
 
-    /// A reference that has been seen for so long, s.
+    /// A reference that has been seen for this long, s.
     pub(super) fn seen(field: Plane<T>, seen_s: T) -> Self {
         Self { seen_s: seen_s.min(T::of(MOST_EVIDENCE_S)), ..Self::new(field) }
     }
 
-    /// How long the field has been like the reference, s.
+    /// How long the field has agreed with the reference, s.
     pub(super) fn seen_s(&self) -> T {
         self.seen_s
     }
 
-    /// Whether a field in the world has norm and dip of the reference, up to a part of its norm.
+    /// Whether a field in the world has the norm and dip of the reference, up to a fraction of its norm.
     pub(super) fn is_like(&self, field: &Vector3<T>, part: T) -> bool {
         distance(in_plane(field), self.reference) < (part * self.norm()) * (part * self.norm())
     }
@@ -98,7 +98,7 @@ impl<T: Real> FieldReference<T> {
         norm(self.reference)
     }
 
-    /// Whether the greatest disturbance of late is beyond what counts as unchanged.
+    /// Whether the largest recent disturbance exceeds the limit for an unchanged field.
     pub(super) fn is_disturbed(&self) -> bool {
         self.disturbance > T::of(SAME * SAME)
     }
@@ -118,7 +118,7 @@ impl<T: Real> FieldReference<T> {
         self.reference[1] / self.norm()
     }
 
-    /// Takes the field of a window of `dt` seconds; `contradicts` if its heading is far from the one known.
+    /// Adds the field of a window of `dt` seconds; `contradicts` if its heading is far from the known one.
     pub(super) fn observe(&mut self, dt: T, field: Plane<T>, contradicts: bool) -> Verdict<T> {
         let unit = self.norm();
         let same = (T::of(SAME) * unit) * (T::of(SAME) * unit);
@@ -136,7 +136,7 @@ impl<T: Real> FieldReference<T> {
             self.candidate = field;
         }
         if distance(self.candidate, self.reference) < same {
-            // The reference itself, whose age says nothing of the field that comes next.
+            // The reference itself; its age says nothing about the next field.
             self.candidate_s = self.candidate_s.min(T::of(LEAST_EVIDENCE_S));
         }
 
@@ -198,7 +198,7 @@ mod tests {
 
     const WINDOW_S: f64 = 0.03;
 
-    /// How long a field lasts before it makes the heading unknown, s; none if it does not within `most_s`.
+    /// How long a field lasts before it makes the heading unknown, s; `None` if it does not within `most_s`.
     fn believed_after(reference: &mut FieldReference<f64>, field: Plane<f64>, most_s: f64) -> Option<f64> {
         let windows = (most_s / WINDOW_S) as i32;
         (1..=windows)

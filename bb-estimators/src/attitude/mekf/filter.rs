@@ -1,4 +1,4 @@
-//! One step of the Kalman filter: strapdown with every sample, the errors once a window.
+//! One step of the Kalman filter: strapdown integration with every sample, errors once per window.
 
 mod heading;
 mod start;
@@ -22,10 +22,10 @@ use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
-/// Standard deviation of an orientation that was given, about every axis, rad.
+/// Standard deviation of a given orientation, about every axis, rad.
 const GIVEN: f64 = 0.087;
 
-/// Standard deviation of the heading that one magnetic sample shows indoors, rad.
+/// Standard deviation of the heading from one magnetic sample indoors, rad.
 const INITIAL_HEADING: f64 = 1.0;
 
 /// A heading known up to this standard deviation is trusted, rad: 10°.
@@ -39,7 +39,7 @@ pub struct MekfFilter<T: Real = f64> {
     heading_known: bool,
     /// rad/s.
     bias: Vector3<T>,
-    /// What `angular_velocity` has to lose beyond the bias, as a fraction of itself.
+    /// Correction of `angular_velocity` beyond the bias, as a fraction of itself.
     calibration: Matrix3<T>,
     /// `world_from_body` after the last sample.
     rotation: Matrix3<T>,
@@ -104,7 +104,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             && let Some(field) = sample.magnetic_field
             && (field != self.last_field || self.rest.is_detected())
         {
-            // A driver that is faster than the magnetometer repeats its last value, which is then a stale one.
+            // A driver that is faster than the magnetometer repeats its last value, which is then stale.
             self.window.add_field(&self.rotation, &rate, &field, &self.iron.offset);
             self.last_field = field;
         }
@@ -144,8 +144,8 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         Some(self.bias)
     }
 
-    /// As of the last window's end, at most 0.1 s ago. Without a magnetometer the heading's own variance is 0: it is
-    /// right by definition at the start, and its drift since then is included.
+    /// At the end of the last window, at most 0.1 s ago. Without a magnetometer, the heading's own variance is 0: it
+    /// is right by definition at the start, and its drift since then is included.
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
         let mut in_world = self.errors.block(ROTATION);
@@ -178,19 +178,19 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 }
 
 impl<T: Real> MekfFilter<T> {
-    /// The gyroscope's scale and misalignment errors: what it reads is `(1 + E)` times the angular velocity and
-    /// the bias, for small E.
+    /// The gyroscope's scale and misalignment errors: its reading is `(1 + E)` times the angular velocity and the
+    /// bias, for small E.
     pub fn gyroscope_calibration(&self) -> Matrix3<T> {
         self.calibration
     }
 
-    /// The offset of the magnetometer's reading from the field, by iron on the body, in the body frame and the field's unit. Zero
-    /// as long as nothing speaks for another.
+    /// The offset of the magnetometer's reading from the field, caused by iron on the body, in the body frame and the
+    /// field's unit. Zero until there is evidence for another value.
     pub fn magnetometer_offset(&self) -> Vector3<T> {
         self.iron.offset
     }
 
-    /// Covariance of the offset in the body frame, the field's unit squared, by what was seen since the offset or the
+    /// Covariance of the offset in the body frame, the field's unit squared, from the data since the offset or the
     /// field last changed.
     pub fn magnetometer_offset_uncertainty(&self) -> Matrix3<T> {
         self.iron.offset_covariance()

@@ -1,7 +1,8 @@
-//! The magnetometer's offset by iron on the body, found while the body turns, and its lag.
+//! The magnetometer's offset caused by iron on the body, estimated while the body turns, and its lag.
 //!
-//! A magnet on a body is a piecewise constant offset: put on, taken off. It is told from a disturbance of the field,
-//! which is fixed in the world, by how well an offset explains the fields of several orientations; see `sums.rs`.
+//! A magnet on a body is a piecewise constant offset: attached, removed. It is distinguished from a disturbance of
+//! the field, which is fixed in the world, by how well an offset explains the fields of several orientations; see
+//! `sums.rs`.
 
 mod sums;
 
@@ -13,80 +14,80 @@ use sums::{Fit, Lag, PRIOR_OFFSET, Sums};
 use super::field::FieldReference;
 use crate::attitude::Real;
 
-/// What was seen fades with this time constant, s: so long does a field stay the same about a body that moves.
+/// Time constant with which data fades, s: the time for which the field stays the same around a moving body.
 const FADING_S: f64 = 30.0;
 
-/// At rest all fields are one; they count for so long, s.
+/// At rest all fields are equal; together they count for this long, s.
 const REST_S: f64 = 0.5;
 
-/// A system is solved with every so many windows.
+/// A system is solved every this many windows.
 const WINDOWS: u32 = 4;
 
-/// A prediction that misses by this part of the norm, as a root mean square, shows another offset or another field.
+/// A prediction error of this fraction of the norm, root mean square, indicates another offset or another field.
 const MISS: f64 = 0.07;
 
-/// That mean is over so long, s.
+/// Averaging time of that error, s.
 const MISS_S: f64 = 0.3;
 
-/// An offset is adopted when the cost falls by this multiple of its noise: e⁻¹⁵ by chance.
+/// An offset is adopted if the cost falls by this multiple of its noise: probability e⁻¹⁵ by chance.
 const EVIDENCE: f64 = 30.0;
 
-/// And by this part of itself.
+/// And by this fraction of itself.
 const EVIDENCE_PART: f64 = 0.5;
 
-/// An offset that makes the field another one than before needs more evidence by this factor: disturbances are fixed in
-/// the world, and while they last an offset may explain them as well, by errors that are no noise.
+/// An offset that implies another field than before needs more evidence by this factor. Disturbances are fixed in the
+/// world; while they last, an offset may explain them as well, through errors that are not noise.
 const OTHER_FIELD: f64 = 20.0;
 
-/// To return to an offset that held for long takes less.
+/// Returning to an offset that was long in use needs less evidence.
 const RETURN: f64 = 1.0 / 3.0;
 
-/// So long it has to have held, s.
+/// The time it must have been in use, s.
 const HOME_S: f64 = 20.0;
 
-/// The root mean square error of a fit that is believed, as a part of the norm.
+/// The root mean square error of an acceptable fit, as a fraction of the norm.
 const GOOD_FIT: f64 = 0.1;
 
-/// That of one that is good enough to need no other.
+/// The error of a fit that is good enough to need no other.
 const BAD_FIT: f64 = 0.03;
 
-/// No fit is of less than this, s.
+/// The shortest time for a fit, s.
 const LEAST_S: f64 = 0.5;
 
-/// A reference seen for so long, s, is asked whether an offset suits it.
+/// A reference seen for this long, s, is used to check whether an offset agrees with it.
 const REFERENCE_S: f64 = 5.0;
 
-/// By this part of the norm the field of a fit may differ from the reference.
+/// The field of a fit may differ from the reference by this fraction of the norm.
 const SAME_FIELD: f64 = 0.12;
 
-/// A fit is an improvement if the variance of the offset is less than this part of that adopted.
+/// A fit is an improvement if the variance of the offset is less than this fraction of the adopted one's.
 const IMPROVEMENT: f64 = 0.9;
 
-/// The heading of a field that was seen for this many times as long as the one before replaces it, as in `field.rs`.
+/// The heading of a field seen for this many times as long as the previous one replaces it, as in `field.rs`.
 const OUTLASTS: f64 = 2.0;
 
-/// And for so long, s.
+/// And for at least this long, s.
 const OUTLASTS_S: f64 = 1.0;
 
 /// A heading known up to this standard deviation, rad, is worth turning to.
 const KNOWN_HEADING: f64 = 0.1;
 
-/// What the offset and the field are now known to be.
+/// The newly adopted offset and field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Adoption<T> {
     /// The field in the world.
     pub(super) field: Vector3<T>,
     /// Variance of its direction about the vertical, rad².
     pub(super) variance: T,
-    /// Whether all that is known of the heading is in this fit.
+    /// Whether this fit contains everything known about the heading.
     pub(super) is_heading: bool,
-    /// Whether the field is another one than the reference.
+    /// Whether the field differs from the reference.
     pub(super) is_other_field: bool,
-    /// How long the fit is over, s.
+    /// The duration of the fit, s.
     pub(super) duration: T,
 }
 
-/// The offset, the lag, and the sums that show them.
+/// The offset, the lag, and the sums from which they are estimated.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HardIron<T> {
     sums: Sums<T>,
@@ -95,18 +96,18 @@ pub(super) struct HardIron<T> {
     unit: T,
     /// In the body frame.
     pub(super) offset: Vector3<T>,
-    /// The trace of its covariance when it was adopted; none before there is evidence since the sums began.
+    /// The trace of its covariance at adoption; `None` until there is evidence since the sums began.
     adopted: Option<T>,
     lag: Lag<T>,
     lag_before: Lag<T>,
-    /// Mean square of how far predictions miss.
+    /// Mean square of the prediction errors.
     miss: T,
     windows: u32,
-    /// How long the sums are over, s, without fading.
+    /// The duration of the sums, s, without fading.
     seen_s: T,
-    /// Whether the sums go back to when the heading was last unknown.
+    /// Whether the sums go back to the last time the heading was unknown.
     is_heading: bool,
-    /// How long those were over, s.
+    /// The duration of those sums, s.
     heading_s: T,
     /// Whether the field or the offset has changed since the start, so that the offset may be any.
     is_doubted: bool,
@@ -115,7 +116,7 @@ pub(super) struct HardIron<T> {
 }
 
 impl<T: Real> HardIron<T> {
-    /// With a lag that is known up to this standard deviation, s.
+    /// With a lag of this standard deviation, s.
     pub(super) fn new(lag_deviation: f64) -> Self {
         // A deviation of zero is one that no data moves.
         let lag = Lag { mean: T::ZERO, variance: T::of((lag_deviation * lag_deviation).max(1e-18)) };
@@ -148,7 +149,7 @@ impl<T: Real> HardIron<T> {
         self.lag.variance
     }
 
-    /// Starts the sums; `is_heading` if the heading is unknown but for what they will show.
+    /// Starts the sums; `is_heading` if only they will show the heading.
     pub(super) fn begin(&mut self, is_heading: bool) {
         if self.is_heading {
             self.heading_s = self.seen_s;
@@ -164,19 +165,19 @@ impl<T: Real> HardIron<T> {
         self.held_s = T::ZERO;
     }
 
-    /// Turns the world by a little.
+    /// Rotates the world by a small rotation.
     pub(super) fn correct(&mut self, correction: &UnitQuaternion<T>) {
         self.sums.turn(correction);
     }
 
-    /// Turns the world by any angle.
+    /// Rotates the world by any rotation.
     pub(super) fn turn(&mut self, rotation: &UnitQuaternion<T>) {
         self.sums.turn(rotation);
         self.fit = None;
     }
 
-    /// Covariance of what is not known of the offset, as far as it disturbs the heading: before there was a reason
-    /// to doubt it, an offset of zero is believed.
+    /// Covariance of the uncertainty of the offset that disturbs the heading: an offset of zero is trusted until
+    /// there is a reason to doubt it.
     pub(super) fn covariance(&self) -> Matrix3<T> {
         if !self.is_doubted && self.adopted.is_none() {
             return Matrix3::zeros();
@@ -195,8 +196,7 @@ impl<T: Real> HardIron<T> {
         }
     }
 
-    /// The variance of the heading by what is not known of the offset, rad², as long as all that is known of the
-    /// heading is the field.
+    /// The variance of the heading due to the uncertain offset, rad², while the field is the only source of heading.
     pub(super) fn heading_variance(&self) -> T {
         match &self.fit {
             Some(fit) if self.is_heading => fit.heading_variance(),
@@ -204,7 +204,7 @@ impl<T: Real> HardIron<T> {
         }
     }
 
-    /// Takes the field of a window of `dt` seconds.
+    /// Adds the field of a window of `dt` seconds.
     pub(super) fn observe(
         &mut self,
         dt: T,
@@ -245,11 +245,11 @@ impl<T: Real> HardIron<T> {
         self.judge(&fit, reference)
     }
 
-    /// Whether the fit does not predict this window's field, nor those before.
+    /// Whether the fit predicts neither this window's field nor the previous ones.
     fn misses(&mut self, dt: T, means: &FieldMeans<T>) -> bool {
         let Some(fit) = &self.fit else { return false };
         let error = means.field - fit.field - means.rotation * fit.offset - means.rate * fit.lag;
-        // What the prediction does not know is no miss.
+        // The prediction's own uncertainty does not count as an error.
         let turned = means.rotation - fit.slope;
         let unknown = (turned * fit.covariance.fixed_view::<3, 3>(0, 0)).component_mul(&turned).sum();
         let excess = (error.norm_squared() - T::of(4.0) * unknown).max(T::ZERO);

@@ -1,8 +1,8 @@
-//! What a window of samples says about the errors, taken one scalar at a time.
+//! The measurements of a window of samples, fused one scalar at a time.
 //!
-//! The errors are those at the end of the window. Their mean is carried along and turned into a correction only
-//! at the end of the next one, so it does not matter when between the two a scalar is taken: one goes with each
-//! sample, and no sample costs much more than another.
+//! The errors are those at the end of the window. Their mean becomes a correction only at the end of the next window,
+//! so it does not matter when a scalar is fused in between: one goes with each sample, and no sample costs much more
+//! than another.
 
 use nalgebra::Vector3;
 
@@ -10,7 +10,7 @@ use super::errors::Errors;
 use super::states::{BIAS, ROTATION, VELOCITY};
 use crate::attitude::Real;
 
-/// Heading, seen by the magnetic field.
+/// Heading measured by the magnetic field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Heading<T> {
     /// How far the field is from north, rad.
@@ -21,13 +21,13 @@ pub(super) struct Heading<T> {
     pub(super) variance: T,
 }
 
-/// The measurements of one window that are still to be taken.
+/// The remaining measurements of one window.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Measurements<T> {
     next: u32,
     velocity_variance: T,
     heading: Option<Heading<T>>,
-    /// What the gyroscope reads at rest, less its known bias, and its variance.
+    /// The gyroscope's reading at rest minus its known bias, and its variance.
     bias: Option<(Vector3<T>, T)>,
 }
 
@@ -37,7 +37,7 @@ impl<T: Real> Measurements<T> {
         Self { next: u32::MAX, velocity_variance: T::ZERO, heading: None, bias: None }
     }
 
-    /// The velocity is zero up to `velocity_variance`, and more if there is more.
+    /// The velocity is zero up to `velocity_variance`, with further measurements if available.
     pub(super) fn new(velocity_variance: T, heading: Option<Heading<T>>, bias: Option<(Vector3<T>, T)>) -> Self {
         Self { next: 0, velocity_variance, heading, bias }
     }
@@ -47,7 +47,7 @@ impl<T: Real> Measurements<T> {
         self.heading = None;
     }
 
-    /// Takes the next scalar; `false` if none is left.
+    /// Fuses the next scalar; returns `false` if none is left.
     pub(super) fn take(&mut self, errors: &mut Errors<T>) -> bool {
         let taken = self.next;
         match taken {

@@ -1,4 +1,4 @@
-//! Detects rest, and averages what the gyroscope reads during it.
+//! Detects rest, and averages the gyroscope's readings during it.
 
 use crate::attitude::Real;
 use nalgebra::Vector3;
@@ -18,10 +18,10 @@ const MAX_GRAVITY_ERROR: f64 = 1.0;
 /// A mean angular velocity beyond the bias by more than this, rad/s, is a rotation: 2°/s, VQF's `biasClip`.
 const MAX_BIAS_STEP: f64 = 0.035;
 
-/// How long all this has to hold, s. VQF waits 1.5 s.
+/// How long all these conditions must hold, s. VQF waits 1.5 s.
 const LEAST_S: f64 = 1.0;
 
-/// Recognises rest.
+/// Detects rest.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Rest<T> {
     /// Mean angular velocity, rad/s.
@@ -35,7 +35,7 @@ impl<T: Real> Rest<T> {
         Self { rate: *rate, force: *force, still_s: T::ZERO }
     }
 
-    /// Takes a sample; the bias is known up to `bias_deviation`, rad/s.
+    /// Adds a sample; the bias is known up to `bias_deviation`, rad/s.
     pub(super) fn add(
         &mut self,
         dt: T,

@@ -1,6 +1,6 @@
-//! What the filter estimates: where each state begins in the error state.
+//! The layout of the error state.
 
-/// How many numbers the filter estimates.
+/// The number of states.
 pub(super) const STATES: usize = 18;
 /// Rotation error, world axes, rad: `R_true = exp(θ) R`.
 pub(super) const ROTATION: usize = 0;
@@ -8,7 +8,7 @@ pub(super) const ROTATION: usize = 0;
 pub(super) const BIAS: usize = 3;
 /// Error of the gyroscope's scale and misalignment, a 3×3 matrix row by row, fraction.
 pub(super) const CALIBRATION: usize = 6;
-/// Horizontal velocity, world axes, m/s: the whole of it, not an error.
+/// Horizontal velocity, world axes, m/s: the total value, not an error.
 pub(super) const VELOCITY: usize = 15;
-/// How much the accelerometer lags the gyroscope, s: the whole of it, not an error.
+/// How much the accelerometer lags the gyroscope, s: the total value, not an error.
 pub(super) const FORCE_LATENCY: usize = 17;

@@ -1,4 +1,4 @@
-//! What the Kalman filter alone does; the laws of all filters are checked here for it, too.
+//! Tests of the Kalman filter alone; the laws of all filters are also checked here for it.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -13,7 +13,7 @@ fn filter<T: Real>(magnetometer: bool) -> MekfFilter<T> {
 
 attitude_laws!(nine_axes: filter(true), six_axes: filter(false));
 
-/// A body that is waved about at 100 Hz, with sensors that err in the ways that the filter is there for.
+/// A body that is waved about at 100 Hz, with the sensor errors that the filter estimates.
 struct World {
     i: i64,
     truth: UnitQuaternion<f64>,

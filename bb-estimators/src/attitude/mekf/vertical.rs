@@ -1,4 +1,4 @@
-//! The vertical that the mean specific force shows, and when it overrules the tilt.
+//! The vertical given by the mean specific force, and when it overrules the tilt.
 //!
 //! A velocity stays bounded, so the mean of R f over a time t is the vertical up to the change of velocity over g t,
 //! rad. The Kalman filter knows that too, but only to first order; a tilt that is off by more restarts.
@@ -14,16 +14,16 @@ const MEAN_S: f64 = 2.0;
 /// The slope of a mean beyond which the tilt is wrong: 30°, more than any motion of that time accelerates by.
 const MAX_SLOPE: f64 = 0.577;
 
-/// A start is believed from this time on, s: a few samples more than the first.
+/// A start is trusted from this time on, s: a few samples after the first.
 const LEAST_START_S: f64 = 0.05;
 
-/// By how much the velocity may have changed since a start, m/s: a hand that shakes a sensor.
+/// How much the velocity may have changed since a start, m/s: a hand that shakes a sensor.
 const START_VELOCITY: f64 = 1.4;
 
-/// The greatest slope that a start leaves alone, rad: the deviation of the first sample's tilt.
+/// The largest slope that leaves a start unchanged, rad: the deviation of the first sample's tilt.
 const MAX_START_SLOPE: f64 = INITIAL_TILT;
 
-/// What the mean specific force contradicts.
+/// The tilt contradicted by the mean specific force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Contradiction<T> {
     /// The tilt of the first sample; the mean is the vertical up to this deviation, rad.
@@ -32,12 +32,12 @@ pub(super) enum Contradiction<T> {
     Tilt(Vector3<T>),
 }
 
-/// The mean specific force of late, in the world.
+/// The recent mean specific force, in the world.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Vertical<T> {
     /// ∫ R f dt, m/s.
     sum: Vector3<T>,
-    /// How long the mean is over, s.
+    /// The duration of the mean, s.
     duration: T,
     /// Whether the filter started from a specific force when the mean began.
     is_start: bool,
@@ -48,7 +48,7 @@ impl<T: Real> Vertical<T> {
         Self { sum: Vector3::zeros(), duration: T::ZERO, is_start }
     }
 
-    /// Takes a window's ∫ R f dt, after the world was corrected.
+    /// Adds a window's ∫ R f dt, after the world was corrected.
     pub(super) fn add(
         &mut self,
         dt: T,
@@ -81,7 +81,7 @@ impl<T: Real> Vertical<T> {
         self.sum = rotation * self.sum;
     }
 
-    /// The world was levelled by the mean, so that it is the vertical from now on.
+    /// The world was levelled by the mean, so the mean is the vertical from now on.
     pub(super) fn levelled(&mut self) {
         self.sum = Vector3::new(T::ZERO, T::ZERO, self.sum.norm());
     }

@@ -1,4 +1,4 @@
-//! What one window of samples adds up to, in a world frame that is not corrected within it.
+//! Sums over one window of samples, in a world frame that is not corrected within it.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -81,8 +81,8 @@ impl<T: Real> Window<T> {
         self.squared_rate += rate.norm_squared() * dt;
     }
 
-    /// Adds a magnetic field that was measured with the sensor at `rotation`, turning at `rate`; `offset` is what
-    /// of it turns with the body.
+    /// Adds a magnetic field measured with the sensor at `rotation`, turning at `rate`; `offset` is the part that
+    /// turns with the body.
     pub(super) fn add_field(
         &mut self,
         rotation: &Matrix3<T>,
@@ -96,7 +96,7 @@ impl<T: Real> Window<T> {
         self.fields += 1;
     }
 
-    /// Means over the fields in the world as `correction` makes it, if there was a field.
+    /// Means over the fields in the world corrected by `correction`, if there was a field.
     pub(super) fn mean_field(&self, correction: &UnitQuaternion<T>) -> Option<FieldMeans<T>> {
         let scale = T::ONE / T::of(f64::from(self.fields.max(1)));
         let correction = *correction.to_rotation_matrix().matrix() * scale;
@@ -107,7 +107,7 @@ impl<T: Real> Window<T> {
         })
     }
 
-    /// How bias and calibration turn the world in this window, rad per rad/s and rad per fraction.
+    /// How bias and calibration rotate the world in this window, rad per rad/s and rad per fraction.
     pub(super) fn gyroscope_integrals(&self) -> [[T; 12]; 3] {
         let mut integrals = [[T::ZERO; 12]; 3];
         for (i, row) in integrals.iter_mut().enumerate() {

@@ -89,7 +89,7 @@ impl<T: Real> AttitudeFilter<T> for TiltFilter<T> {
 }
 
 impl<T: Real> TiltFilter<T> {
-    /// Lets the low-passes begin with the next sample.
+    /// Restarts the low-passes with the next sample.
     fn begin(&mut self) {
         self.force = None;
         self.field = None;
@@ -98,7 +98,7 @@ impl<T: Real> TiltFilter<T> {
     }
 }
 
-/// One step of a low-pass that begins with its first input.
+/// One step of a low-pass that is initialised by its first input.
 fn approach<T: Real>(mean: &mut Option<Vector3<T>>, value: &Vector3<T>, gain: T) -> Vector3<T> {
     let mean = mean.get_or_insert(*value);
     *mean += (value - *mean) * gain;

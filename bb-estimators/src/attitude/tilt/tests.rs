@@ -1,4 +1,4 @@
-//! What the filter without a gyroscope alone does; the laws of filters without one are checked here for it, too.
+//! Tests of the filter without a gyroscope alone; the laws of such filters are also checked here for it.
 
 use nalgebra::{UnitQuaternion, Vector3};
 

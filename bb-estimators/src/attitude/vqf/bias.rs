@@ -7,7 +7,7 @@ use super::coefficients::InertialCoefficients;
 use super::low_pass::LowPass;
 use crate::attitude::Real;
 
-/// The gyroscope's bias and what is known of it.
+/// The gyroscope's bias and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Bias<T> {
     /// rad/s, body frame.
@@ -31,13 +31,13 @@ impl<T: Real> Bias<T> {
         }
     }
 
-    /// Restarts the low-passes; what is known of the bias stays.
+    /// Restarts the low-passes; the bias and its uncertainty are kept.
     pub(super) fn forget_motion(&mut self) {
         self.rotations = LowPass::new();
         self.biases = LowPass::new();
     }
 
-    /// What the gyroscope reads at rest is the bias: `rate` is low-passed, rad/s.
+    /// The gyroscope's reading at rest is the bias: `rate` is low-passed, rad/s.
     #[inline]
     pub(super) fn rest(&mut self, params: &VqfParams, coefficients: &InertialCoefficients<T>, rate: &Vector3<T>) {
         self.grow(coefficients);
@@ -54,7 +54,7 @@ impl<T: Real> Bias<T> {
         self.correct(params, change);
     }
 
-    /// What the inclination had to be corrected by is what is left of the bias, horizontally.
+    /// The correction of the inclination shows the remaining bias, horizontally.
     ///
     /// `leaning` is the unit vector of the low-passed specific force in the level frame before the correction,
     /// `level_from_body` the orientation after it. Nothing shows the vertical part of the bias; a weak measurement
@@ -82,7 +82,7 @@ impl<T: Real> Bias<T> {
             (horizontal.y, coefficients.motion_variance),
             (vertical, coefficients.vertical_variance),
         ];
-        // The noises are independent, so the three are taken one after the other and no matrix is inverted.
+        // The noises are independent, so the three are fused one after the other and no matrix is inverted.
         let mut change = Vector3::zeros();
         for (row, (innovation, variance)) in measurements.into_iter().enumerate() {
             let observation: Vector3<T> = rotation.0.row(row).transpose();
@@ -94,7 +94,7 @@ impl<T: Real> Bias<T> {
         self.correct(params, change);
     }
 
-    /// Low-passes rotation and bias, also where nothing is measured in motion.
+    /// Low-passes rotation and bias, also while nothing is measured in motion.
     #[inline]
     pub(super) fn low_pass(
         &mut self,
@@ -109,7 +109,7 @@ impl<T: Real> Bias<T> {
         (Matrix3::from_column_slice(&elements), biases)
     }
 
-    /// What was known fades.
+    /// The known bias fades.
     fn grow(&mut self, coefficients: &InertialCoefficients<T>) {
         self.covariance *= coefficients.bias_kept;
         for axis in 0..3 {

@@ -1,23 +1,23 @@
-//! What depends on parameters and sample time alone, made when the sample time changes.
+//! Coefficients that depend only on parameters and sample time, recomputed when the sample time changes.
 
 use super::low_pass::Coefficients;
 use super::{DEGREE, VqfParams};
 use crate::attitude::Real;
 use crate::attitude::low_pass::gain;
 
-/// Coefficients serve sample times that differ from theirs by up to this fraction.
+/// Coefficients are used for sample times that differ from theirs by up to this fraction.
 const TOLERANCE: f64 = 1.0 / 64.0;
 
 /// How far a bias wanders within the forgetting time, rad/s: 0.1°/s. Source: section 3.4 of the paper.
 const BIAS_WANDER: f64 = 0.1 * DEGREE;
 
-/// For what happens with every sample of gyroscope and accelerometer.
+/// For the processing of every sample of gyroscope and accelerometer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct InertialCoefficients<T> {
     dt_s: T,
     pub(super) tilt: Coefficients<T>,
     pub(super) rest: Coefficients<T>,
-    /// What is kept of the bias's covariance in a sample, as a factor, and what is added to its variances, (rad/s)².
+    /// The factor by which the bias's covariance fades in a sample, and the addition to its variances, (rad/s)².
     pub(super) bias_kept: T,
     pub(super) bias_growth: T,
     /// Variances of the bias's measurements, (rad/s)².
@@ -57,7 +57,7 @@ impl<T: Real> InertialCoefficients<T> {
     }
 }
 
-/// For what happens with every sample of the magnetometer.
+/// For the processing of every sample of the magnetometer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FieldCoefficients<T> {
     dt_s: T,

@@ -7,7 +7,7 @@ use super::coefficients::FieldCoefficients;
 use super::low_pass::LowPass;
 use crate::attitude::Real;
 
-/// What a rotation about the vertical leaves alone of a field.
+/// The properties of a field that a rotation about the vertical does not change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Field<T> {
     /// In the field's own unit.
@@ -53,7 +53,7 @@ impl<T: Real> Disturbance<T> {
         }
     }
 
-    /// After a gap: the reference stays, what was about to change it does not.
+    /// After a gap: the reference stays, a pending change of it does not.
     pub(super) fn forget_motion(&mut self) {
         self.fields = LowPass::new();
         self.candidate = None;
@@ -65,8 +65,9 @@ impl<T: Real> Disturbance<T> {
         self.detected
     }
 
-    /// Takes a field of this norm, in its own unit, and its direction in the level frame; `turning` if the body turns enough to tell the world's field from one that
-    /// goes along with it. Returns what the heading's gain is to be multiplied by.
+    /// Adds a field of this norm, in its own unit, with its direction in the level frame; `turning` if the body turns
+    /// enough to distinguish the world's field from one that turns with it. Returns the factor for the heading's
+    /// gain.
     #[inline]
     pub(super) fn observe(
         &mut self,
@@ -129,7 +130,7 @@ impl<T: Real> Disturbance<T> {
         }
     }
 
-    /// A disturbed field counts for nothing at first, and for less when it lasts.
+    /// A disturbed field is ignored at first, and has less weight while it lasts.
     fn trust(&mut self, params: &VqfParams, dt_s: T) -> T {
         if !self.detected {
             self.rejected_s = (self.rejected_s - T::of(params.rejection_factor) * dt_s).max(T::ZERO);

@@ -17,10 +17,10 @@ use crate::params::Params as _;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
 
-/// Below this squared norm, (m/s²)², a mean specific force does not show where up is.
+/// Below this squared norm, (m/s²)², a mean specific force does not show which way is up.
 const NO_FORCE: f64 = 1e-12;
 
-/// Sample times that the coefficients begin with, s; the first samples change them.
+/// The initial sample time of the coefficients, s; the first samples change it.
 const USUAL_DT_S: f64 = 0.01;
 
 /// The versatile quaternion-based filter.
@@ -121,8 +121,7 @@ impl<T: Real> AttitudeFilter<T> for VqfFilter<T> {
 }
 
 impl<T: Real> VqfFilter<T> {
-    /// Starts from the orientation that the state has, if it has one; what is known of the gyroscope and of the
-    /// field stays.
+    /// Starts from the state's orientation, if it has one; the estimates of the gyroscope and of the field are kept.
     #[cold]
     fn begin(&mut self, heading: Heading<T>, forces: LowPass<T, 3>) {
         if let Some(orientation) = self.state.world_from_body() {
@@ -137,7 +136,7 @@ impl<T: Real> VqfFilter<T> {
         self.since_field_s = T::ZERO;
     }
 
-    /// Lets the means of the low-passes begin with the sample that started the filter.
+    /// Initialises the means of the low-passes with the sample that started the filter.
     #[cold]
     fn average_first(&mut self, sample: &ImuSample<T>) {
         let (coefficients, level_from_body) = (&self.coefficients, &self.inertial_from_body);
@@ -146,7 +145,7 @@ impl<T: Real> VqfFilter<T> {
         self.bias.low_pass(T::ZERO, coefficients, level_from_body.to_rotation_matrix().matrix());
     }
 
-    /// Integrates the gyroscope less its bias.
+    /// Integrates the gyroscope minus its bias.
     #[inline]
     fn strapdown(&mut self, dt_s: T, measured: &Vector3<T>) {
         self.rest.add_rate(&self.params, dt_s, &self.coefficients, measured);
@@ -154,7 +153,8 @@ impl<T: Real> VqfFilter<T> {
         self.inertial_from_body = renormalised(&turned);
     }
 
-    /// Corrects the inclination by the specific force, and the bias by that; returns the orientation but for heading.
+    /// Corrects the inclination by the specific force, and the bias by that; returns the orientation without the
+    /// heading.
     #[inline]
     fn incline(&mut self, dt_s: T, force: &Vector3<T>) -> UnitQuaternion<T> {
         let (params, coefficients) = (&self.params, &self.coefficients);

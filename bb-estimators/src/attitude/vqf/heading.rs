@@ -12,12 +12,12 @@ use crate::attitude::rotation::{half_angle, turn_heading_by};
 pub(super) struct Heading<T> {
     /// Cosine and sine of half the angle.
     half: [T; 2],
-    /// The gain of a mean over all fields so far, as long as it is above that of the low-pass; then 0.
+    /// The gain of a mean over all fields so far, while it is above that of the low-pass; then 0.
     mean_gain: T,
 }
 
 impl<T: Real> Heading<T> {
-    /// None; the next field sets it if `mean_gain` is 1, and if it is 0 it is known.
+    /// Unknown; the next field sets it if `mean_gain` is 1. If `mean_gain` is 0, it is known.
     pub(super) fn new(mean_gain: T) -> Self {
         Self { half: [T::ONE, T::ZERO], mean_gain }
     }
@@ -27,7 +27,7 @@ impl<T: Real> Heading<T> {
         turn_heading_by(level_from_body, self.half)
     }
 
-    /// Takes the direction of a field in the level frame; it counts for `trust`, a fraction.
+    /// Adds the direction of a field in the level frame, with weight `trust`, a fraction.
     #[inline]
     pub(super) fn correct(
         &mut self,

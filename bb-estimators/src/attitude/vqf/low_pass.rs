@@ -11,7 +11,7 @@ use core::f64::consts::SQRT_2;
 /// The greatest `dt / (√2 τ)`: beyond it the low-pass lets everything through in one sample, and the tangent ends.
 const MAX_ANGLE: f64 = 1.5;
 
-/// What a low-pass of one time constant multiplies by, at one sample time.
+/// The coefficients of a low-pass with one time constant, at one sample time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Coefficients<T> {
     time_constant_s: T,
@@ -30,7 +30,7 @@ impl<T: Real> Coefficients<T> {
 
 /// The state of `N` low-passes with common coefficients.
 ///
-/// For the first time constant the output is the mean of all that came.
+/// During the first time constant, the output is the mean of all inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LowPass<T, const N: usize> {
     band: [T; N],
@@ -41,17 +41,17 @@ pub(super) struct LowPass<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> LowPass<T, N> {
-    /// One that begins with the mean of its first inputs.
+    /// A low-pass initialised by the mean of its first inputs.
     pub(super) fn new() -> Self {
         Self { band: [T::ZERO; N], low: [T::ZERO; N], samples: Some(T::ZERO), elapsed_s: T::ZERO }
     }
 
-    /// One that has had this input for ever.
+    /// A low-pass settled at this input.
     pub(super) fn settled(value: [T; N]) -> Self {
         Self { band: [T::ZERO; N], low: value, samples: None, elapsed_s: T::ZERO }
     }
 
-    /// Takes an input that came `dt_s` after the last one; returns the output.
+    /// Adds an input that came `dt_s` after the last one; returns the output.
     #[inline]
     pub(super) fn filter(&mut self, input: &[T; N], dt_s: T, coefficients: &Coefficients<T>) -> [T; N] {
         if let Some(samples) = self.samples {
@@ -75,7 +75,7 @@ impl<T: Real, const N: usize> LowPass<T, N> {
             *mean += (*input - *mean) / samples;
         }
         self.elapsed_s += dt_s;
-        // The first sample has no period of its own; it gets that of this one.
+        // The first sample has no period; it gets that of the current one.
         self.samples = (self.elapsed_s + dt_s < time_constant_s).then_some(samples);
         self.low
     }

@@ -7,7 +7,7 @@ use super::coefficients::InertialCoefficients;
 use super::low_pass::LowPass;
 use crate::attitude::Real;
 
-/// Recognises rest by how far gyroscope and accelerometer are from their low-passed values.
+/// Detects rest by the deviation of gyroscope and accelerometer from their low-passed values.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Rest<T> {
     rates: LowPass<T, 3>,
@@ -33,7 +33,7 @@ impl<T: Real> Rest<T> {
         self.detected
     }
 
-    /// Lets the means begin with a sample.
+    /// Initialises the means with a sample.
     pub(super) fn average_first(
         &mut self,
         coefficients: &InertialCoefficients<T>,
@@ -44,7 +44,7 @@ impl<T: Real> Rest<T> {
         self.forces.filter(&(*force).into(), T::ZERO, &coefficients.rest);
     }
 
-    /// Takes an angular velocity, rad/s, and ends rest if it differs too much or is too large for a bias.
+    /// Adds an angular velocity, rad/s; ends rest if it differs too much or is too large for a bias.
     #[inline]
     pub(super) fn add_rate(
         &mut self,
@@ -62,7 +62,7 @@ impl<T: Real> Rest<T> {
         }
     }
 
-    /// Takes a specific force, m/s², and ends rest if it differs too much; else the sensor may be at rest.
+    /// Adds a specific force, m/s²; ends rest if it differs too much, otherwise the sensor may be at rest.
     #[inline]
     pub(super) fn add_force(
         &mut self,

@@ -1,4 +1,4 @@
-//! What VQF alone does; the laws of all filters are checked here for it, too.
+//! Tests of VQF alone; the laws of all filters are also checked here for it.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -70,7 +70,7 @@ fn a_disturbed_field_is_rejected_and_followed_only_if_it_lasts() {
     let mut filter = filter(true);
     tumble(&mut filter, 0, 30, FIELD, Vector3::zeros());
     assert_eq!(filter.is_magnetically_disturbed(), Some(false));
-    // Turned by 45° and stronger; new in motion for 10 s, less than a new reference takes.
+    // Rotated by 45° and stronger; in motion for 10 s, less than a new reference needs.
     let disturbed = Vector3::new(30e-6, 30e-6, -45e-6);
     let error = tumble(&mut filter, 30, 10, disturbed, Vector3::zeros());
     assert_eq!(filter.is_magnetically_disturbed(), Some(true));

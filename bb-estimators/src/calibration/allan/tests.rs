@@ -107,13 +107,13 @@ fn white_noise_is_found_as_well_as_chi_square_allows() {
         assert!((noise.density.value / density - 1.0).abs() < 4.0 * bound, "{:?}", noise.density);
         errors.push((noise.density.value - density) / noise.density.deviation);
     }
-    // Three deviations of the mean of as many; the parts that are no less than nothing take a little of it.
+    // Three deviations of the mean of that many; the constraint to non-negative components lowers it slightly.
     let (mean, deviation) = moments(&errors);
     assert!(
         mean.abs() < 0.3 + 3.0 / (SEEDS as f64).sqrt() && (0.75..1.25).contains(&deviation),
         "{mean} {deviation}"
     );
-    // Of a walk that is not there little is seen.
+    // A walk that is not there is hardly seen.
     let over = found.iter().filter(|noise| noise.random_walk.value > 2.0 * noise.random_walk.deviation).count();
     assert!(over <= 10, "{over} of {SEEDS} see a random walk");
 }
@@ -137,7 +137,8 @@ fn a_random_walk_is_found_as_well_as_it_is_said_to_be() {
     let mean_ratio = ratios.iter().sum::<f64>() / SEEDS as f64;
     println!("random walk: {mean_ratio} of the true one, {:?} {:?}", moments(&of_density), moments(&of_walk));
     assert!((mean_ratio - 1.0).abs() < 0.04, "{mean_ratio}");
-    // Three deviations of the mean of as many, and of their root mean square; what is no less than nothing takes a little away.
+    // Three deviations of the mean of that many, and of their root mean square; the constraint to non-negative values
+    // lowers it slightly.
     let by_chance = 3.0 / (SEEDS as f64).sqrt();
     for (mean, deviation) in [moments(&of_density), moments(&of_walk)] {
         assert!(mean.abs() < by_chance && (deviation - 1.0).abs() < by_chance / 2_f64.sqrt(), "{mean} {deviation}");

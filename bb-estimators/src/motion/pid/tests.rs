@@ -42,8 +42,8 @@ fn the_derivative_is_filtered_with_its_time_constant() {
     }
 }
 
-/// A setpoint out of reach for a minute: without protection the integral holds 600 then, and the output stays at its limit for
-/// many seconds after the setpoint is back in reach.
+/// A setpoint out of reach for a minute: without protection, the integral would then be 600, and the output would
+/// stay at its limit for many seconds after the setpoint is back in reach.
 #[test]
 fn it_does_not_wind_up() {
     let mut pid = Pid::new(PARAMS);
@@ -60,7 +60,7 @@ fn it_does_not_wind_up() {
     assert!(slow.update(20.0, 1.0, 0.01).integral < 10.0 + 0.5 * 19.0 + 0.2);
 }
 
-/// A mass with friction comes to rest at the setpoint, also with a load, which the integral finds.
+/// A mass with friction comes to rest at the setpoint, also with a load, for which the integral compensates.
 #[test]
 fn it_holds_a_mass_against_a_load() {
     let mut pid = Pid::new(PidParams { proportional: 20.0, integral: 15.0, derivative: 8.0, ..PARAMS });

@@ -11,10 +11,10 @@ use syn::meta::ParseNestedMeta;
 use syn::parse::ParseStream;
 use syn::{Expr, ExprRange, Field, LitStr, RangeLimits, Token, Type};
 
-/// What an option may say of itself.
+/// The words of an option's attribute.
 const WORDS: [&str; 4] = ["default", "required", "range", "unit"];
 
-/// What `#[option(…)]` says.
+/// The contents of `#[option(…)]`.
 #[derive(Default)]
 pub(super) struct Attribute {
     pub(super) required: bool,
@@ -92,7 +92,7 @@ impl Attribute {
         Ok(())
     }
 
-    /// Literals are of the kind that the option is.
+    /// Checks that literals are of the option's kind.
     fn check_numbers(&self, field: &Field, diagnostics: &mut Diagnostics) {
         let ends = self.range.iter().flat_map(|(start, end, _)| [start, end]);
         for number in ends.chain(&self.default) {
@@ -109,7 +109,7 @@ fn value(meta: &ParseNestedMeta<'_>, example: &str) -> syn::Result<()> {
     equals.map(drop).map_err(|_| syn::Error::new(place, format!("expected `=`, as in `{word} = {example}`")))
 }
 
-/// Nothing but a comma follows a value. What does is mostly a unit.
+/// Only a comma may follow a value. Other tokens are usually a unit.
 fn end(input: ParseStream<'_>, field: &Field) -> syn::Result<()> {
     if input.is_empty() || input.peek(Token![,]) {
         return Ok(());

@@ -1,10 +1,10 @@
-//! Numbers in defaults and ranges: their value, and whether they are of the kind that the option is.
+//! Numbers in defaults and ranges: their value, and whether they are of the option's kind.
 
 use crate::diagnostics::Diagnostics;
 use quote::ToTokens;
 use syn::{Expr, ExprUnary, Lit, Type, UnOp};
 
-/// Reports a literal of another kind than the option's, where rustc would point at the derive or say less.
+/// Reports a literal of another kind than the option's; rustc would point at the derive or say less.
 pub(super) fn check_number(number: &Expr, kind: &Type, diagnostics: &mut Diagnostics) {
     let Type::Path(path) = kind else { return };
     let Some(kind) = path.path.segments.last().map(|segment| segment.ident.to_string()) else { return };
@@ -33,7 +33,7 @@ pub(super) fn check_number(number: &Expr, kind: &Type, diagnostics: &mut Diagnos
     diagnostics.error(number, message);
 }
 
-/// The number of a literal, with or without a minus.
+/// The number of a literal, with or without a minus sign.
 pub(super) fn literal_number(expression: &Expr) -> Option<f64> {
     let sign = if matches!(expression, Expr::Unary(_)) { -1.0 } else { 1.0 };
     match literal(expression)? {
@@ -43,7 +43,7 @@ pub(super) fn literal_number(expression: &Expr) -> Option<f64> {
     }
 }
 
-/// A literal, with or without a minus.
+/// A literal, with or without a minus sign.
 fn literal(expression: &Expr) -> Option<&Lit> {
     match expression {
         Expr::Unary(ExprUnary { op: UnOp::Neg(_), expr, .. }) => match &**expr {
@@ -55,7 +55,7 @@ fn literal(expression: &Expr) -> Option<&Lit> {
     }
 }
 
-/// The text of an expression without the blanks between its tokens.
+/// The text of an expression without the whitespace between its tokens.
 pub(super) fn plain(expression: &Expr) -> String {
     expression.to_token_stream().to_string().replace(' ', "")
 }

@@ -73,7 +73,7 @@ fn of_struct(fields: &Fields, text: &TokenStream) -> Parts {
     }
 }
 
-/// The number of the variant, then for each variant with fields a list of none or one.
+/// The number of the variant, then for each variant with fields a list of at most one.
 fn of_enum(data: &DataEnum, text: &TokenStream) -> Parts {
     let lists = data.variants.iter().filter(|variant| !variant.fields.is_empty()).count();
     let mut before = 0;

@@ -1,4 +1,4 @@
-//! When a command may run, how long, beside which others, and which it ends.
+//! When a command may run, for how long, together with which others, and which ones it ends.
 
 use crate::language::CommandItem;
 use crate::parse::Notes;
@@ -9,7 +9,7 @@ use proc_macro2::Ident;
 use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 
-/// All that were written; a rule reports a second one.
+/// All occurrences; a rule reports a second one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CommandSettings {
     pub(crate) allowed_states: Vec<AllowedStates>,

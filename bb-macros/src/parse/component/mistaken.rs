@@ -1,4 +1,4 @@
-//! Components written in other ways: `Encoder { port: 1 }`, `Encoder::new(1)`, `sensor_msgs::Image()`.
+//! Components written in other syntaxes: `Encoder { port: 1 }`, `Encoder::new(1)`, `sensor_msgs::Image()`.
 
 use crate::diagnostics::Place;
 use crate::language::{item_words, starts_item};
@@ -10,7 +10,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{LitStr, Token};
 
-/// Reports a function of a type, `Encoder::new`, and leaves the type.
+/// Reports an associated function, `Encoder::new`, and leaves the type.
 pub(super) fn constructor(kind: &mut syn::Path, notes: &mut Notes<'_>) -> bool {
     let starts = |segment: &syn::PathSegment, is: fn(char) -> bool| segment.ident.to_string().starts_with(is);
     let mut last = kind.segments.iter().rev();
@@ -29,7 +29,7 @@ pub(super) fn constructor(kind: &mut syn::Path, notes: &mut Notes<'_>) -> bool {
     true
 }
 
-/// The packages of ROS that have the messages of robots.
+/// The ROS packages with the messages of robots.
 const ROS_PACKAGES: [&str; 12] = [
     "action_msgs",
     "builtin_interfaces",
@@ -45,15 +45,16 @@ const ROS_PACKAGES: [&str; 12] = [
     "visualization_msgs",
 ];
 
-/// The package and the last name of a type of ROS: `sensor_msgs::msg::Image`.
+/// The package and the last name of a ROS type: `sensor_msgs::msg::Image`.
 fn of_ros(path: &syn::Path) -> Option<(String, syn::PathSegment)> {
     let package = path.segments.first()?.ident.to_string();
     let is_of_ros = path.segments.len() > 1 && ROS_PACKAGES.contains(&&*package);
     is_of_ros.then(|| path.segments.last().map(|last| (package, last.clone()))).flatten()
 }
 
-/// Reports types of ROS. `sensor_msgs::Image()` becomes an unknown component, `External<sensor_msgs::Imu>` keeps the last name. A
-/// type of another crate cannot be a payload, so that such a path names no payload even if there is a crate of that name.
+/// Reports ROS types. `sensor_msgs::Image()` becomes an unknown component, `External<sensor_msgs::Imu>` keeps the
+/// last name. A type of another crate cannot be a payload, so such a path never names a payload, even if a crate of
+/// that name exists.
 pub(super) fn ros_types(word: &str, kind: &mut syn::Path, notes: &mut Notes<'_>) {
     if let Some((package, message)) = of_ros(kind) {
         let message = message.ident;
@@ -88,7 +89,7 @@ pub(super) fn ros_types(word: &str, kind: &mut syn::Path, notes: &mut Notes<'_>)
     }
 }
 
-/// The error for what is not a type, where one is expected: `"Bmi270"`, `dyn Sensor`, `&Bmi270`.
+/// The error for tokens that are not a type where one is expected: `"Bmi270"`, `dyn Sensor`, `&Bmi270`.
 pub(super) fn type_of(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
     let place = input.span();
     let message = if let Ok(text) = input.fork().parse::<LitStr>()
@@ -103,7 +104,8 @@ pub(super) fn type_of(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error
     Some(syn::Error::new(place, message))
 }
 
-/// The error for what follows a component in other languages: `Bmi270().rate(200)`, `Bmi270() @ 200 Hz`, `Bmi270 | Bmi088`.
+/// The error for syntax that follows a component in other languages: `Bmi270().rate(200)`, `Bmi270() @ 200 Hz`,
+/// `Bmi270 | Bmi088`.
 pub(super) fn tail(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
     let is_tail = input.peek(Token![.]) || input.peek(Token![@]) || input.peek(Token![|]) || input.peek(Token![=]);
     let message = format!(
@@ -112,7 +114,7 @@ pub(super) fn tail(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
     is_tail.then(|| input.error(message))
 }
 
-/// The error for options in braces, `Encoder { port: 1 }`, which are read if they come next.
+/// The error for options in braces, `Encoder { port: 1 }`, which are read if they follow.
 pub(super) fn fields(kind: &syn::Path, input: ParseStream<'_>) -> Option<syn::Error> {
     let names = names(&input.fork())?;
     let braces: TokenTree = input.parse().ok()?;
@@ -122,7 +124,7 @@ pub(super) fn fields(kind: &syn::Path, input: ParseStream<'_>) -> Option<syn::Er
     Some(Place::of(&braces).syntax(message))
 }
 
-/// The names of the fields in braces: none where one is a word of the language, or near to one.
+/// The names of the fields in braces; `None` if one is a word of the language, or near to one.
 fn names(input: ParseStream<'_>) -> Option<Vec<String>> {
     let content = opened(input).ok()?;
     let mut names = Vec::new();

@@ -1,4 +1,4 @@
-//! What a component is given: `beta = 0.1`, `gain = param::gain`.
+//! The options of a component: `beta = 0.1`, `gain = param::gain`.
 
 use crate::parse::literal::capitalized;
 use crate::parse::name::whole;
@@ -22,7 +22,7 @@ pub(crate) enum OptionValue {
     Quantity(Quantity),
     /// `param::imu::beta`: the current value of the parameter.
     Parameter(Path),
-    /// Any expression; with its number, if it is a literal one.
+    /// Any expression; with its number if it is a literal.
     Expression { expression: Box<Expr>, number: Option<f64> },
 }
 
@@ -78,7 +78,7 @@ impl OptionValue {
     }
 }
 
-/// The error for a value in the notation of Python or of a launch file: `True`, `param.imu.beta`, `$(arg beta)`.
+/// The error for a value in the syntax of Python or of a launch file: `True`, `param.imu.beta`, `$(arg beta)`.
 fn elsewhere(input: ParseStream<'_>) -> Option<syn::Error> {
     let (start, place) = (input.cursor(), input.span());
     if is_function(&input.fork()) {
@@ -112,7 +112,8 @@ fn elsewhere(input: ParseStream<'_>) -> Option<syn::Error> {
     (is_all && names.len() > 1).then(|| place_since(start, input).syntax(message))
 }
 
-/// Whether a function begins here as Python, JavaScript or C++ writes it: `lambda x: …`, `(x) => …`, `[](double x) { … }`.
+/// Whether a function starts here in the syntax of Python, JavaScript or C++: `lambda x: …`, `(x) => …`, `[](double
+/// x) { … }`.
 fn is_function(input: ParseStream<'_>) -> bool {
     if input.fork().parse::<Ident>().is_ok_and(|word| word == "lambda") {
         return input.peek2(syn::Ident) || input.peek2(Token![:]) && !input.peek2(Token![::]);
@@ -130,8 +131,8 @@ fn parenthesized<'a>(input: ParseStream<'a>) -> Option<syn::parse::ParseBuffer<'
     parse().ok()
 }
 
-/// `Some(Some(number))` for a literal without a unit, `Some(None)` for an expression of several terms, and none where a
-/// suffix may be a unit.
+/// `Some(Some(number))` for a literal without a unit, `Some(None)` for an expression of several terms, and `None` if
+/// a suffix may be a unit.
 fn plain_number(expression: &Expr) -> Option<Option<f64>> {
     const RUST: [&str; 15] =
         ["", "i8", "i16", "i32", "i64", "i128", "isize", "u8", "u16", "u32", "u64", "u128", "usize", "f32", "f64"];
@@ -147,7 +148,7 @@ fn plain_number(expression: &Expr) -> Option<Option<f64>> {
     }
 }
 
-/// The number, if it is one that a double can hold.
+/// The number, if it fits in a double.
 fn finite(digits: &str) -> Option<f64> {
     digits.parse().ok().filter(|number: &f64| number.is_finite())
 }

@@ -27,7 +27,7 @@ pub(crate) struct Inertial {
 pub(crate) struct Shape {
     pub(crate) word: Ident,
     pub(crate) origin: Option<Origin>,
-    /// All that were written; there must be one.
+    /// All occurrences; there must be one.
     pub(crate) geometries: Vec<(Ident, Geometry)>,
     pub(crate) material: Option<Material>,
 }

@@ -17,7 +17,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
-/// How a joint moves. Each property is kept as often as it is written: a rule refuses the second.
+/// How a joint moves. Every occurrence of each property is kept: a rule refuses the second.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct JointProperties {
     pub(crate) origins: Vec<Origin>,
@@ -32,7 +32,7 @@ pub(crate) struct JointProperties {
 pub(crate) struct Joint {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// Its name as a URDF has it, which need not be an identifier.
+    /// Its name in the URDF, which need not be an identifier.
     pub(crate) label: Option<String>,
     pub(crate) kind: JointKind,
     pub(crate) kind_word: Ident,
@@ -79,7 +79,7 @@ impl Joint {
             semicolon(input, &format!("`{}`", joint.name), notes);
         }
         if let Err(error) = kind {
-            // What it carries is known all the same; whether it needs an axis and a limit is not.
+            // Its child is still known; whether it needs an axis and a limit is not.
             notes.syntax(&error);
             joint.properties.axes.clear();
             joint.properties.limits.clear();

@@ -1,4 +1,4 @@
-//! Messages that wait for one user of a link.
+//! Messages waiting for one user of a link.
 
 use crate::link::{LinkError, Peer};
 use bb_core::MonotonicTime;
@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A message, and when it came.
+/// A message, and its arrival time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Received {
     pub(crate) message: MavMessage,
@@ -16,7 +16,7 @@ pub(crate) struct Received {
     pub(crate) arrival: MonotonicTime,
 }
 
-/// The newest messages with certain ids of one peer: a bounded number.
+/// The newest messages with certain ids from one peer, bounded in number.
 #[derive(Debug)]
 pub(crate) struct Inbox {
     peer: Peer,
@@ -39,7 +39,7 @@ impl Inbox {
         Self { peer, ids: ids.to_vec(), capacity, waiting: Mutex::new(waiting), changed: Condvar::new() }
     }
 
-    /// Takes a copy of a message if it is wanted. The oldest makes room; returns whether one had to.
+    /// Adds a copy of a message if it is wanted. Returns whether the oldest had to be dropped for it.
     pub(super) fn offer(&self, header: MavHeader, id: u32, message: &MavMessage, arrival: MonotonicTime) -> bool {
         if !self.ids.contains(&id) || !self.peer.is(header) {
             return false;
@@ -61,10 +61,10 @@ impl Inbox {
         self.changed.notify_all();
     }
 
-    /// The oldest message; waits for it, at most so long.
+    /// The oldest message; waits for one until `timeout`.
     ///
     /// # Errors
-    /// The link has failed. What came before that is given first.
+    /// The link has failed. Earlier messages are returned first.
     pub(crate) fn receive(&self, timeout: Duration) -> Result<Option<Received>, LinkError> {
         let deadline = Instant::now() + timeout;
         let mut waiting = self.lock();

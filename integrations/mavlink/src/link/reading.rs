@@ -1,4 +1,4 @@
-//! The thread that reads a link, hands out what comes, and sends heartbeats.
+//! The thread that reads a link, distributes messages, and sends heartbeats.
 
 use super::LinkError;
 use super::shared::Shared;
@@ -8,7 +8,7 @@ use mavlink::dialects::common::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavMod
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How often a component says that it is there.
+/// The period of heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 pub(super) fn read(shared: &Shared, mut reader: Reader) {
@@ -26,7 +26,7 @@ pub(super) fn read(shared: &Shared, mut reader: Reader) {
                 take(shared, &reader, &mut framer, bytes);
             }
             Err(error) => {
-                // The device is closed before anybody may open it again.
+                // The device is closed before another user may open it.
                 drop(reader);
                 shared.fail(LinkError::Failed { address: shared.address().clone(), source: Arc::new(error) });
                 return;
@@ -35,7 +35,7 @@ pub(super) fn read(shared: &Shared, mut reader: Reader) {
     }
 }
 
-/// Takes the bytes of one read; none if nothing has come for a while.
+/// Processes the bytes of one read; empty after a timeout.
 fn take(shared: &Shared, reader: &Reader, framer: &mut Framer, bytes: &[u8]) {
     let arrival = shared.clock().now();
     let mut has_peer = false;
@@ -43,7 +43,7 @@ fn take(shared: &Shared, reader: &Reader, framer: &mut Framer, bytes: &[u8]) {
         has_peer |= matches!(item, Item::Message(..));
         shared.deliver(item, arrival);
     };
-    // What has not become a frame becomes none if nothing follows, or a datagram that begins with a frame of its own.
+    // Incomplete bytes are discarded if nothing follows, or if a datagram begins with a frame of its own.
     if bytes.is_empty() || reader.is_datagrams() && framer.is_waiting() && begins_with_message(bytes) {
         std::iter::from_fn(|| framer.next_at_end()).for_each(&mut deliver);
     }
@@ -66,7 +66,7 @@ fn say_hello(shared: &Shared) {
         mavlink_version: 3,
     });
     for voice in shared.voices() {
-        // A write that fails is counted, and the next read says why.
+        // A failed write is counted, and the next read reports why.
         let _ = shared.send(&voice, &heartbeat);
     }
 }

@@ -1,4 +1,4 @@
-//! What the users of a link and its thread share.
+//! The state shared by the users of a link and its thread.
 
 use super::inbox::Inbox;
 use super::{LinkError, LinkStatistics, Peer};
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// Who speaks: system and component, and how many frames they have sent.
+/// A sender: system and component, and how many frames they have sent.
 #[derive(Debug)]
 pub(crate) struct Voice {
     system_id: u8,
@@ -21,7 +21,7 @@ pub(crate) struct Voice {
     sequence: Arc<AtomicU8>,
 }
 
-/// Who speaks where nobody has chosen: the onboard computer of the first vehicle.
+/// The default sender: the onboard computer of the first vehicle.
 const DEFAULT_VOICE: (u8, u8) = (1, 191);
 
 #[derive(Debug)]
@@ -30,10 +30,10 @@ pub(crate) struct Shared {
     clock: Clock,
     is_stopping: AtomicBool,
     state: Mutex<State>,
-    /// None once the link has failed.
+    /// `None` once the link has failed.
     writer: Mutex<Option<Writer>>,
     voices: Mutex<Vec<Weak<Voice>>>,
-    /// Speaks where nobody else does; whoever chooses its ids continues its numbers.
+    /// Used when there is no other sender; a sender that chooses its ids continues its numbering.
     default_voice: Arc<Voice>,
 }
 
@@ -92,7 +92,7 @@ impl Shared {
         inbox
     }
 
-    /// A voice with these ids: that which has them already, if there is one.
+    /// A voice with these ids: the existing one, if there is one.
     pub(super) fn voice(&self, ids: (u8, u8)) -> Arc<Voice> {
         let mut voices = self.voices.lock().unwrap_or_else(PoisonError::into_inner);
         voices.retain(|voice| voice.strong_count() > 0);
@@ -117,7 +117,7 @@ impl Shared {
         if living.is_empty() { vec![Arc::clone(&self.default_voice)] } else { living }
     }
 
-    /// Sends a message. Returns `false` if nobody is known who would hear it.
+    /// Sends a message. Returns `false` if no receiver is known.
     pub(super) fn send(&self, voice: &Voice, message: &MavMessage) -> Result<bool, LinkError> {
         let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(open) = writer.as_mut() else { return Err(self.failure()) };
@@ -176,7 +176,7 @@ impl Shared {
     }
 
     pub(super) fn fail(&self, failure: LinkError) {
-        // Both ends are closed before anybody is told, who may then open the device again.
+        // Both ends are closed before users are told, since they may then open the device again.
         *self.writer.lock().unwrap_or_else(PoisonError::into_inner) = None;
         let mut state = self.state();
         for inbox in state.inboxes.iter().filter_map(Weak::upgrade) {
@@ -207,7 +207,7 @@ impl Shared {
 }
 
 impl State {
-    /// Counts what was lost before a frame.
+    /// Counts frames lost before this one.
     fn hear(&mut self, header: MavHeader) -> &mut Heard {
         let MavHeader { system_id, component_id, sequence } = header;
         let heard = self
@@ -215,8 +215,8 @@ impl State {
             .entry((system_id, component_id))
             .or_insert(Heard { sequence: sequence.wrapping_sub(1), heartbeat: None });
         let lost = sequence.wrapping_sub(heard.sequence).wrapping_sub(1);
-        // More than half a round back is more likely a frame that was overtaken, sent twice, or a sender that has
-        // started again.
+        // A difference of more than half the range is more likely a frame that was overtaken or sent twice, or a
+        // sender that restarted.
         if lost < 128 {
             self.statistics.lost += u64::from(lost);
         }

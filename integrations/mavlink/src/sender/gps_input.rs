@@ -1,4 +1,4 @@
-//! `GPS_INPUT`: the estimate as that of a receiver of satellite navigation.
+//! `GPS_INPUT`: the estimate as that of a satellite receiver.
 
 use crate::axes::swap_world;
 use bb_core::nalgebra::Vector3;
@@ -6,7 +6,7 @@ use bb_core::time::WallTime;
 use bb_estimators::navigation::state_estimator::FlightEstimate;
 use mavlink::dialects::common::{GPS_INPUT_DATA, GpsFixType, GpsInputIgnoreFlags};
 
-/// What the estimate does not say.
+/// Values that the estimate does not contain.
 #[derive(Clone, Debug)]
 pub(super) struct GpsInput {
     pub(super) geoid_height: Option<f64>,
@@ -19,7 +19,7 @@ pub(super) struct GpsInput {
 }
 
 impl GpsInput {
-    /// None if a value is not finite, or the position not on the Earth.
+    /// `None` if a value is not finite, or the position is not on the Earth.
     pub(super) fn message(&self, estimate: &FlightEstimate, wall: WallTime) -> Option<GPS_INPUT_DATA> {
         use GpsInputIgnoreFlags as Flags;
         let position = &estimate.position;
@@ -30,7 +30,7 @@ impl GpsInput {
         let altitude = self.geoid_height.map_or(0.0, |geoid| height - geoid) as f32;
         let sent = [altitude, height as f32, horizontal as f32, vertical as f32];
         let is_finite = sent.iter().chain(velocity.iter()).all(|value| value.is_finite());
-        // The covariance has none of the velocity.
+        // The covariance does not include the velocity.
         let mut ignore_flags = Flags::GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY | Flags::GPS_INPUT_IGNORE_FLAG_VDOP;
         ignore_flags.set(Flags::GPS_INPUT_IGNORE_FLAG_ALT, self.geoid_height.is_none());
         ignore_flags.set(Flags::GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, self.geoid_height.is_none());
@@ -81,7 +81,7 @@ impl GpsInput {
 /// In tenths of microdegrees.
 fn degrees(radians: f64, limit: f64) -> Option<i32> {
     let degrees = radians.to_degrees();
-    // Not a number is not within either.
+    // NaN is out of range as well.
     (degrees.abs() <= limit).then(|| (degrees * 1e7).round() as i32)
 }
 

@@ -1,4 +1,4 @@
-//! Which message is sent.
+//! The kind of message to send.
 
 use super::gps_input::GpsInput;
 use super::odometry::OdometryFrame;
@@ -6,7 +6,7 @@ use super::source::Estimate;
 use bb_core::time::WallTime;
 use mavlink::dialects::common::MavMessage;
 
-/// What is sent.
+/// The kind of message.
 #[derive(Clone, Debug)]
 pub(super) enum Kind {
     GpsInput(GpsInput),
@@ -14,12 +14,12 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Whether it can be made of the odometry of any estimator, which does not know where on the Earth it is.
+    /// Whether it can be built from the odometry of any estimator, which does not know its place on the Earth.
     pub(super) fn takes_odometry(&self) -> bool {
         matches!(self, Self::Odometry(_))
     }
 
-    /// None if the estimate has a value that cannot be sent.
+    /// `None` if the estimate has a value that cannot be sent.
     pub(super) fn message(&mut self, estimate: &Estimate, wall: WallTime) -> Option<MavMessage> {
         match (self, estimate) {
             (Self::GpsInput(settings), Estimate::Flight(estimate)) => {

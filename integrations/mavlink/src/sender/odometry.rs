@@ -8,7 +8,7 @@ use bb_estimators::navigation::state_estimator::FlightEstimate;
 use bb_estimators::navigation::{Geodetic, LocalFrame};
 use mavlink::dialects::common::{MavEstimatorType, MavFrame, ODOMETRY_DATA};
 
-/// A jump of the estimate that is longer shows that the origin was nowhere near the robot, m.
+/// A larger jump of the estimate, m, shows that the origin was far from the robot.
 const JUMP: f64 = 1000.0;
 
 /// The frame of flight estimates.
@@ -17,19 +17,19 @@ pub(super) struct OdometryFrame {
     origin: Origin,
     /// How often the origin has changed.
     moves: u32,
-    /// The last estimate: where, and after how many jumps.
+    /// The last estimate: its position, and its count of jumps.
     last: Option<(Geodetic, u32)>,
     frame_id: MavFrame,
 }
 
-/// Where the local frame begins.
+/// The origin of the local frame.
 #[derive(Clone, Debug)]
 enum Origin {
-    /// In the options: it stays.
+    /// From the options: it stays.
     Given(LocalFrame),
-    /// At an estimate that was not degraded: it stays, unless that turns out to have been wrong.
+    /// At an estimate that was not degraded: it stays, unless it proves to be wrong.
     Trusted(LocalFrame),
-    /// At an estimate, until there is one that is not degraded.
+    /// At an estimate, until one is not degraded.
     Provisional(LocalFrame),
     /// There is no estimate yet.
     Unknown,
@@ -63,7 +63,7 @@ impl OdometryFrame {
         frame
     }
 
-    /// None if a value is not finite.
+    /// `None` if a value is not finite.
     pub(super) fn of_flight(&mut self, estimate: &FlightEstimate, wall: WallTime) -> Option<ODOMETRY_DATA> {
         let position = &estimate.position;
         let here = Geodetic {
@@ -74,7 +74,7 @@ impl OdometryFrame {
         let is_on_earth = [here.latitude, here.longitude, here.height].iter().all(|value| value.is_finite());
         is_on_earth.then_some(())?;
         let origin = self.origin(&here, estimate);
-        // Level there is not level here.
+        // Horizontal there is not horizontal here.
         let origin_from_here = LocalFrame::new(here).other_from_self(&origin).rotation;
         let world_from_body = origin_from_here * estimate.world_from_body;
         let body_from_here = estimate.world_from_body.inverse();
@@ -96,7 +96,7 @@ impl OdometryFrame {
         .message(wall, self.frame_id, MavEstimatorType::MAV_ESTIMATOR_TYPE_VIO)
     }
 
-    /// None if a value is not finite.
+    /// `None` if a value is not finite.
     pub(super) fn of_odometry(&self, estimate: &Odometry, wall: WallTime) -> Option<ODOMETRY_DATA> {
         let Odometry { pose, twist } = estimate;
         // Of the orientation, about the axes of the world; MAVLink has those of the body.
@@ -109,7 +109,7 @@ impl OdometryFrame {
             velocity: twist.linear,
             angular_velocity: Some(twist.angular),
             velocity_covariance: twist.covariance,
-            // Odometry does not tell.
+            // Not contained in odometry.
             resets: 0,
         }
         .message(wall, self.frame_id, MavEstimatorType::MAV_ESTIMATOR_TYPE_UNKNOWN)
@@ -165,16 +165,16 @@ impl Motion {
             velocity_covariance: upper_triangle(velocity_covariance),
             frame_id,
             child_frame_id: MavFrame::MAV_FRAME_BODY_FRD,
-            // It counts in a circle; who listens looks whether it has changed.
+            // The counter wraps; receivers check whether it has changed.
             reset_counter: self.resets.to_le_bytes()[0],
             estimator_type,
-            // Unknown: the covariance tells.
+            // Unknown: see the covariance.
             quality: 0,
         })
     }
 }
 
-/// Row by row. What is unknown begins with what is not a number.
+/// Row by row. An unknown one begins with NaN.
 fn upper_triangle(covariance: Option<Matrix6<f64>>) -> [f32; 21] {
     let mut entries = [0.0; 21];
     let Some(covariance) = covariance else {

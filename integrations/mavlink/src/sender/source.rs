@@ -1,4 +1,4 @@
-//! Where estimates come from.
+//! The source of estimates.
 
 use bb_core::message::Stamped;
 use bb_core::payload::Odometry;
@@ -21,7 +21,7 @@ pub(super) enum Estimate {
 }
 
 impl Source {
-    /// Subscribes to flight estimates, or else to odometry if that will do.
+    /// Subscribes to flight estimates, or otherwise to odometry if that is sufficient.
     pub(super) fn subscribe(bus: &Bus, path: &str, takes_odometry: bool) -> Result<Self, Fault> {
         let flight = bus.subscribe(path, Overflow::KeepLatest).map(Self::Flight);
         if flight.is_ok() || !takes_odometry {
@@ -43,7 +43,7 @@ impl Source {
         }
     }
 
-    /// The same; waits for one, at most so long.
+    /// The same, but waits for one until `timeout`.
     pub(super) fn wait(&self, timeout: Duration) -> Option<Estimate> {
         match self {
             Self::Flight(estimates) => {
@@ -57,7 +57,7 @@ impl Source {
 }
 
 impl Estimate {
-    /// What it is an estimate of.
+    /// The time of the estimate.
     pub(super) fn time(&self) -> MonotonicTime {
         match self {
             Self::Flight(estimate) => estimate.time,

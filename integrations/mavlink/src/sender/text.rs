@@ -5,10 +5,10 @@ use mavlink::dialects::common::{MavSeverity, STATUSTEXT_DATA};
 
 /// Characters in one message.
 const CHUNK: usize = 50;
-/// Messages of one text, which a byte numbers.
+/// The largest number of messages for one text, numbered by a byte.
 const CHUNKS: usize = 256;
 
-/// The severity of an event. That the flight controller is on its own is critical.
+/// The severity of an event. It is critical that the flight controller is on its own.
 pub(super) fn severity(event: &FlightEvent) -> MavSeverity {
     match event.level {
         _ if event.kind == "fallback_engaged" => MavSeverity::MAV_SEVERITY_CRITICAL,
@@ -19,8 +19,9 @@ pub(super) fn severity(event: &FlightEvent) -> MavSeverity {
     }
 }
 
-/// The messages of a text. One that needs several gets the next id, and its last message ends with a null character, as
-/// the specification wants: if it is full, an empty one follows. What is not ASCII is a question mark.
+/// The messages of a text. A text that needs several gets the next id, and its last message ends with a null
+/// character, as the specification requires: if it is full, an empty one follows. Characters that are not ASCII
+/// become question marks.
 pub(super) fn chunks(severity: MavSeverity, text: &str, last_id: &mut u16) -> Vec<STATUSTEXT_DATA> {
     // A null character would end the text.
     let printable = |c: char| if c.is_ascii() && c != '\0' { c as u8 } else { b'?' };
@@ -33,7 +34,7 @@ pub(super) fn chunks(severity: MavSeverity, text: &str, last_id: &mut u16) -> Ve
     if bytes.len() <= CHUNK {
         return vec![message(&bytes, 0, 0)];
     }
-    // 0 is a text of one message.
+    // 0 marks a text in a single message.
     *last_id = last_id.checked_add(1).unwrap_or(1);
     let is_full = bytes.len().is_multiple_of(CHUNK);
     let chunks = bytes.chunks(CHUNK).chain(is_full.then_some(&[][..]));
@@ -46,7 +47,7 @@ mod tests {
     use bb_core::MonotonicTime;
     use proptest::prelude::*;
 
-    /// As a ground station puts it together.
+    /// As assembled by a ground station.
     fn joined(messages: &[STATUSTEXT_DATA]) -> String {
         messages.iter().map(|message| message.text.to_str().expect("it is ASCII")).collect()
     }

@@ -28,9 +28,10 @@ pub struct MavlinkAttitudeOptions {
     pub timeout: Duration,
 }
 
-/// The attitude that the flight controller estimates, as `world_from_body`: from forward, left, up to east, north, up.
+/// The attitude estimated by the flight controller, as `world_from_body`: from forward, left, up to east, north, up.
 ///
-/// A quaternion whose norm is not 1 within 1 % is no reading. The offset for displays (`repr_offset_q`) is not applied.
+/// A quaternion whose norm differs from 1 by more than 1 % is not a reading. The offset for displays
+/// (`repr_offset_q`) is not applied.
 #[derive(Debug)]
 pub struct MavlinkAttitude {
     stream: Stream,
@@ -68,7 +69,7 @@ impl Sensor for MavlinkAttitude {
 fn orientation(data: &ATTITUDE_QUATERNION_DATA) -> Option<Orientation> {
     let [w, i, j, k] = [data.q1, data.q2, data.q3, data.q4].map(f64::from);
     let quaternion = Quaternion::new(w, i, j, k);
-    // Neither is one that is not a number.
+    // NaN is rejected as well.
     let is_unit = (quaternion.norm() - 1.0).abs() <= 0.01;
     is_unit.then(|| Orientation::new(world_from_body(&UnitQuaternion::from_quaternion(quaternion))))
 }

@@ -33,8 +33,8 @@ pub struct MavlinkGnssOptions {
 
 /// The fixes of the flight controller's receiver.
 ///
-/// A message without a fix is a reading without a position. The accuracies of the message (one standard deviation) are
-/// the covariance; where they are zero, as in MAVLink 1, it is unknown.
+/// A message without a fix is a reading without a position. The accuracies of the message (one standard deviation)
+/// give the covariance; if they are zero, as in MAVLink 1, it is unknown.
 #[derive(Debug)]
 pub struct MavlinkGnss {
     stream: Stream,
@@ -77,7 +77,7 @@ impl Sensor for MavlinkGnss {
     }
 }
 
-/// None if the position is not on the Earth.
+/// `None` if the position is not on the Earth.
 fn fix(data: &GPS_RAW_INT_DATA, geoid_height: Option<f64>) -> Option<GnssFix> {
     let (status, has_height) = match data.fix_type {
         GpsFixType::GPS_FIX_TYPE_NO_GPS | GpsFixType::GPS_FIX_TYPE_NO_FIX => (GnssStatus::NoFix, false),
@@ -97,7 +97,7 @@ fn fix(data: &GPS_RAW_INT_DATA, geoid_height: Option<f64>) -> Option<GnssFix> {
     if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
         return None;
     }
-    // Zero says that the receiver does not give it.
+    // Zero means that the receiver does not report it.
     let ellipsoid = Some(f64::from(data.alt_ellipsoid) * 1e-3).filter(|_| data.alt_ellipsoid != 0);
     let sea = geoid_height.map(|geoid| f64::from(data.alt) * 1e-3 + geoid);
     let position = GeodeticPosition {

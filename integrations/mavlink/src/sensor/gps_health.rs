@@ -1,4 +1,4 @@
-//! How the flight controller's receiver is, from `GPS_RAW_INT` and `STATUSTEXT`.
+//! The state of the flight controller's receiver, from `GPS_RAW_INT` and `STATUSTEXT`.
 
 use super::stream::Stream;
 use crate::link::Peer;
@@ -37,10 +37,11 @@ pub struct MavlinkGpsHealthOptions {
     pub timeout: Duration,
 }
 
-/// The health of the flight controller's receiver, with each `GPS_RAW_INT`, as the state estimator takes it.
+/// The health of the flight controller's receiver, with each `GPS_RAW_INT`, as input for the state estimator.
 ///
-/// The dialect `common` has no message about spoofing, so the receiver is taken for spoofed for a while after a
-/// `STATUSTEXT` that says so, as "GPS1: spoofing indicated", unless one says that it has ended, as "spoofing cleared".
+/// The dialect `common` has no message about spoofing. So the receiver counts as spoofed for a while after a
+/// `STATUSTEXT` that reports it, as "GPS1: spoofing indicated", unless another one reports its end, as "spoofing
+/// cleared".
 #[derive(Debug)]
 pub struct MavlinkGpsHealth {
     stream: Stream,
@@ -71,7 +72,7 @@ impl Sensor for MavlinkGpsHealth {
                 }
                 said => {
                     self.spoofed = self.spoofed.filter(|_| said.is_none());
-                    // A flood of texts must not hide that nothing else comes.
+                    // A flood of texts must not hide that no other messages come.
                     return self.stream.check_silence().map(|()| Reading::nothing());
                 }
             },
@@ -87,10 +88,10 @@ impl Sensor for MavlinkGpsHealth {
     }
 }
 
-/// What makes the next word its contrary.
+/// Words that negate the next word.
 const NOT: [&str; 4] = ["no", "not", "none", "without"];
 
-/// What may be between that and the word.
+/// Words that may be between these and the word.
 const BETWEEN: [&str; 6] = ["gps", "gnss", "gps1", "gps2", "longer", "more"];
 
 /// What says after the word that it has ended, or is not so.
@@ -100,9 +101,10 @@ const ENDED: [&str; 10] =
 /// What says beside the word that it is so, unless it is denied.
 const FOUND: [&str; 4] = ["detect", "detects", "detected", "indicated"];
 
-/// Whether a text says that there is spoofing, or that there is none; none if it is about something else. In doubt there is.
+/// Whether a text reports spoofing, or its absence; `None` if it is about something else. In doubt, it counts as
+/// spoofing.
 fn spoofing(text: &STATUSTEXT_DATA) -> Option<bool> {
-    // A colon is a word: what was denied before it, as in "not trusted: spoofed", is something else.
+    // A colon is a word: a negation before it, as in "not trusted: spoofed", does not apply after it.
     let text = text.text.to_str().ok()?.to_ascii_lowercase().replace(':', " : ");
     let is_between = |c: char| !c.is_ascii_alphanumeric() && c != ':';
     let words: Vec<&str> = text.split(is_between).filter(|word| !word.is_empty()).collect();
@@ -130,7 +132,7 @@ fn health(data: &GPS_RAW_INT_DATA, options: &MavlinkGpsHealthOptions) -> GpsHeal
     }
     let has_few = data.satellites_visible != u8::MAX && data.satellites_visible < options.least_satellites;
     let is_diluted = data.eph != u16::MAX && f64::from(data.eph) * 1e-2 > options.largest_hdop;
-    // Zero where it is unknown.
+    // Zero if unknown.
     let is_inaccurate = f64::from(data.h_acc) * 1e-3 > options.largest_accuracy;
     if has_few || is_diluted || is_inaccurate { GpsHealth::Unstable } else { GpsHealth::Stable }
 }

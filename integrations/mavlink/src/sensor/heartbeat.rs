@@ -24,10 +24,10 @@ pub struct MavlinkHeartbeatOptions {
     pub timeout: Duration,
 }
 
-/// What a flight controller says of itself once a second, and how the link to it is.
+/// A flight controller's report about itself once a second, and the state of its link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct FlightController {
-    /// `MAV_TYPE`: what it flies.
+    /// `MAV_TYPE`: the type of vehicle.
     pub vehicle_type: u8,
     /// `MAV_AUTOPILOT`: 3 is ArduPilot, 12 is PX4.
     pub autopilot: u8,

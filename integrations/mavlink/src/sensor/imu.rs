@@ -36,8 +36,8 @@ pub struct MavlinkImuOptions {
 
 /// The flight controller's IMU, in its body axes: forward, left, up.
 ///
-/// A sample is used if it has all of acceleration and angular velocity: of `HIGHRES_IMU`, where `fields_updated` says
-/// that all six were updated. Other messages are no reading.
+/// A sample is used if it has both acceleration and angular velocity: for `HIGHRES_IMU`, if `fields_updated` says
+/// that all six were updated. Other messages are not readings.
 #[derive(Debug)]
 pub struct MavlinkImu {
     stream: Stream,

@@ -1,4 +1,4 @@
-//! A stream of messages of one kind, and what may go wrong with it.
+//! A stream of messages of one kind, and its faults.
 
 use crate::link::{Inbox, Link, Peer, Received};
 use bb_core::time::Clock;
@@ -8,7 +8,7 @@ use std::time::Duration;
 
 /// How long one read waits.
 const WAIT: Duration = Duration::from_millis(50);
-/// Messages that wait for a driver; more is a flood.
+/// The number of messages that may be queued for a driver; more is a flood.
 const CAPACITY: usize = 64;
 /// How often a flood is logged.
 const COMPLAINT: Duration = Duration::from_secs(10);
@@ -35,7 +35,7 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// Opens the link, and listens there. The first of `messages` is the one that the driver is after.
+    /// Opens the link, and listens there. The first of `messages` is the one the driver needs.
     pub(super) fn open(
         link: &str,
         peer: Peer,
@@ -62,10 +62,11 @@ impl Stream {
         })
     }
 
-    /// The next message and its arrival on the robot's clock; waits a little. It reads one message, however many there are.
+    /// The next message and its arrival on the robot's clock; waits briefly. It reads one message, however many are
+    /// queued.
     ///
     /// # Errors
-    /// The link has failed, or there has been no message or none with a value for too long.
+    /// The link has failed, or there has been no message, or none with a value, for too long.
     pub(super) fn next(&mut self) -> Result<Option<Received>, Fault> {
         let received = self.inbox.receive(WAIT)?;
         self.watch_flood();
@@ -80,15 +81,15 @@ impl Stream {
         Ok(Some(received))
     }
 
-    /// The message was of the kind that the driver is after, and had a value.
+    /// The message was of the kind the driver needs, and had a value.
     pub(super) fn has_value(&mut self) {
         (self.message, self.value) = (Some(self.link.now()), Some(self.link.now()));
     }
 
-    /// The message was of the kind that the driver is after, and had no value.
+    /// The message was of the kind the driver needs, but had no value.
     ///
     /// # Errors
-    /// None has had one for too long.
+    /// No message has had a value for too long.
     pub(super) fn has_none(&mut self, why: &'static str) -> Result<(), Fault> {
         (self.message, self.without) = (Some(self.link.now()), why);
         self.check_silence()
@@ -104,7 +105,7 @@ impl Stream {
     }
 
     /// # Errors
-    /// There has been no message or none with a value for too long.
+    /// There has been no message, or none with a value, for too long.
     pub(super) fn check_silence(&self) -> Result<(), Fault> {
         let now = self.link.now();
         let since = |time: MonotonicTime| now.seconds_since(time);
@@ -153,13 +154,13 @@ impl Stream {
     }
 }
 
-/// After so long, the specification takes a component for gone: four or five heartbeats, s.
+/// The time after which the specification considers a component gone: four or five heartbeats, s.
 const HEARTBEAT_LOST: f64 = 5.0;
 
-/// Which of `names` an option names.
+/// The one of `names` that an option selects.
 ///
 /// # Errors
-/// None.
+/// There is none.
 pub(super) fn choose<'a, T>(option: &str, text: &str, names: &'a [(&'static str, T)]) -> Result<&'a T, Fault> {
     let found = names.iter().find(|(name, _)| *name == text).map(|(_, value)| value);
     found.ok_or_else(|| {

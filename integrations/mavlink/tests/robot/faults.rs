@@ -1,4 +1,4 @@
-//! What becomes of a stream that stops, lies or floods, and of options that are wrong.
+//! Streams that stop, have wrong clocks or flood, and wrong options.
 
 use super::{LONG, drone, fault_of_imu};
 use crate::other::Other;
@@ -17,7 +17,7 @@ fn a_stream_that_stops_is_reported_and_comes_back() {
     other.does.is_mute.store(true, Ordering::Release);
     let stopped = fault_of_imu(&faults, "no HIGHRES_IMU for ");
     assert!(stopped.contains(" s: heartbeats still come, the last "), "{stopped}");
-    // The driver that was started again has seen none.
+    // The restarted driver has seen none.
     let again = fault_of_imu(&faults, "no HIGHRES_IMU in the ");
     assert!(again.contains(" s since the driver started: "), "{again}");
 
@@ -57,7 +57,7 @@ fn a_flight_controller_that_is_gone_is_told_from_a_stream_that_stops() {
 fn a_clock_that_jumps_is_reported_and_readings_go_on() {
     let other = Other::new();
     let mut builder = drone(&other.address);
-    // So that nothing else restarts the driver, which then knows nothing of the clock before.
+    // So that nothing else restarts the driver, which would then not know the previous clock.
     builder.options(drone::sensor::base::imu).timeout = LONG;
     let faults = builder.subscribe(system::Faults);
     let readings = builder.subscribe(drone::sensor::base::imu);

@@ -1,4 +1,4 @@
-//! A whole robot beside a flight controller that is simulated on the loopback device, with frames of the crate `mavlink`.
+//! A whole robot beside a simulated flight controller on the loopback device, with frames of the crate `mavlink`.
 
 mod faults;
 mod other;
@@ -42,7 +42,7 @@ robot! {
     }
 }
 
-/// A drone all of whose links lead to `address`.
+/// A drone whose links all lead to `address`.
 fn drone(address: &str) -> bb_core::Builder<Drone> {
     let mut builder = Drone::builder();
     for imu in [drone::sensor::base::imu, drone::sensor::base::other_imu] {

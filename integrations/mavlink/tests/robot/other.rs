@@ -13,7 +13,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// What it does, which tests switch.
+/// Its behaviour, which tests switch.
 #[derive(Debug, Default)]
 pub(crate) struct Does {
     /// Sends no `HIGHRES_IMU`.
@@ -26,7 +26,7 @@ pub(crate) struct Does {
     pub(crate) is_spoofed: AtomicBool,
     /// Sends without a pause.
     pub(crate) floods: AtomicBool,
-    /// What its clock is ahead, ms.
+    /// How far its clock is ahead, ms.
     pub(crate) ahead_ms: AtomicI64,
     /// Its clock stands still.
     pub(crate) is_still: AtomicBool,

@@ -47,7 +47,7 @@ impl Peer {
         Self { process, address, heard }
     }
 
-    /// Tells it what to do wrong.
+    /// Tells it which fault to simulate.
     fn tell(&mut self, what: &str) {
         let input = self.process.stdin.as_mut().expect("it is piped");
         writeln!(input, "{what}").and_then(|()| input.flush()).expect("it reads");

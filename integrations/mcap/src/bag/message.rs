@@ -18,8 +18,8 @@ pub struct BagMessage {
     pub topic: Arc<str>,
     /// Its type in the full spelling, as `sensor_msgs/msg/Imu`.
     pub schema: Arc<str>,
-    /// When the recorder received it, in nanoseconds of the recorder's clock, mostly since 1970. When its values
-    /// held is in the header.
+    /// When the recorder received it, in nanoseconds of the recorder's clock, usually since 1970. The measurement
+    /// time is in the header.
     pub log_time_ns: u64,
     /// The encoded message; decompressed, if the message was compressed individually.
     pub data: Vec<u8>,
@@ -56,7 +56,7 @@ impl BagMessage {
         self.read(wanted, decode_as_ros)
     }
 
-    /// The message as a type that has ROS's fields and, by `#[payload(name = "package/Name")]`, ROS's name.
+    /// The message as a type with ROS's fields and, by `#[payload(name = "package/Name")]`, ROS's name.
     ///
     /// # Errors
     /// The message is of another type, or its bytes are damaged.
@@ -68,10 +68,10 @@ impl BagMessage {
         self.read(wanted, decode)
     }
 
-    /// The header at the beginning of the message, as most messages have: the time and the frame of its values.
+    /// The header at the beginning of the message, which most messages have: the time and the frame of its values.
     ///
     /// # Errors
-    /// Its bytes are no header.
+    /// Its bytes are not a header.
     pub fn header(&self) -> Result<Header, RecordingError> {
         self.check_encoding()?;
         Reader::of_message(&self.data)
@@ -129,17 +129,17 @@ fn is_named(schema: &str, name: &str) -> bool {
         })
 }
 
-/// A topic that was chosen.
+/// A chosen topic.
 #[derive(Debug)]
 pub(crate) struct Wanted {
     pub(crate) topic: Arc<str>,
-    /// How many messages there are at least, by the summary.
+    /// The minimum number of messages, from the summary.
     pub(crate) expected: u64,
-    /// How many there have been.
+    /// The number of messages so far.
     pub(crate) count: u64,
 }
 
-/// What the messages of a channel have in common.
+/// Properties common to the messages of a channel.
 #[derive(Clone, Debug)]
 pub(super) struct MessageKind {
     pub(super) schema: Arc<str>,

@@ -20,10 +20,10 @@ pub struct BagMessages {
     channels: Channels,
     wanted: Vec<Wanted>,
     only_cdr: bool,
-    /// What is read instead of records, in a bag that is a database.
+    /// The source of messages instead of records, in a bag that is a database.
     #[cfg(feature = "sqlite")]
     rows: Option<super::sqlite::Rows>,
-    /// What to do with the messages of each channel met so far; `None` for those that are not wanted.
+    /// What to do with the messages of each channel met so far; `None` for unwanted ones.
     routes: HashMap<u16, Option<Route>>,
 }
 
@@ -112,8 +112,8 @@ impl BagMessages {
             let byte = records.byte();
             return Ok(Some(BagMessage::new(topic, &route.kind, log_time, data, &self.path, *count, byte)));
         }
-        // The length of a chunk and that it is one are covered by no checksum. Damage there can hide the chunk, and
-        // only the summary knows.
+        // A chunk's length and type are not covered by a checksum. Damage there can hide the chunk, and only the
+        // summary reveals it.
         match self.wanted.iter().find(|wanted| wanted.count < wanted.expected) {
             Some(Wanted { topic, expected, count }) => {
                 Err(records.corrupt(format!("it ends with {count} of the {expected} messages on {topic}")))

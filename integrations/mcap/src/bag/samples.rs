@@ -11,19 +11,19 @@ pub const MAGNETIC_FIELD: &str = "sensor_msgs/msg/MagneticField";
 
 /// The samples of a recorded IMU at the stamps of their headers, in the order of the file.
 ///
-/// A reading of the magnetometer belongs to the IMU sample with the same stamp, if that comes just before or after it in the
-/// file, or else to the sample before it. Bags contain messages of one instant in any order, so each sample waits for the next
-/// one. Samples may be out of order; estimators refuse those.
+/// A reading of the magnetometer belongs to the IMU sample with the same stamp, if that comes just before or after it
+/// in the file; otherwise to the sample before it. Bags contain messages of one instant in any order, so each sample
+/// waits for the next one. Samples may be out of order; estimators refuse those.
 ///
 /// An error comes after the last sample before it, and ends the iteration.
 #[derive(Debug)]
 pub struct MargSamples {
     messages: BagMessages,
-    /// The sample that waits until it is known which reading of the magnetometer belongs to it.
+    /// The sample that is held until its magnetometer reading is known.
     pending: Option<(MonotonicTime, Marg)>,
-    /// The last reading, if it may belong to the sample that comes next.
+    /// The last reading, if it may belong to the next sample.
     early: Option<(MonotonicTime, MagneticField)>,
-    /// The error that waits for that sample to be taken.
+    /// The error to be returned after that sample.
     broken: Option<RecordingError>,
     /// After an error.
     is_over: bool,
@@ -42,12 +42,12 @@ impl MargSamples {
         Ok(samples)
     }
 
-    /// When the sample that comes next was measured; none at the end.
+    /// When the next sample was measured; `None` at the end.
     pub fn next_time(&self) -> Option<MonotonicTime> {
         self.pending.as_ref().map(|(time, _)| *time)
     }
 
-    /// Reads up to the next message of the IMU, and gives the sample that waited for it.
+    /// Reads up to the next message of the IMU, and returns the held sample.
     fn advance(&mut self) -> Result<Option<(MonotonicTime, Marg)>, RecordingError> {
         while let Some(message) = self.messages.next() {
             let message = message.inspect_err(|_| self.settle())?;
@@ -77,14 +77,14 @@ impl MargSamples {
         Ok(self.pending.take())
     }
 
-    /// At the end no sample comes that the last reading may belong to.
+    /// At the end, there is no further sample that the last reading may belong to.
     fn settle(&mut self) {
         if let Some((_, field)) = self.early.take() {
             self.give(field);
         }
     }
 
-    /// A reading for the sample that waits, if one does.
+    /// A reading for the held sample, if there is one.
     fn give(&mut self, field: MagneticField) {
         if let Some((_, sample)) = &mut self.pending {
             sample.magnetic_field = Some(field);

@@ -10,22 +10,22 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What a database of SQLite starts with.
+/// The first bytes of an SQLite database.
 const MAGIC: &[u8] = b"SQLite format 3\0";
 
-/// How many messages are looked up at once. Their data are read one by one.
+/// How many messages are looked up at once. Their data is read one by one.
 const PAGE: i64 = 1000;
 
-/// Whether a file is a database. For one that cannot be read it says no, so that the reader of MCAP reports why.
+/// Whether a file is a database. Returns false for an unreadable one, so that the MCAP reader reports why.
 pub(super) fn is_database(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
-    // Asked before opening: opening a pipe would wait for a writer.
+    // Checked before opening: opening a pipe would wait for a writer.
     path.is_file()
         && std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok()
         && start == MAGIC
 }
 
-/// The topics of a database. How many messages each has is not known without reading all of it.
+/// The topics of a database. The number of messages of each is not known without reading all of it.
 pub(super) fn topics(path: &Path) -> Result<Vec<Topic>, RecordingErrorKind> {
     let rows = read_topics(&open(path).map_err(fault(0))?).map_err(fault(0))?;
     Ok(rows.into_iter().map(|(_, topic)| topic).collect())
@@ -58,7 +58,7 @@ fn read_topics(connection: &Connection) -> rusqlite::Result<Vec<(i64, Topic)>> {
     topics.collect()
 }
 
-/// The definitions of types and how they are written, by their names; bags before Iron have none.
+/// The definitions of types and their formats, by name; bags before Iron have none.
 fn definitions(connection: &Connection) -> rusqlite::Result<HashMap<String, (String, String)>> {
     if !connection.table_exists(None, "message_definitions")? {
         return Ok(HashMap::new());
@@ -76,10 +76,10 @@ fn fault(messages: u64) -> impl Fn(rusqlite::Error) -> RecordingErrorKind {
 /// The messages of chosen topics, by time.
 pub(super) struct Rows {
     connection: Connection,
-    /// The chosen topics: the place among those wanted, and the type, by their numbers in the database.
+    /// The chosen topics, by their numbers in the database: the index among those wanted, and the type.
     chosen: HashMap<i64, (usize, MessageKind)>,
     page: VecDeque<Row>,
-    /// Where the next page begins: after this time and number.
+    /// The start of the next page: after this time and number.
     last: (i64, i64),
     messages: u64,
 }
@@ -104,7 +104,7 @@ impl Rows {
         Ok(Self { connection, chosen, page: VecDeque::new(), last: (i64::MIN, i64::MIN), messages: 0 })
     }
 
-    /// The next message of the topics that are wanted.
+    /// The next message of the wanted topics.
     pub(super) fn next(
         &mut self,
         path: &Arc<Path>,
@@ -144,7 +144,7 @@ impl Rows {
 
     /// Looks up the next messages; false if there are none.
     fn turn(&mut self) -> rusqlite::Result<bool> {
-        // In the form that the index of the timestamps answers.
+        // In a form that can use the index of the timestamps.
         let mut statement = self.connection.prepare_cached(
             "SELECT id, topic_id, timestamp, length(CAST(data AS BLOB)) FROM messages
              WHERE timestamp >= ?1 AND (timestamp > ?1 OR id > ?2)

@@ -12,8 +12,8 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 /// The footer: where the summary starts, where its offsets start, a checksum.
 const FOOTER: usize = 8 + 8 + 4;
 
-/// The topics by the summary, if there is one that is whole, agrees with its checksum and repeats the channels.
-/// Anything else is no error: reading the messages tells the same, only later.
+/// The topics from the summary, if it is complete, matches its checksum and repeats the channels. Anything else is
+/// not an error: reading the messages gives the same, only later.
 ///
 /// mcap has a reader for this, which can panic on a damaged summary.
 pub(crate) fn topics(mut file: BufReader<File>, size: u64) -> Option<Vec<Topic>> {
@@ -25,7 +25,7 @@ pub(crate) fn topics(mut file: BufReader<File>, size: u64) -> Option<Vec<Topic>>
     let mut start = [0; 8];
     file.read_exact(&mut start).ok()?;
     let start = u64::from_le_bytes(start);
-    // A start of zero says that there is none.
+    // A start of zero means that there is none.
     if unframe(frame) != (op::FOOTER, FOOTER as u64) || start < MAGIC.len() as u64 || start > footer {
         return None;
     }
@@ -42,7 +42,7 @@ pub(crate) fn topics(mut file: BufReader<File>, size: u64) -> Option<Vec<Topic>>
             .with_validate_summary_section_crc(true)
             .with_record_length_limit(usize::try_from(length).ok()?),
     );
-    // The reader sums up the bytes after the record that ends the data, so it is shown one.
+    // The reader computes the checksum of the bytes after the record that ends the data, so it is given one.
     let data_end: [u8; FRAME + 4] = [op::DATA_END, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
     reader.insert(data_end.len()).copy_from_slice(&data_end);
     reader.notify_read(data_end.len());

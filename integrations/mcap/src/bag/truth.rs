@@ -24,19 +24,19 @@ pub struct Bool {
 /// Poses farther apart are not interpolated.
 const LONGEST_GAP_NS: i64 = 100_000_000;
 
-/// What a recording knows of the true orientation: poses (`geometry_msgs/PoseStamped`, or `nav_msgs/Odometry` where it
-/// is named), and when the body moves (`std_msgs/Bool`, on change).
+/// The true orientation in a recording: poses (`geometry_msgs/PoseStamped`, or `nav_msgs/Odometry` if it is named),
+/// and when the body moves (`std_msgs/Bool`, on change).
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
-    /// By time; none where the markers were lost.
+    /// By time; `None` where the markers were lost.
     poses: Vec<(i64, Option<UnitQuaternion<f64>>)>,
-    /// Changes, by time; a recording without them counts as moving all the time.
+    /// Changes, by time; in a recording without them, the body counts as moving all the time.
     moving: Vec<(i64, bool)>,
 }
 
 impl Truth {
-    /// Reads both, where the bag has exactly one topic of their types. Poses that a robot of this project published are
-    /// not taken: they are estimates.
+    /// Reads both, if the bag has exactly one topic of each type. Poses published by a robot of this project are not
+    /// used: they are estimates.
     ///
     /// # Errors
     /// The bag is broken; says where.
@@ -52,7 +52,7 @@ impl Truth {
     /// Adds poses and the times at which the body moves; other messages are ignored.
     ///
     /// # Errors
-    /// The bag is broken; says where. What came before stays.
+    /// The bag is damaged; says where. Data before that is kept.
     pub fn extend(&mut self, mut messages: BagMessages) -> Result<(), RecordingError> {
         let end = messages.try_for_each(|message| {
             let message = message?;
@@ -65,7 +65,7 @@ impl Truth {
                     let (odometry, time) = message.payload::<Odometry>()?;
                     self.push(time, &odometry.pose);
                 }
-                // It has no header: its time is the recorder's.
+                // It has no header, so it has the recorder's time.
                 MOVING => {
                     let Bool { data } = message.decode()?;
                     self.moving.push((i64::try_from(message.log_time_ns).unwrap_or(i64::MAX), data));

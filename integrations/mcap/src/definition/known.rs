@@ -1,4 +1,4 @@
-//! Types that are read though the file does not define them.
+//! Types that can be read even if the file does not define them.
 
 use bb_core::message::codec::ros::{Text, TransformStamped, TransformsMessage};
 use bb_core::message::codec::{Field, Shape};
@@ -8,7 +8,7 @@ use bb_core::payload::{
     Odometry, Orientation, Path, Pose, PoseWithCovariance, Range, TwistWithCovariance, Wrench,
 };
 
-/// Those that ROS has and no payload is written as.
+/// ROS types that no payload is written as.
 const PLAIN: [(&str, &str); 14] = [
     ("std_msgs/msg/Bool", "bool data"),
     ("std_msgs/msg/Int8", "int8 data"),

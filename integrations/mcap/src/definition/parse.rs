@@ -4,8 +4,8 @@ use super::{Count, DEEPEST, Field, Kind, Message, MessageDefinition};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The definition of the type `name`; the texts of the types it is made of follow it, each after a line of `=` and a
-/// line `MSG: package/Name`.
+/// The definition of the type `name`; the texts of its component types follow it, each after a line of `=` and a line
+/// `MSG: package/Name`.
 pub(super) fn definition(name: &str, text: &str) -> Result<MessageDefinition, String> {
     let mut texts = vec![(short(name), Vec::new())];
     let mut lines = text.lines();
@@ -19,7 +19,7 @@ pub(super) fn definition(name: &str, text: &str) -> Result<MessageDefinition, St
             lines.push(line);
         }
     }
-    // Of two of one name the first is taken.
+    // If two have the same name, the first is used.
     let names: HashMap<&str, usize> =
         texts.iter().enumerate().rev().map(|(index, (name, _))| (&**name, index)).collect();
     let mut messages = Vec::new();
@@ -27,7 +27,7 @@ pub(super) fn definition(name: &str, text: &str) -> Result<MessageDefinition, St
         let fields = lines.iter().filter_map(|line| field(line, name, &names).transpose());
         let mut fields = fields.collect::<Result<Vec<_>, _>>().map_err(|fault| format!("{name}: {fault}"))?;
         let variants: Vec<_> = lines.iter().filter_map(|line| variant(line)).collect();
-        // As recordings of this project have an enum: its number is first, its constants are the names.
+        // An enum as written in recordings of this project: its number is first, its constants are the names.
         if let Some(first) = fields.first_mut()
             && *first.name == *"kind"
             && (first.kind, first.count) == (Kind::U32, Count::One)
@@ -41,14 +41,14 @@ pub(super) fn definition(name: &str, text: &str) -> Result<MessageDefinition, St
     Ok(MessageDefinition { messages })
 }
 
-/// `sensor_msgs/Imu`, of `sensor_msgs/msg/Imu` too.
+/// `sensor_msgs/Imu`, also for `sensor_msgs/msg/Imu`.
 fn short(name: &str) -> String {
     name.replacen("/msg/", "/", 1)
 }
 
-/// The field that a line declares; none if it is empty or a comment or declares a constant.
+/// The field declared on a line; `None` if it is empty, a comment or a constant.
 fn field(line: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<Option<Field>, String> {
-    // A `#` in a text constant starts no comment; but constants are not kept.
+    // A `#` in a string constant does not start a comment; but constants are not kept.
     let line = line.split('#').next().unwrap_or("").trim();
     let Some((kind, rest)) = line.split_once(char::is_whitespace) else {
         return if line.is_empty() { Ok(None) } else { Err(format!("a name is missing in `{line}`")) };
@@ -97,7 +97,7 @@ fn element_kind(element: &str, owner: &str, names: &HashMap<&str, usize>) -> Res
     })
 }
 
-/// A type without a package is of the package of the type that names it.
+/// A type without a package is in the package of the type that refers to it.
 fn index(name: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<usize, String> {
     let short = short(name);
     let full = match owner.split_once('/') {
@@ -109,8 +109,7 @@ fn index(name: &str, owner: &str, names: &HashMap<&str, usize>) -> Result<usize,
     found.ok_or_else(|| format!("{full} is not defined"))
 }
 
-/// The longest chain of messages within messages below this one, at `depth` itself. `below` remembers those that were
-/// asked before.
+/// The longest chain of nested messages below this one, which is at `depth`. `below` caches earlier results.
 fn depth_below(
     messages: &[Message],
     index: usize,

@@ -1,4 +1,5 @@
-//! CDR by a definition. Every value has a byte at least, so that no definition makes a message longer than its bytes.
+//! Reads CDR by a definition. Every value has at least one byte, so no definition makes a message longer than its
+//! bytes.
 
 use super::{Count, Field, Kind, MessageDefinition, Value};
 use bb_core::message::DecodeError;
@@ -18,7 +19,7 @@ fn fields(definition: &MessageDefinition, index: usize, reader: &mut Reader<'_>)
     });
     let fields = fields.collect::<Result<Vec<_>, _>>()?;
     if fields.is_empty() {
-        // What a struct without fields holds.
+        // The content of a struct without fields.
         reader.raw(1, "a byte")?;
     }
     Ok(Value::Message(fields))
@@ -36,7 +37,7 @@ fn counted(definition: &MessageDefinition, field: &Field, reader: &mut Reader<'_
     if field.kind == Kind::U8 {
         return Ok(Value::Bytes(reader.raw(length, "bytes")?.to_vec()));
     }
-    // What a length asks for is given as the elements come.
+    // Memory for a length is allocated as the elements arrive.
     let mut values = Vec::new();
     for index in 0..length {
         values.push(one(definition, field.kind, reader).map_err(|error| error.within(format!("[{index}]")))?);

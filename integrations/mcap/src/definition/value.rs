@@ -7,15 +7,15 @@ use std::sync::Arc;
 pub enum Value {
     /// `bool`
     Bool(bool),
-    /// An integer with a sign.
+    /// A signed integer.
     Signed(i64),
-    /// An integer.
+    /// An unsigned integer.
     Unsigned(u64),
-    /// Which variant of an enum, and the name that the definition has for it.
+    /// The variant of an enum, and its name in the definition.
     Variant {
         /// Counted from zero.
         number: u32,
-        /// As the constants of messages are written: `OUT_OF_RANGE`.
+        /// In the spelling of message constants: `OUT_OF_RANGE`.
         name: Arc<str>,
     },
     /// `float32`
@@ -28,12 +28,12 @@ pub enum Value {
     Bytes(Vec<u8>),
     /// Any other list.
     List(Vec<Value>),
-    /// Fields in their order.
+    /// Fields in order.
     Message(Vec<(Arc<str>, Value)>),
 }
 
 impl Value {
-    /// A number, that of a variant too, or a `bool` as 0 or 1.
+    /// A number, including that of a variant, or a `bool` as 0 or 1.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Self::Bool(value) => Some(f64::from(u8::from(*value))),

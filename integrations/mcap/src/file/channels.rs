@@ -1,4 +1,4 @@
-//! The schemas and channels that a file defines as it goes along.
+//! The schemas and channels that a file defines while it is read.
 
 use super::Record;
 use std::collections::{BTreeMap, HashMap};
@@ -11,7 +11,7 @@ pub(crate) struct Channel {
     /// The full name of the type; empty if the file gives none.
     pub(crate) schema: Arc<str>,
     pub(crate) definition: Arc<[u8]>,
-    /// How the definition is written, `ros2msg` say.
+    /// The format of the definition, for example `ros2msg`.
     pub(crate) definition_encoding: Arc<str>,
     pub(crate) encoding: Arc<str>,
     pub(crate) metadata: BTreeMap<String, String>,
@@ -33,8 +33,8 @@ pub(crate) struct Channels {
 }
 
 impl Channels {
-    /// Takes in a schema or a channel, and returns a channel that is new; ignores other records. The error says what is
-    /// wrong.
+    /// Adds a schema or a channel, and returns the channel if it is new; ignores other records. The error says what
+    /// is wrong.
     pub(crate) fn define(&mut self, record: Record<'_>) -> Result<Option<(u16, &Channel)>, String> {
         match record {
             Record::Schema { id, name, encoding, data } => {

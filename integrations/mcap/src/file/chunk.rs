@@ -1,4 +1,4 @@
-//! The records of one chunk, which mcap unpacks.
+//! The records of one chunk, decompressed by mcap.
 
 use super::fields::Fields;
 use super::frame::{FRAME, LIMIT};
@@ -6,17 +6,17 @@ use mcap::McapError;
 use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// A chunk, or as much of it as there is.
+/// A chunk, or the available part of it.
 pub(super) enum Chunk {
-    /// Whole, or packed.
+    /// Complete, or compressed.
     Read { reader: Box<LinearReader>, is_whole: bool },
-    /// The beginning of one that is not packed.
+    /// The beginning of an uncompressed chunk.
     Beginning { data: Vec<u8>, at: usize },
 }
 
-/// Why a chunk cannot be read, or goes no further.
+/// Why a chunk cannot be read, or not further.
 pub(super) enum ChunkFault {
-    /// It breaks off, as was known.
+    /// It is cut off, as was known.
     Ends,
     Corrupt(String),
     TooLarge(u64),
@@ -45,7 +45,7 @@ impl Chunk {
                 let length = data.len().min(usize::try_from(packed).unwrap_or(usize::MAX));
                 return Ok(Self::Beginning { data: data[..length].to_vec(), at: 0 });
             }
-            // mcap counts down the bytes of an unpacked chunk without looking and would underflow.
+            // mcap decrements the remaining bytes of an uncompressed chunk without a check, and would underflow.
             "" if unpacked != packed || !is_framed(data) => {
                 return Err("a record in the chunk runs over its end".into());
             }
@@ -55,16 +55,16 @@ impl Chunk {
         if unpacked > LIMIT {
             return Err(ChunkFault::TooLarge(unpacked));
         }
-        // No record of this chunk can be longer than this, packed or unpacked.
+        // No record of this chunk can be longer than this, compressed or not.
         let longest = body.len().max(usize::try_from(unpacked).unwrap_or(usize::MAX));
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
-            // The checksum of what breaks off is unknown.
+            // The checksum of a chunk that is cut off is unknown.
             .with_prevalidate_chunk_crcs(is_whole)
             .with_record_length_limit(longest);
         let mut reader = Box::new(LinearReader::new_with_options(options));
-        // What is not there is announced, so that mcap takes it for what breaks off.
+        // The missing bytes are announced, so that mcap treats the chunk as cut off.
         let head = (body.len() - data.len()) as u64;
         let length = if is_whole { body.len() as u64 } else { head.saturating_add(packed) };
         let room = reader.insert(FRAME + body.len());
@@ -75,7 +75,7 @@ impl Chunk {
         Ok(Self::Read { reader, is_whole })
     }
 
-    /// Puts the next record's bytes into `body` and returns its kind; none at the end.
+    /// Puts the next record's bytes into `body` and returns its kind; `None` at the end.
     pub(super) fn next(&mut self, body: &mut Vec<u8>) -> Result<Option<u8>, ChunkFault> {
         let (opcode, data) = match self {
             Self::Beginning { data, at } => {
@@ -85,8 +85,8 @@ impl Chunk {
                 (opcode, record)
             }
             Self::Read { reader, is_whole } => {
-                // It was given all there is at once, so a request for more means that the chunk is over or breaks off;
-                // told that nothing follows, mcap knows which. It asks a second time where it can go no further.
+                // It was given all bytes at once, so a request for more means that the chunk is over or cut off. Told
+                // that nothing follows, mcap knows which. If it cannot proceed, it asks a second time.
                 let mut has_asked = false;
                 loop {
                     match reader.next_event() {
@@ -116,14 +116,14 @@ impl Chunk {
     }
 }
 
-/// What a chunk says of itself.
+/// The header of a chunk.
 struct Head<'a> {
-    /// Its length, unpacked.
+    /// Its decompressed length.
     unpacked: u64,
     compression: &'a str,
-    /// Its length as it is.
+    /// Its stored length.
     packed: u64,
-    /// As much of it as there is.
+    /// The available part of it.
     data: &'a [u8],
 }
 
@@ -140,7 +140,7 @@ impl<'a> Head<'a> {
     }
 }
 
-/// The first record of some: its kind and its bytes.
+/// The first of several records: its kind and its bytes.
 fn split(bytes: &[u8]) -> Option<(u8, &[u8])> {
     let mut fields = Fields(bytes);
     let [opcode] = fields.number::<1>()?;
@@ -148,7 +148,7 @@ fn split(bytes: &[u8]) -> Option<(u8, &[u8])> {
     Some((opcode, fields.take(length)?))
 }
 
-/// Whether the bytes are a row of whole records.
+/// Whether the bytes are a sequence of complete records.
 fn is_framed(mut records: &[u8]) -> bool {
     while !records.is_empty() {
         let Some((_, record)) = split(records) else { return false };
@@ -157,7 +157,7 @@ fn is_framed(mut records: &[u8]) -> bool {
     true
 }
 
-/// What a chunk's error means, in words.
+/// The meaning of a chunk's error, in words.
 fn fault(error: McapError) -> String {
     match error {
         McapError::BadChunkCrc { saved, calculated } => {

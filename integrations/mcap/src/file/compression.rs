@@ -1,21 +1,22 @@
-//! Messages that are packed one by one, as `ros2 bag record --compression-mode message` writes them.
+//! Messages compressed one by one, as written by `ros2 bag record --compression-mode message`.
 
 use super::LIMIT;
 use std::borrow::Cow;
 use std::io::Read;
 
-/// What a frame of zstd starts with. No CDR does: it starts with a zero.
+/// The first bytes of a zstd frame. CDR never starts like this: it starts with a zero.
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-/// What a frame of lz4 starts with.
+/// The first bytes of an lz4 frame.
 const LZ4: [u8; 4] = [0x04, 0x22, 0x4d, 0x18];
 
-/// The payload of a message, unpacked if it is packed by itself. The error says what is wrong with it.
+/// The payload of a message, decompressed if it is compressed individually. The error says what is wrong with it.
 pub(crate) fn unpack(payload: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     let unpacked = match payload.first_chunk::<4>() {
         Some(&ZSTD) => zstd::stream::read::Decoder::new(payload).and_then(read),
         Some(&LZ4) => lz4::Decoder::new(payload).and_then(|mut decoder| {
             let unpacked = read(&mut decoder)?;
-            // Unlike zstd's, this decoder takes the end of its input for that of the frame, and says so only here.
+            // Unlike zstd's, this decoder takes the end of its input for the end of the frame, and reports that only
+            // here.
             if unpacked.len() as u64 <= LIMIT { decoder.finish().1.map(|()| unpacked) } else { Ok(unpacked) }
         }),
         _ => return Ok(Cow::Borrowed(payload)),
@@ -27,7 +28,7 @@ pub(crate) fn unpack(payload: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     }
 }
 
-/// One byte more than is taken at most, so that more can be told from as many.
+/// One byte more than the limit, to detect longer data.
 fn read(decoder: impl Read) -> std::io::Result<Vec<u8>> {
     let mut unpacked = Vec::new();
     decoder.take(LIMIT + 1).read_to_end(&mut unpacked)?;

@@ -1,8 +1,8 @@
-//! The fields of MCAP's records, read off bytes that may be damaged.
+//! The fields of MCAP's records, read from bytes that may be damaged.
 
 use std::collections::BTreeMap;
 
-/// What is left of a record.
+/// The remaining bytes of a record.
 pub(super) struct Fields<'a>(pub(super) &'a [u8]);
 
 impl<'a> Fields<'a> {

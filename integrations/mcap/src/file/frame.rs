@@ -1,7 +1,7 @@
 //! The frame of a record.
 
-/// The longest record or unpacked chunk that is taken, in bytes. Recorders make chunks of about a megabyte; what
-/// exceeds this by far is damage, and would be believed to the point of filling the memory.
+/// The longest record or decompressed chunk that is accepted, in bytes. Recorders make chunks of about a megabyte; a
+/// much larger length is damage, and trusting it would fill the memory.
 pub(crate) const LIMIT: u64 = 256 << 20;
 
 /// Every record starts with its kind (one byte) and its length (eight bytes, little endian).

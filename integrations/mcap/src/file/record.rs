@@ -1,4 +1,4 @@
-//! The records that matter, parsed by hand: mcap's parser panics on some malformed ones.
+//! The relevant records, parsed by hand: mcap's parser panics on some malformed ones.
 
 use super::fields::Fields;
 use mcap::records::op;
@@ -42,7 +42,7 @@ pub(crate) enum Record<'a> {
         media_type: &'a str,
         data: &'a [u8],
     },
-    /// How many messages each channel has, by the summary.
+    /// The number of messages of each channel, from the summary.
     Statistics {
         channels: u32,
         messages: BTreeMap<u16, u64>,
@@ -50,7 +50,7 @@ pub(crate) enum Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// The kinds that [`parse`](Self::parse) knows, as a fault names them.
+    /// The name of a kind that [`parse`](Self::parse) knows, for faults.
     pub(crate) fn kind(opcode: u8) -> &'static str {
         match opcode {
             op::HEADER => "header",
@@ -64,7 +64,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// The record of this kind with these bytes; none if they are not one.
+    /// The record of this kind with these bytes; `None` if they are malformed.
     pub(crate) fn parse(opcode: u8, body: &'a [u8]) -> Option<Self> {
         let mut fields = Fields(body);
         match opcode {

@@ -1,8 +1,8 @@
-//! The records of a file in order, those inside chunks included, up to the end or the break.
+//! The records of a file in order, including those inside chunks, up to the end or the damage.
 //!
-//! The records of the file are framed here rather than by mcap: a place in the file can then be named exactly, a
-//! length is compared with the file before anything is allocated for it, what is not needed (indexes, attachments) is
-//! skipped unread, and a chunk that breaks off is read as far as it goes. mcap unpacks the chunks.
+//! The records of the file are framed here rather than by mcap. A place in the file can then be named exactly, a
+//! length is compared with the file before anything is allocated for it, unneeded records (indexes, attachments) are
+//! skipped unread, and a chunk that is cut off is read as far as it goes. mcap decompresses the chunks.
 
 use super::chunk::{Chunk, ChunkFault};
 use super::frame::{FRAME, LIMIT, unframe};
@@ -14,12 +14,12 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// A file, and where in it the reading is.
+/// A file, and the reading position.
 pub(crate) struct Records {
     file: BufReader<File>,
     /// The size of the file when it was opened. A recorder may still be writing to it.
     size: u64,
-    /// Whether the file ends as a finished one does, so that running over its end is damage and not truncation.
+    /// Whether the file ends like a complete one, so that running over its end is damage and not truncation.
     is_finished: bool,
     /// Whether headers, metadata and attachments are wanted as well.
     all: bool,
@@ -27,7 +27,7 @@ pub(crate) struct Records {
     next: u64,
     /// Where the current record starts, or the chunk it is in.
     byte: u64,
-    /// The chunk that is being read.
+    /// The chunk being read.
     chunk: Option<Chunk>,
     /// The kind of the current record.
     opcode: u8,
@@ -35,7 +35,7 @@ pub(crate) struct Records {
     body: Vec<u8>,
     /// Messages before the current record.
     messages: u64,
-    /// After the end, and after the break.
+    /// After the end, and after the damage.
     is_over: bool,
 }
 
@@ -50,13 +50,13 @@ impl Records {
         Self::open_for(path, true)
     }
 
-    /// Looks at both ends of the file.
+    /// Checks both ends of the file.
     fn open_for(path: &Path, all: bool) -> Result<Self, RecordingErrorKind> {
         let io = |cause: io::Error| match cause.kind() {
             io::ErrorKind::NotFound => RecordingErrorKind::Missing,
             _ => RecordingErrorKind::Read { byte: 0, cause },
         };
-        // Asked before opening: opening a pipe would wait for a writer.
+        // Checked before opening: opening a pipe would wait for a writer.
         let about = std::fs::metadata(path).map_err(io)?;
         if !about.is_file() {
             return Err(RecordingErrorKind::NotAFile);
@@ -99,7 +99,7 @@ impl Records {
         self.size
     }
 
-    /// The file itself, to look elsewhere in it; reading on from there is not possible.
+    /// The file itself, to read elsewhere in it; reading cannot be resumed afterwards.
     pub(crate) fn into_file(self) -> BufReader<File> {
         self.file
     }
@@ -120,7 +120,7 @@ impl Records {
         RecordingErrorKind::Corrupt { messages: self.messages, byte: self.byte, fault: fault.into() }
     }
 
-    /// Steps to the next record that is wanted; false at the end of the data. After an error there is nothing more.
+    /// Steps to the next wanted record; returns false at the end of the data. After an error there is nothing more.
     pub(crate) fn advance(&mut self) -> Result<bool, RecordingErrorKind> {
         if self.is_over {
             return Ok(false);
@@ -146,7 +146,7 @@ impl Records {
                     Err(fault) => return Err(self.chunk_fault(fault)),
                 },
                 None => match self.step()? {
-                    // Only what a whole file ends with tells that nothing is missing after it.
+                    // Only the records at the end of a complete file show that nothing is missing after it.
                     (op::DATA_END | op::FOOTER, _) if !self.is_finished => return Err(self.overrun()),
                     (op::DATA_END | op::FOOTER, _) => return Ok(false),
                     (op::CHUNK, is_whole) => {
@@ -172,8 +172,8 @@ impl Records {
         }
     }
 
-    /// Reads the next record of the file and returns its kind, and whether it is whole: only a chunk need not be. The
-    /// body is read only of the kinds that are wanted.
+    /// Reads the next record of the file and returns its kind, and whether it is complete: only a chunk may be
+    /// incomplete. The body is read only for wanted kinds.
     fn step(&mut self) -> Result<(u8, bool), RecordingErrorKind> {
         self.byte = self.next;
         let left = self.size.saturating_sub(self.next);
@@ -236,7 +236,7 @@ impl Records {
     }
 }
 
-/// What a file that is not MCAP is likely to be, by what it starts with, and the way out.
+/// The likely format of a file that is not MCAP, by its first bytes, and what to do with it.
 const OTHERS: [(&[u8], &str); 10] = [
     (
         b"SQLite format 3",

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long the thread waits for a message before it looks whether it shall stop.
+/// How long the thread waits for a message before it checks whether to stop.
 const WAIT: Duration = Duration::from_millis(20);
 
 /// A recorder that writes on its own thread until it is stopped or dropped.
@@ -33,7 +33,7 @@ impl BackgroundRecorder {
         let path = recorder.path().to_owned();
         let shared = Arc::new(Shared::default());
         let theirs = Arc::clone(&shared);
-        // If no thread starts, the recorder comes back, so that it is dropped here with its file ended.
+        // If no thread starts, the recorder is returned, so that it is dropped here and its file completed.
         let recorder = Arc::new(Mutex::new(Some(recorder)));
         let handed = Arc::clone(&recorder);
         let thread = std::thread::Builder::new().name("recorder".into()).spawn(move || {
@@ -80,7 +80,7 @@ impl BackgroundRecorder {
 
 impl Drop for BackgroundRecorder {
     fn drop(&mut self) {
-        // There is nobody to tell.
+        // The error cannot be reported to anyone.
         let _ = self.end();
     }
 }

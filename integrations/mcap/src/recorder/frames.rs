@@ -1,4 +1,4 @@
-//! Where the frames of the robot are, on the topics where viewers expect that: `/tf_static` and `/tf`.
+//! The robot's frames, on the topics where viewers expect them: `/tf_static` and `/tf`.
 
 use bb_core::message::codec::ros::{Header, Time, TransformStamped, TransformsMessage, WORLD};
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -6,30 +6,30 @@ use bb_core::payload::{Odometry, Orientation, Pose, PoseWithCovariance};
 use bb_core::topology::Topology;
 use bb_core::{DynamicMessage, JointSide};
 
-/// What is known of the frames from the messages so far.
+/// The state of the frames from the messages so far.
 #[derive(Debug)]
 pub(super) struct Frames {
     topology: &'static Topology,
-    /// The path that tells where the robot is, and whether it tells a position.
+    /// The path that places the robot, and whether it includes a position.
     body: Option<(String, Told)>,
 }
 
-/// How much a path tells of a body; the more, the greater.
+/// How much a path says about a body, in increasing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Told {
     Orientation,
     Pose,
-    /// Whatever it is, it was chosen.
+    /// Chosen explicitly, whatever it contains.
     Chosen,
 }
 
 impl Frames {
-    /// Of a robot whose place is told by `body`, or else by the path that tells the most, the first of several.
+    /// For a robot placed by `body`, or otherwise by the path that says the most, the first of several.
     pub(super) fn new(topology: &'static Topology, body: Option<String>) -> Self {
         Self { topology, body: body.map(|path| (path, Told::Chosen)) }
     }
 
-    /// All joints that move, at rest: where they are until a message says otherwise.
+    /// All moving joints, at rest: their positions until a message reports others.
     pub(super) fn at_rest(&self) -> impl Iterator<Item = (usize, Vec<f64>)> + '_ {
         let joints = self.topology.joints.iter().enumerate();
         joints.map(|(number, _)| match self.topology.followed(number) {
@@ -38,7 +38,7 @@ impl Frames {
         })
     }
 
-    /// The transforms that a message tells.
+    /// The transforms reported by a message.
     pub(super) fn told(&mut self, message: &DynamicMessage) -> TransformsMessage {
         let stamp = message.stamp();
         let joints = self.joints(message);
@@ -51,7 +51,7 @@ impl Frames {
             child_frame_id: child.to_owned(),
             transform: world_from_body,
         };
-        // The frame of a link has one parent, its joint's; an estimate of where it is has a frame of its own.
+        // The frame of a link has one parent, its joint's; an estimate of its pose gets its own frame.
         let mut transforms = vec![at(message.path())];
         if let Some(root) = self.topology.links.first()
             && root.name == stamp.frame.name()
@@ -73,7 +73,7 @@ impl Frames {
         }
     }
 
-    /// The joints whose positions a message tells, and where they are.
+    /// The joints whose positions a message reports, and these positions.
     fn joints(&self, message: &DynamicMessage) -> Vec<(usize, Vec<f64>)> {
         let mut told = Vec::new();
         let stamp = message.stamp();
@@ -110,7 +110,7 @@ impl Frames {
 
 const NONE: TransformsMessage = TransformsMessage { transforms: Vec::new() };
 
-/// Where a body is by an estimate of it; none if the message is not an estimate of a pose, or is not finite.
+/// The pose of a body from an estimate; `None` if the message is not an estimate of a pose, or is not finite.
 fn place(message: &DynamicMessage) -> Option<(Told, Isometry3<f64>)> {
     let at = |position: Vector3<f64>, rotation: UnitQuaternion<f64>| {
         let is_place = position.iter().all(|value| value.is_finite()) && (rotation.norm() - 1.0).abs() < 0.1;

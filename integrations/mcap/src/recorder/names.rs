@@ -1,4 +1,4 @@
-//! The names of definitions: readers tell types apart by them, so that one name must have one definition.
+//! The names of definitions: readers distinguish types by them, so one name must have one definition.
 
 use crate::error::RecordingErrorKind;
 use crate::file::full_name;
@@ -12,7 +12,7 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// Takes in a definition and all that it names.
+    /// Adds a definition and all those it refers to.
     ///
     /// # Errors
     /// One of the names has another definition already.

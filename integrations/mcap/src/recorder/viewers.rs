@@ -1,4 +1,4 @@
-//! What is in a recording for viewers: which robot it is, and topics that no component published.
+//! Data for viewers in a recording: the identity of the robot, and topics that no component published.
 
 use super::{FileWriter, ROBOT, RecorderOptions, URDF};
 use bb_core::WallTime;
@@ -9,7 +9,7 @@ use mcap::{Attachment, McapResult};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// Which robot it is, at the beginning.
+/// Identifies the robot, at the beginning.
 pub(super) fn describe(writer: &mut FileWriter, options: &RecorderOptions) -> McapResult<()> {
     let Some(robot) = &options.robot else { return Ok(()) };
     let metadata = BTreeMap::from([("name".to_owned(), robot.name.to_owned())]);
@@ -41,7 +41,7 @@ pub(crate) fn view_as(
     qos: &str,
 ) -> McapResult<u16> {
     let schema = Schema::new(name, shape);
-    // ROS's player wants it to be there.
+    // ROS's player requires it.
     let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos.to_owned())]);
     let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
     writer.add_channel(schema, topic, Schema::MESSAGE_ENCODING, &metadata)
@@ -62,7 +62,7 @@ pub(super) fn latched<T: Field>(
     writer.write_to_known_channel(&header, &bytes)
 }
 
-/// Keep the last, reliable, transient local: as ROS's recorder writes it.
+/// Keep the last, reliable, transient local: as written by ROS's recorder.
 const LATCHED: &str = "- history: 1
   depth: 1
   reliability: 1
@@ -80,7 +80,7 @@ const LATCHED: &str = "- history: 1
   avoid_ros_namespace_conventions: false
 ";
 
-/// MCAP has no time before 1970.
+/// MCAP has no times before 1970.
 pub(crate) fn nanos(time: WallTime) -> u64 {
     u64::try_from(time.as_unix_nanos()).unwrap_or(0)
 }

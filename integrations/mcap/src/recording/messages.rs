@@ -1,4 +1,4 @@
-//! The messages of a recording, as they are asked for.
+//! The messages of a recording, read lazily.
 
 use super::RecordedChannel;
 use crate::error::{RecordingError, RecordingErrorKind};
@@ -13,19 +13,19 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A message whose payload's type only its reader knows.
+/// A message whose payload type is known only to its reader.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct RecordedMessage {
-    /// Where it was published.
+    /// The path it was published at.
     pub channel: Arc<RecordedChannel>,
-    /// Its wall time, as published; that of one before 1970 is the epoch here.
+    /// Its wall time, as published; a time before 1970 becomes the epoch.
     pub time: WallTime,
-    /// As the channel's definition says.
+    /// Encoded according to the channel's definition.
     pub data: Vec<u8>,
-    /// The message with all it holds, where ROS's layout does not hold it.
+    /// The complete message, if ROS's layout cannot represent it.
     exact: Option<Vec<u8>>,
-    /// The second message, where ROS has two.
+    /// The second message, if ROS has two.
     companion: Option<Vec<u8>>,
 }
 
@@ -33,7 +33,7 @@ impl RecordedMessage {
     /// The message as it was published, bit for bit.
     ///
     /// # Errors
-    /// Its payload is no `T`, or its bytes are damaged.
+    /// Its payload is not a `T`, or its bytes are damaged.
     pub fn decode<T: Payload>(&self) -> Result<Stamped<T>, RecordingErrorKind> {
         self.channel.check::<T>()?;
         self.read()
@@ -63,7 +63,7 @@ impl RecordedMessage {
 }
 
 impl RecordedChannel {
-    /// Whether its messages carry a `T` as it is now.
+    /// Whether its messages have the current fields of `T`.
     pub(crate) fn check<T: Payload>(&self) -> Result<(), RecordingErrorKind> {
         let exact = Stamped::<T>::schema();
         let now = match self.layout {
@@ -89,7 +89,7 @@ impl RecordedChannel {
     }
 }
 
-/// Which channels are read.
+/// The channels that are read.
 #[derive(Debug)]
 pub(crate) struct Wanted {
     by_id: HashMap<u16, Role>,
@@ -125,12 +125,12 @@ pub struct AllMessages {
     path: PathBuf,
     records: Records,
     wanted: Wanted,
-    /// What was written beside the next message of a channel, by channel.
+    /// Data written beside the next message of a channel, by channel.
     beside: HashMap<u16, Numbered>,
     companions: HashMap<u16, Numbered>,
 }
 
-/// The number of a message, and what goes with it.
+/// The number of a message, and the data that belongs to it.
 type Numbered = (u32, Vec<u8>);
 
 impl AllMessages {

@@ -9,7 +9,7 @@ use bb_core::prelude::*;
 use bb_mcap::{Bag, BagMessage, IMU, MOVING, RecordingError, RecordingErrorKind};
 use mcap::WriteOptions;
 
-/// That a message of a type that is read is one.
+/// Checks that a message of a readable type decodes.
 fn decoded(message: &BagMessage) -> Result<(), RecordingError> {
     match &*message.schema {
         IMU => message.payload::<Imu>().map(drop),
@@ -18,7 +18,7 @@ fn decoded(message: &BagMessage) -> Result<(), RecordingError> {
     }
 }
 
-/// Reads all it can: how many messages, and the error that ended it.
+/// Reads as much as possible. Returns the number of messages, and the error that ended it.
 fn read(path: &Path) -> (usize, Option<RecordingError>) {
     let bag = match Bag::open(path) {
         Ok(bag) => bag,
@@ -152,8 +152,8 @@ fn cut_anywhere() {
     }
 }
 
-/// A changed bit gives an error or, where nothing checks it, fewer or other messages, but no panic. Chunks without
-/// checksums are the hard case: whatever is in them is believed.
+/// A changed bit gives an error or, if nothing checks it, fewer or other messages, but never a panic. Chunks without
+/// checksums are the hard case: their contents are trusted.
 #[test]
 fn bits_flipped_anywhere() {
     let mut cases: Vec<_> = layouts().into_iter().map(|(name, options)| (name.to_owned(), options)).collect();
@@ -173,8 +173,8 @@ fn bits_flipped_anywhere() {
             std::fs::write(&path, &bytes).expect("writes");
             let (count, error) = read(&path);
             assert!(count <= 12, "{name} {at}");
-            // Nothing is lost in silence: the checksums cover the messages, and the summary counts them, which
-            // shows when a changed frame hides a whole chunk.
+            // Nothing is lost silently: the checksums cover the messages, and the summary counts them, which reveals
+            // a chunk hidden by a changed frame.
             if summed && error.is_none() {
                 assert_eq!(count, 12, "{name} {at}");
             }
@@ -227,7 +227,7 @@ fn a_chunk_packed_in_an_unknown_way() {
     assert!(said.starts_with("the chunk at byte ") && said.contains("packed with `brot`"), "{said}");
 }
 
-/// A record that is there, and longer than what is held in memory. The file is sparse, so that it takes no room.
+/// A record that exists and is longer than the memory limit. The file is sparse, so it takes no space.
 #[test]
 fn a_message_of_300_mib_is_refused() {
     let length: u64 = 300 << 20;
@@ -245,7 +245,7 @@ fn a_message_of_300_mib_is_refused() {
     std::fs::remove_file(&path).expect("it is ours");
 }
 
-/// A chunk that says that it is short and unpacks to much is not unpacked further than it says.
+/// A chunk that claims to be short but decompresses to much more is not decompressed beyond its claim.
 #[test]
 fn a_chunk_that_unpacks_to_more_than_it_says() {
     let packed = zstd::stream::encode_all(std::io::repeat(0).take(300 << 20), 0).expect("packs");

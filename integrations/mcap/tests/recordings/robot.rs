@@ -1,4 +1,4 @@
-//! A robot whose sensors publish what is hard to record.
+//! A robot whose sensors publish payloads that are hard to record.
 
 use bb_core::nalgebra::{Matrix3, Quaternion, Unit, Vector3};
 use bb_core::prelude::*;
@@ -40,7 +40,7 @@ macro_rules! counted {
 }
 
 counted! {
-    /// Sometimes with covariances that ROS takes for unknown ones, and with a NaN that has a number in it.
+    /// Sometimes with covariances that ROS treats as unknown, and with a NaN that has a payload.
     Inertial, Imu, |n| Imu {
         orientation: (n.is_multiple_of(3)).then(|| Unit::new_unchecked(Quaternion::new(1.0, 0.0, -0.0, f64::from(n)))),
         orientation_covariance: (n.is_multiple_of(2)).then(Matrix3::identity),

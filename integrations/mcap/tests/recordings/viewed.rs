@@ -1,4 +1,4 @@
-//! What other programs see in a recording: IMUs, frames, dates, and names that they can tell apart.
+//! A recording as seen by other programs: IMUs, frames, dates, and distinguishable names.
 
 use crate::robot::{Temporary, record};
 use bb_core::message::codec::ros::TransformsMessage;

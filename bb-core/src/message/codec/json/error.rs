@@ -21,7 +21,7 @@ impl JsonError {
         Self::new(format!("expected {expected}, found {found}"))
     }
 
-    /// The same, in the field `name` of a larger value.
+    /// The same error, in the field `name` of a larger value.
     pub fn within(mut self, name: impl Into<Cow<'static, str>>) -> Self {
         self.path.enter(name);
         self

@@ -1,7 +1,7 @@
 //! JSON and a shape to bytes.
 //!
-//! `serde_json` checks the syntax of the whole text, then splits it level by level as the shape requires. The recursion is
-//! therefore as deep as the shape, however deep the text is nested.
+//! `serde_json` checks the syntax of the whole text, then splits it level by level as the shape requires. The
+//! recursion is therefore as deep as the shape, no matter how deeply the text is nested.
 
 use super::token::{float, integer, list, members, string, syntax, text_of};
 use super::wording::{Quoted, did_you_mean, expected, found, mismatch, unknown};
@@ -12,7 +12,7 @@ use serde_json::value::RawValue;
 /// A value from JSON, in the form that [`to_json`](super::to_json) writes.
 ///
 /// An `Option` may be left out of an object; every other field is required. Unknown and repeated fields are errors. A
-/// struct without fields reads from `{}`, from `null` and from empty text.
+/// struct without fields is read from `{}`, from `null` and from empty text.
 ///
 /// ```
 /// use bb_core::message::codec::from_json;
@@ -39,8 +39,8 @@ pub fn from_json<T: Field>(text: &str) -> Result<T, JsonError> {
     Ok(decode(&json_to_bytes(text, T::SHAPE)?)?)
 }
 
-/// The bytes that [`encode`](super::super::encode) writes for the value that JSON describes, without its type. What the
-/// type itself refuses is not checked, such as a `Duration` with 10⁹ or more in its nanoseconds.
+/// The bytes that [`encode`](super::super::encode) writes for the value described by JSON, without its type.
+/// Restrictions of the type itself are not checked, such as a `Duration` with 10⁹ or more in its nanoseconds.
 ///
 /// # Errors
 /// As for [`from_json`].
@@ -196,7 +196,7 @@ fn variant(of: &'static EnumShape, value: &RawValue, writer: &mut Writer<'_>) ->
     let is_list = |variant: &&StructShape| !variant.fields.is_empty();
     let before = of.variants.iter().take(index).filter(is_list).count();
     let after = of.variants.iter().skip(index + 1).filter(is_list).count();
-    // An enum with more variants than `u32` has numbers does not compile in a lifetime.
+    // An enum with more than `u32::MAX` variants does not compile in a lifetime.
     writer.variant(u32::try_from(index).unwrap_or(u32::MAX), before);
     match (variant.fields.is_empty(), fields) {
         (true, None) => {}

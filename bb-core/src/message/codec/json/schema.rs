@@ -1,4 +1,4 @@
-//! A shape as JSON Schema: which JSON [`from_json`](super::from_json) accepts.
+//! A shape as JSON Schema: the JSON that [`from_json`](super::from_json) accepts.
 
 use super::read::is_optional;
 use super::write::{number, text};
@@ -36,7 +36,7 @@ pub fn json_schema(shape: Shape) -> String {
     document(&title(shape), &root, definitions)
 }
 
-/// A schema of these keywords, with what they refer to.
+/// A schema with these keywords, and the definitions it refers to.
 pub(crate) fn document(title: &str, root: &str, mut definitions: Definitions) -> String {
     let mut json = r#"{"$schema":"https://json-schema.org/draft/2020-12/schema""#.to_owned();
     for keywords in [title, root] {
@@ -45,7 +45,7 @@ pub(crate) fn document(title: &str, root: &str, mut definitions: Definitions) ->
             json.push_str(keywords);
         }
     }
-    // A definition may name further ones.
+    // A definition may refer to others.
     let mut index = 0;
     while let Some((name, shape)) = definitions.known.get(index).cloned() {
         json.push_str(if index == 0 { r#","$defs":{"# } else { "," });
@@ -77,7 +77,7 @@ pub(crate) struct Definitions {
 }
 
 impl Definitions {
-    /// What is between the braces of a schema.
+    /// The contents of a schema's braces.
     fn keywords(&mut self, shape: Shape) -> String {
         match shape {
             Shape::Bool => member("type", "boolean"),

@@ -1,4 +1,4 @@
-//! What is written is read back, what is wrong is named, and the schema takes what the reader takes.
+//! Written values are read back, errors name the field, and the schema accepts what the reader accepts.
 
 use super::*;
 use crate::Payload;
@@ -12,7 +12,8 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use std::time::Duration;
 
-/// JSON that was written is read back: the same but for which NaN it was and for `Some(None)`, which `null` is not.
+/// JSON that was written is read back unchanged, except for the bits of a NaN and for `Some(None)`, which `null` does
+/// not express.
 pub(in crate::message::codec) fn round_trip<T: Field>(value: &T) {
     let json = to_json(value);
     let read: T = from_json(&json).expect("it was written just now");
@@ -54,7 +55,7 @@ enum Mode {
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 struct Wrapped(Option<u16>);
 
-/// As a user writes it for a command that takes none.
+/// As a user writes it for a command without arguments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 struct NoArguments;
 
@@ -71,7 +72,7 @@ fn arguments() -> Value {
     })
 }
 
-/// What is said of the arguments with one field changed.
+/// The error for the arguments with one field changed.
 fn error_with(field: &str, value: Value) -> String {
     let mut arguments = arguments();
     arguments[field] = value;
@@ -324,7 +325,7 @@ fn a_schema_says_what_is_read() {
     assert_eq!(json_schema(bool::SHAPE), scalar);
 }
 
-/// So much of JSON Schema as ours use.
+/// The part of JSON Schema that our schemas use.
 fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
     let Some(keywords) = schema.as_object() else { return schema != &json!(false) };
     let all = |list: &Value| list.as_array().cloned().unwrap_or_default();

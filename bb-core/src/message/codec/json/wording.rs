@@ -27,7 +27,7 @@ pub(super) fn mismatch(shape: Shape, value: &RawValue) -> JsonError {
     JsonError::mismatch(expected(shape), found(value))
 }
 
-/// In the words of JSON.
+/// As named in JSON.
 pub(super) fn expected(shape: Shape) -> String {
     let range = |least: i128, most: i128| format!("an integer from {least} to {most}");
     match shape {
@@ -70,7 +70,7 @@ pub(super) fn found(value: &RawValue) -> String {
     }
 }
 
-/// Text in quotes, as JSON has it.
+/// Text in quotes, as in JSON.
 pub(super) struct Quoted<'a>(pub(super) &'a str);
 
 impl fmt::Display for Quoted<'_> {

@@ -9,7 +9,7 @@ pub fn to_json<T: Field>(value: &T) -> String {
     let mut bytes = Vec::new();
     value.write(&mut Writer::new(&mut bytes));
     let mut json = String::new();
-    // What was written just now can be read.
+    // Bytes written just now can be read.
     let _ = write(T::SHAPE, &mut Reader::new(&bytes), &mut json);
     json
 }

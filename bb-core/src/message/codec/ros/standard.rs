@@ -78,23 +78,23 @@ pub struct Header {
 }
 
 impl Header {
-    /// Of a message whose values are in its frame.
+    /// The header of a message whose values are in its frame.
     pub fn of<T>(message: &Stamped<T>) -> Self {
         Self::in_frame(message, message.frame.name())
     }
 
-    /// Of a message whose values are in another frame.
+    /// The header of a message whose values are in another frame.
     pub fn in_frame<T>(message: &Stamped<T>, frame: &str) -> Self {
         Self { stamp: Time::of(message.wall_time), frame_id: frame.to_owned() }
     }
 
-    /// Writes one without making it.
+    /// Writes a header without creating it.
     pub(in crate::message::codec) fn write_parts(time: WallTime, frame: &str, writer: &mut Writer<'_>) {
         Time::of(time).write(writer);
         writer.text(frame);
     }
 
-    /// Reads one of which only the frame is needed, and kept.
+    /// Reads a header, keeping only the frame.
     pub(in crate::message::codec) fn read_frame(reader: &mut Reader<'_>) -> Result<&'static str, DecodeError> {
         Time::read(reader).map_err(|error| error.within("stamp"))?;
         let frame = reader.text().map_err(|error| error.within("frame_id"))?;
@@ -114,11 +114,11 @@ pub struct Text {
 #[derive(Clone, Debug, PartialEq, Payload)]
 #[payload(name = "geometry_msgs/TransformStamped")]
 pub struct TransformStamped {
-    /// Time, and the frame that the transform leads to.
+    /// The time, and the frame that the transform leads to.
     pub header: Header,
     /// The frame that it leads from.
     pub child_frame_id: String,
-    /// Takes points of the child to the frame of the header.
+    /// Transforms points from the child frame to the frame of the header.
     pub transform: Isometry3<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Every shared payload: as bytes, as JSON and as ROS has it.
+//! Every shared payload: as bytes, as JSON and as a ROS message.
 
 mod exchange;
 mod random;
@@ -14,12 +14,12 @@ use random::Random;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What is written is read back, and `is_exact_as_ros` tells what ROS's message does not keep.
+/// Written values are read back, and `is_exact_as_ros` tells what ROS's message loses.
 fn holds<T: Payload + RosMessage>(random: &mut Random, stamp: Stamp) {
     let payload: T = random.value();
     round_trip(&payload);
     ros_round_trip(payload, stamp);
-    // So is what came from ROS.
+    // The same for values from ROS.
     let message: T::Message = random.value();
     let bytes = bytes_of(&message);
     let message: T::Message = decode(&bytes).expect("it was written just now");
@@ -28,7 +28,7 @@ fn holds<T: Payload + RosMessage>(random: &mut Random, stamp: Stamp) {
     }
 }
 
-/// Calls a function for each payload that ROS has a message for.
+/// Calls a function for each payload that has a ROS message.
 macro_rules! of_each_ros_payload {
     ($call:ident($($argument:expr),*)) => {
         of_each_ros_payload! {
@@ -48,7 +48,7 @@ macro_rules! of_each_ros_payload {
 use of_each_ros_payload;
 
 proptest! {
-    // Of every payload each.
+    // One of every payload.
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
@@ -63,7 +63,7 @@ proptest! {
     }
 }
 
-/// As ROS 2 Kilted has them in its packages' `msg/*.json`; `tests/ros2/check` compares with what is installed.
+/// From the packages' `msg/*.json` in ROS 2 Kilted; `tests/ros2/check` compares with the installed ones.
 #[test]
 fn type_hashes_are_those_of_ros() {
     fn named<T: Payload>(hashes: &mut Vec<(String, String)>) {
@@ -107,7 +107,8 @@ fn type_hashes_are_those_of_ros() {
     assert_eq!(hashes, expected);
 }
 
-/// `sensor_msgs/Imu` documents −1 as the first element of a covariance as the mark of what is absent, and zeros as unknown.
+/// `sensor_msgs/Imu` documents −1 as the first element of a covariance as the mark of an absent value, and zeros as
+/// unknown.
 #[test]
 fn an_orientation_is_absent_where_ros_says_so() {
     let imu = |orientation: [f64; 4], first: f64| {
@@ -154,7 +155,7 @@ fn nine_axes_are_two_messages() {
     }
 }
 
-/// ROS's message holds what sensors usually measure, so it is recorded once.
+/// ROS's message holds everything that sensors usually measure, so it is recorded once.
 #[test]
 fn usual_values_are_exact_as_ros() {
     fn is_exact<T: Payload>(payload: T) -> bool {
@@ -318,7 +319,7 @@ fn messages_that_a_payload_cannot_be_are_refused_by_field() {
 fn what_ros_appends_is_ignored() {
     let mut bytes = vec![0; 36];
     bytes[1] = 1;
-    // An empty frame is the zero that ends it.
+    // An empty frame is its terminating zero.
     bytes[12] = 1;
     bytes.extend(*b"astrtps_");
     let (states, _) = decode_as_ros::<JointStates>(&bytes).expect("it is whole");

@@ -1,4 +1,4 @@
-//! `sensor_msgs/BatteryState`: NaN is not measured; degrees Celsius, ampere hours.
+//! `sensor_msgs/BatteryState`: NaN means not measured; degrees Celsius, ampere hours.
 
 use super::super::number::{code, of_code, or_nan, unless_nan};
 use super::super::ros_message;

@@ -1,4 +1,4 @@
-//! `sensor_msgs/JointState`, which is also what ROS has for commands: with the lists that are commanded.
+//! `sensor_msgs/JointState`, which ROS also uses for commands, with only the commanded lists.
 
 use super::super::ros_message;
 use crate::message::{DecodeError, Stamped};

@@ -1,4 +1,4 @@
-//! What the field says about the heading.
+//! The heading measurement from the field.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -11,7 +11,7 @@ use crate::attitude::mekf::measurement::Heading;
 use crate::attitude::mekf::states::ROTATION;
 use crate::attitude::rotation::turn_heading;
 
-/// How long a disturbance of the field lasts for a body that moves, s.
+/// How long a disturbance of the field lasts for a moving body, s.
 const FIELD_TIME_S: f64 = 0.5;
 
 /// A heading that is known from before is turned to the field beyond this difference, rad, and two standard deviations.
@@ -23,7 +23,7 @@ const CONTRADICTION: f64 = 0.35;
 const CONTRADICTION_DEVIATIONS: f64 = 4.0;
 
 impl<T: Real> MekfFilter<T> {
-    /// What the field says about the heading, less the offset and the lag.
+    /// The heading measured by the field, corrected for the offset and the lag.
     pub(super) fn heading(&mut self, dt: T, fields: &FieldMeans<T>) -> Heading<T> {
         let FieldMeans { rotation, field, rate } = fields;
         let field = field - rotation * self.iron.offset - rate * self.iron.lag();
@@ -44,7 +44,7 @@ impl<T: Real> MekfFilter<T> {
         let usual = T::of(self.params.field_disturbance * self.params.field_disturbance);
         let least = T::of(0.25) * horizontal * horizontal * reference.squared_norm();
         let rate = (rate.x * field.y - rate.y * field.x) / squared.max(least);
-        // What is not known of the offset, across the field, as a fraction of its norm.
+        // The uncertainty of the offset, across the field, as a fraction of its norm.
         let across = rotation.tr_mul(&Vector3::new(field.y, -field.x, T::ZERO)) / squared.max(least).sqrt();
         let unknown = across.dot(&(self.iron.covariance() * across)) / reference.squared_norm();
         let disturbed = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown) / (horizontal * horizontal);
@@ -55,11 +55,11 @@ impl<T: Real> MekfFilter<T> {
         }
     }
 
-    /// Takes an offset that the field has shown, and the heading where the fields are all that shows it.
+    /// Adopts an offset shown by the field, and the heading if the fields are its only source.
     #[cold]
     pub(super) fn adopt(&mut self, orientation: UnitQuaternion<T>, adoption: &Adoption<T>) -> UnitQuaternion<T> {
         let Adoption { field, variance, is_heading, is_other_field, duration } = adoption;
-        // What the window says about the heading was with the offset before.
+        // The heading measurement of this window used the previous offset.
         self.measurements.forget_heading();
         if *is_heading || *is_other_field {
             self.field = Some(FieldReference::seen(in_plane(field), *duration));

@@ -1,4 +1,4 @@
-//! How the filter starts, and starts again: with a sample, after a gap, and where what it knows is contradicted.
+//! How the filter starts and restarts: with a sample, after a gap, and if its estimates are contradicted.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -31,7 +31,7 @@ impl<T: Real> MekfFilter<T> {
         self.vertical = Vertical::new(true);
     }
 
-    /// Resets the orientation's errors; what is known of the sensors stays.
+    /// Resets the orientation's errors; the sensor errors are kept.
     pub(super) fn begin(&mut self, orientation: &UnitQuaternion<T>, tilt_deviation: T, heading_deviation: T) {
         // Without a magnetometer there is no heading to be wrong.
         let heading_deviation = if self.params.magnetometer { heading_deviation } else { T::ZERO };
@@ -49,7 +49,7 @@ impl<T: Real> MekfFilter<T> {
         self.iron.begin(true);
     }
 
-    /// Doubts what is known of the sensors as at the start.
+    /// Resets the uncertainty of the sensor errors to that at the start.
     pub(super) fn forget_sensors(&mut self) {
         let params = &self.params;
         self.errors.forget::<3>(BIAS, T::of(params.initial_bias * params.initial_bias));
@@ -59,7 +59,7 @@ impl<T: Real> MekfFilter<T> {
     }
 
     /// The body accelerated at the start: levels it by the mean specific force since, known up to `deviation`, rad.
-    /// The heading is that of the last field; what is known of the sensors stays.
+    /// The heading is that of the last field; the sensor errors are kept.
     #[cold]
     pub(super) fn level_start(
         &mut self,
@@ -93,7 +93,7 @@ impl<T: Real> MekfFilter<T> {
         orientation
     }
 
-    /// Numbers beyond all reason came in, and no knowledge is left: restarts from the orientation.
+    /// Absurd numbers came in and no estimate is usable: restarts from the orientation.
     #[cold]
     pub(super) fn recover(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
         let (state, heading_known) = (self.state.clone(), self.heading_known);

@@ -1,4 +1,4 @@
-//! The end of a window: errors taken to now, corrected by, and what the window measures.
+//! The end of a window: propagates and corrects the errors, and prepares the window's measurements.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -24,17 +24,17 @@ const REST_VELOCITY: f64 = 0.05;
 /// Noise of the accelerometer, of its scale and of the lever arm's rotation, m/s/√s.
 const ACCELEROMETER_NOISE: f64 = 0.02;
 
-/// What the gyroscope's mean over a second at rest may differ from its bias by, rad/s: 0.07°/s.
+/// How much the gyroscope's mean over a second at rest may differ from its bias, rad/s: 0.07°/s.
 const REST_BIAS: f64 = 1.2e-3;
 
 /// A bias at rest this many standard deviations off has stepped.
 const BIAS_STEP: f64 = 4.0;
 
-/// The greatest difference to the bias that rest is believed for, rad/s: 2°/s, VQF's `biasClip`.
+/// The largest difference from the bias for which rest is accepted, rad/s: 2°/s, VQF's `biasClip`.
 const MAX_REST_BIAS: f64 = 0.035;
 
 impl<T: Real> MekfFilter<T> {
-    /// Ends a window: takes the errors to now, corrects by them, and looks at what the window says.
+    /// Ends a window: propagates the errors to now, corrects by them, and evaluates the window.
     pub(super) fn close_window(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
         while self.measurements.take(&mut self.errors) {}
         let window = core::mem::replace(&mut self.window, Window::new());
@@ -74,7 +74,7 @@ impl<T: Real> MekfFilter<T> {
         }
     }
 
-    /// Moves the mean errors into what they are errors of; returns the rotation.
+    /// Moves the mean errors into the estimates; returns the rotation.
     pub(super) fn correct(&mut self) -> UnitQuaternion<T> {
         let mean = &mut self.errors.mean;
         let rotation = Vector3::new(mean[ROTATION], mean[ROTATION + 1], mean[ROTATION + 2]);
@@ -88,7 +88,7 @@ impl<T: Real> MekfFilter<T> {
         turn(&UnitQuaternion::identity(), &rotation)
     }
 
-    /// Looks at what a window says, for the samples of the next one to take.
+    /// Prepares a window's measurements, to be fused with the samples of the next one.
     fn measure(&mut self, dt: T, fields: Option<&FieldMeans<T>>, force: &Vector3<T>) {
         let resting = self.rest.is_detected();
         let squared = (force.x * force.x + force.y * force.y) / (dt * dt);
@@ -106,7 +106,7 @@ impl<T: Real> MekfFilter<T> {
         self.measurements = Measurements::new(velocity_variance, heading, bias);
     }
 
-    /// What the gyroscope reads at rest is its bias.
+    /// The gyroscope's reading at rest is its bias.
     fn rest_bias(&mut self, dt: T) -> (Vector3<T>, T) {
         let difference = self.rest.rate - self.bias;
         let squared = difference.norm_squared();

@@ -8,19 +8,19 @@ use nalgebra::{Matrix3, Matrix4, UnitQuaternion, Vector3, Vector4};
 
 use crate::attitude::Real;
 
-/// The errors of a field before any are seen, as a fraction of its norm, and how long that is worth, s: seven numbers fit
-/// the first second too well.
+/// The assumed error of a field before any is seen, as a fraction of its norm, and its weight as a duration, s: seven
+/// numbers fit the first second too well.
 const PRIOR_ERROR: f64 = 0.02;
 const PRIOR_S: f64 = 2.0;
 
-/// What the errors of the field, which last for some time, are taken to be correlated over, s.
+/// The correlation time of the field's errors, s.
 const CORRELATION_S: f64 = 0.25;
 
-/// The least standard deviation of a field indoors, as a fraction of its norm: a room is not more even than that.
+/// The smallest standard deviation of a field indoors, as a fraction of its norm: no room is more uniform than that.
 const LEAST_ERROR: f64 = 0.02;
 
-/// Standard deviation of the offset on each axis before anything is known of it, as a fraction of the field's norm: that
-/// of chips without calibration.
+/// Prior standard deviation of the offset on each axis, as a fraction of the field's norm: that of uncalibrated
+/// chips.
 pub(in super::super) const PRIOR_OFFSET: f64 = 0.5;
 
 /// Means over the field samples of one window, in the world but for the offset's own frame.
@@ -49,7 +49,7 @@ pub(super) struct Sums<T> {
     rate_times_field: T,
 }
 
-/// The lag as it was known before the sums began: its mean, s, and variance, s².
+/// The prior of the lag when the sums began: its mean, s, and variance, s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lag<T> {
     pub(super) mean: T,
@@ -74,7 +74,8 @@ pub(super) struct Fit<T> {
     /// ∂B/∂x, negated: the means of R and q.
     pub(super) slope: Matrix3<T>,
     rate: Vector3<T>,
-    /// What one independent second of cost weighs: the variance of the field's error times its correlation, unit² s.
+    /// The weight of one independent second of cost: the variance of the field's error times its correlation, unit²
+    /// s.
     pub(super) noise: T,
 }
 
@@ -93,7 +94,7 @@ impl<T: Real> Sums<T> {
         }
     }
 
-    /// Adds a window of `dt` seconds, after what was before has faded by `keep`.
+    /// Adds a window of `dt` seconds, after earlier data has faded by `keep`.
     pub(super) fn add(&mut self, dt: T, keep: T, means: &FieldMeans<T>) {
         let FieldMeans { rotation, field, rate } = means;
         self.duration = self.duration * keep + dt;
@@ -114,13 +115,13 @@ impl<T: Real> Sums<T> {
         self.rate = correction * self.rate;
     }
 
-    /// Solves for offset and lag; `unit` is the norm of the field. None without data.
+    /// Solves for offset and lag; `unit` is the norm of the field. `None` without data.
     pub(super) fn fit(&self, unit: T, prior: Lag<T>) -> Option<Fit<T>> {
         let scale = T::ONE / self.duration;
         let slope = self.rotation * scale;
         let mean_rate = self.rate * scale;
         let mean_field = self.field * scale;
-        // R̄ᵀ R̄ is the identity but for the rotation within a window.
+        // R̄ᵀ R̄ is the identity up to the rotation within a window.
         let offset_block = Matrix3::identity() * self.duration - self.rotation.tr_mul(&slope);
         let cross = self.rate_on_body - self.rotation.tr_mul(&mean_rate);
         let mut matrix = Matrix4::zeros();
@@ -190,7 +191,7 @@ impl<T: Real> Fit<T> {
         self.cost(&Vector4::new(self.offset.x, self.offset.y, self.offset.z, self.lag))
     }
 
-    /// The cost with this offset and the lag that suits it best, and that lag, s.
+    /// The cost with this offset and its best lag, and that lag, s.
     pub(super) fn cost_of(&self, offset: &Vector3<T>, prior: Lag<T>) -> (T, T) {
         let information = self.noise / prior.variance;
         let cross = Vector3::new(self.matrix[(0, 3)], self.matrix[(1, 3)], self.matrix[(2, 3)]);

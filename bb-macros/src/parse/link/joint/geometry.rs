@@ -24,7 +24,7 @@ pub(crate) struct Axis {
     pub(crate) word: Ident,
     /// As written, not yet of unit length.
     pub(crate) direction: [f64; 3],
-    /// The components, if they were written as numbers: none of them has a unit.
+    /// The components, if they were written as numbers; they have no unit.
     pub(crate) components: Vec<Quantity>,
     pub(crate) place: Place,
 }
@@ -66,7 +66,7 @@ impl Origin {
 }
 
 impl Axis {
-    /// The direction as a unit vector; one that has unit length already is not changed.
+    /// The direction as a unit vector; one with unit length is not changed.
     pub(crate) fn unit(&self) -> [f64; 3] {
         let length = self.direction.iter().map(|value| value * value).sum::<f64>().sqrt();
         if (length - 1.0).abs() < 1e-12 { self.direction } else { self.direction.map(|value| value / length) }

@@ -1,4 +1,4 @@
-//! Friction of a joint, the joint that it mimics, and its gear.
+//! Friction of a joint, the joint that it mimics, and its transmission.
 
 use crate::language::{DynamicsField, MimicField, TransmissionField, words};
 use crate::parse::block::{Head, colon, semicolon};
@@ -19,7 +19,7 @@ pub(crate) struct Dynamics {
 #[derive(Clone, Debug)]
 pub(crate) struct Mimic {
     pub(crate) word: Ident,
-    /// The joint that is followed; `None` if it could not be read.
+    /// The joint to follow; `None` if it could not be read.
     pub(crate) joint: Option<Ident>,
     pub(crate) multiplier: Option<Quantity>,
     pub(crate) offset: Option<Quantity>,

@@ -1,4 +1,4 @@
-//! Messages for ROS 2 itself to read, and back: run by `tests/ros2/check`, which names the folder.
+//! Messages for ROS 2 itself to read and write back: run by `tests/ros2/check`, which names the folder.
 
 use super::super::super::tests::bytes_of;
 use super::super::super::{Field, Reader, bytes_to_json, json_schema, to_json, type_hash};
@@ -23,7 +23,7 @@ fn hex(bytes: &[u8]) -> String {
 fn line<T: Field>(schema: Schema, hash: &str, value: &T, lines: &mut Vec<String>) {
     let bytes = bytes_of(value);
     let text = |text: &str| Value::from(text).to_string();
-    // As it is: serde_json reads floats to the last bit but one.
+    // Kept as text: serde_json reads floats to the last bit but one.
     let value = bytes_to_json(&bytes, T::SHAPE).expect("it was written just now");
     lines.push(format!(
         r#"{{"name": {}, "definition": {}, "hash": {}, "cdr": {}, "json": {value}, "schema": {}}}"#,
@@ -35,7 +35,7 @@ fn line<T: Field>(schema: Schema, hash: &str, value: &T, lines: &mut Vec<String>
     ));
 }
 
-/// Any value of ROS's message, and what a payload becomes.
+/// Any value of ROS's message, and the payload it converts to.
 fn as_ros<T: Payload + RosMessage>(random: &mut Random, lines: &mut Vec<String>) {
     for _ in 0..EACH {
         let payload = Stamped::new(random.value(), random.value::<T>());
@@ -68,7 +68,7 @@ fn messages_for_ros() {
     std::fs::write(file("exact.jsonl"), exact.join("\n")).expect("the folder is there");
 }
 
-/// Whether a message that ROS has written, in hexadecimal digits, is the one that it was given.
+/// Whether a message written by ROS, in hexadecimal digits, is the one it was given.
 fn is_read<T: Payload + RosMessage>(name: &str, cdr: &str, expected: &str) -> bool {
     if Stamped::<T>::ros_schema().is_none_or(|schema| schema.name != name) {
         return false;

@@ -17,7 +17,7 @@ impl Random {
         usize::try_from(self.next() % end as u64).expect("it is below a usize")
     }
 
-    /// Any bits, and often the numbers that ROS gives a meaning.
+    /// Any bits, and often the numbers with a special meaning in ROS.
     fn float(&mut self) -> f64 {
         match self.below(6) {
             0 => f64::from_bits(self.next()),
@@ -32,10 +32,10 @@ impl Random {
             Shape::Char => 'x'.write(writer),
             Shape::U8 | Shape::I8 => (self.next() as u8).write(writer),
             Shape::U16 | Shape::I16 => (self.next() as u16).write(writer),
-            // A second has no more.
+            // Nanoseconds are below a second.
             Shape::U32 if name == "nanosec" => ((self.next() % 1_000_000_000) as u32).write(writer),
             Shape::U32 | Shape::I32 => (self.next() as u32).write(writer),
-            // Small enough for ROS, at times.
+            // Sometimes small enough for ROS.
             Shape::U64 | Shape::I64 => {
                 let shift = self.below(48);
                 (self.next() >> shift).write(writer);
