@@ -171,6 +171,11 @@ impl Registry {
         Ok(topic)
     }
 
+    /// Whether there is a topic at `path` that has not made room for others.
+    pub(crate) fn has(&self, path: &str) -> bool {
+        self.lock().topics.get(path).is_some_and(|made| !made.is_gone)
+    }
+
     /// In a replay: somebody could publish at `path` from now on; no more if the name of the payload is empty.
     pub(crate) fn expect(&self, path: &'static str, payload: &'static str) {
         let mut state = self.lock();
