@@ -170,7 +170,8 @@ impl Cadence {
         now_ns.saturating_sub(self.keyframe_ns) >= self.interval_ns && !self.awaits_camera(now_ns, 0)
     }
 
-    /// Whether the camera says where keyframes are.
+    /// Whether the camera determines where keyframes are.
+    #[cfg(feature = "smoother")]
     fn has_camera(&self, now_ns: i64) -> bool {
         self.awaits_camera(now_ns, self.interval_ns / 2)
     }
