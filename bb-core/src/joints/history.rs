@@ -236,11 +236,25 @@ impl History {
     }
 }
 
-/// Moves a position on with its velocity, which is NaN if it is not measured.
+/// The most coordinates of a joint: the position and the quaternion of a floating one.
+const MOST: usize = 7;
+
+/// Moves a position on with its velocity, which is NaN if it is not measured. It is held where an absurd velocity leads beyond all
+/// numbers.
 fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: f64) {
     if velocity.iter().any(|value| value.is_nan()) {
         return;
     }
+    let mut held = [0.0; MOST];
+    let held = &mut held[..position.len().min(MOST)];
+    held.copy_from_slice(&position[..held.len()]);
+    follow(kind, position, velocity, duration_s);
+    if !position.iter().all(|value| value.is_finite()) {
+        position[..held.len()].copy_from_slice(held);
+    }
+}
+
+fn follow(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: f64) {
     match (kind, position, velocity) {
         (JointKind::Planar, [x, y, angle], [forward, left, rate]) => {
             // Along the circle, in the axes at its middle: the error is of third order.
@@ -258,13 +272,7 @@ fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: 
             let turned = (rotation * UnitQuaternion::from_scaled_axis(turn)).into_inner();
             [*rw, *rx, *ry, *rz] = [turned.w, turned.i, turned.j, turned.k];
         }
-        (_, [position], [velocity]) => {
-            // Held where an absurd velocity leads beyond all numbers.
-            let moved = *position + velocity * duration_s;
-            if moved.is_finite() {
-                *position = moved;
-            }
-        }
+        (_, [position], [velocity]) => *position += velocity * duration_s,
         _ => {}
     }
 }
@@ -282,7 +290,7 @@ fn interpolate(kind: JointKind, from: &[f64], to: &[f64], share: f64, position: 
             let (&[x0, y0, from, ..], &[x1, y1, to, ..]) = (from, to) else { return };
             let turn = to - from;
             [*x, *y] = [lerp(x0, x1), lerp(y0, y1)];
-            *angle = from + (turn - TAU * (turn / TAU).round()) * share;
+            *angle = if turn.is_finite() { from + (turn - TAU * (turn / TAU).round()) * share } else { from };
         }
         (JointKind::Floating, [x, y, z, rw, rx, ry, rz]) => {
             let (&[x0, y0, z0, w0, i0, j0, k0, ..], &[x1, y1, z1, w1, i1, j1, k1, ..]) = (from, to) else { return };

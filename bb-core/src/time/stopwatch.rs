@@ -2,12 +2,13 @@
 
 use super::{Clock, MonotonicTime};
 use std::sync::{Once, OnceLock};
+use std::time::{Duration, Instant};
 
 /// Measures how long code takes on one thread. Reading the processor's counter costs less than half of reading the
 /// [`Clock`].
 ///
 /// It is not a clock: readings of two threads cannot be compared, and the scale is exact to some parts in a million
-/// (a percent, if the machine was busy during calibration). If a processor has no counter that runs at a constant
+/// (a percent, if the machine was busy during calibration; a scale that is further off is not used). If a processor has no counter that runs at a constant
 /// rate, the crate `quanta` reads the system's clock.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stopwatch(Option<&'static quanta::Clock>);
@@ -22,12 +23,16 @@ pub(crate) enum Reading {
 static COUNTER: OnceLock<quanta::Clock> = OnceLock::new();
 
 impl Stopwatch {
-    /// Starts calibrating the counter, unless done already: up to 200 ms of a busy machine, on a separate thread.
+    /// Starts calibrating the counter, unless done already: up to 200 ms of a busy machine and a pause of 50 ms, on a
+    /// separate thread.
     pub(crate) fn prepare() {
         static ONCE: Once = Once::new();
         ONCE.call_once(|| {
             let find = || {
-                COUNTER.get_or_init(quanta::Clock::new);
+                let counter = quanta::Clock::new();
+                if is_right(&counter) {
+                    COUNTER.get_or_init(|| counter);
+                }
             };
             // If the thread cannot be started, the clock is read.
             let _ = std::thread::Builder::new().name("bb-counter".into()).spawn(find);
@@ -62,15 +67,42 @@ impl Stopwatch {
     }
 }
 
+/// Whether the counter and the system's clock agree within a percent over a pause. The scale would be wrong for good if the machine was
+/// suspended, or the thread had no core, at the wrong moment of the calibration.
+fn is_right(counter: &quanta::Clock) -> bool {
+    let start = together(counter);
+    std::thread::sleep(Duration::from_millis(50));
+    let end = together(counter);
+    let (Some(start), Some(end)) = (start, end) else { return false };
+    let measured = counter.delta_as_nanos(start.1, end.1) as f64;
+    let elapsed = end.0.duration_since(start.0).as_nanos() as f64;
+    (measured / elapsed - 1.0).abs() < 0.01
+}
+
+/// Reads both at the same time: of ten tries, the one that took the least time.
+fn together(counter: &quanta::Clock) -> Option<(Instant, u64)> {
+    let tries = (0..10).map(|_| {
+        let (before, raw) = (Instant::now(), counter.raw());
+        (before.elapsed(), (before, raw))
+    });
+    tries.min_by_key(|(took, _)| *took).map(|(_, read)| read)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::{Duration, Instant};
+
+    /// The counter of this process, once it is calibrated.
+    fn calibrated() -> &'static quanta::Clock {
+        let counter = quanta::Clock::new();
+        assert!((0..20).any(|_| is_right(&counter)), "the scale is off");
+        COUNTER.get_or_init(|| counter)
+    }
 
     #[test]
     fn a_duration_is_the_systems() {
         let clock = Clock::real();
-        for stopwatch in [Stopwatch(None), Stopwatch(Some(COUNTER.get_or_init(quanta::Clock::new)))] {
+        for stopwatch in [Stopwatch(None), Stopwatch(Some(calibrated()))] {
             for millis in [0, 1, 30, 300] {
                 let outer = Instant::now();
                 let start = stopwatch.read(&clock);
@@ -89,7 +121,7 @@ mod tests {
 
     #[test]
     fn a_counter_that_goes_back_gives_zero() {
-        let stopwatch = Stopwatch(Some(COUNTER.get_or_init(quanta::Clock::new)));
+        let stopwatch = Stopwatch(Some(calibrated()));
         for (start, end) in [(u64::MAX, 0), (1, 0)] {
             assert_eq!(stopwatch.nanos_between(Reading::Counter(start), Reading::Counter(end)), 0);
         }
