@@ -27,7 +27,7 @@ use std::ops::Deref;
 ///     pub imu: Input<'a, Imu>,
 ///     /// The wheels.
 ///     pub odometry: Input<'a, Odometry>,
-/// /// Magnetic heading, if the robot has it.
+///     /// Magnetic heading, if the robot has it.
 ///     pub magnetic_field: Option<Input<'a, MagneticField>>,
 /// }
 /// ```

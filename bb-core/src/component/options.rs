@@ -20,11 +20,10 @@ use std::any::Any;
 ///     /// Device file.
 ///     #[option(required)]
 ///     pub port: String,
-/// /// Readings beyond it are dropped. Unit: m.
+///     /// Readings beyond it are dropped. Unit: m.
 ///     #[option(default = 4.0, range = 0.1..=30.0, unit = "m")]
 ///     pub maximum_range: f64,
-/// /// How long a reading may take. In `robot!` it is written with a unit, `timeout = 20 ms`; here it is a Rust
-/// value.
+///     /// How long a reading may take. In `robot!` it is written with a unit, `timeout = 20 ms`; here it is a Rust value.
 ///     #[option(default = Duration::from_millis(50))]
 ///     pub timeout: Duration,
 /// }
