@@ -234,7 +234,7 @@ fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>
     }
     let mut result = Ok(());
     let allocations = allocation_counter::measure(|| {
-        result = (30..1000).try_for_each(|k| keyframe(&mut smoother, k));
+        result = (30..400).try_for_each(|k| keyframe(&mut smoother, k));
     });
     result?;
     assert_eq!(allocations.count_total, 0);
@@ -246,6 +246,6 @@ fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>
     );
     let seen = sights.counts();
     assert!(seen.fused + seen.weighed_down > 500 && seen.gate > 20 && seen.not_applicable > 100, "{seen:?}");
-    assert!(moved > 100 && smoother.gaps() > 10 && smoother.marginalised() > 900, "{moved}");
+    assert!(moved > 100 && smoother.gaps() > 7 && smoother.marginalised() > 350, "{moved}");
     Ok(())
 }
