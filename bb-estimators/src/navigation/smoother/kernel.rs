@@ -1,4 +1,4 @@
-//! Robust kernels: how much a measurement weighs that does not fit.
+//! Robust kernels: weights for measurements that do not fit.
 
 use crate::navigation::math::sqrt;
 
