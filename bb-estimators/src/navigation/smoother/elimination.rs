@@ -5,8 +5,8 @@
 //! * `M⁺ = Gᵀ (M⁻¹ + Q)⁻¹ G = Xᵀ X` with `X = S⁻ᵀ R G` and `Sᵀ S = I + R Q Rᵀ`,
 //! * `v⁺ = Xᵀ z` with `z = S⁻ᵀ (R⁻ᵀ v - R g)`.
 //!
-//! Everything is a sum of squares, so no digits cancel at any ratio of magnitudes. An undetermined direction is a zero
-//! in R or in Q. The newest keyframe comes last, so its pivot gives its covariance.
+//! Everything is a sum of squares, so no digits cancel at any ratio of magnitudes. R and Q may
+//! have zeros, for example in undetermined directions. The newest keyframe comes last, so its pivot gives its covariance.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
