@@ -1,4 +1,4 @@
-//! Gates measurements at any keyframe of the window, and adds them.
+//! Gates and adds measurements at any keyframe of the window.
 
 use super::elimination::{Judged, Known, judge, judge_pair};
 use super::factor::Factor;
@@ -16,13 +16,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     ///
     /// `stream` is the stream of the sensor: its gate decides, and its counts and statistics record the result. After
     /// [`patience`](crate::navigation::StreamParams::patience) refusals at the newest keyframe, the window is assumed
-    /// to be wrong. It then restarts at that keyframe with its covariance raised. If the factor is relative to the
-    /// keyframe before, only the noise of the motion between the two is raised.
+    /// to be wrong: it restarts at that keyframe with its covariance raised. If the factor also depends on the previous
+    /// keyframe, only the noise of the motion between the two is raised.
     ///
     /// # Errors
     ///
     /// [`Refusal`], which the stream has counted; the smoother is then unchanged. [`Refusal::NoKeyframe`] if the
-    /// keyframe has left the window, or if a relative pose does not refer to the keyframe before.
+    /// keyframe has left the window, or if a relative pose does not refer to the previous keyframe.
     pub fn add(&mut self, stream: &mut Stream, id: u64, factor: impl Into<F>) -> Result<Fused, Refusal> {
         self.add_robust(stream, id, factor, Kernel::Squares)
     }
@@ -128,8 +128,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(correction)
     }
 
-    /// Raises the covariance of the newest keyframe, or the noise of the motion to it. Returns the index that the
-    /// keyframe then has.
+    /// Raises the covariance of the newest keyframe, or the noise of the motion to it. Returns the new index of that
+    /// keyframe.
     #[cold]
     fn raise(&mut self, factor: f64, way: bool) -> usize {
         let newest = self.window.len() - 1;

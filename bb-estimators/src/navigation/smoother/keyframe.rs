@@ -18,7 +18,7 @@ use super::rows::Rows;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
-/// The smallest difference at which a weight is replaced by the kernel's.
+/// A weight is replaced if the kernel's differs from it by at least this much.
 const REWEIGHED: f64 = 0.02;
 
 /// A factor and its weight.

@@ -1,5 +1,4 @@
-//! One landmark: its position, its observations and the information that its elimination leaves on the poses that saw
-//! it.
+//! One landmark: its position, its observations, and the information that it gives on the poses of the keyframes.
 //!
 //! Let d be the vector from the body to the landmark l in the world. What the camera sees changes by
 //! `B (δl - δp + d × θ)`, so all Jacobians are made of the 2 × 3 matrix B. The normal matrix of landmark and poses
@@ -148,8 +147,8 @@ impl Landmark {
         coupling.add_rows((from, to), &[a, b, c], &residual.into(), -sign);
     }
 
-    /// Adds the information of one more observation before it is inserted, or removes it after the observation was
-    /// taken out.
+    /// Adds the information of an observation that is not inserted yet, or removes that of one that is no longer
+    /// stored.
     pub(super) fn add_one<const N: usize>(
         &self,
         sight: &Sight,
@@ -192,7 +191,7 @@ impl Landmark {
         coupling.add_rows((from, to), &[a, b], &residual.into(), sign);
     }
 
-    /// The range of poses from the first to the last that saw it. Clears that range in `rows`.
+    /// The range of poses from the first to the last that saw it. Zeroes that range in `rows`.
     fn range(&self, first: u64, rows: &mut [Vec<f64>; 3]) -> Option<(usize, usize)> {
         let from = (self.sights.first()?.serial - first) as usize;
         let to = (self.sights.last()?.serial - first) as usize + 1;

@@ -19,14 +19,14 @@ use crate::navigation::state::States;
 /// A landmark is relinearised if the kernel's weight of an observation differs from the current one by more than this.
 const REWEIGHED: f64 = 0.1;
 
-/// When a landmark without a prior is continued, its standard deviation is this many times its distance: almost no
+/// A landmark that continues without a prior is given a standard deviation of this many times its distance: almost no
 /// information, but never singular.
 const UNKNOWN: f64 = 100.0;
 
 /// Gauss–Newton steps for a single landmark.
 const STEPS: usize = 5;
 
-/// A landmark is lost if none of this many last keyframes saw it: it is not continued once its first keyframe leaves.
+/// A landmark that none of this many newest keyframes saw is lost: it is not continued once its first keyframe leaves.
 const LOST_AFTER: u64 = 5;
 
 /// The fraction of good landmarks that are rejected because their directions do not intersect.
@@ -43,7 +43,7 @@ pub(super) struct Landmarks<const N: usize> {
     rows: [Vec<f64>; 3],
     /// The pose covariances used to gate the observations of a keyframe, with that keyframe's id.
     pub(super) judged: Option<(u64, Judging)>,
-    /// The χ² limit above which directions do not intersect, by their number, from two on.
+    /// The χ² limit above which the directions of a landmark do not intersect, indexed by their number.
     unfit: Vec<f64>,
 }
 

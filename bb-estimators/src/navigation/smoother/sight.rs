@@ -81,8 +81,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(landmarks.estimate(landmark, &self.window))
     }
 
-    /// Adds an observation of a landmark at a keyframe of the window. Observations may arrive in any order. Add them
-    /// after the other measurements of that keyframe, since the gate uses the keyframe's estimate.
+    /// Adds an observation of a landmark at a keyframe of the window. Observations may arrive in any order. For best
+    /// results, add them after the other measurements of that keyframe, since the gate uses the keyframe's estimate.
     ///
     /// The gate of `stream` compares the observation with the estimated position of the landmark. The stream's patience
     /// is not used: after [`LandmarkParams::patience`] refusals in a row, the landmark is restarted.

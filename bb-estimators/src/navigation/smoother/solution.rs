@@ -13,14 +13,14 @@ const SETTLED: f64 = 0.01;
 /// The work done by an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Updated {
-    /// How many eliminations of a keyframe were done, repetitions included.
+    /// Number of keyframe eliminations, counting repeated ones.
     pub eliminated: usize,
-    /// How many relinearisations of a keyframe were done, repetitions included.
+    /// Number of keyframe relinearisations, counting repeated ones.
     pub relinearised: usize,
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
-    /// Linearises all factors on a keyframe, and on it and the previous one.
+    /// Linearises all factors on a keyframe, including those that it shares with the previous one.
     pub(super) fn linearise(&mut self, index: usize) {
         let (before, after) = self.window.make_contiguous().split_at_mut(index);
         if let Some(keyframe) = after.first_mut() {
@@ -85,7 +85,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
     }
 
-    /// The same, with the next correction as an argument.
+    /// The same, with the correction of the next keyframe as an argument.
     pub(super) fn back(&self, index: usize, next: &[f64; N]) -> Option<[f64; N]> {
         let (keyframe, after) = (self.window.get(index)?, self.window.get(index + 1)?);
         let coupling = self.landmarks.as_ref().map(|landmarks| &landmarks.coupling);
