@@ -324,8 +324,7 @@ fn subtract_column<const N: usize>(target: &mut [f64], rows: &[f64], stride: usi
     combine::<N>(target, &factors, &rows[column..], stride);
 }
 
-/// `target += Σ factorᵢ rowᵢ`, with the rows `stride` apart. Eight rows at a time, since each pass loads and stores the
-/// target.
+/// `target += Σ factorᵢ rowᵢ`, with the rows `stride` apart. Eight rows at a time, since each pass loads and stores the target.
 #[inline]
 fn combine<const N: usize>(target: &mut [f64], factors: &[f64; N], rows: &[f64], stride: usize) {
     let mut k = 0;

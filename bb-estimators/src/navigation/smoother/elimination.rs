@@ -70,8 +70,7 @@ impl<const N: usize> Pivot<N> {
         for i in 0..N {
             let row: &mut [f64; N] = &mut inner[i];
             row[i] = 1.0;
-            // Only entries on and above the diagonal are read; in those, the terms with k < i are zero, as R is upper
-            // triangular.
+            // Only entries on and above the diagonal are read; in those, the terms with k < i are zero, as R is upper triangular.
             for k in i..N {
                 axpy(row, by_noise[i][k], &across[k]);
             }
@@ -287,8 +286,7 @@ pub(super) fn judge<const N: usize>(
     decompose(factor, residual, covariance)
 }
 
-/// Compares a factor on a keyframe and the previous one with their estimates. The pivot is that of the previous
-/// keyframe.
+/// Compares a factor on a keyframe and the previous one with their estimates. The pivot is that of the previous keyframe.
 pub(super) fn judge_pair<const N: usize>(
     factor: &Rows<N>,
     before: &Pivot<N>,

@@ -128,8 +128,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(correction)
     }
 
-    /// Raises the covariance of the newest keyframe, or the noise of the motion to it. Returns the new index of that
-    /// keyframe.
+    /// Raises the covariance of the newest keyframe, or the noise of the motion to it. Returns the new index of that keyframe.
     #[cold]
     fn raise(&mut self, factor: f64, way: bool) -> usize {
         let newest = self.window.len() - 1;

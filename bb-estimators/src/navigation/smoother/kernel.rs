@@ -2,7 +2,7 @@
 
 use crate::navigation::math::sqrt;
 
-/// The weight of a factor as a function of `x`, the norm of its whitened residual in standard deviations.
+/// The weight of a factor as a function of `x`, the norm of its whitened residual: how many standard deviations it is off.
 ///
 /// Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic fitting", Image and Vision Computing
 /// 15(1), 1997, section 9.

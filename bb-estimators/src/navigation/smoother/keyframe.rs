@@ -18,7 +18,7 @@ use super::rows::Rows;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
-/// A weight is replaced if the kernel's differs from it by at least this much.
+/// A weight is replaced if the kernel's differs from it by more than this.
 const REWEIGHED: f64 = 0.02;
 
 /// A factor and its weight.

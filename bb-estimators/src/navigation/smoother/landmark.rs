@@ -147,8 +147,7 @@ impl Landmark {
         coupling.add_rows((from, to), &[a, b, c], &residual.into(), -sign);
     }
 
-    /// Adds the information of an observation that is not inserted yet, or removes that of one that is no longer
-    /// stored.
+    /// Adds the information of an observation that is not inserted yet, or removes that of one that is no longer stored.
     pub(super) fn add_one<const N: usize>(
         &self,
         sight: &Sight,

@@ -170,8 +170,7 @@ impl<const N: usize> Landmarks<N> {
         Some(true)
     }
 
-    /// Whether a landmark must be relinearised: a keyframe or the landmark itself moved, or its kernel gives another
-    /// weight.
+    /// Whether a landmark must be relinearised: a keyframe or the landmark itself moved, or its kernel gives another weight.
     fn is_stale<F>(&self, landmark: &Landmark, window: &Window<F, N>) -> bool {
         let first = self.coupling.first;
         let correction = landmark.correction(window, first);
@@ -251,8 +250,7 @@ impl Landmark {
     }
 }
 
-/// Intersects the directions, with the keyframes at their estimates. Returns `None` if the directions are nearly
-/// parallel.
+/// Intersects the directions, with the keyframes at their estimates. Returns `None` if the directions are nearly parallel.
 fn meeting<F, S: States, const N: usize>(
     landmark: &Landmark,
     camera: &Camera,

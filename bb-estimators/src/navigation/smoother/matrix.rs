@@ -81,7 +81,7 @@ impl<const N: usize> Root<N> {
             let pivot = upper[k][k];
             let (above, below) = upper.split_at_mut(k + 1);
             let row = &mut above[k];
-            // Below the diagonal, values were unspecified.
+            // Clear the unspecified values below the diagonal.
             row[..k].fill(0.0);
             if !(pivot > LEAST_PIVOT * matrix[k][k] && pivot.is_finite()) {
                 *row = [0.0; N];

@@ -2,8 +2,7 @@
 //!
 //! C. Forster, L. Carlone, F. Dellaert, D. Scaramuzza, "On-manifold preintegration for real-time visual–inertial odometry",
 //! IEEE Transactions on Robotics 33(1), 2017. Two things are added: the mean is exact over a sample, as in
-//! `eskf/propagation.rs`; and the covariance includes the random walk of the biases, which correlates them with the
-//! rest.
+//! `eskf/propagation.rs`; and the covariance includes the random walk of the biases, which correlates them with the rest.
 //!
 //! All quantities are in the body's axes at the first keyframe, without gravity. `ΔR`, `Δv` and `Δp` start from
 //! identity, zero and zero. For one sample of length dt, let B = -ΔR Γ1 dt and B₂ = -ΔR Γ2 dt², and let T, T₂ be the

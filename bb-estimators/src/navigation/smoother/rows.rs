@@ -103,8 +103,7 @@ impl<const N: usize> Rows<N> {
         self.set(model.residual, None, &model.jacobian, &model.noise)
     }
 
-    /// The whitened residual and Jacobian rows of the keyframe; `None` if the factor also depends on the previous
-    /// keyframe.
+    /// The whitened residual and Jacobian rows of the keyframe; `None` if the factor also depends on the previous keyframe.
     #[cfg(feature = "eskf")]
     pub(in crate::navigation) fn alone(&self) -> Option<(&[f64], &[[f64; N]])> {
         let is_alone = self.previous[..self.count].iter().flatten().all(|x| *x == 0.0);

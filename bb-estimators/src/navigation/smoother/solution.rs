@@ -34,8 +34,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let end = end.min(len);
         let mut coupling = self.landmarks.as_mut().map(|landmarks| &mut landmarks.coupling);
         coupling = coupling.filter(|coupling| coupling.is_tied());
-        // Intermediate landmark information is not stored, so every keyframe is eliminated again unless only the newest
-        // changed.
+        // Intermediate landmark information is not stored, so every keyframe is eliminated again unless only the newest changed.
         let end = if coupling.is_some() { len } else { end };
         if coupling.is_some() && self.dirty + 1 < len {
             self.dirty = 0;
@@ -210,8 +209,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 }
 
-/// Whether two corrections agree to within a centimetre of position and a hundredth of the rotation threshold for
-/// relinearisation.
+/// Whether two corrections agree to within a centimetre of position and a hundredth of the rotation threshold for relinearisation.
 fn is_settled<const N: usize>(a: &[f64; N], b: &[f64; N], params: &SmootherParams) -> bool {
     let is_rotation = |i: usize| (ROTATION..ROTATION + 3).contains(&i);
     let limit = |i: usize| SETTLED * if is_rotation(i) { params.relinearise_rotation } else { 1.0 };

@@ -1,5 +1,4 @@
-//! Preintegration, factors and elimination, each against an independent computation, and the invariants of the
-//! smoother.
+//! Preintegration, factors and elimination, each against an independent computation, and the invariants of the smoother.
 
 #[cfg(feature = "autodiff")]
 mod automatic;

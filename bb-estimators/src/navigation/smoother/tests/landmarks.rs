@@ -24,8 +24,7 @@ fn random(noise: &mut Noise) -> SMatrix<f64, N, N> {
     SMatrix::from_fn(|_, _| noise.next())
 }
 
-/// A smoother with a random problem in its window, and the same problem as one dense system: keyframes first, then
-/// landmarks.
+/// A smoother with a random problem in its window, and the same problem as one dense system: keyframes first, then landmarks.
 struct Problem {
     smoother: Plain,
     matrix: DMatrix<f64>,

@@ -27,8 +27,7 @@ fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Information that leaves the window is not lost: with linear factors, the result matches the one with all
-    /// keyframes.
+    /// Information that leaves the window is not lost: with linear factors, the result matches the one with all keyframes.
     #[test]
     fn a_window_is_the_batch(seed in any::<u64>(), window in 2_usize..12) {
         let flight = Flight::new(seed, 40, 1.0);
