@@ -68,7 +68,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.window.get(index).map(|keyframe| keyframe.estimate::<S>())
     }
 
-    /// Covariance of a keyframe of the window, ordered like [`covariance`](Self::covariance). The cost is one backward
+    /// Covariance of a keyframe of the window, in the same form as [`covariance`](Self::covariance). The cost is one backward
     /// step for each later keyframe.
     pub fn smoothed_covariance(&self, id: u64) -> Option<SMatrix<f64, N, N>> {
         let index = self.window.iter().position(|keyframe| keyframe.id == id)?;
