@@ -1,4 +1,4 @@
-//! The camera against numeric derivatives, its inverse, and numbers of OpenCV's model worked out by hand.
+//! The camera against numeric derivatives, its inverse, and hand-computed values of OpenCV's model.
 
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::Camera;
 use crate::navigation::Refusal;
 
-/// The lens of EuRoC's first camera.
+/// The lens of the first EuRoC camera.
 fn lens() -> Camera {
     Camera {
         distortion: [-0.283, 0.0740, 0.012, 1.94e-4, 1.76e-5],
@@ -42,7 +42,7 @@ proptest! {
         prop_assert!(apart < 1e-6, "{apart}");
     }
 
-    /// Any numbers give a pixel, or are refused.
+    /// Any numbers either give a pixel or are refused.
     #[test]
     fn absurd_numbers(
         numbers in proptest::collection::vec(prop_oneof![
@@ -85,7 +85,7 @@ fn what_cannot_be_seen_is_refused() {
     assert_eq!(camera.undistorted(&Vector2::new(f64::NAN, 0.0)), Err(Refusal::NonFinite));
     assert_eq!(camera.undistorted(&Vector2::new(-1.0, 5.0)), Err(Refusal::OutOfRange));
     assert_eq!(camera.undistorted(&Vector2::new(5.0, 480.5)), Err(Refusal::OutOfRange));
-    // A lens that folds back before it reaches the corner.
+    // A lens whose distortion folds back before the corner.
     let folded = Camera { distortion: [-1.5, 0.0, 0.0, 0.0, 0.0], ..camera };
     assert_eq!(folded.undistorted(&Vector2::new(1.0, 1.0)), Err(Refusal::OutOfRange));
 }

@@ -1,4 +1,4 @@
-//! Factors of your own without Jacobians: what is expected is written once, and differentiated with dual numbers.
+//! Custom factors without Jacobians: the expected measurement is written once and differentiated with dual numbers.
 
 use core::fmt;
 
@@ -12,25 +12,25 @@ use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, States, VELOCITY,
 };
 
-/// An estimate in numbers that know their derivative.
+/// An estimate in numbers that carry their derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Differentiable<T, const N: usize> {
     /// In the world, m.
     pub position: [T; 3],
     /// In the world, m/s.
     pub velocity: [T; 3],
-    /// Takes body coordinates to the world, row by row.
+    /// Rotates body coordinates to the world, row by row.
     pub world_from_body: [[T; 3]; 3],
     /// Body axes, m/s².
     pub accelerometer_bias: [T; 3],
     /// Body axes, rad/s.
     pub gyroscope_bias: [T; 3],
-    /// Optional states where their errors are, see [`offset`](crate::navigation::offset).
+    /// Optional states at the indices of their errors, see [`offset`](crate::navigation::offset).
     pub optional: [T; N],
 }
 
 impl<T: DualNum<Primitive = f64> + Copy, const N: usize> Differentiable<T, N> {
-    /// A point of the body in the world.
+    /// Transforms a point from the body to the world.
     pub fn in_world(&self, point: &Vector3<f64>) -> [T; 3] {
         core::array::from_fn(|i| {
             let [x, y, z] = self.world_from_body[i];
@@ -38,7 +38,7 @@ impl<T: DualNum<Primitive = f64> + Copy, const N: usize> Differentiable<T, N> {
         })
     }
 
-    /// A point of the world in the body.
+    /// Transforms a point from the world to the body.
     pub fn in_body(&self, point: &Vector3<f64>) -> [T; 3] {
         let offset: [T; 3] = core::array::from_fn(|i| -self.position[i] + point[i]);
         core::array::from_fn(|j| {
@@ -49,12 +49,12 @@ impl<T: DualNum<Primitive = f64> + Copy, const N: usize> Differentiable<T, N> {
 }
 
 impl<const N: usize> Differentiable<Dual64, N> {
-    /// An estimate, and its derivative along one error; along none if there is no such.
+    /// The estimate with its derivative with respect to one error, or without a derivative if `error` is `None`.
     fn along(estimate: &Estimate<N>, error: Option<usize>) -> Self {
         let number = |value: f64, index: usize| Dual64::new(value, if error == Some(index) { 1.0 } else { 0.0 });
         let vector = |vector: &Vector3<f64>, first: usize| core::array::from_fn(|i| number(vector[i], first + i));
         let rotation = estimate.rotation();
-        // exp(θ) R ≈ (I + [θ]×) R: exact to the first order, which is all that is asked for.
+        // exp(θ) R ≈ (I + [θ]×) R: exact to first order, and only the first derivative is used.
         let turn = match error {
             Some(index) if (ROTATION..ROTATION + 3).contains(&index) => {
                 Vector3::ith(index - ROTATION, 1.0).cross_matrix() * rotation
@@ -76,7 +76,7 @@ impl<const N: usize> Differentiable<Dual64, N> {
     }
 }
 
-/// What `D` numbers are expected to be, for any kind of number.
+/// The expected value of a measurement of `D` numbers, for any number type.
 ///
 /// ```
 /// use bb_estimators::navigation::{Automatic, Differentiable, Expectation};
@@ -114,30 +114,30 @@ impl<const N: usize> Differentiable<Dual64, N> {
 /// # let _: Automatic<Range, 1> = factor;
 /// ```
 pub trait Expectation<const D: usize, const N: usize> {
-    /// The keyframe before, by its id, if it concerns that as well.
+    /// The id of the previous keyframe, if the measurement also depends on it.
     fn previous(&self) -> Option<u64> {
         None
     }
 
-    /// What is expected where the estimates are. `previous` is there if [`previous`](Self::previous) named one.
+    /// The expected measurement at the estimates. `previous` is `Some` if [`previous`](Self::previous) returned an id.
     fn expected<T: DualNum<Primitive = f64> + Copy>(
         &self,
         previous: Option<&Differentiable<T, N>>,
         at: &Differentiable<T, N>,
     ) -> [T; D];
 
-    /// What was measured.
+    /// The measured values.
     fn measured(&self) -> [f64; D];
 
     /// Covariance of the noise, `D × D`.
     fn noise(&self) -> SMatrix<f64, D, D>;
 }
 
-/// An [`Expectation`] as a factor, by automatic differentiation: one pass for each error that a keyframe has, so about `N` times
-/// the cost of a factor with Jacobians of its own.
+/// An [`Expectation`] as a factor, by automatic differentiation. It takes one pass for each error of a keyframe, so it
+/// costs about `N` times as much as a factor with its own Jacobians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Automatic<E, const D: usize>(
-    /// What is expected.
+    /// The expected measurement.
     pub E,
 );
 

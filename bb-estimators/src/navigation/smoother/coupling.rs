@@ -1,15 +1,15 @@
-//! What landmarks say of the poses of a window, and how it goes through the elimination in the order of time.
+//! Landmark information on the poses of a window, and its elimination in chronological order.
 //!
-//! Eliminating a landmark ties all keyframes that saw it to each other, so the window is no longer a chain: besides the
-//! information of a keyframe x and its link to the next, `x = G x⁺ + g + ν` with noise ν of covariance Q, there is an
-//! information matrix Λ of all poses P, and ties C between x and the poses after it. With the information M, v of x,
-//! eliminating x leaves, with `Q' = (M + Q⁻¹)⁻¹`,
+//! Eliminating a landmark couples all keyframes that saw it, so the window is no longer a chain. A keyframe x still has
+//! its information and its link to the next, `x = G x⁺ + g + ν` with noise ν of covariance Q. In addition, there is an
+//! information matrix Λ of all poses P, and there are ties C between x and the later poses. With the information M, v
+//! of x and `Q' = (M + Q⁻¹)⁻¹`, eliminating x leaves
 //!
 //! * the ties `Gᵀ (I + M Q)⁻¹ C` of x⁺,
 //! * `Λ - Cᵀ Q' C` and `λ - Cᵀ (g + Q' (v - M g))` of the later poses,
 //!
-//! besides what the chain alone leaves. Q is not inverted here either. What the oldest keyframe leaves when it is
-//! marginalised is the same.
+//! in addition to the terms of the chain alone. Q is not inverted here either. Marginalising the oldest keyframe leaves
+//! the same terms.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -20,15 +20,15 @@ use super::elimination::Carried;
 use super::matrix::Square;
 use crate::navigation::state::{POSITION, ROTATION};
 
-/// The errors of a pose.
+/// The number of error components of a pose.
 pub(super) const POSE: usize = 6;
 
-/// Where the errors of a pose are among those of a keyframe.
+/// The index of a pose's error among the errors of a keyframe.
 pub(super) const fn place(i: usize) -> usize {
     if i < 3 { POSITION + i } else { ROTATION + i - 3 }
 }
 
-/// What landmarks say of one pose: a matrix, on and above the diagonal, and a vector, as of `Information`.
+/// Landmark information on one pose: a matrix, on and above the diagonal, and a vector, as in `Information`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PoseInformation {
     pub(super) matrix: [[f64; POSE]; POSE],
@@ -41,26 +41,26 @@ impl PoseInformation {
     }
 }
 
-/// See the module. Rows are poses of the window, the oldest first.
+/// See the module. Rows are poses of the window, oldest first.
 #[derive(Clone, Debug)]
 pub(super) struct Coupling<const N: usize> {
-    /// Keyframes that there is room for.
+    /// The number of keyframes that fit.
     slots: usize,
     stride: usize,
-    /// The oldest keyframe, counted from the start of the window.
+    /// The serial number of the oldest keyframe, counted from the start.
     pub(super) first: u64,
-    /// Keyframes that came since anything was added; none if nothing is there.
+    /// Keyframes appended since the last addition; `None` if nothing is tied.
     idle: Option<usize>,
     /// Λ, on and above the diagonal.
     matrix: Vec<f64>,
     /// λ.
     vector: Vec<f64>,
-    /// C of the oldest keyframe, from what was marginalised.
+    /// C of the oldest keyframe, left by marginalisation.
     front: Vec<f64>,
-    /// Λ and λ as the elimination goes.
+    /// Λ and λ during elimination.
     reduced: Vec<f64>,
     reduced_vector: Vec<f64>,
-    /// C of each keyframe at its elimination.
+    /// C of each keyframe when it is eliminated.
     ties: Vec<f64>,
     /// Products with C.
     product: Vec<f64>,
@@ -84,7 +84,7 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// Whether it says anything.
+    /// Whether it holds any information.
     pub(super) fn is_tied(&self) -> bool {
         self.idle.is_some()
     }
@@ -97,10 +97,10 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// A keyframe is added to `len` others; nothing is tied to it yet.
+    /// Appends a keyframe to `len` others; it has no ties yet.
     pub(super) fn append(&mut self, len: usize) {
         let Some(idle) = self.idle else { return };
-        // By then all that was tied has left.
+        // By then every tied keyframe has left.
         self.idle = (idle < 2 * self.slots).then_some(idle + 1);
         let stride = self.stride;
         for index in 0..len {
@@ -124,8 +124,8 @@ impl<const N: usize> Coupling<N> {
         &self.ties[slot * N * self.stride..(slot + 1) * N * self.stride]
     }
 
-    /// Adds rows to Λ: `sign · rowsᵀ rows`, and `sign · rowsᵀ residual` to λ; they are of the poses from `from` to `to`,
-    /// each in a row of its own as long as Λ's.
+    /// Adds rows to Λ and λ: `sign · rowsᵀ rows` and `sign · rowsᵀ residual`. The rows cover the poses `from` to `to`;
+    /// each row is as long as one of Λ.
     pub(super) fn add_rows<const R: usize>(
         &mut self,
         (from, to): (usize, usize),
@@ -145,7 +145,7 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// Adds to Λ and λ what concerns one pose.
+    /// Adds information on one pose to Λ and λ.
     pub(super) fn add_pose(&mut self, index: usize, information: &PoseInformation, sign: f64) {
         self.idle = Some(0);
         for i in 0..POSE {
@@ -157,12 +157,12 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// A row as long as Λ's, for `add_rows`.
+    /// A buffer as long as a row of Λ, for `add_rows`.
     pub(super) fn row(&self) -> Vec<f64> {
         vec![0.0; self.stride]
     }
 
-    /// Begins an elimination of `len` keyframes.
+    /// Begins the elimination of `len` keyframes.
     pub(super) fn begin(&mut self, len: usize) {
         let width = POSE * len;
         for i in 0..width {
@@ -174,7 +174,7 @@ impl<const N: usize> Coupling<N> {
         self.ties[start..start + N * self.stride].copy_from_slice(&self.front);
     }
 
-    /// What is left for a keyframe once those before are eliminated; its ties are complete then.
+    /// The information left for a keyframe once those before it are eliminated; its ties are then complete.
     pub(super) fn arrive(&mut self, index: usize, len: usize) -> PoseInformation {
         let mut known = PoseInformation::none();
         let (at, stride) = (POSE * index, self.stride);
@@ -190,7 +190,7 @@ impl<const N: usize> Coupling<N> {
         known
     }
 
-    /// What the elimination of a keyframe adds to the chain's information on the next: the ties to the pose of that.
+    /// Adds the ties between a keyframe and the pose of the next to the information on the next.
     pub(super) fn fold(&self, index: usize, carried: &Carried<N>, information: &mut Square<N>) {
         let ties = self.ties(index);
         for i in 0..N {
@@ -202,14 +202,14 @@ impl<const N: usize> Coupling<N> {
                 }
             }
             for (j, tie) in row.into_iter().enumerate() {
-                // To both halves, of which the upper is read.
+                // Added to both halves; only the upper is read.
                 information[i][place(j)] += tie;
                 information[place(j)][i] += tie;
             }
         }
     }
 
-    /// Eliminates a keyframe: what it leaves of Λ, λ and the ties of the next.
+    /// Eliminates a keyframe: updates Λ, λ and the ties of the next.
     pub(super) fn pass(&mut self, index: usize, len: usize, carried: &Carried<N>) {
         let width = POSE * (len - 1 - index);
         let stride = self.stride;
@@ -223,7 +223,7 @@ impl<const N: usize> Coupling<N> {
         }
         let ties = &self.ties[slot * N * stride..];
         subtract_at::<N>(&mut self.reduced_vector[begin..begin + width], ties, stride, &carried.at);
-        // The next's own pose is folded.
+        // The next keyframe's own pose is already folded.
         let later = width - POSE;
         for i in 0..N {
             let target = &mut self.product[i * stride..i * stride + later];
@@ -237,7 +237,7 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// The oldest of `len` keyframes leaves.
+    /// Marginalises the oldest of `len` keyframes.
     pub(super) fn leave(&mut self, len: usize, carried: &Carried<N>) {
         let width = POSE * (len - 1);
         let stride = self.stride;
@@ -252,7 +252,7 @@ impl<const N: usize> Coupling<N> {
         self.vector.copy_within(POSE..POSE + width, 0);
         let ties = &self.ties[slot * N * stride..];
         subtract_at::<N>(&mut self.vector[..width], ties, stride, &carried.at);
-        // Nothing is known of the keyframe that comes next.
+        // Nothing is known yet of the keyframe that comes next.
         for i in 0..width + POSE {
             let start = i * stride + width;
             self.matrix[start..start + POSE].fill(0.0);
@@ -268,7 +268,7 @@ impl<const N: usize> Coupling<N> {
         self.first += 1;
     }
 
-    /// The same where nothing is tied.
+    /// The same if nothing is tied.
     pub(super) fn leave_untied(&mut self) {
         self.first += 1;
     }
@@ -283,7 +283,7 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// `C P`, with the corrections of the keyframes after.
+    /// `C P`, with the corrections of the later keyframes.
     pub(super) fn pull<'a>(&self, index: usize, later: impl Iterator<Item = &'a [f64; N]>) -> [f64; N] {
         let ties = self.ties(index);
         let mut pull = [0.0; N];
@@ -298,7 +298,7 @@ impl<const N: usize> Coupling<N> {
         pull
     }
 
-    /// `Cᵀ x`, subtracted from one vector for each pose after.
+    /// Subtracts `Cᵀ x` from one vector for each later pose.
     pub(super) fn push(&self, index: usize, x: &[f64; N], later: &mut [f64]) {
         subtract_at::<N>(later, self.ties(index), self.stride, x);
     }
@@ -312,19 +312,19 @@ fn add_one(target: &mut [f64], factor: f64, row: &[f64]) {
     }
 }
 
-/// `target -= Σ rowᵢ xᵢ`, the rows `stride` apart.
+/// `target -= Σ rowᵢ xᵢ`, with the rows `stride` apart.
 fn subtract_at<const N: usize>(target: &mut [f64], rows: &[f64], stride: usize, x: &[f64; N]) {
     let negative: [f64; N] = core::array::from_fn(|i| -x[i]);
     combine::<N>(target, &negative, rows, stride);
 }
 
-/// `target -= Σ rowᵢ[column] rowᵢ[column..]`, the rows `stride` apart.
+/// `target -= Σ rowᵢ[column] rowᵢ[column..]`, with the rows `stride` apart.
 fn subtract_column<const N: usize>(target: &mut [f64], rows: &[f64], stride: usize, column: usize) {
     let factors: [f64; N] = core::array::from_fn(|i| -rows[i * stride + column]);
     combine::<N>(target, &factors, &rows[column..], stride);
 }
 
-/// `target += Σ factorᵢ rowᵢ`, the rows `stride` apart: eight at a time, as the target is loaded and stored for each.
+/// `target += Σ factorᵢ rowᵢ`, with the rows `stride` apart. Eight rows at a time, since each pass loads and stores the target.
 #[inline]
 fn combine<const N: usize>(target: &mut [f64], factors: &[f64; N], rows: &[f64], stride: usize) {
     let mut k = 0;

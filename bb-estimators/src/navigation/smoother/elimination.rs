@@ -1,12 +1,12 @@
-//! Elimination in the order of time: from what is known of a keyframe to what it says of the next, and back.
+//! Elimination in chronological order, from each keyframe to the next, and back-substitution.
 //!
-//! With the information `Rᵀ R` of a keyframe and the [`Link`] to the next, `δ = G δ⁺ + g + ν`, eliminating δ leaves
+//! Given the information `Rᵀ R` of a keyframe and the [`Link`] to the next, `δ = G δ⁺ + g + ν`, eliminating δ leaves
 //!
 //! * `M⁺ = Gᵀ (M⁻¹ + Q)⁻¹ G = Xᵀ X` with `X = S⁻ᵀ R G` and `Sᵀ S = I + R Q Rᵀ`,
 //! * `v⁺ = Xᵀ z` with `z = S⁻ᵀ (R⁻ᵀ v - R g)`.
 //!
-//! It is a sum of squares throughout: no digits cancel, whatever is large beside what, and what is not known at all may be
-//! a zero in R or a zero in Q. The newest keyframe comes last, so its pivot is its covariance.
+//! Everything is a sum of squares, so no digits cancel at any ratio of magnitudes. R and Q may
+//! have zeros, for example in undetermined directions. The newest keyframe comes last, so its pivot gives its covariance.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -15,14 +15,14 @@ use super::matrix::{Root, Square, add_gram, axpy, dot, mirror, times, transpose_
 use super::rows::{MOST_ROWS, Rows};
 use crate::navigation::math::ln;
 
-/// What the elimination of a keyframe makes of its ties to later poses.
+/// How the elimination of a keyframe transforms its ties to later poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Carried<const N: usize> {
     /// `Gᵀ (I + M Q)⁻¹`, for the next keyframe.
     pub(super) carry: Square<N>,
-    /// A root of Q': `spreadᵀ spread = Q'`.
+    /// A square root of Q': `spreadᵀ spread = Q'`.
     pub(super) spread: Square<N>,
-    /// `g + Q' (v - M g)`: where it would be if the next were where it is linearised.
+    /// `g + Q' (v - M g)`: the correction of this keyframe if that of the next were zero.
     pub(super) at: [f64; N],
 }
 
@@ -31,20 +31,20 @@ pub(super) struct Carried<const N: usize> {
 pub(super) struct Response<const N: usize> {
     /// `R⁻ᵀ v`.
     pub(super) mean: [f64; N],
-    /// What later poses are pushed by, times the ties.
+    /// The vector that, multiplied by the ties, is subtracted from the later poses.
     pub(super) at: [f64; N],
-    /// What arrives at the next keyframe.
+    /// The information vector passed to the next keyframe.
     pub(super) next: [f64; N],
 }
 
-/// A keyframe, eliminated.
+/// An eliminated keyframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pivot<const N: usize> {
     /// R.
     pub(super) root: Root<N>,
     /// `R⁻ᵀ v`.
     pub(super) mean: [f64; N],
-    /// S; of the last keyframe, whatever it was.
+    /// S; unspecified for the last keyframe.
     inner: Root<N>,
     /// X.
     through: Square<N>,
@@ -55,14 +55,14 @@ impl<const N: usize> Pivot<N> {
         Self { root: Root::zeros(), mean: [0.0; N], inner: Root::zeros(), through: zeros() }
     }
 
-    /// Takes in what is known of the keyframe.
+    /// Factors the information of the keyframe.
     #[inline]
     pub(super) fn take(&mut self, known: &Information<N>) {
         self.root = Root::of(&known.matrix);
         self.mean = self.root.solve_transposed(&known.vector);
     }
 
-    /// What it says of the next keyframe.
+    /// Eliminates the keyframe and returns the information on the next.
     pub(super) fn eliminate(&mut self, link: &Link<N>) -> Information<N> {
         let by_noise = self.root.times_rows(&link.noise);
         let across = transposed(&self.root.upper);
@@ -70,7 +70,7 @@ impl<const N: usize> Pivot<N> {
         for i in 0..N {
             let row: &mut [f64; N] = &mut inner[i];
             row[i] = 1.0;
-            // On and above the diagonal, all that is read: R has nothing left of its own.
+            // Only entries on and above the diagonal are read; in those, the terms with k < i are zero, as R is upper triangular.
             for k in i..N {
                 axpy(row, by_noise[i][k], &across[k]);
             }
@@ -88,7 +88,8 @@ impl<const N: usize> Pivot<N> {
         message
     }
 
-    /// What eliminating it makes of its ties to later poses, after [`eliminate`](Self::eliminate); see `coupling.rs`.
+    /// The effect of the elimination on the ties to later poses, after [`eliminate`](Self::eliminate); see
+    /// `coupling.rs`.
     pub(super) fn carried(&self, link: &Link<N>) -> Carried<N> {
         let mut identity = zeros();
         for i in 0..N {
@@ -118,7 +119,7 @@ impl<const N: usize> Pivot<N> {
         Carried { carry, spread, at }
     }
 
-    /// What information `arrived` on this keyframe says of it alone and of the next, if all else is zero.
+    /// The response of this keyframe and the next to the information vector `arrived`, with all others zero.
     pub(super) fn respond(&self, link: &Link<N>, arrived: &[f64; N]) -> Response<N> {
         let mean = self.root.solve_transposed(arrived);
         let half = self.inner.solve_transposed(&mean);
@@ -126,7 +127,7 @@ impl<const N: usize> Pivot<N> {
         Response { mean, at: times(&link.noise, &weighted), next: transpose_times(&self.through, &half) }
     }
 
-    /// The mean of this keyframe then, as `back_pulled`.
+    /// The mean of this keyframe for such a response; the counterpart of `back_pulled`.
     pub(super) fn respond_back(
         &self,
         mean: &[f64; N],
@@ -150,7 +151,7 @@ impl<const N: usize> Pivot<N> {
         self.back_from(&self.mean, link, &link.offset, next)
     }
 
-    /// The same where it is tied to later poses as well: by `C P`.
+    /// The same if the keyframe also has ties to later poses, where `pull` is `C P`.
     pub(super) fn back_pulled(&self, link: &Link<N>, next: &[f64; N], pull: &[f64; N]) -> [f64; N] {
         let mut mean = self.mean;
         axpy(&mut mean, -1.0, &self.root.solve_transposed(pull));
@@ -228,16 +229,16 @@ fn sandwich<const N: usize>(outer: &Square<N>, inner: &Square<N>) -> Square<N> {
     product
 }
 
-/// What is known of a keyframe when a measurement of it is judged.
+/// The uncertainty of a keyframe when one of its measurements is gated.
 pub(super) enum Known<'a, const N: usize> {
-    /// Of the newest: its pivot.
+    /// The pivot of the newest keyframe.
     Newest(&'a Root<N>),
-    /// Of another: its covariance.
+    /// The covariance of any other keyframe.
     Other(&'a Square<N>),
 }
 
 impl<const N: usize> Known<'_, N> {
-    /// `H P Hᵀ`, on and below the diagonal, added to `sum`.
+    /// Adds `H P Hᵀ` to `sum`, on and below the diagonal.
     fn add_to(&self, rows: &[[f64; N]], sum: &mut [[f64; MOST_ROWS]; MOST_ROWS]) {
         for (i, row) in rows.iter().enumerate() {
             match self {
@@ -258,7 +259,7 @@ impl<const N: usize> Known<'_, N> {
     }
 }
 
-/// A measurement before it is fused.
+/// The gating quantities of a measurement, before it is fused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Judged {
     /// Normalised innovation squared.
@@ -269,7 +270,7 @@ pub(super) struct Judged {
     pub(super) whitened: f64,
 }
 
-/// Compares a factor at one keyframe with what is known of that.
+/// Compares a factor at one keyframe with its estimate.
 pub(super) fn judge<const N: usize>(
     factor: &Rows<N>,
     correction: &[f64; N],
@@ -285,7 +286,7 @@ pub(super) fn judge<const N: usize>(
     decompose(factor, residual, covariance)
 }
 
-/// Compares a factor on a keyframe and the one before, whose pivot it is, with what is known of them.
+/// Compares a factor on a keyframe and the previous one with their estimates. The pivot is that of the previous keyframe.
 pub(super) fn judge_pair<const N: usize>(
     factor: &Rows<N>,
     before: &Pivot<N>,
@@ -295,7 +296,7 @@ pub(super) fn judge_pair<const N: usize>(
 ) -> Option<Judged> {
     let mut innovation = link.innovation(factor);
     let count = factor.count;
-    // The noise between them, given what is known of the one before.
+    // The noise between them, given the information on the previous keyframe.
     let mut whitened = [[0.0; N]; MOST_ROWS];
     for i in 0..count {
         let by_root = times(&before.root.upper, &innovation.projected[i]);
@@ -333,7 +334,7 @@ fn decompose<const N: usize>(
             lower[i][i] -= share * share;
             residual[i] -= share * residual[j];
         }
-        // With the factor's own noise, of 1, it is not less, but for rounding.
+        // The factor's own noise has variance 1, so the pivot is not smaller, except for rounding.
         let pivot = lower[i][i].max(1e-6);
         if !pivot.is_finite() {
             return None;

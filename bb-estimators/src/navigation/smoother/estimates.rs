@@ -1,4 +1,4 @@
-//! What is asked of a smoother: estimates and covariances of its keyframes.
+//! Estimates and covariances of the keyframes.
 
 use nalgebra::{Matrix6, SMatrix};
 
@@ -11,12 +11,12 @@ use super::scratch::Scratch;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
-    /// What is estimated of the newest keyframe; none before the start.
+    /// The estimate of the newest keyframe; `None` before the start.
     pub fn estimate(&self) -> Option<Estimate<N>> {
         self.window.back().map(|keyframe| keyframe.estimate::<S>())
     }
 
-    /// The estimate at the last sample of the IMU, for an output between keyframes; none before the start.
+    /// The estimate at the last IMU sample, for an output between keyframes; `None` before the start.
     pub fn predicted(&self) -> Option<Estimate<N>> {
         let mut estimate = self.estimate()?;
         if self.time_ns > estimate.time_ns {
@@ -28,9 +28,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(estimate)
     }
 
-    /// Covariance of the newest keyframe, `N × N`, in the order of [`POSITION`] to
-    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states, as of the last update. None
-    /// before the first, and where something is not known at all.
+    /// Covariance of the newest keyframe, `N × N`, as of the last update. The order is [`POSITION`] to
+    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS), then the optional states. `None` before the first update,
+    /// or if a direction is not determined at all.
     pub fn covariance(&self) -> Option<SMatrix<f64, N, N>> {
         self.newest_covariance().map(|covariance| SMatrix::from_fn(|i, j| covariance[i][j]))
     }
@@ -45,21 +45,20 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         })
     }
 
-    /// Covariance of the pose of the newest keyframe: position error in the world, m², then rotation error in the world,
-    /// rad². None as [`covariance`](Self::covariance).
+    /// Covariance of the pose of the newest keyframe: position error in the world, m², then rotation error in the
+    /// world, rad². `None` in the same cases as [`covariance`](Self::covariance).
     pub fn pose_covariance(&self) -> Option<Matrix6<f64>> {
         let covariance = self.newest_covariance()?;
         let index = |i: usize| if i < 3 { POSITION + i } else { ROTATION + i - 3 };
         Some(Matrix6::from_fn(|i, j| covariance[index(i)][index(j)]))
     }
 
-    /// The keyframes of the window by their ids, the oldest first.
+    /// The ids of the keyframes in the window, oldest first.
     pub fn keyframes(&self) -> impl DoubleEndedIterator<Item = u64> + ExactSizeIterator {
         self.window.iter().map(|keyframe| keyframe.id)
     }
 
-    /// What is estimated of a keyframe of the window, from all that was measured before and after it, as of the last
-    /// update.
+    /// The estimate of a keyframe of the window from all measurements before and after it, as of the last update.
     pub fn smoothed(&mut self, id: u64) -> Option<Estimate<N>> {
         let index = self.window.iter().position(|keyframe| keyframe.id == id)?;
         if index < self.exact_from && self.dirty >= self.window.len() {
@@ -69,8 +68,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.window.get(index).map(|keyframe| keyframe.estimate::<S>())
     }
 
-    /// Covariance of a keyframe of the window, as [`covariance`](Self::covariance). It takes as many steps back as there are
-    /// keyframes after it.
+    /// Covariance of a keyframe of the window, in the same form as [`covariance`](Self::covariance). The cost is one backward
+    /// step for each later keyframe.
     pub fn smoothed_covariance(&self, id: u64) -> Option<SMatrix<f64, N, N>> {
         let index = self.window.iter().position(|keyframe| keyframe.id == id)?;
         let covariance = if self.is_tied() {
@@ -81,7 +80,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(SMatrix::from_fn(|i, j| covariance[i][j]))
     }
 
-    /// The same, without taking memory.
+    /// The same, without allocating.
     pub(super) fn covariance_now(&mut self, index: usize) -> Option<Square<N>> {
         if !self.is_tied() {
             return self.covariance_at(index);
@@ -92,7 +91,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         covariance
     }
 
-    /// The covariance where landmarks tie keyframes: column by column, what the window makes of an impulse.
+    /// The covariance where landmarks couple keyframes: computed column by column as the response to an impulse.
     fn covariance_tied(&self, index: usize, scratch: &mut Scratch<N>) -> Option<Square<N>> {
         let newest = self.newest_covariance()?;
         if index + 1 == self.window.len() {
@@ -109,7 +108,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(covariance)
     }
 
-    /// What the correction of a keyframe is if there is no information vector but this, at that keyframe.
+    /// The correction of a keyframe if the only information vector is this one, at that keyframe.
     fn response(
         &self,
         index: usize,

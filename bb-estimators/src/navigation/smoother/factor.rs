@@ -1,4 +1,4 @@
-//! What a window is made of besides the IMU, and how to add to it.
+//! The factors of a window, besides those of the IMU, and the trait for custom ones.
 
 use super::relative::compare;
 use super::rows::Rows;
@@ -9,10 +9,10 @@ use crate::navigation::measurement::{
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, States};
 
-/// What was measured at one keyframe, or between it and the one before.
+/// A measurement at one keyframe, or between it and the previous one.
 ///
-/// Every [`Measurement`](crate::navigation::Measurement) is one: [`Rows::measure`] is all there is to do for it. For factors of several kinds in one window,
-/// write an enum.
+/// Every [`Measurement`](crate::navigation::Measurement) can be used as a factor: its implementation only calls
+/// [`Rows::measure`]. To hold several kinds of factors in one window, write an enum.
 ///
 /// ```
 /// use bb_estimators::navigation::{Estimate, NavigationFactor, Factor, Refusal, Rows, States, POSITION};
@@ -55,16 +55,17 @@ use crate::navigation::state::{Estimate, States};
 /// }
 /// ```
 pub trait Factor<S: States, const N: usize> {
-    /// The keyframe before, by its id, if the factor concerns that as well.
+    /// The id of the previous keyframe, if the factor also depends on it.
     fn previous(&self) -> Option<u64> {
         None
     }
 
-    /// Compares with what the estimates make expect. `previous` is there if [`previous`](Self::previous) named one.
+    /// Compares the measurement with its prediction from the estimates. `previous` is `Some` if
+    /// [`previous`](Self::previous) returned an id.
     ///
     /// # Errors
     ///
-    /// Why it cannot be, [`Refusal::NotObservable`] for one.
+    /// The reason if it cannot be compared, for example [`Refusal::NotObservable`].
     fn linearise(
         &self,
         previous: Option<&Estimate<N>>,
@@ -75,7 +76,7 @@ pub trait Factor<S: States, const N: usize> {
 
 macro_rules! navigation_factors {
     ($($measurement:ident),* $(,)?) => {
-        /// The measurements of this crate as factors. [`RelativePose`] is between a keyframe and the one before.
+        /// The measurements of this crate as factors. [`RelativePose`] relates a keyframe to the previous one.
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[allow(missing_docs, reason = "each is documented as a measurement")]
         pub enum NavigationFactor {

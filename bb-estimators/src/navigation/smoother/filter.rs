@@ -1,4 +1,4 @@
-//! The smoother: samples of the IMU become keyframes, factors tie them to the world, the oldest leave.
+//! The fixed-lag smoother: turns IMU samples into keyframes, holds the factors on them and marginalises the oldest.
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
@@ -19,8 +19,8 @@ use crate::navigation::eskf::{EskfParams, ImuMean, LONGEST_GAP_S, Start, seconds
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};
 
-/// Position, velocity, attitude and biases at the last keyframes, with the optional states `S`, `N` errors in all, and
-/// factors of type `F`; see the [module](super).
+/// Estimates position, velocity, attitude, biases and the optional states `S` at the last keyframes: `N` error
+/// components in all, with factors of type `F`. See the [module](super).
 ///
 /// ```
 /// use bb_estimators::navigation::{AbsolutePose, FixedLagSmoother, ImuMean, SmootherParams, Start, Stream};
@@ -51,17 +51,17 @@ use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, State
 pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION, F = NavigationFactor> {
     pub(super) params: SmootherParams,
     pub(super) window: Window<F, N>,
-    /// Keyframes that are not in the window.
+    /// Keyframes outside the window, kept for reuse.
     pub(super) spare: Vec<Box<Keyframe<F, N>>>,
-    /// Since the newest keyframe.
+    /// The motion since the newest keyframe.
     pub(super) motion: Preintegration,
     pub(super) time_ns: i64,
     pub(super) last: ImuMean,
-    /// The first keyframe that has to be eliminated again.
+    /// The first keyframe to eliminate again.
     pub(super) dirty: usize,
-    /// Keyframes before this one may have an older correction than could be had.
+    /// Corrections of keyframes before this one may be out of date.
     pub(super) exact_from: usize,
-    /// None without a camera.
+    /// `None` without a camera.
     pub(super) landmarks: Option<Landmarks<N>>,
     pub(super) scratch: Scratch<N>,
     pub(super) gaps: u32,
@@ -70,11 +70,11 @@ pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION,
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
-    /// Makes one that has not started. This is when memory is taken; later, none is.
+    /// Creates a smoother that has not started. All memory is allocated here; none is allocated later.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name.
+    /// Returns the first parameter outside its accepted range, by name.
     pub fn new(params: SmootherParams) -> Result<Self, ParamsError> {
         const {
             assert!(
@@ -93,7 +93,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
         params.check()?;
         let empty = Estimate::unknown();
-        // One more than the window: the newest comes before the oldest leaves.
+        // One more than the window: the newest keyframe is added before the oldest leaves.
         let spare = (0..=params.window).map(|_| Box::new(Keyframe::new(empty, params.factors))).collect();
         let rest = Vector3::zeros();
         Ok(Self {
@@ -113,28 +113,28 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         })
     }
 
-    /// The parameters it was made with, or has been given since.
+    /// The current parameters.
     pub fn params(&self) -> &SmootherParams {
         &self.params
     }
 
-    /// Changes the noise of the sensors from now on: what has been integrated stays as it is.
+    /// Changes the noise of the sensors from now on. Motion that is already integrated keeps its noise.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name.
+    /// Returns the first parameter outside its accepted range, by name.
     pub fn set_sensors(&mut self, sensors: EskfParams) -> Result<(), ParamsError> {
         SmootherParams { sensors, ..self.params }.check()?;
         self.params.sensors = sensors;
         Ok(())
     }
 
-    /// Starts, or starts afresh, with one keyframe; optional states are zero, with the deviations of the parameters.
+    /// Starts or restarts with one keyframe. Optional states are zero, with the standard deviations of the parameters.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite or the orientation no rotation, [`Refusal::Noise`] if a covariance is
-    /// not positive definite. The smoother is then as it was.
+    /// [`Refusal::NonFinite`] if a value is not finite or the orientation is not a rotation; [`Refusal::Noise`] if a
+    /// covariance is not positive definite. The smoother is then unchanged.
     pub fn start(&mut self, id: u64, start: &Start) -> Result<(), Refusal> {
         let (estimate, matrix) = start.information::<S, N>(&self.params.sensors)?;
         let information = Information { matrix: matrix.data.0, vector: [0.0; N] };
@@ -144,12 +144,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(())
     }
 
-    /// Starts afresh from what a filter of the same robot estimates, with all correlations: a warm start, or another noise.
-    /// Optional states that only one of them has are dropped, or zero with the deviations of the parameters.
+    /// Restarts from the estimate of a filter of the same robot, with all its correlations: for a warm start or a
+    /// change of noise. Optional states that only the filter has are dropped. Those that only the smoother has are
+    /// zero, with the standard deviations of the parameters.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] and [`Refusal::Noise`] as [`start`](Self::start).
+    /// [`Refusal::NonFinite`] and [`Refusal::Noise`], as for [`start`](Self::start).
     pub fn adopt<T: States, const M: usize>(
         &mut self,
         id: u64,
@@ -165,7 +166,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         adopted.gyroscope_bias = estimate.gyroscope_bias;
         adopted.angular_velocity = estimate.angular_velocity;
         adopted.specific_force = estimate.specific_force;
-        // Where each error is in the filter's; none if it has it not.
+        // The index of each error in the filter, or `None` if the filter does not have it.
         let mut places: [Option<usize>; N] = core::array::from_fn(|i| (i < NAVIGATION).then_some(i));
         let mut variances = [0.0; N];
         for state in S::OPTIONAL {
@@ -214,15 +215,15 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.eliminate(1);
     }
 
-    /// Integrates one sample of the IMU.
+    /// Integrates one IMU sample.
     ///
-    /// A sample that covers more than [`EskfParams::longest_sample`] is a gap: the body is taken to keep velocity and
-    /// attitude, up to the noise that the parameters give a gap.
+    /// A sample that covers more than [`EskfParams::longest_sample`] is a gap: velocity and attitude are assumed
+    /// constant, up to the noise that the parameters give a gap.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] if the smoother has not started, a value is not finite or absurdly large, time stands still or runs
-    /// back, or the gap is longer than a minute. The smoother is then as it was.
+    /// [`Refusal`] if the smoother has not started, a value is not finite or absurdly large, time does not increase, or
+    /// the gap is longer than a minute. The smoother is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         let newest = self.window.back().ok_or(Refusal::NotStarted)?;
         sample.check()?;
@@ -232,7 +233,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             self.motion.add(&sample.angular_velocity, &sample.specific_force, dt, &sensors.densities());
             self.last = *sample;
         } else if dt <= LONGEST_GAP_S {
-            // What holds the body up, so that it does not fall.
+            // The specific force that cancels gravity.
             let up = Vector3::new(0.0, 0.0, sensors.gravity);
             let now = newest.estimate::<S>().world_from_body * self.motion.rotation();
             let force = now.inverse_transform_vector(&up) + self.motion.accelerometer_bias();
@@ -247,12 +248,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(())
     }
 
-    /// Makes the present a keyframe. If the window is full, the oldest leaves it, and what it says stays as a prior.
+    /// Adds a keyframe at the current time. If the window is full, the oldest keyframe is marginalised and its
+    /// information kept as a prior.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NotStarted`]; [`Refusal::TimeNotIncreasing`] if there was no sample since the last keyframe, or the id is
-    /// not greater than the last.
+    /// [`Refusal::NotStarted`]; [`Refusal::TimeNotIncreasing`] if there was no sample since the last keyframe, or the
+    /// id is not greater than the last.
     pub fn add_keyframe(&mut self, id: u64) -> Result<(), Refusal> {
         let newest = self.window.back().ok_or(Refusal::NotStarted)?;
         let previous_ns = newest.point.time_ns;
@@ -282,7 +284,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(())
     }
 
-    /// The oldest keyframe leaves.
+    /// Marginalises the oldest keyframe.
     pub(super) fn marginalise(&mut self) {
         if self.dirty <= 1 {
             self.eliminate(2);
@@ -293,7 +295,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if let Some(next) = self.window.front_mut() {
             next.own.add(&next.incoming);
             next.prior = Some(Prior { information: next.incoming, mean: None });
-            // It holds what was measured at the keyframe before; that cannot be linearised again.
+            // The prior includes the factors on the marginalised keyframe; they can no longer be relinearised.
             next.factors.retain(|held| Factor::<S, N>::previous(&held.factor).is_none());
             next.incoming = Information::none();
         }
@@ -302,7 +304,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.marginalised = self.marginalised.wrapping_add(1);
     }
 
-    /// What landmarks say of the oldest keyframe goes on to the others.
+    /// Passes the information that landmarks hold about the oldest keyframe on to the other keyframes.
     fn release(&mut self) {
         let Some(landmarks) = &mut self.landmarks else { return };
         let len = self.window.len();
@@ -317,12 +319,12 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
     }
 
-    /// How many gaps were bridged.
+    /// The number of gaps that were bridged.
     pub fn gaps(&self) -> u32 {
         self.gaps
     }
 
-    /// How many keyframes have left the window.
+    /// The number of keyframes that have left the window.
     pub fn marginalised(&self) -> u64 {
         self.marginalised
     }

@@ -1,4 +1,4 @@
-//! What was measured, at any keyframe of the window: judged by its gate, and added.
+//! Gates and adds measurements at any keyframe of the window.
 
 use super::elimination::{Judged, Known, judge, judge_pair};
 use super::factor::Factor;
@@ -12,26 +12,26 @@ use crate::navigation::state::States;
 use crate::navigation::stream::{Gate, Stream, Verdict};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
-    /// Adds what was measured at a keyframe of the window, in any order.
+    /// Adds a measurement at a keyframe of the window. Measurements may arrive in any order.
     ///
-    /// `stream` is that of the sensor: its gate decides, and its counts and statistics tell of it. After
-    /// [`patience`](crate::navigation::StreamParams::patience) refusals at the newest keyframe it is the window that is
-    /// taken to be wrong: it begins afresh there, with its covariance raised, or, if it was the way from the keyframe
-    /// before, with the noise of that raised.
+    /// `stream` is the stream of the sensor: its gate decides, and its counts and statistics record the result. After
+    /// [`patience`](crate::navigation::StreamParams::patience) refusals at the newest keyframe, the window is assumed
+    /// to be wrong: it restarts at that keyframe with its covariance raised. If the factor also depends on the previous
+    /// keyframe, only the noise of the motion between the two is raised.
     ///
     /// # Errors
     ///
-    /// [`Refusal`], which the stream has counted; the smoother is then as it was. [`Refusal::NoKeyframe`] if the keyframe has
-    /// left the window, or a relative pose is not one to the keyframe before.
+    /// [`Refusal`], which the stream has counted; the smoother is then unchanged. [`Refusal::NoKeyframe`] if the
+    /// keyframe has left the window, or if a relative pose does not refer to the previous keyframe.
     pub fn add(&mut self, stream: &mut Stream, id: u64, factor: impl Into<F>) -> Result<Fused, Refusal> {
         self.add_robust(stream, id, factor, Kernel::Squares)
     }
 
-    /// [`add`](Self::add) with a robust kernel: how much it weighs is decided again as the window learns.
+    /// Like [`add`](Self::add), with a robust kernel. The weight is updated as the estimate of the window changes.
     ///
     /// # Errors
     ///
-    /// As there.
+    /// Those of [`add`](Self::add).
     pub fn add_robust(
         &mut self,
         stream: &mut Stream,
@@ -95,7 +95,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(Fused { nis: judged.nis, dimension, weight, raised, limit, log_likelihood, whitened: judged.whitened })
     }
 
-    /// Compares a factor with what is known so far. Corrections stay as they were at the last update, all but the newest.
+    /// Compares a factor with the current estimate. Only the correction of the newest keyframe is recomputed; the
+    /// others are as of the last update.
     fn judged(&mut self, index: usize, rows: &Rows<N>, ties: bool) -> Option<Judged> {
         self.eliminate(self.window.len());
         let is_newest = index + 1 == self.window.len();
@@ -113,7 +114,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         judge_pair(rows, &before.pivot, &keyframe.link, (&earlier, &correction), &known)
     }
 
-    /// The correction of a keyframe as it would be solved.
+    /// The correction of a keyframe if it were solved now.
     fn correction_at(&mut self, index: usize) -> Option<[f64; N]> {
         if self.is_tied() {
             self.solve_all();
@@ -127,7 +128,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(correction)
     }
 
-    /// Trusts the newest keyframe less, or the way to it; where that is now.
+    /// Raises the covariance of the newest keyframe, or the noise of the motion to it. Returns the new index of that keyframe.
     #[cold]
     fn raise(&mut self, factor: f64, way: bool) -> usize {
         let newest = self.window.len() - 1;

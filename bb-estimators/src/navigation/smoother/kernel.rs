@@ -1,8 +1,8 @@
-//! Robust kernels: how much a measurement weighs that does not fit.
+//! Robust kernels: weights for measurements that do not fit.
 
 use crate::navigation::math::sqrt;
 
-/// How much a factor weighs, by how many standard deviations `x` it is off: the norm of its whitened residual.
+/// The weight of a factor as a function of `x`, the norm of its whitened residual: how many standard deviations it is off.
 ///
 /// Z. Zhang, "Parameter estimation techniques: a tutorial with application to conic fitting", Image and Vision Computing
 /// 15(1), 1997, section 9.
@@ -15,12 +15,13 @@ pub enum Kernel {
     Huber(f64),
     /// Weight `1 / (1 + (x / c)²)`. Usual: 2.385.
     Cauchy(f64),
-    /// Weight `1 / (1 + (x / c)²)²`: what is far off hardly counts, and so cannot return to where it counts.
+    /// Weight `1 / (1 + (x / c)²)²`: outliers far off have almost no weight, and so cannot recover it.
     GemanMcClure(f64),
 }
 
 impl Kernel {
-    /// The weight for a squared norm of the whitened residual, from 0 to 1. With a parameter that is not positive, the weight is 1.
+    /// The weight for a squared norm of the whitened residual, from 0 to 1. If the parameter is not positive, the
+    /// weight is 1.
     pub fn weight(self, squared: f64) -> f64 {
         let ratio = |parameter: f64| squared / (parameter * parameter);
         match self {

@@ -1,4 +1,4 @@
-//! A keyframe of the window: where it is linearised, and all that is held of it.
+//! A keyframe of the window: its linearisation point, factors and information.
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
@@ -18,61 +18,61 @@ use super::rows::Rows;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
-/// A weight that differs by less from what the kernel says stays.
+/// A weight is replaced if the kernel's differs from it by more than this.
 const REWEIGHED: f64 = 0.02;
 
-/// A factor, and how it weighs.
+/// A factor and its weight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Held<F> {
     pub(super) factor: F,
     pub(super) kernel: Kernel,
-    /// What its variance is divided by, as its stream says.
+    /// The divisor of its variance, as given by its stream.
     pub(super) trust: f64,
-    /// What the kernel makes of it.
+    /// The weight given by the kernel.
     pub(super) weight: f64,
 }
 
-/// What is known of the oldest keyframe besides what was measured at it.
+/// The prior of the oldest keyframe.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prior<const N: usize> {
     pub(super) information: Information<N>,
-    /// What it is a prior of, from the start; the keyframe may be linearised elsewhere. Without it, the prior is of what
-    /// left the window, and the keyframe stays where that was linearised about it.
+    /// The mean of the prior at the start; the keyframe may be relinearised elsewhere. If `None`, the prior comes from
+    /// marginalised keyframes, and the keyframe stays at the linearisation point that they used.
     ///
     /// G. Huang, A. Mourikis, S. Roumeliotis, "A first-estimates Jacobian EKF for improving SLAM consistency", ISER 2008.
     pub(super) mean: Option<Estimate<N>>,
 }
 
-/// The keyframes that are held, the oldest first.
+/// The keyframes of the window, oldest first.
 pub(super) type Window<F, const N: usize> = VecDeque<Box<Keyframe<F, N>>>;
 
 /// See the module.
 #[derive(Clone, Debug)]
 pub(super) struct Keyframe<F, const N: usize> {
     pub(super) id: u64,
-    /// Where it is linearised.
+    /// The linearisation point.
     pub(super) point: Estimate<N>,
-    /// What is estimated, less that.
+    /// The estimate minus the linearisation point.
     pub(super) correction: [f64; N],
     pub(super) prior: Option<Prior<N>>,
-    /// From the keyframe before.
+    /// The motion from the previous keyframe.
     pub(super) motion: Preintegration,
-    /// What its noise is multiplied by.
+    /// The factor that scales the noise of the motion.
     pub(super) raised: f64,
     pub(super) factors: Vec<Held<F>>,
     /// Whether a factor has a kernel.
     pub(super) is_robust: bool,
-    /// What is known of it alone: the prior and factors.
+    /// Information on this keyframe alone: the prior and the factors.
     pub(super) own: Information<N>,
-    /// What it has to do with the one before.
+    /// The link to the previous keyframe.
     pub(super) link: Link<N>,
-    /// What the ones before say of it.
+    /// Information from the earlier keyframes.
     pub(super) incoming: Information<N>,
-    /// What landmarks say of it, besides what those before it have of that.
+    /// Information from landmarks, besides the part that earlier keyframes carry.
     pub(super) seen: PoseInformation,
-    /// Changes whenever it is linearised elsewhere.
+    /// Changes whenever the keyframe is relinearised.
     pub(super) version: u32,
-    /// Whether a landmark that was marginalised is linearised about where it is.
+    /// Whether a marginalised landmark is linearised about this keyframe's linearisation point.
     pub(super) is_fixed: bool,
     pub(super) pivot: Pivot<N>,
 }
@@ -98,7 +98,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         }
     }
 
-    /// Begins another keyframe in its place.
+    /// Reuses the storage for another keyframe.
     pub(super) fn renew(&mut self, id: u64, point: Estimate<N>, motion: &Preintegration) {
         self.id = id;
         self.point = point;
@@ -115,13 +115,13 @@ impl<F, const N: usize> Keyframe<F, N> {
         self.is_fixed = false;
     }
 
-    /// All that is known of it from what was measured at it and before, and from landmarks.
+    /// All information on this keyframe from its own and earlier measurements, and from landmarks.
     pub(super) fn known(&self) -> Information<N> {
         let mut known = self.own;
         known.add(&self.incoming);
         for (i, row) in self.seen.matrix.iter().enumerate() {
             known.vector[place(i)] += self.seen.vector[i];
-            // The places increase, so it is on and above the diagonal as well.
+            // The indices increase, so the result is on and above the diagonal as well.
             for (j, value) in row.iter().enumerate().skip(i) {
                 known.matrix[place(i)][place(j)] += value;
             }
@@ -129,17 +129,17 @@ impl<F, const N: usize> Keyframe<F, N> {
         known
     }
 
-    /// What is estimated.
+    /// The estimate.
     pub(super) fn estimate<S: States>(&self) -> Estimate<N> {
         self.point.corrected::<S>(&SVector::from(self.correction))
     }
 
-    /// Whether it may be linearised elsewhere.
+    /// Whether it may be relinearised elsewhere.
     pub(super) fn is_free(&self) -> bool {
         !self.is_fixed && self.prior.is_none_or(|prior| prior.mean.is_some())
     }
 
-    /// Whether it is farther from where it was linearised than it may be.
+    /// Whether the correction exceeds a relinearisation threshold.
     pub(super) fn is_off(&self, params: &SmootherParams) -> bool {
         let beyond = |first: usize, limit: f64| {
             let [x, y, z] = core::array::from_fn(|i| self.correction[first + i]);
@@ -148,7 +148,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         beyond(ROTATION, params.relinearise_rotation) || beyond(POSITION, params.relinearise_position)
     }
 
-    /// Linearises it where it is estimated.
+    /// Relinearises at the current estimate.
     pub(super) fn relinearise<S: States>(&mut self) {
         self.point = self.estimate::<S>();
         self.correction = [0.0; N];
@@ -157,7 +157,7 @@ impl<F, const N: usize> Keyframe<F, N> {
 }
 
 impl<F, const N: usize> Keyframe<F, N> {
-    /// Sums up all that concerns it alone, and, with the keyframe before, the link to that.
+    /// Sums the information on this keyframe alone and, given the previous keyframe, builds the link to it.
     pub(super) fn linearise<S: States>(&mut self, before: Option<&Self>, params: &SmootherParams)
     where
         F: Factor<S, N>,
@@ -182,7 +182,7 @@ impl<F, const N: usize> Keyframe<F, N> {
             let Some(held) = self.factors.get(index) else { continue };
             let (trust, kernel) = (held.trust, held.kernel);
             let ties = held.factor.previous().is_some();
-            // It was linearised when it was added; where it cannot be now, it says nothing.
+            // It could be linearised when it was added; where that fails now, it contributes nothing.
             if self.rows::<S>(&held.factor, before, &mut rows).is_err() {
                 continue;
             }
@@ -222,7 +222,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         factor.linearise(previous, &self.point, rows)
     }
 
-    /// The squared norm of a whitened residual, where the window is estimated now.
+    /// The squared norm of a whitened residual at the current estimate of the window.
     fn distance(&self, rows: &Rows<N>, before: Option<&Self>) -> f64 {
         let mut squared = 0.0;
         for row in 0..rows.count {
@@ -235,7 +235,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         squared
     }
 
-    /// Whether a kernel says another weight now.
+    /// Whether a kernel now gives a different weight.
     pub(super) fn is_misweighed<S: States>(&self, before: Option<&Self>) -> bool
     where
         F: Factor<S, N>,
@@ -250,7 +250,7 @@ impl<F, const N: usize> Keyframe<F, N> {
     }
 }
 
-/// Where the next keyframe is, by the motion from this one.
+/// Predicts the next keyframe from this one and the motion since.
 pub(super) fn after<F, S: States, const N: usize>(
     from: &Keyframe<F, N>,
     motion: &Preintegration,

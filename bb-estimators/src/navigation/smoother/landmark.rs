@@ -1,10 +1,11 @@
-//! One landmark: where it is, who saw it, and what eliminating it says of the poses that did.
+//! One landmark: its position, its observations, and the information that it gives on the poses of the keyframes.
 //!
-//! With the direction d from the body to the landmark l in the world, what the camera sees changes by
-//! `B (δl - δp + d × θ)`: all Jacobians are made of the 2 × 3 matrix B. So the normal matrix of landmark and poses is made of
-//! `Nᵢ = Bᵢᵀ Bᵢ` and `Dᵢ = [-I | [dᵢ]×]`, and eliminating the landmark, whose own matrix is `V = Π + Σ Nᵢ` with its prior Π,
-//! leaves `Σ Dᵢᵀ Nᵢ Dᵢ - Yᵀ Y` with `Yᵢ = V^-½ Nᵢ Dᵢ`. One more observation adds two rows to that:
-//! `(I + B V⁻¹ Bᵀ)^-½ [-B V⁻¹ Nᵢ Dᵢ … B D]`. Moving and turning all of the world changes none of it but by the prior.
+//! Let d be the vector from the body to the landmark l in the world. What the camera sees changes by
+//! `B (δl - δp + d × θ)`, so all Jacobians are made of the 2 × 3 matrix B. The normal matrix of landmark and poses
+//! therefore consists of `Nᵢ = Bᵢᵀ Bᵢ` and `Dᵢ = [-I | [dᵢ]×]`. The landmark's own matrix is `V = Π + Σ Nᵢ` with its
+//! prior Π. Eliminating the landmark leaves `Σ Dᵢᵀ Nᵢ Dᵢ - Yᵀ Y` with `Yᵢ = V^-½ Nᵢ Dᵢ`. Each further observation adds
+//! two rows: `(I + B V⁻¹ Bᵀ)^-½ [-B V⁻¹ Nᵢ Dᵢ … B D]`. Moving or rotating the whole world changes only the contribution
+//! of the prior.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -18,19 +19,19 @@ use crate::navigation::camera::{Camera, Undistorted, normalised};
 use crate::navigation::math::sqrt;
 use crate::navigation::state::{POSITION, ROTATION, States};
 
-/// Where a landmark was seen.
+/// An observation of a landmark from one keyframe.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sight {
-    /// Of the keyframe, counted as by [`Coupling::first`].
+    /// The serial number of the keyframe, counted like [`Coupling::first`].
     pub(super) serial: u64,
-    /// Which linearisation of the keyframe it has.
+    /// The version of the keyframe's linearisation that it uses.
     pub(super) version: u32,
     pub(super) seen: Undistorted,
-    /// What the inverse of the standard deviation of a pixel is, as the stream has it.
+    /// The inverse of a pixel's standard deviation, as given by the stream.
     pub(super) precision: f64,
-    /// What the kernel makes of it.
+    /// The weight given by the kernel.
     pub(super) weight: f64,
-    /// B and what is left to explain, divided by the noise.
+    /// B and the residual, divided by the noise.
     pub(super) jacobian: Matrix2x3<f64>,
     pub(super) residual: Vector2<f64>,
     /// d.
@@ -41,20 +42,20 @@ pub(super) struct Sight {
 #[derive(Clone, Debug)]
 pub(super) struct Landmark {
     pub(super) id: u64,
-    /// Where it is linearised.
+    /// The linearisation point.
     pub(super) point: Vector3<f64>,
-    /// Its mean, and the inverse of its variance; none without a guess.
+    /// The mean and inverse variance of the prior; `None` without a guess.
     pub(super) prior: Option<(Vector3<f64>, f64)>,
-    /// Whether its place is known, and so the window uses it.
+    /// Whether the position is known, so that the window uses the landmark.
     pub(super) is_used: bool,
-    /// Whether more may be added: the last observations of a landmark that is lost stay.
+    /// Whether observations may still be added. A lost landmark keeps its last observations.
     pub(super) is_open: bool,
-    /// The keyframe that saw it last.
+    /// The serial number of the keyframe that saw it last.
     pub(super) last: u64,
     pub(super) refused_in_a_row: u32,
-    /// In the order of time.
+    /// In chronological order.
     pub(super) sights: Vec<Sight>,
-    /// V⁻¹ and `V⁻¹ b`, where b is what prior and observations pull.
+    /// V⁻¹ and `V⁻¹ b`, where b is the information vector of prior and observations.
     inverse: Matrix3<f64>,
     mean: Vector3<f64>,
 }
@@ -75,7 +76,7 @@ impl Landmark {
         }
     }
 
-    /// Begins another in its place.
+    /// Reuses the storage for another landmark.
     pub(super) fn renew(&mut self, id: u64, prior: Option<(Vector3<f64>, f64)>) {
         self.id = id;
         self.point = prior.map_or(Vector3::zeros(), |(mean, _)| mean);
@@ -87,17 +88,18 @@ impl Landmark {
         self.sum();
     }
 
-    /// B V⁻¹ Bᵀ of any B.
+    /// B V⁻¹ Bᵀ for any B.
     pub(super) fn spread(&self, jacobian: &Matrix2x3<f64>) -> SMatrix<f64, 2, 2> {
         jacobian * self.inverse * jacobian.transpose()
     }
 
-    /// What part of it is the prior's: `V⁻¹ Π`.
+    /// The share of the prior: `V⁻¹ Π`.
     pub(super) fn held(&self) -> Matrix3<f64> {
         self.prior.map_or(Matrix3::zeros(), |(_, weight)| self.inverse * weight)
     }
 
-    /// Sums up prior and observations. Where that does not determine where it is, it is not used until something does.
+    /// Sums prior and observations. If they do not determine the position, the landmark is not used until further
+    /// observations do.
     pub(super) fn sum(&mut self) {
         let mut matrix = Matrix3::zeros();
         let mut vector = Vector3::zeros();
@@ -116,7 +118,7 @@ impl Landmark {
         self.mean = self.inverse * vector;
     }
 
-    /// How far it is estimated to be from where it is linearised.
+    /// The estimated offset from the linearisation point.
     pub(super) fn correction<F, const N: usize>(&self, window: &Window<F, N>, first: u64) -> Vector3<f64> {
         let mut pull = Vector3::zeros();
         for sight in &self.sights {
@@ -126,7 +128,7 @@ impl Landmark {
         self.mean - self.inverse * pull
     }
 
-    /// Adds to Λ what it says of the poses, or takes it away again: all as it was linearised.
+    /// Adds its information on the poses to Λ, or removes it again, using the stored linearisation.
     pub(super) fn add_to<const N: usize>(&self, coupling: &mut Coupling<N>, rows: &mut [Vec<f64>; 3], sign: f64) {
         let Some(root) = self.inverse.cholesky().map(|root| root.l()) else { return };
         let Some((from, to)) = self.range(coupling.first, rows) else { return };
@@ -145,7 +147,7 @@ impl Landmark {
         coupling.add_rows((from, to), &[a, b, c], &residual.into(), -sign);
     }
 
-    /// Adds what one more observation says, before that is among its own, or takes it away, once it is not any more.
+    /// Adds the information of an observation that is not inserted yet, or removes that of one that is no longer stored.
     pub(super) fn add_one<const N: usize>(
         &self,
         sight: &Sight,
@@ -157,7 +159,7 @@ impl Landmark {
         let jacobian = sight.jacobian * weight;
         let index = (sight.serial - coupling.first) as usize;
         let (mut from, mut to) = self.range(coupling.first, rows).unwrap_or((index, index + 1));
-        // What is between must be zero as well.
+        // The columns in between must be zero as well.
         for row in rows.iter_mut() {
             row[POSE * index..POSE * (index + 1)].fill(0.0);
             if index >= to {
@@ -188,7 +190,7 @@ impl Landmark {
         coupling.add_rows((from, to), &[a, b], &residual.into(), sign);
     }
 
-    /// The poses from the first to the last that saw it, and zeros in the rows there.
+    /// The range of poses from the first to the last that saw it. Zeroes that range in `rows`.
     fn range(&self, first: u64, rows: &mut [Vec<f64>; 3]) -> Option<(usize, usize)> {
         let from = (self.sights.first()?.serial - first) as usize;
         let to = (self.sights.last()?.serial - first) as usize + 1;
@@ -205,7 +207,7 @@ impl Sight {
         self.jacobian.transpose() * self.jacobian * self.weight
     }
 
-    /// Linearises at a keyframe and a landmark; not if that would be behind the camera.
+    /// Linearises at a keyframe and a landmark. Returns `false` if the landmark would be behind the camera.
     pub(super) fn linearise<F, const N: usize>(
         &mut self,
         camera: &Camera,
@@ -223,7 +225,7 @@ impl Sight {
         self.jacobian.iter().chain(self.residual.iter()).all(|x| x.abs() < 1e12)
     }
 
-    /// B and the residual where keyframe and landmark are estimated to be.
+    /// B and the residual at the estimates of keyframe and landmark.
     pub(super) fn estimated<F, S: States, const N: usize>(
         &self,
         camera: &Camera,
@@ -252,7 +254,7 @@ impl Sight {
         }
     }
 
-    /// What it says of its pose if the landmark is where it is linearised.
+    /// The information on its pose if the landmark stays at its linearisation point.
     fn information(&self) -> PoseInformation {
         let mut information = PoseInformation::none();
         let mut rows = [[0.0; POSE]; 2];
@@ -270,7 +272,7 @@ impl Sight {
     }
 }
 
-/// The block of a pose in a covariance of a keyframe.
+/// Extracts the block of the pose from the covariance of a keyframe.
 pub(super) fn pose_block<const N: usize>(covariance: &[[f64; N]; N]) -> SMatrix<f64, POSE, POSE> {
     SMatrix::from_fn(|i, j| covariance[place(i)][place(j)])
 }

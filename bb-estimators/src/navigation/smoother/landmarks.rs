@@ -1,4 +1,4 @@
-//! The landmarks of a window: which are used, how well they fit, and what becomes of them when a keyframe leaves.
+//! The landmarks of a window: triangulation, relinearisation, and marginalisation when a keyframe leaves.
 
 #![allow(clippy::vec_box, reason = "landmarks move between the two lists")]
 
@@ -16,20 +16,20 @@ use crate::navigation::camera::Camera;
 use crate::navigation::chi_square::limit;
 use crate::navigation::state::States;
 
-/// A weight that differs by less from what the kernel says stays until the landmark is linearised again.
+/// A landmark is relinearised if the kernel's weight of an observation differs from the current one by more than this.
 const REWEIGHED: f64 = 0.1;
 
-/// Without a prior, the place of a landmark that goes on counts as known to within this many times its distance: next to
-/// nothing, but never indeterminate.
+/// A landmark that continues without a prior is given a standard deviation of this many times its distance: almost no
+/// information, but never singular.
 const UNKNOWN: f64 = 100.0;
 
-/// Gauss–Newton steps of a landmark alone.
+/// Gauss–Newton steps for a single landmark.
 const STEPS: usize = 5;
 
-/// A landmark that was not seen by as many of the last keyframes is lost: it is not continued once its first keyframe leaves.
+/// A landmark that none of this many newest keyframes saw is lost: it is not continued once its first keyframe leaves.
 const LOST_AFTER: u64 = 5;
 
-/// Part of good landmarks that are not taken because their directions do not meet.
+/// The fraction of good landmarks that are rejected because their directions do not intersect.
 const UNFIT: f64 = 1e-4;
 
 /// See the module.
@@ -41,18 +41,18 @@ pub(super) struct Landmarks<const N: usize> {
     pub(super) all: Vec<Box<Landmark>>,
     spare: Vec<Box<Landmark>>,
     rows: [Vec<f64>; 3],
-    /// What is known of the pose of a keyframe as its observations arrive, by the keyframe's id.
+    /// The pose covariances used to gate the observations of a keyframe, with that keyframe's id.
     pub(super) judged: Option<(u64, Judging)>,
-    /// The least χ² that two directions or more, which do not meet, have; by their number.
+    /// The χ² limit above which the directions of a landmark do not intersect, indexed by their number.
     unfit: Vec<f64>,
 }
 
-/// What the observations at one keyframe are judged with.
+/// The covariances with which the observations at one keyframe are gated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Judging {
     /// Covariance of the pose.
     pub(super) pose: SMatrix<f64, POSE, POSE>,
-    /// The part of it that is not common with the keyframes before.
+    /// The part that is independent of the previous keyframes.
     pub(super) step: SMatrix<f64, POSE, POSE>,
 }
 
@@ -80,12 +80,12 @@ impl<const N: usize> Landmarks<N> {
         self.judged = None;
     }
 
-    /// A landmark, if it can be added to.
+    /// The index of a landmark that still accepts observations.
     pub(super) fn find(&self, id: u64) -> Option<usize> {
         self.all.iter().position(|landmark| landmark.id == id && landmark.is_open)
     }
 
-    /// Begins a landmark; none if there is no room.
+    /// Begins a landmark. Returns `None` if there is no room.
     pub(super) fn begin(&mut self, id: u64, guess: Option<(Vector3<f64>, f64)>) -> Option<usize> {
         let mut landmark = self.spare.pop()?;
         landmark.renew(id, guess.map(|(mean, deviation)| (mean, 1.0 / (deviation * deviation))));
@@ -98,12 +98,12 @@ impl<const N: usize> Landmarks<N> {
         self.spare.push(landmark);
     }
 
-    /// Where a landmark is estimated to be.
+    /// The estimated position of a landmark.
     pub(super) fn estimate<F>(&self, landmark: &Landmark, window: &Window<F, N>) -> Vector3<f64> {
         landmark.point + landmark.correction(window, self.coupling.first)
     }
 
-    /// Adds an observation to a landmark that is used.
+    /// Adds an observation to a landmark that is in use.
     pub(super) fn add<F, S: States>(&mut self, index: usize, sight: Sight, window: &Window<F, N>) {
         let first = self.coupling.first;
         let Some(landmark) = self.all.get(index) else { return };
@@ -125,7 +125,7 @@ impl<const N: usize> Landmarks<N> {
         self.linearise::<F, S>(index, point, window);
     }
 
-    /// Linearises a landmark and all its observations, beginning at a point, and adds what it says.
+    /// Linearises a landmark and all its observations, starting from `point`, and adds its information to the window.
     fn linearise<F, S: States>(&mut self, index: usize, point: Vector3<f64>, window: &Window<F, N>) {
         let first = self.coupling.first;
         let (camera, kernel) = (self.camera, self.params.kernel);
@@ -144,7 +144,8 @@ impl<const N: usize> Landmarks<N> {
         }
     }
 
-    /// Uses a landmark if its directions meet well enough; whether they do, or that they never will.
+    /// Triangulates a landmark and uses it if its directions fit: `Some(true)`. `Some(false)` if they do not intersect,
+    /// `None` if more observations are needed.
     pub(super) fn triangulate<F, S: States>(&mut self, index: usize, window: &Window<F, N>) -> Option<bool> {
         let first = self.coupling.first;
         let (camera, params) = (self.camera, self.params);
@@ -159,7 +160,7 @@ impl<const N: usize> Landmarks<N> {
             };
             squared += residual.norm_squared();
         }
-        // Where they all weigh less if they are off, one that is off does not spoil the others.
+        // The residuals are unweighted here, so an outlier counts in full.
         let is_fit = squared <= self.unfit.get(landmark.sights.len()).copied().unwrap_or(f64::INFINITY);
         if !is_fit {
             return Some(false);
@@ -169,7 +170,7 @@ impl<const N: usize> Landmarks<N> {
         Some(true)
     }
 
-    /// Whether a landmark has to be linearised again: a keyframe or the landmark itself moved, or a kernel says otherwise.
+    /// Whether a landmark must be relinearised: a keyframe or the landmark itself moved, or its kernel gives another weight.
     fn is_stale<F>(&self, landmark: &Landmark, window: &Window<F, N>) -> bool {
         let first = self.coupling.first;
         let correction = landmark.correction(window, first);
@@ -188,7 +189,7 @@ impl<const N: usize> Landmarks<N> {
         })
     }
 
-    /// Linearises again what has to be; how many that were.
+    /// Relinearises the stale landmarks and returns their number.
     pub(super) fn relinearise<F, S: States>(&mut self, window: &Window<F, N>) -> usize {
         let mut count = 0;
         for index in 0..self.all.len() {
@@ -204,8 +205,8 @@ impl<const N: usize> Landmarks<N> {
         count
     }
 
-    /// Before the oldest keyframe leaves: what was seen there stays in Λ as it is linearised, and its landmarks begin again
-    /// where they are, as if they were unknown.
+    /// Called before the oldest keyframe is marginalised. The observations of its landmarks stay in Λ as linearised,
+    /// and these landmarks restart at their estimates as if they were unknown.
     pub(super) fn release<F>(&mut self, window: &mut Window<F, N>) {
         let first = self.coupling.first;
         let newest = first + window.len().saturating_sub(1) as u64;
@@ -242,14 +243,14 @@ impl<const N: usize> Landmarks<N> {
 }
 
 impl Landmark {
-    /// In the order of time.
+    /// Inserts an observation in chronological order.
     pub(super) fn insert(&mut self, sight: Sight) {
         let after = self.sights.partition_point(|other| other.serial < sight.serial);
         self.sights.insert(after, sight);
     }
 }
 
-/// Where the directions meet, with the keyframes as they are estimated; none if they are too much alike.
+/// Intersects the directions, with the keyframes at their estimates. Returns `None` if the directions are nearly parallel.
 fn meeting<F, S: States, const N: usize>(
     landmark: &Landmark,
     camera: &Camera,
@@ -277,8 +278,8 @@ fn meeting<F, S: States, const N: usize>(
     matrix.cholesky().map(|root| root.solve(&vector)).filter(|point| point.iter().all(|x| x.is_finite()))
 }
 
-/// Where a landmark is if the keyframes are where they are estimated, by Gauss–Newton steps from a point; none if it cannot
-/// have been seen there.
+/// Refines the position of a landmark by Gauss–Newton steps from `point`, with the keyframes at their estimates.
+/// Returns `None` if the landmark cannot have been seen there.
 fn located<F, S: States, const N: usize>(
     landmark: &Landmark,
     camera: &Camera,
@@ -315,7 +316,7 @@ fn located<F, S: States, const N: usize>(
     Some(point)
 }
 
-/// `B P Bᵀ` of a 2-dimensional observation.
+/// `B P Bᵀ` for a 2-dimensional observation.
 pub(super) fn projected(jacobian: &SMatrix<f64, 2, POSE>, covariance: &SMatrix<f64, POSE, POSE>) -> Matrix2<f64> {
     jacobian * covariance * jacobian.transpose()
 }

@@ -1,9 +1,10 @@
-//! What ties a keyframe to the one before: the IMU between them, and relative poses.
+//! The link between a keyframe and the previous one: the IMU between them, and relative poses.
 //!
-//! It is held backwards in time, as `δ_before = G δ + g + ν` with noise ν of covariance Q, and what it says of the keyframe
-//! alone. So the noise of the IMU is never inverted: neither a millisecond between two keyframes, which says next to all,
-//! nor a minute, which says next to nothing, costs digits. A factor on both keyframes is a measurement of ν, and updates G, g
-//! and Q as a Kalman filter does; what it says of the later keyframe alone is information on that.
+//! The link is stored backwards in time, as `δ_before = G δ + g + ν` with noise ν of covariance Q, together with its
+//! information on the later keyframe alone. The noise of the IMU is therefore never inverted. No digits are lost after
+//! a millisecond between two keyframes, which determines almost everything, nor after a minute, which determines almost
+//! nothing. A factor on both keyframes is a measurement of ν: it updates G, g and Q like a Kalman filter. The rest is
+//! information on the later keyframe alone.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -18,10 +19,11 @@ use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, States, VELOCITY, offset,
 };
 
-/// An optional state keeps at least this part of itself from one keyframe to the next, so that there is a way back.
+/// An optional state keeps at least this fraction of its value from one keyframe to the next, so that the transition
+/// stays invertible.
 const LEAST_KEPT: f64 = 1e-6;
 
-/// What is known of a state, in the form of least squares: the cost `½ δᵀ M δ - vᵀ δ`.
+/// Information on a state in least-squares form: the cost `½ δᵀ M δ - vᵀ δ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Information<const N: usize> {
     /// M, on and above the diagonal.
@@ -51,7 +53,7 @@ impl<const N: usize> Information<N> {
     }
 }
 
-/// A keyframe and the one before.
+/// The link between a keyframe and the previous one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Link<const N: usize> {
     /// G.
@@ -60,11 +62,11 @@ pub(super) struct Link<const N: usize> {
     pub(super) offset: [f64; N],
     /// Q.
     pub(super) noise: Square<N>,
-    /// What it says of the later keyframe alone.
+    /// The information on the later keyframe alone.
     pub(super) information: Information<N>,
 }
 
-/// Where the body is after the motion, if it was at `from`.
+/// Predicts the body's state after the motion from its state at `from`.
 pub(super) fn predicted<S: States, const N: usize>(
     from: &Estimate<N>,
     motion: &Preintegration,
@@ -83,12 +85,12 @@ pub(super) fn predicted<S: States, const N: usize>(
     to
 }
 
-/// The motion at the biases of an estimate.
+/// The motion, corrected to the biases of an estimate.
 struct Corrected {
     position: Vector3<f64>,
     velocity: Vector3<f64>,
     rotation: nalgebra::UnitQuaternion<f64>,
-    /// Derivative of the rotation by the gyroscope's bias.
+    /// Derivative of the rotation with respect to the gyroscope's bias.
     rotation_by_gyroscope: Matrix3<f64>,
 }
 
@@ -112,7 +114,7 @@ impl Corrected {
     }
 }
 
-/// Optional states: their index, what they keep of themselves over a time, and the variance that they gain.
+/// The optional states: their index, the fraction that they keep over a time, and the variance that they gain.
 fn wandering<S: States>(seconds: f64, params: &EskfParams) -> impl Iterator<Item = (usize, f64, f64)> {
     S::OPTIONAL.iter().flat_map(move |state| {
         let process = params.process(*state);
@@ -130,12 +132,12 @@ impl<const N: usize> Link<N> {
         Self { back: zeros(), offset: [0.0; N], noise: zeros(), information: Information::none() }
     }
 
-    /// What the motion says, about these estimates; its noise is multiplied by `raised`.
+    /// The link by the motion, linearised about these estimates; its noise is multiplied by `raised`.
     ///
-    /// What a rotation does to position and velocity is taken from the estimates, not from what was measured: then turning
-    /// and moving all of the world, which no IMU sees, changes nothing here either, and no information about heading comes of
-    /// noise. G. Huang, A. Mourikis, S. Roumeliotis, "Observability-based rules for designing consistent EKF SLAM
-    /// estimators", The International Journal of Robotics Research 29(5), 2010.
+    /// The derivatives of position and velocity with respect to rotation are taken from the estimates, not from the
+    /// measured motion. Rotating and moving the whole world, which no IMU observes, then changes nothing here either,
+    /// and noise yields no information about heading. G. Huang, A. Mourikis, S. Roumeliotis, "Observability-based rules
+    /// for designing consistent EKF SLAM estimators", The International Journal of Robotics Research 29(5), 2010.
     pub(super) fn of_motion<S: States>(
         from: &Estimate<N>,
         to: &Estimate<N>,
@@ -147,7 +149,7 @@ impl<const N: usize> Link<N> {
         let seconds = motion.seconds();
         let predicted = predicted::<S, N>(from, motion, params);
 
-        // In the axes of the body at `from`: the inverse of what `preintegration.rs` has.
+        // In the axes of the body at `from`: the inverse of the transition in `preintegration.rs`.
         let to_world = from.rotation();
         let fall = Vector3::new(0.0, 0.0, -params.gravity * seconds);
         let gained = to.velocity - from.velocity - fall;
@@ -216,7 +218,7 @@ impl<const N: usize> Link<N> {
     pub(super) fn add(&mut self, factor: &Rows<N>) {
         let mut innovation = self.innovation(factor);
         let count = factor.count;
-        // Q Aᵀ, then its rows divided by the factor of the covariance of the innovation, and so all else.
+        // Q Aᵀ; its rows and all other terms are then divided by the Cholesky factor of the innovation covariance.
         let Innovation { projected, expected, residual, covariance } = &mut innovation;
         for i in 0..count {
             for j in 0..i {
@@ -251,7 +253,7 @@ impl<const N: usize> Link<N> {
         self.information.add_rows(&expected[..count], &residual[..count]);
     }
 
-    /// What the factor says of ν: with `A δ_before + B δ = residual + noise` it is `A ν = residual' - (A G + B) δ`.
+    /// Rewrites the factor in ν: with `A δ_before + B δ = residual + noise`, it is `A ν = residual' - (A G + B) δ`.
     #[inline]
     pub(super) fn innovation(&self, factor: &Rows<N>) -> Innovation<N> {
         let mut all = Innovation {
@@ -290,8 +292,8 @@ pub(super) struct Innovation<const N: usize> {
     pub(super) covariance: [[f64; MOST_ROWS]; MOST_ROWS],
 }
 
-/// `T M Tᵀ` with the rotation on position, velocity and rotation, of a symmetric matrix that has nothing but navigation
-/// states yet.
+/// `T M Tᵀ` of a symmetric matrix that holds only navigation states so far. T applies the rotation to position,
+/// velocity and rotation.
 fn rotate<const N: usize>(matrix: &mut Square<N>, rotation: &Matrix3<f64>) {
     const TURNED: [usize; 3] = [POSITION, VELOCITY, ROTATION];
     let block =

@@ -1,13 +1,13 @@
-//! Dense kernels on rows of known length. The inner loops run along rows, so that they vectorise.
+//! Dense kernels on rows of known length. The inner loops run along rows so that they vectorise.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
 use crate::navigation::math::sqrt;
 
-/// `N × N`, row by row.
+/// `N × N`, row-major.
 pub(super) type Square<const N: usize> = [[f64; N]; N];
 
-/// A pivot below this part of its diagonal is rounding: the direction is taken to be unknown.
+/// A pivot below this fraction of its diagonal is rounding error: the direction is treated as unknown.
 const LEAST_PIVOT: f64 = 1e-15;
 
 pub(super) const fn zeros<const N: usize>() -> Square<N> {
@@ -47,7 +47,7 @@ pub(super) fn transpose_times<const N: usize>(matrix: &Square<N>, v: &[f64; N]) 
     product
 }
 
-/// `target += Mᵀ M`, on and above the diagonal; below it, anything.
+/// `target += Mᵀ M`, on and above the diagonal; values below it are unspecified.
 #[inline]
 pub(super) fn add_gram<const N: usize>(target: &mut Square<N>, matrix: &[[f64; N]]) {
     for row in matrix {
@@ -59,9 +59,9 @@ pub(super) fn add_gram<const N: usize>(target: &mut Square<N>, matrix: &[[f64; N
     }
 }
 
-/// An upper triangle R with `Rᵀ R = M`, which is read on and above the diagonal, and the reciprocals of its diagonal.
+/// An upper triangle R with `Rᵀ R = M`, and the reciprocals of its diagonal. M is read on and above the diagonal.
 ///
-/// What M does not determine gets a row of zeros, and 0 as its reciprocal; so does what is not a number.
+/// A direction that M does not determine, or whose pivot is NaN, gets a row of zeros and 0 as its reciprocal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Root<const N: usize> {
     pub(super) upper: Square<N>,
@@ -81,7 +81,7 @@ impl<const N: usize> Root<N> {
             let pivot = upper[k][k];
             let (above, below) = upper.split_at_mut(k + 1);
             let row = &mut above[k];
-            // Below the diagonal there was anything.
+            // Clear the unspecified values below the diagonal.
             row[..k].fill(0.0);
             if !(pivot > LEAST_PIVOT * matrix[k][k] && pivot.is_finite()) {
                 *row = [0.0; N];
@@ -155,7 +155,7 @@ impl<const N: usize> Root<N> {
 
     /// `(Rᵀ R)⁻¹`.
     pub(super) fn inverse(&self) -> Square<N> {
-        // R⁻ᵀ, the gram of which it is.
+        // R⁻ᵀ, whose Gram matrix is the inverse.
         let mut identity = zeros();
         for i in 0..N {
             identity[i][i] = 1.0;
@@ -172,7 +172,7 @@ impl<const N: usize> Root<N> {
     }
 }
 
-/// The upper half onto the lower.
+/// Copies the upper half to the lower.
 pub(super) fn mirror<const N: usize>(matrix: &mut Square<N>) {
     for i in 0..N {
         for j in 0..i {
@@ -181,9 +181,9 @@ pub(super) fn mirror<const N: usize>(matrix: &mut Square<N>) {
     }
 }
 
-/// The first row with every component finite and not absurd; whitened numbers beyond are no measurements.
+/// Whether every component is finite and not absurd; larger whitened numbers cannot be measurements.
 pub(super) fn is_sound(row: &[f64]) -> bool {
-    // A NaN is not within.
+    // A NaN is outside the range.
     row.iter().all(|x| (-1e15..=1e15).contains(x))
 }
 

@@ -1,4 +1,4 @@
-//! How large the window is, and how it is solved.
+//! Size of the window and settings of the solver.
 
 use super::kernel::Kernel;
 use crate::navigation::eskf::EskfParams;

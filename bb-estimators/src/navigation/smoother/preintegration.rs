@@ -1,18 +1,18 @@
-//! Samples of the IMU between two keyframes, as one.
+//! Preintegration: combines the IMU samples between two keyframes.
 //!
 //! C. Forster, L. Carlone, F. Dellaert, D. Scaramuzza, "On-manifold preintegration for real-time visual–inertial odometry",
-//! IEEE Transactions on Robotics 33(1), 2017; with the mean exact over a sample, as in `eskf/propagation.rs`, and with the
-//! random walk of the biases, which correlates them with the rest.
+//! IEEE Transactions on Robotics 33(1), 2017. Two things are added: the mean is exact over a sample, as in
+//! `eskf/propagation.rs`; and the covariance includes the random walk of the biases, which correlates them with the rest.
 //!
-//! All of it is in the body's axes at the first keyframe, without gravity: with `ΔR`, `Δv`, `Δp` from identity, zero, zero,
-//! one sample of length dt and B = -ΔR Γ1 dt, B₂ = -ΔR Γ2 dt² and the derivatives T, T₂ of the two increments δv, δp by the
-//! gyroscope's bias,
+//! All quantities are in the body's axes at the first keyframe, without gravity. `ΔR`, `Δv` and `Δp` start from
+//! identity, zero and zero. For one sample of length dt, let B = -ΔR Γ1 dt and B₂ = -ΔR Γ2 dt², and let T, T₂ be the
+//! derivatives of the two increments δv, δp with respect to the gyroscope's bias. Then
 //!
 //! * `θ⁺ = θ + B b_g`
 //! * `v⁺ = v - [δv]× θ + B b_a + T b_g`
 //! * `p⁺ = p + v dt - [δp]× θ + B₂ b_a + T₂ b_g`
 //!
-//! for errors θ, v, p, and for the derivatives by the biases alike.
+//! for errors θ, v, p. The derivatives with respect to the biases follow the same recursion.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -20,7 +20,7 @@ use crate::navigation::eskf::ImuDensities;
 use crate::navigation::math::{Integrals, renormalised, rotation, skew};
 use crate::navigation::state::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY};
 
-/// What position, velocity and rotation have in common: a 3 × 3 matrix for each.
+/// A 3 × 3 matrix for each of position, velocity and rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Columns {
     pub(super) position: Matrix3<f64>,
@@ -28,7 +28,7 @@ pub(super) struct Columns {
     pub(super) rotation: Matrix3<f64>,
 }
 
-/// The motion over samples of the IMU, its derivatives by the biases, and its covariance.
+/// The motion over IMU samples, its derivatives with respect to the biases, and its covariance.
 ///
 /// ```
 /// use bb_estimators::navigation::{ImuDensities, Preintegration};
@@ -52,9 +52,9 @@ pub struct Preintegration {
     position: Vector3<f64>,
     velocity: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
-    /// Derivatives by the accelerometer's bias; none of the rotation.
+    /// Derivatives with respect to the accelerometer's bias; zero for the rotation.
     pub(super) by_accelerometer: Columns,
-    /// Derivatives by the gyroscope's bias.
+    /// Derivatives with respect to the gyroscope's bias.
     pub(super) by_gyroscope: Columns,
     /// Covariance of y with the accelerometer's bias; see [`add_covariance`](Self::add_covariance).
     with_accelerometer: Columns,
@@ -78,7 +78,7 @@ impl Columns {
         Self { position: ZERO, velocity: ZERO, rotation: ZERO }
     }
 
-    /// `Φ X`: what a sample does to them.
+    /// `Φ X`: the transition over one sample.
     #[inline]
     fn carried(&self, dt: f64, change: &Increments) -> Self {
         Self {
@@ -88,7 +88,7 @@ impl Columns {
         }
     }
 
-    /// The same where the rotation has no part in them.
+    /// The same for columns whose rotation part is zero.
     #[inline]
     fn carried_straight(&self, dt: f64) -> Self {
         Self { position: self.position + self.velocity * dt, ..*self }
@@ -104,10 +104,10 @@ impl Columns {
     }
 }
 
-/// One of the three.
+/// Selects one of the three matrices.
 type Part = fn(&Columns) -> &Matrix3<f64>;
 
-/// What a sample adds to velocity and position.
+/// The increments of velocity and position over one sample.
 #[derive(Clone, Copy, Debug)]
 struct Increments {
     position: Vector3<f64>,
@@ -115,7 +115,7 @@ struct Increments {
 }
 
 impl Preintegration {
-    /// No sample yet, at these biases.
+    /// An empty motion, integrated at these biases.
     pub fn new(accelerometer_bias: Vector3<f64>, gyroscope_bias: Vector3<f64>) -> Self {
         Self {
             accelerometer_bias,
@@ -139,7 +139,7 @@ impl Preintegration {
         }
     }
 
-    /// Adds a sample: means over `dt` seconds, in body axes, rad/s and m/s², as they were measured.
+    /// Adds a sample: the measured means over `dt` seconds, in body axes, rad/s and m/s².
     pub fn add(
         &mut self,
         angular_velocity: &Vector3<f64>,
@@ -155,7 +155,7 @@ impl Preintegration {
         let second = to_first * integrals.second_matrix(&turn) * (dt * dt);
         let change = Increments { position: second * force, velocity: first * force };
 
-        // ∂(Γ f)/∂φ to second order in φ: of c₁ φ × f + c₂ φ × (φ × f), [φ]×[f]× = f φᵀ - (φ·f) I.
+        // ∂(Γ f)/∂φ to second order in φ, from c₁ φ × f + c₂ φ × (φ × f) and [φ]×[f]× = f φᵀ - (φ·f) I.
         let linear = skew(&force);
         let mut square = skew(&turn.cross(&force)) + force * turn.transpose();
         square -= Matrix3::from_diagonal_element(turn.dot(&force));
@@ -176,7 +176,8 @@ impl Preintegration {
         self.seconds += dt;
     }
 
-    /// Of the errors less what the biases now make of them, `y = x - J b`: that has no transition by a bias.
+    /// Propagates the covariance of `y = x - J b`: the errors less the contribution of the biases. The biases do not
+    /// enter its transition.
     #[inline]
     fn add_covariance(&mut self, dt: f64, change: &Increments, densities: &ImuDensities) {
         // Φ P, then (Φ P) Φᵀ; the rotation error has no transition.
@@ -192,7 +193,7 @@ impl Preintegration {
         self.vv = vv - crossed_right(&vr, &change.velocity);
         self.vr = vr;
 
-        // A step n of a bias is -J n in them, J the derivatives by the bias so far.
+        // A step n of a bias adds -J n to them, where J is the derivative with respect to the bias so far.
         let accelerometer = densities.accelerometer_bias * dt;
         let by = &self.by_accelerometer;
         let (position, velocity) =
@@ -214,7 +215,7 @@ impl Preintegration {
         self.rr += by.rotation * rotation;
         self.with_gyroscope = self.with_gyroscope.carried(dt, change).plus(by, -gyroscope);
 
-        // White noise of density q on a derivative: q [dt³/3, dt²/2; dt²/2, dt] on position and velocity.
+        // White noise of density q on a derivative gives q [dt³/3, dt²/2; dt²/2, dt] on position and velocity.
         let velocity = densities.accelerometer * dt;
         for i in 0..3 {
             self.pp[(i, i)] += velocity * dt * dt / 3.0;
@@ -226,45 +227,45 @@ impl Preintegration {
         self.gyroscope_walk += gyroscope;
     }
 
-    /// How long the samples are together, s.
+    /// Total duration of the samples, s.
     pub fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// The accelerometer's bias that the samples were freed of, m/s².
+    /// The accelerometer's bias that was subtracted from the samples, m/s².
     pub fn accelerometer_bias(&self) -> &Vector3<f64> {
         &self.accelerometer_bias
     }
 
-    /// The gyroscope's bias that the samples were freed of, rad/s.
+    /// The gyroscope's bias that was subtracted from the samples, rad/s.
     pub fn gyroscope_bias(&self) -> &Vector3<f64> {
         &self.gyroscope_bias
     }
 
-    /// Where the body is in its axes at the first keyframe, without gravity and without its velocity there, m.
+    /// Position in the body's axes at the first keyframe, m, without gravity and the initial velocity.
     pub fn position(&self) -> &Vector3<f64> {
         &self.position
     }
 
-    /// What the specific force has added to the velocity, in the axes of the first keyframe, m/s.
+    /// Velocity gained from the specific force, in the axes of the first keyframe, m/s.
     pub fn velocity(&self) -> &Vector3<f64> {
         &self.velocity
     }
 
-    /// Takes body coordinates now to those of the first keyframe.
+    /// Rotates body coordinates at the end to those of the first keyframe.
     pub fn rotation(&self) -> &UnitQuaternion<f64> {
         &self.rotation
     }
 
-    /// Covariance of the errors at the end, given those at the first keyframe, 15 × 15, in the order of [`POSITION`] to
-    /// [`GYROSCOPE_BIAS`], all in the axes of the first keyframe.
+    /// Covariance of the errors at the end, given those at the first keyframe, 15 × 15. The order is that of
+    /// [`POSITION`] to [`GYROSCOPE_BIAS`], and all errors are in the axes of the first keyframe.
     pub fn covariance(&self) -> [[f64; NAVIGATION]; NAVIGATION] {
         let mut covariance = [[0.0; NAVIGATION]; NAVIGATION];
         self.write_covariance(&mut covariance);
         covariance
     }
 
-    /// The same into the first rows and columns of a matrix that is zero there.
+    /// Writes the same covariance to the first rows and columns of a matrix that is zero there.
     #[inline]
     pub(super) fn write_covariance<const N: usize>(&self, covariance: &mut [[f64; N]; N]) {
         let mut set = |row: usize, column: usize, block: &Matrix3<f64>| {

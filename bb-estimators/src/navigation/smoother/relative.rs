@@ -1,4 +1,4 @@
-//! Relative poses of visual or lidar odometry, between two keyframes.
+//! Relative poses between two keyframes, from visual or lidar odometry.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -10,9 +10,10 @@ use crate::navigation::state::{Estimate, Optional, POSITION, ROTATION, States, o
 
 /// Compares with the poses of both keyframes: `R_k t - (1 + s) (p - p_k)` and `log(R_k Q Rᵀ)`, in the world's axes.
 ///
-/// As in [`Link::of_motion`](super::link::Link::of_motion), what a rotation does to the translation is taken from the
-/// estimates, and that of the logarithm is the identity: turning all of the world changes nothing. The gradient of the cost
-/// is exact all the same where noise is alike along all axes, since what is left out is normal to the residual.
+/// As in [`Link::of_motion`](super::link::Link::of_motion), the derivative of the translation with respect to rotation
+/// is taken from the estimates, and that of the logarithm is the identity. Rotating the whole world therefore changes
+/// nothing. The gradient of the cost is still exact where the noise is isotropic, since the neglected part is normal to
+/// the residual.
 pub(super) fn compare<S: States, const N: usize>(
     measured: &RelativePose,
     previous: &Estimate<N>,

@@ -1,4 +1,4 @@
-//! A factor, linearised and divided by its noise.
+//! A linearised factor, whitened by its noise.
 
 use nalgebra::SMatrix;
 
@@ -8,10 +8,10 @@ use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, States};
 
-/// The most numbers that one factor compares.
+/// The maximum number of values in one factor.
 pub const MOST_ROWS: usize = 9;
 
-/// A factor, linearised and divided by its noise: `residual = H_previous error_previous + H error + noise` with noise of
+/// A linearised factor, whitened by its noise: `residual = H_previous error_previous + H error + noise` with noise of
 /// variance 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rows<const N: usize> {
@@ -24,19 +24,19 @@ pub struct Rows<const N: usize> {
 }
 
 impl<const N: usize> Rows<N> {
-    /// None yet.
+    /// Creates an empty factor.
     pub fn new() -> Self {
         let zeros = [[0.0; N]; MOST_ROWS];
         Self { count: 0, residual: [0.0; MOST_ROWS], previous: zeros, at: zeros, log_density: 0.0 }
     }
 
-    /// Sets what was measured less what was expected, what it grows by with the errors at the keyframe before and at the
-    /// keyframe, row by row, and the covariance of the noise.
+    /// Sets the residual (measured minus expected), its Jacobians with respect to the errors at the previous keyframe
+    /// and at this one, row by row, and the covariance of the noise.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Noise`] if the covariance is not positive definite, [`Refusal::NonFinite`] and [`Refusal::OutOfRange`] for
-    /// numbers that are NaN or absurdly large.
+    /// [`Refusal::Noise`] if the covariance is not positive definite; [`Refusal::NonFinite`] and
+    /// [`Refusal::OutOfRange`] for numbers that are NaN or absurdly large.
     pub fn set<const D: usize>(
         &mut self,
         residual: [f64; D],
@@ -53,7 +53,7 @@ impl<const N: usize> Rows<N> {
             None => self.previous[..D].fill([0.0; N]),
         }
         self.log_density = 0.0;
-        // Forward substitution with the Cholesky factor of the noise, as it is found.
+        // Forward substitution with the Cholesky factor of the noise while it is computed.
         let mut lower = *noise;
         for i in 0..D {
             for j in 0..i {
@@ -74,7 +74,7 @@ impl<const N: usize> Rows<N> {
             if lower[(i, i)] <= 0.0 {
                 return Err(Refusal::Noise);
             }
-            // What is left is the reciprocal of the diagonal.
+            // The pivot is final; the diagonal is replaced by the reciprocal of its root.
             self.log_density -= 0.5 * ln(lower[(i, i)]);
             lower[(i, i)] = 1.0 / sqrt(lower[(i, i)]);
             self.scale(i, lower[(i, i)]);
@@ -88,11 +88,11 @@ impl<const N: usize> Rows<N> {
         Err(if is_number { Refusal::OutOfRange } else { Refusal::NonFinite })
     }
 
-    /// Sets them from a measurement at the keyframe.
+    /// Sets the rows from a measurement at the keyframe.
     ///
     /// # Errors
     ///
-    /// As the measurement, and as [`set`](Self::set).
+    /// Those of the measurement and of [`set`](Self::set).
     pub fn measure<S: States, M: Measurement<D>, const D: usize>(
         &mut self,
         measurement: &M,
@@ -103,14 +103,14 @@ impl<const N: usize> Rows<N> {
         self.set(model.residual, None, &model.jacobian, &model.noise)
     }
 
-    /// The residual and the rows of the keyframe, divided by the noise; none if the factor concerns the keyframe before too.
+    /// The whitened residual and Jacobian rows of the keyframe; `None` if the factor also depends on the previous keyframe.
     #[cfg(feature = "eskf")]
     pub(in crate::navigation) fn alone(&self) -> Option<(&[f64], &[[f64; N]])> {
         let is_alone = self.previous[..self.count].iter().flatten().all(|x| *x == 0.0);
         is_alone.then(|| (&self.residual[..self.count], &self.at[..self.count]))
     }
 
-    /// Multiplies the weight: the square of what the rows are multiplied by.
+    /// Multiplies the weight. The rows are multiplied by its square root.
     #[cfg(feature = "smoother")]
     pub(super) fn weigh(&mut self, weight: f64) {
         let factor = sqrt(weight);

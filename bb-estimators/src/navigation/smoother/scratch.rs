@@ -1,11 +1,11 @@
-//! Room that is taken once.
+//! Preallocated scratch space.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::coupling::POSE;
 
-/// Room for what the covariance of an earlier keyframe takes.
+/// Scratch space for the covariance of an earlier keyframe.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch<const N: usize> {
     pub(super) means: Vec<[f64; N]>,

@@ -1,4 +1,4 @@
-//! Landmarks as a camera sees them: observations arrive, are judged, and are added to the window.
+//! Camera observations of landmarks: how they are gated and added to the window.
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
@@ -17,44 +17,44 @@ use crate::navigation::state::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, States, VELOC
 use crate::navigation::stream::{Gate, Stream};
 use crate::params::ParamsError;
 
-/// What a camera saw of one landmark.
+/// A camera's observation of one landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Which one, by a number of the camera's choice: an id that is not held begins a landmark.
+    /// The landmark's id, chosen by the camera's front end. An id that is not held begins a new landmark.
     pub landmark: u64,
-    /// u, v, as the lens shows it.
+    /// u, v in the distorted image.
     pub pixel: Vector2<f64>,
-    /// Standard deviation of each of them, pixels.
+    /// Standard deviation of each coordinate, pixels.
     pub deviation_px: f64,
-    /// Where the landmark is known to be in the world, m, and the standard deviation of each component. It is used if the
-    /// landmark begins with this observation: it is information, and must not be given twice.
+    /// Prior position of the landmark in the world, m, and the standard deviation of each component. It is used only if
+    /// this observation begins the landmark. It counts as information, so it must not be given twice.
     pub guess: Option<(Vector3<f64>, f64)>,
 }
 
 impl Observation {
-    /// Without a guess.
+    /// An observation without a guess.
     pub fn new(landmark: u64, pixel: Vector2<f64>, deviation_px: f64) -> Self {
         Self { landmark, pixel, deviation_px, guess: None }
     }
 }
 
-/// What became of an observation that was not refused.
+/// The outcome of an observation that was not refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sighted {
     /// The window uses it.
     Used(Fused),
-    /// Where the landmark is cannot be told yet; it will be used when that can.
+    /// The position of the landmark cannot be determined yet; the observation will be used once it can.
     Waiting,
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
-    /// Sets the camera that sees landmarks. This is when memory for them is taken; later, none is. Landmarks of before are
-    /// forgotten, what they said of the window included.
+    /// Sets the camera that sees landmarks. All memory for landmarks is allocated here; none is allocated later.
+    /// Earlier landmarks are dropped, along with their information on the window.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name; `camera` if a number of it is not finite, or a focal length
-    /// or the size not positive.
+    /// Returns the first parameter outside its accepted range, by name; `camera` if one of its numbers is not finite,
+    /// or a focal length or the size is not positive.
     pub fn set_camera(&mut self, camera: Camera, params: LandmarkParams) -> Result<(), ParamsError> {
         params.check()?;
         if !camera.is_sound() {
@@ -67,31 +67,32 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(())
     }
 
-    /// How many landmarks are held, and how many of them the window uses.
+    /// The number of landmarks that are held, and how many of them the window uses.
     pub fn landmarks(&self) -> (usize, usize) {
         let all = self.landmarks.as_ref().map_or(&[][..], |landmarks| &landmarks.all);
         (all.len(), all.iter().filter(|landmark| landmark.is_used).count())
     }
 
-    /// Where a landmark is estimated to be in the world, m, as of the last update; none if that is not known, or the
-    /// landmark is not held.
+    /// The estimated position of a landmark in the world, m, as of the last update. `None` if the position is not known
+    /// or the landmark is not held.
     pub fn landmark(&self, id: u64) -> Option<Vector3<f64>> {
         let landmarks = self.landmarks.as_ref()?;
         let landmark = landmarks.all.get(landmarks.find(id)?).filter(|landmark| landmark.is_used)?;
         Some(landmarks.estimate(landmark, &self.window))
     }
 
-    /// Adds what the camera saw of a landmark at a keyframe of the window, in any order; best after all else that was
-    /// measured at that keyframe, as landmarks are judged by what is known of it.
+    /// Adds an observation of a landmark at a keyframe of the window. Observations may arrive in any order. For best
+    /// results, add them after the other measurements of that keyframe, since the gate uses the keyframe's estimate.
     ///
-    /// The gate of `stream` compares it with where the landmark is estimated to be. The stream's patience is not used:
-    /// after [`LandmarkParams::patience`] refusals in a row it is the landmark that begins again.
+    /// The gate of `stream` compares the observation with the estimated position of the landmark. The stream's patience
+    /// is not used: after [`LandmarkParams::patience`] refusals in a row, the landmark is restarted.
     ///
     /// # Errors
     ///
-    /// [`Refusal`], which the stream has counted; nothing is added then. [`Refusal::OutOfRange`] if the pixel is not in the
-    /// image, or the guess not on the Earth, [`Refusal::NotObservable`] if the landmark is behind the camera, [`Refusal::Repeated`] if the keyframe has
-    /// seen it already, [`Refusal::Full`] if there is no room for another, [`Refusal::NotStarted`] also without a camera.
+    /// [`Refusal`], which the stream has counted; nothing is added then. [`Refusal::OutOfRange`] if the pixel is not in
+    /// the image, or the guess is not on the Earth; [`Refusal::NotObservable`] if the landmark is behind the camera;
+    /// [`Refusal::Repeated`] if the keyframe has already seen it; [`Refusal::Full`] if there is no room for another
+    /// landmark; [`Refusal::NotStarted`] also without a camera.
     pub fn observe(&mut self, stream: &mut Stream, id: u64, seen: &Observation) -> Result<Sighted, Refusal> {
         let result = self.sight(stream, id, seen);
         match &result {
@@ -125,7 +126,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if !landmark.is_used {
             return self.wait(index, sight);
         }
-        // A landmark is judged where it is linearised, but for its correction.
+        // The innovation is evaluated at the linearisation point, then corrected to first order.
         if !sight.linearise(&landmarks.camera, keyframe, &landmark.point) {
             return self.refuse(index, is_new, sight, Refusal::NotObservable);
         }
@@ -135,7 +136,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let log_density = judged.map_or(0.0, |judged| judged.log_density);
         let verdict = judged.and_then(|judged| {
             let verdict = stream.weigh(judged.nis, 2, log_density, Gate::Closed)?;
-            // A landmark is never what all else is adapted to.
+            // The window is never adapted to a landmark: an observation cannot override its gate.
             if verdict.raised > 1.0 {
                 return Err(Refusal::Gate { nis: judged.nis, limit: verdict.limit });
             }
@@ -162,7 +163,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }))
     }
 
-    /// Refuses an observation of a landmark that it does not fit, or begins the landmark again with it once too many did not.
+    /// Refuses an observation that does not fit its landmark. After too many refusals in a row, restarts the landmark
+    /// with this observation.
     fn refuse(&mut self, index: usize, is_new: bool, sight: Sight, refusal: Refusal) -> Result<Sighted, Refusal> {
         let Some(landmarks) = &mut self.landmarks else { return Err(refusal) };
         if is_new {
@@ -174,7 +176,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if landmark.refused_in_a_row < landmarks.params.patience {
             return Err(refusal);
         }
-        // It is another landmark by now. What the old one said stays.
+        // The id now denotes another landmark. The information of the old one stays.
         let id = landmark.id;
         landmark.is_open = false;
         if landmark.sights.is_empty() {
@@ -184,7 +186,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.wait(index, sight)
     }
 
-    /// Keeps an observation of a landmark that is not used yet, and uses all of them if that makes it known.
+    /// Stores an observation of a landmark that is not used yet. If the landmark can now be triangulated, uses all its
+    /// observations.
     fn wait(&mut self, index: usize, sight: Sight) -> Result<Sighted, Refusal> {
         let Some(landmarks) = &mut self.landmarks else { return Err(Refusal::NotStarted) };
         let Some(landmark) = landmarks.all.get_mut(index) else { return Err(Refusal::NotStarted) };
@@ -193,7 +196,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         landmark.insert(sight);
         match landmarks.triangulate::<F, S>(index, &self.window) {
             Some(true) => self.dirty = 0,
-            // They do not meet: it begins again from the last.
+            // The directions do not intersect: restart from the last one.
             Some(false) => {
                 if let Some(landmark) = landmarks.all.get_mut(index) {
                     landmark.sights.retain(|sight| sight.serial == serial);
@@ -205,7 +208,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(Sighted::Waiting)
     }
 
-    /// What is known of a keyframe before it sees the first landmark.
+    /// The covariance of a keyframe's pose before it sees its first landmark.
     fn judging(&mut self, at: usize, id: u64) -> Result<Judging, Refusal> {
         let known = self.landmarks.as_ref().and_then(|landmarks| landmarks.judged);
         if let Some((_, judging)) = known.filter(|(judged, _)| *judged == id) {
@@ -219,7 +222,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if at > 0 {
             let seconds = keyframe.motion.seconds();
             step = pose_block(&keyframe.link.noise);
-            // In the world's axes, as the pose is.
+            // In the world's axes, like the pose.
             let to_world = keyframe.point.rotation();
             let block = |first: usize| Matrix3::from_fn(|i, j| covariance[first + i][first + j]);
             let turned = |first: usize| to_world * block(first) * to_world.transpose();
@@ -239,7 +242,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 }
 
-/// An observation without distortion, at a keyframe.
+/// An undistorted observation at a keyframe.
 fn sighted(camera: &Camera, seen: &Observation, serial: u64, factor: f64) -> Result<Sight, Refusal> {
     if let Some((position, deviation)) = seen.guess {
         if !position.iter().all(|x| x.is_finite()) || deviation.is_nan() {
@@ -271,7 +274,7 @@ fn sighted(camera: &Camera, seen: &Observation, serial: u64, factor: f64) -> Res
     })
 }
 
-/// An observation before it is used.
+/// The gating quantities of an observation, before it is used.
 #[derive(Clone, Copy, Debug)]
 struct Judged {
     nis: f64,
@@ -279,10 +282,10 @@ struct Judged {
     whitened: f64,
 }
 
-/// Compares an observation with where the landmark is estimated to be.
+/// Compares an observation with the estimated position of the landmark.
 ///
-/// What is common to all keyframes moves the landmark along, but for the part of it that its prior holds; what is not is the
-/// noise of the last step.
+/// The error that all keyframes have in common also moves the landmark, except for the part held by its prior. The
+/// remaining error is the noise of the last step.
 fn judge(landmark: &Landmark, sight: &Sight, innovation: &Vector2<f64>, judging: &Judging) -> Option<Judged> {
     let jacobian = sight.jacobian;
     let along = |share: Matrix2x3<f64>| {

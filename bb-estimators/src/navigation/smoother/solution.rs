@@ -1,4 +1,4 @@
-//! The estimate of the window: elimination of what has changed, and linearising again what moved.
+//! Solving the window: eliminates what has changed and relinearises what has moved.
 
 use super::factor::Factor;
 use super::filter::FixedLagSmoother;
@@ -6,21 +6,21 @@ use super::params::SmootherParams;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{ROTATION, States};
 
-/// Where a correction changes by less than this part of what is linearised again, earlier ones are left as they are until
-/// they are asked for.
+/// The fraction of a relinearisation threshold below which a change of correction is not propagated to earlier
+/// keyframes until they are requested.
 const SETTLED: f64 = 0.01;
 
-/// What an update did.
+/// The work done by an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Updated {
-    /// How many keyframes were eliminated, each time they were.
+    /// Number of keyframe eliminations, counting repeated ones.
     pub eliminated: usize,
-    /// How many keyframes were linearised again, each time they were.
+    /// Number of keyframe relinearisations, counting repeated ones.
     pub relinearised: usize,
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
-    /// Linearises all that concerns a keyframe and the one before.
+    /// Linearises all factors on a keyframe, including those that it shares with the previous one.
     pub(super) fn linearise(&mut self, index: usize) {
         let (before, after) = self.window.make_contiguous().split_at_mut(index);
         if let Some(keyframe) = after.first_mut() {
@@ -28,13 +28,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
     }
 
-    /// Eliminates what has changed, and all that follows it, up to a keyframe.
+    /// Eliminates the keyframes from the first that changed up to `end`, exclusive. Returns how many were eliminated.
     pub(super) fn eliminate(&mut self, end: usize) -> usize {
         let len = self.window.len();
         let end = end.min(len);
         let mut coupling = self.landmarks.as_mut().map(|landmarks| &mut landmarks.coupling);
         coupling = coupling.filter(|coupling| coupling.is_tied());
-        // What landmarks say of the poses is not kept as it is between: all is eliminated again, but for the newest alone.
+        // Intermediate landmark information is not stored, so every keyframe is eliminated again unless only the newest changed.
         let end = if coupling.is_some() { len } else { end };
         if coupling.is_some() && self.dirty + 1 < len {
             self.dirty = 0;
@@ -68,14 +68,14 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         end.saturating_sub(first)
     }
 
-    /// Corrections from the keyframe before `from`, which has its own, back to `to`.
+    /// Solves for the corrections from the keyframe before `from`, which has its own, back to `to`.
     pub(super) fn solve_back(&mut self, from: usize, to: usize) {
         for index in (to..from).rev() {
             self.solve_one(index);
         }
     }
 
-    /// The correction of a keyframe, from that of the next.
+    /// Solves for the correction of a keyframe, given that of the next.
     fn solve_one(&mut self, index: usize) {
         let next = self.window.get(index + 1).map(|next| next.correction);
         let correction = next.and_then(|next| self.back(index, &next));
@@ -84,7 +84,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
     }
 
-    /// The same, given that of the next.
+    /// The same, with the correction of the next keyframe as an argument.
     pub(super) fn back(&self, index: usize, next: &[f64; N]) -> Option<[f64; N]> {
         let (keyframe, after) = (self.window.get(index)?, self.window.get(index + 1)?);
         let coupling = self.landmarks.as_ref().map(|landmarks| &landmarks.coupling);
@@ -96,7 +96,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(keyframe.pivot.back_pulled(&after.link, next, &pull))
     }
 
-    /// Corrections of all keyframes.
+    /// Solves for the corrections of all keyframes.
     pub(super) fn solve_all(&mut self) {
         if let Some(newest) = self.window.back_mut() {
             newest.correction = newest.pivot.newest();
@@ -105,13 +105,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.exact_from = 0;
     }
 
-    /// Whether landmarks tie keyframes to others than their neighbours.
+    /// Whether landmarks couple keyframes that are not neighbours.
     pub(super) fn is_tied(&self) -> bool {
         self.landmarks.as_ref().is_some_and(|landmarks| landmarks.coupling.is_tied())
     }
 
-    /// Corrections of all keyframes that have changed by more than matters, at least of those from `least` on; the first of
-    /// them.
+    /// Solves for the corrections that changed noticeably, and at least for those from `least` on. Returns the index of
+    /// the first keyframe that is up to date.
     fn solve(&mut self, least: usize) -> usize {
         if self.is_tied() {
             self.solve_all();
@@ -125,7 +125,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             let (these, after) = window.split_at_mut(first);
             let (Some(keyframe), Some(next)) = (these.last_mut(), after.first()) else { break };
             let correction = keyframe.pivot.back(&next.link, &next.correction);
-            // What is below adds up, since it is not stored.
+            // A smaller change is not stored, so that small changes accumulate.
             if first <= least && is_settled(&correction, &keyframe.correction, &self.params) {
                 break;
             }
@@ -136,14 +136,14 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         first
     }
 
-    /// Estimates the window from all that was added.
+    /// Solves the window with everything added since the last update.
     ///
-    /// Keyframes that moved far are linearised again, and what they concern is eliminated again, as often as the
-    /// parameters allow. It is no error if that is not often enough: the next update goes on.
+    /// Keyframes that moved far are relinearised and eliminated again, as often as the parameters allow. Reaching that
+    /// limit is not an error: the next update continues.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NotStarted`]; [`Refusal::NonFinite`] if the estimate is beyond all numbers: start afresh.
+    /// [`Refusal::NotStarted`]; [`Refusal::NonFinite`] if the estimate is no longer finite: restart the smoother.
     pub fn update(&mut self) -> Result<Updated, Refusal> {
         if self.window.is_empty() {
             return Err(Refusal::NotStarted);
@@ -171,11 +171,11 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(updated)
     }
 
-    /// Linearises again what moved far or weighs otherwise, from a keyframe on; how many moved.
+    /// Relinearises, from `first` on, the keyframes that moved far or whose weights changed. Returns how many moved.
     fn relinearise(&mut self, first: usize) -> usize {
         let mut moved = 0;
         let count = self.window.len();
-        // Where a keyframe moved, the next has to be linearised as well.
+        // If a keyframe moved, the next must be linearised as well.
         let mut is_next = false;
         for index in first..count {
             let params = &self.params;
@@ -200,7 +200,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         moved
     }
 
-    /// Eliminates all of the window.
+    /// Eliminates the whole window.
     #[cfg(test)]
     pub(super) fn eliminate_all(&mut self) {
         self.dirty = 0;
@@ -209,7 +209,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 }
 
-/// Whether two corrections are alike: a centimetre of position, or a hundredth of what is linearised again of rotation.
+/// Whether two corrections agree to within a centimetre of position and a hundredth of the rotation threshold for relinearisation.
 fn is_settled<const N: usize>(a: &[f64; N], b: &[f64; N], params: &SmootherParams) -> bool {
     let is_rotation = |i: usize| (ROTATION..ROTATION + 3).contains(&i);
     let limit = |i: usize| SETTLED * if is_rotation(i) { params.relinearise_rotation } else { 1.0 };

@@ -1,8 +1,8 @@
-//! Preintegration, factors and elimination, each against another way to the same, and the laws of the smoother.
+//! Preintegration, factors and elimination, each against an independent computation, and the invariants of the smoother.
 
 #[cfg(feature = "autodiff")]
 mod automatic;
-// Matrices of any size need the allocator's part of nalgebra.
+// Dynamically sized matrices need nalgebra's allocating types.
 #[cfg(feature = "std")]
 mod batch;
 mod cases;

@@ -1,4 +1,4 @@
-//! Automatic differentiation against the Jacobians that are written by hand, and in a window.
+//! Automatic differentiation against hand-written Jacobians, and in a window.
 
 use nalgebra::{Matrix1, Matrix3, SMatrix, UnitQuaternion, Vector3};
 use num_dual::DualNum;
@@ -13,7 +13,7 @@ use crate::navigation::{
     Start, offset,
 };
 
-/// A fix of an antenna whose place is estimated.
+/// A position fix of an antenna whose lever arm is estimated.
 #[derive(Clone, Copy, Debug)]
 struct Fix {
     position: Vector3<f64>,
@@ -43,7 +43,7 @@ impl<const M: usize> Expectation<3, M> for Fix {
     }
 }
 
-/// How far the body has come, in its axes at the keyframe before.
+/// Displacement of the body, in its axes at the previous keyframe.
 #[derive(Clone, Copy, Debug)]
 struct Way([f64; 3]);
 
@@ -185,7 +185,7 @@ fn ranges_tell_where_it_is() {
     }
     let found = smoother.estimate().unwrap().position;
     assert!((found - truth).norm() < 0.01, "{found}");
-    // At the beacon itself a distance has no derivative.
+    // At the beacon itself, the distance has no derivative.
     let at = Estimate::<NAVIGATION>::unknown();
     let beside = Automatic(Range { beacon: at.position, distance_m: 1.0 });
     let refused = Factor::<Navigation, NAVIGATION>::linearise(&beside, None, &at, &mut Rows::new());

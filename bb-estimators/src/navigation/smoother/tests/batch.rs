@@ -1,4 +1,4 @@
-//! Elimination in the order of time against all at once, on random problems.
+//! Elimination in chronological order against a batch solution, on random problems.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -26,7 +26,7 @@ fn numbers(noise: &mut Noise) -> SVector<f64, N> {
     SVector::from_fn(|_, _| noise.next())
 }
 
-/// A problem, held twice: as the smoother has it, and as one system of normal equations.
+/// A problem in two forms: as the smoother holds it, and as one system of normal equations.
 struct Problem {
     own: Vec<Information<N>>,
     links: Vec<Link<N>>,
@@ -35,7 +35,7 @@ struct Problem {
 }
 
 impl Problem {
-    /// `stiffness` is what noise between keyframes is multiplied by.
+    /// `stiffness` scales the noise between keyframes.
     fn new(seed: u64, keyframes: usize, stiffness: f64) -> Self {
         let mut noise = Noise::new(seed);
         let size = N * keyframes;
@@ -46,7 +46,7 @@ impl Problem {
             vector: DVector::zeros(size),
         };
         for k in 0..keyframes {
-            // What is known of one alone may have any rank; the first is known.
+            // Information on one keyframe alone may have any rank; the first keyframe is known.
             let root = random(&mut noise);
             let of_rank =
                 SMatrix::<f64, N, N>::from_fn(|i, j| if k == 0 || i < k % 3 { root[(i, j)] } else { 0.0 });
@@ -84,7 +84,7 @@ impl Problem {
         view += &weighted * &rows;
         let mut view = self.vector.rows_mut(at, 2 * N);
         view += &weighted * offset;
-        // Factors on both.
+        // Factors on both keyframes.
         for _ in 0..2 {
             let mut factor = Rows::new();
             let jacobians: [SMatrix<f64, D, N>; 2] = [(); 2].map(|()| SMatrix::from_fn(|_, _| noise.next()));
@@ -160,8 +160,8 @@ proptest! {
     }
 }
 
-/// What a keyframe says of the next is the same whether its noise is tiny or huge beside what is known: against the same
-/// formula in exact arithmetic, of one dimension.
+/// The information passed to the next keyframe loses no digits, however small or large the noise is relative to what is
+/// known. Compared with the same formula in exact arithmetic, in one dimension.
 #[test]
 fn nothing_cancels() {
     for (known, noise) in [(1.0, 1e-16), (1e-12, 1e-9), (1e14, 1e-20), (1e-8, 1e8), (1e12, 1.0), (1e12, 1e12)] {
@@ -176,7 +176,7 @@ fn nothing_cancels() {
     }
 }
 
-/// What is not known at all is nothing, not an error.
+/// An undetermined direction is a zero row, not an error.
 #[test]
 fn a_singular_matrix_has_a_root() {
     let matrix = [[4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 9.0]];

@@ -1,4 +1,4 @@
-//! What the smoother does in single cases.
+//! Single cases of the smoother.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -19,7 +19,7 @@ fn rest(time_ns: i64) -> ImuMean {
     ImuMean { time_ns, angular_velocity: Vector3::zeros(), specific_force: gravity }
 }
 
-/// At rest, level, at the origin to within `deviation`, with `keyframes` of 0.1 s.
+/// A smoother at rest, level, at the origin to within `deviation`, with `keyframes` of 0.1 s.
 fn at_rest(params: SmootherParams, deviation: f64, keyframes: u64) -> Plain {
     let mut smoother = Plain::new(params).unwrap();
     let start = Start::at(0, (Vector3::zeros(), deviation), (Vector3::zeros(), 0.1), (level(), 0.05));
@@ -59,7 +59,8 @@ fn refusals_are_named_and_counted() {
     let wild = ImuMean { specific_force: Vector3::new(0.0, 1e7, 0.0), ..rest(2 * time_ns) };
     assert_eq!(smoother.propagate(&wild), Err(Refusal::OutOfRange));
     assert!(matches!(smoother.propagate(&rest(i64::MAX)), Err(Refusal::Gap { .. })));
-    // It has left the window, it has no keyframe before it, and the other is not the one before.
+    // Keyframe 1 has left the window, keyframe 2 has no previous keyframe, and keyframe 2 does not directly precede
+    // keyframe 4.
     let relative = |id| RelativePose::new(id, (Vector3::zeros(), 0.1), (level(), 0.1));
     assert_eq!(smoother.add(&mut stream, 1, fix), Err(Refusal::NoKeyframe { id: 1 }));
     assert_eq!(smoother.add(&mut stream, 2, relative(1)), Err(Refusal::NoKeyframe { id: 1 }));
@@ -86,7 +87,7 @@ fn a_parameter_out_of_range_is_named() {
     assert!(refused.is_err_and(|error| error.to_string().contains("window")));
 }
 
-/// Of a flight as the filter takes it to be, the covariance is that of the filter.
+/// On a flight that matches the filter's model, the covariance is that of the filter.
 #[test]
 fn the_newest_covariance_is_that_of_the_filter() {
     let mut flight = Flight::new(5, 60, 0.0);
@@ -122,8 +123,8 @@ fn the_newest_covariance_is_that_of_the_filter() {
     assert!(error.amax() < 1e-5, "{error}");
 }
 
-/// A millisecond between keyframes, and a position that is known to a thousand kilometres: the pivot is tiny beside its
-/// diagonal, and right all the same.
+/// With a millisecond between keyframes and a position known to a thousand kilometres, the pivot is tiny relative to
+/// its diagonal. It is still correct.
 #[test]
 fn a_tiny_pivot_is_no_trouble() {
     let params = SmootherParams { window: 10, ..SmootherParams::default() };
@@ -155,7 +156,7 @@ fn a_gap_grows_the_covariance_and_is_counted() {
     assert_eq!(smoother.gaps(), 1);
     let (after, estimate) = (smoother.pose_covariance().unwrap(), smoother.estimate().unwrap());
     assert!(after[(0, 0)] > 4.0 * before[(0, 0)] && after[(5, 5)] > 1.0, "{after}");
-    // At rest before, and so after.
+    // At rest before the gap, so also after it.
     assert!(estimate.position.norm() < 0.1, "{}", estimate.position);
 }
 
@@ -177,7 +178,7 @@ fn a_gate_that_refuses_all_gives_way() {
     }
     let position = smoother.estimate().unwrap().position;
     assert!((position.x - 300.0).abs() < 3.0, "{position}");
-    // Relative poses that disagree with the IMU: it is the way that is trusted less.
+    // Relative poses that disagree with the IMU: the noise of the motion is raised instead.
     let mut stream = Stream::default();
     let jump = |id| RelativePose::new(id, (Vector3::new(5.0, 0.0, 0.0), 0.01), (level(), 0.01));
     for _ in 0..3 {
@@ -187,11 +188,11 @@ fn a_gate_that_refuses_all_gives_way() {
     assert!(smoother.add(&mut stream, 19, jump(18)).unwrap().raised > 1.0);
     smoother.update().unwrap();
     let way = smoother.smoothed(19).unwrap().position - smoother.smoothed(18).unwrap().position;
-    // Most of it; the velocity before is as well known as it was.
+    // Most of the jump; the velocity before is as well known as it was.
     assert!((3.0..5.1).contains(&way.x) && smoother.keyframes().len() == before, "{way}");
 }
 
-/// At rest at the origin for a second, with one pose of many 40 m off: where it is then.
+/// The final position after a second at rest at the origin, where one of many poses is 40 m off.
 fn with_an_outlier(kernel: Kernel, at: u64) -> f64 {
     let mut smoother = at_rest(SmootherParams::default(), 30.0, 1);
     for k in 1..12 {
@@ -216,7 +217,7 @@ fn a_robust_kernel_takes_an_outlier_for_one() {
         let robust = with_an_outlier(kernel, 6);
         assert!(robust < part * plain, "{kernel:?}: {robust}, without {plain}");
     }
-    // What fitted when it came is found out by what comes later: the cost is convex.
+    // A measurement that fitted when it arrived is exposed by later ones: the cost is convex.
     let learnt = with_an_outlier(Kernel::Huber(1.345), 1);
     assert!(learnt < 0.1 * plain, "{learnt}");
 }
@@ -241,7 +242,7 @@ fn between_keyframes_it_goes_on_with_the_imu() {
     assert!(((end.position - predicted.position) / 0.05 - mean).norm() < 0.1);
 }
 
-/// From a filter of other optional states, with all correlations.
+/// From a filter with other optional states, with all correlations.
 #[test]
 fn a_warm_start_has_what_the_filter_has() {
     let flight = Flight::new(7, 40, 1.0);

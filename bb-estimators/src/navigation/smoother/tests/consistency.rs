@@ -1,4 +1,4 @@
-//! With sensors that err exactly as the smoother is told, its errors are as large as it says: of the newest keyframe, and of
+//! If the sensors err exactly as the smoother is told, its errors match its covariance, at the newest keyframe and at
 //! the oldest in the window.
 
 use super::flight::{Flight, sensors};
@@ -21,7 +21,7 @@ fn errors_are_as_large_as_the_smoother_says() {
             *sum += nees(&flight.error(k as usize, &estimate), &of_navigation).unwrap() / f64::from(FLIGHTS);
         }
     }
-    // Three standard deviations of a mean of χ² of as many dimensions.
+    // Three standard deviations of the mean of a χ² variable with this many degrees of freedom.
     let dimension = NAVIGATION as f64;
     let spread = 3.0 * (2.0 * dimension / f64::from(FLIGHTS)).sqrt();
     for (mean, which) in sums.into_iter().zip(["newest", "oldest"]) {

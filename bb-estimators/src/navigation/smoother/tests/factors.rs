@@ -1,4 +1,4 @@
-//! Every factor: its derivatives by both keyframes are those of numeric differentiation, where it fits and where it does not.
+//! Every factor: its derivatives by both keyframes match numeric differentiation, whether it fits or not.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -59,7 +59,7 @@ fn relative(previous: &Estimate<N>, at: &Estimate<N>, off: &Vector3<f64>) -> Rel
     RelativePose::new(0, (translation, 0.05), (turn, 2e-3))
 }
 
-/// What all errors are if the world is turned about the vertical.
+/// The error of every state if the world is turned about the vertical.
 fn turned(at: &Estimate<N>) -> Error {
     let mut error = Error::zeros();
     let mut set = |first: usize, part: Vector3<f64>| error.fixed_rows_mut::<3>(first).copy_from(&part);
@@ -70,7 +70,7 @@ fn turned(at: &Estimate<N>) -> Error {
 }
 
 proptest! {
-    /// Also where the measurement does not fit, the gradient of the cost is that of numeric differentiation.
+    /// The gradient of the cost matches numeric differentiation even if the measurement does not fit.
     #[test]
     fn gradients_of_relative_poses(previous in estimate(), at in estimate(), off in vector(1.0)) {
         let factor = NavigationFactor::from(relative(&previous, &at, &off));
@@ -105,7 +105,7 @@ proptest! {
         }
     }
 
-    /// Nothing between two keyframes sees which way the world is turned, wherever they are linearised.
+    /// No factor between two keyframes observes the heading of the world, wherever they are linearised.
     #[test]
     fn the_world_may_turn(from in estimate(), off in error(), samples in 1_usize..40, turn in vector(2.0)) {
         let motion = motion(samples, turn, Vector3::new(3.0, -1.0, 9.0));
@@ -120,12 +120,12 @@ proptest! {
         for row in 0..rows.count {
             let (before, here) = (turned(&from), turned(&to));
             let seen: f64 = (0..N).map(|i| rows.previous[row][i] * before[i] + rows.at[row][i] * here[i]).sum();
-            // Rows are divided by deviations down to 2e-3, of positions up to 170 m.
+            // Rows are divided by deviations as small as 2e-3, for positions of up to 170 m.
             prop_assert!(seen.abs() < 1e-8, "row {row}: {seen}");
         }
     }
 
-    /// Where it fits, so is every row.
+    /// If the measurement fits, every row matches as well.
     #[test]
     fn relative_poses(previous in estimate(), at in estimate()) {
         let scale = 1.0 + at.scalar::<Drone>(crate::navigation::Optional::RelativeScale);
@@ -153,7 +153,7 @@ proptest! {
         }
     }
 
-    /// The way back is the inverse of the way there.
+    /// The backward link is the inverse of the forward transition.
     #[test]
     fn the_link_is_the_motion_backwards(
         from in estimate(),
@@ -177,7 +177,7 @@ proptest! {
         }
         let product = back * forward;
         let apart = (product - SMatrix::identity()).amax();
-        // The derivative by the gyroscope's bias is to second order in the turn of a sample.
+        // The derivative by the gyroscope's bias is of second order in the turn of a sample.
         prop_assert!(apart < 1e-5, "{apart}: {product:.6}");
         prop_assert!(link.offset.iter().all(|x| x.abs() < 1e-9));
         // Forward, the noise is that of preintegration, in the axes of the first body.
@@ -200,7 +200,7 @@ proptest! {
     }
 }
 
-/// Whitened rows hold what the noise says: `Hᵀ R⁻¹ H` and `Hᵀ R⁻¹ r`.
+/// Whitened rows carry the information of the noise: `Hᵀ R⁻¹ H` and `Hᵀ R⁻¹ r`.
 #[test]
 fn rows_are_divided_by_their_noise() {
     let noise = SMatrix::<f64, 2, 2>::new(4.0, 1.0, 1.0, 0.5);

@@ -1,4 +1,4 @@
-//! A simulated flight, with noise that is as the smoother is told, or none.
+//! A simulated flight, with the noise that the smoother is told, or none.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -9,7 +9,7 @@ use crate::navigation::{
     NavigationFactor, Optional, RelativePose, SmootherParams, Start, States,
 };
 
-/// A flight with a camera whose scale drifts and an antenna that is not quite where it should be.
+/// A flight with a camera whose scale drifts and an antenna with an offset from its nominal position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Drone;
 
@@ -21,7 +21,7 @@ pub(super) const N: usize = Drone::DIMENSION;
 
 pub(super) type Smoother = FixedLagSmoother<Drone, N>;
 
-/// Samples between two keyframes, and their length.
+/// Number of samples between two keyframes, and their length.
 pub(super) const SAMPLES: i64 = 10;
 pub(super) const DT_NS: i64 = 10_000_000;
 pub(super) const DT: f64 = 0.01;
@@ -38,22 +38,22 @@ pub(super) fn sensors() -> EskfParams {
     }
 }
 
-/// Linear: everything is linearised where it was first.
+/// Linear: every keyframe keeps its first linearisation point.
 pub(super) fn linear(window: usize) -> SmootherParams {
     SmootherParams { sensors: sensors(), window, iterations: 0, ..SmootherParams::default() }
 }
 
-/// To convergence.
+/// Iterates to convergence.
 pub(super) fn converged(window: usize) -> SmootherParams {
     SmootherParams { relinearise_rotation: 0.0, relinearise_position: 0.0, iterations: 20, ..linear(window) }
 }
 
-/// What happened, and what was measured of it.
+/// The true flight and its measurements.
 pub(super) struct Flight {
     pub(super) start: Start,
-    /// Samples that end at keyframe k, from 1 on.
+    /// The samples that end at keyframe k, from 1 on.
     pub(super) samples: Vec<Vec<ImuMean>>,
-    /// What was measured at keyframe k.
+    /// The measurements at keyframe k.
     pub(super) measured: Vec<Vec<NavigationFactor>>,
     /// The truth at keyframe k.
     pub(super) truth: Vec<Truth>,
@@ -69,7 +69,7 @@ pub(super) struct Truth {
 }
 
 impl Flight {
-    /// `keyframes` of them, with noise of `level` times what the smoother is told.
+    /// A flight of `keyframes` keyframes, with noise of `level` times the smoother's.
     pub(super) fn new(seed: u64, keyframes: usize, level: f64) -> Self {
         let params = sensors();
         let mut noise = Noise::new(seed);
@@ -140,7 +140,7 @@ impl Flight {
         flight
     }
 
-    /// Flies it all, and updates at each keyframe.
+    /// Flies the whole flight, with an update at each keyframe.
     pub(super) fn flown(&self, params: SmootherParams) -> Smoother {
         let mut smoother = Smoother::new(params).unwrap();
         smoother.start(0, &self.start).unwrap();
@@ -152,7 +152,7 @@ impl Flight {
         smoother
     }
 
-    /// From keyframe k - 1 to keyframe k, which is added.
+    /// Flies from keyframe k - 1 to keyframe k, which is added.
     pub(super) fn fly_to(&self, smoother: &mut Smoother, k: usize) {
         for sample in &self.samples[k] {
             smoother.propagate(sample).unwrap();
@@ -160,7 +160,7 @@ impl Flight {
         smoother.add_keyframe(k as u64).unwrap();
     }
 
-    /// Adds what was measured at keyframe k, ungated.
+    /// Adds the measurements at keyframe k, ungated.
     pub(super) fn measure(&self, smoother: &mut Smoother, k: usize) {
         for factor in &self.measured[k] {
             smoother.add(&mut open(), k as u64, *factor).unwrap();
@@ -188,7 +188,7 @@ pub(super) fn open() -> crate::navigation::Stream {
     })
 }
 
-/// A flight that turns and accelerates, sample by sample at 100 Hz.
+/// A flight that turns and accelerates, sampled at 100 Hz.
 pub(super) fn sample(i: i64) -> ImuMean {
     let t = i as f64 * DT;
     ImuMean {

@@ -1,4 +1,4 @@
-//! Robust kernels: the weight is the derivative of the cost, halved, over the distance.
+//! Robust kernels: the weight is half the derivative of the cost, divided by the distance.
 
 use proptest::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Landmarks against a dense batch solution that has them as unknowns of their own, random problems.
+//! Landmarks against a dense batch solution that has them as unknowns of their own, on random problems.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
@@ -24,7 +24,7 @@ fn random(noise: &mut Noise) -> SMatrix<f64, N, N> {
     SMatrix::from_fn(|_, _| noise.next())
 }
 
-/// A smoother whose window holds a random problem, and the same as one dense system: keyframes first, then landmarks.
+/// A smoother with a random problem in its window, and the same problem as one dense system: keyframes first, then landmarks.
 struct Problem {
     smoother: Plain,
     matrix: DMatrix<f64>,
@@ -96,7 +96,8 @@ impl Problem {
         view += vector;
     }
 
-    /// A landmark with a prior that some of the keyframes see, added one by one, at once, or taken away in between.
+    /// A landmark with a prior that some of the keyframes see. Its observations are added one by one or at once, or
+    /// removed in between.
     fn landmark(&mut self, noise: &mut Noise, number: usize) {
         let at = self.keyframes * N + 3 * number;
         let mean = noise.vector(1.0);
@@ -137,7 +138,7 @@ impl Problem {
                 landmark.add_to(&mut landmarks.coupling, &mut rows, -1.0);
                 landmark.add_to(&mut landmarks.coupling, &mut rows, 1.0);
             }
-            // The same rows, of keyframe and landmark.
+            // The same rows, for keyframe and landmark.
             let mut dense = DMatrix::zeros(2, self.matrix.ncols());
             dense.view_mut((0, k * N + POSITION), (2, 3)).copy_from(&-jacobian);
             dense.view_mut((0, k * N + ROTATION), (2, 3)).copy_from(&(jacobian * sight.arm.cross_matrix()));
@@ -157,7 +158,7 @@ fn agrees(numbers: impl Iterator<Item = (f64, f64)>, what: &str) -> Result<(), T
     Ok(())
 }
 
-/// Every correction and covariance of the window, and every landmark.
+/// Compares every correction and covariance of the window, and every landmark.
 fn compare(
     smoother: &mut Plain,
     left: usize,
@@ -195,7 +196,7 @@ proptest! {
         compare(&mut problem.smoother, 0, &covariance, &solution, keyframes)?;
     }
 
-    /// What leaves the window is not lost: the others are as with all of them.
+    /// Information that leaves the window is not lost: the remaining keyframes match the solution with all of them.
     #[test]
     fn marginalised_is_the_batch(seed in any::<u64>(), keyframes in 3_usize..8, landmarks in 1_usize..9) {
         let mut problem = Problem::new(seed, keyframes, landmarks);
@@ -204,13 +205,13 @@ proptest! {
         for left in 1..keyframes - 1 {
             problem.smoother.marginalise();
             compare(&mut problem.smoother, left, &covariance, &solution, keyframes)?;
-            // From scratch as well.
+            // Also when everything is eliminated again.
             problem.smoother.dirty = 0;
             compare(&mut problem.smoother, left, &covariance, &solution, keyframes)?;
         }
     }
 
-    /// A keyframe that comes after costs no elimination of all, and is as if all were.
+    /// Appending a keyframe does not eliminate all others again, and gives the same result as if it did.
     #[test]
     fn the_newest_alone_is_as_all(seed in any::<u64>(), landmarks in 1_usize..6) {
         let mut problem = Problem::new(seed, 5, landmarks);

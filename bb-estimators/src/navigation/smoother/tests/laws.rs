@@ -1,4 +1,4 @@
-//! What holds of every flight.
+//! Invariants of every flight.
 
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -8,12 +8,12 @@ use crate::navigation::{
     AbsolutePose, Estimate, GnssPosition, GnssVelocity, NavigationFactor, RelativePose, SmootherParams,
 };
 
-/// The largest difference of two estimates, each in its unit.
+/// The largest difference of two estimates, each component in its unit.
 fn apart(a: &Estimate<N>, b: &Estimate<N>) -> f64 {
     a.error_to::<Drone>(b).amax()
 }
 
-/// The largest difference of two covariances, relative to what is known.
+/// The largest difference of two covariances, relative to the variances.
 fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
     let mut largest = 0.0_f64;
     for i in 0..N {
@@ -27,7 +27,7 @@ fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// What has left the window is not lost: all that is linear is as with all keyframes.
+    /// Information that leaves the window is not lost: with linear factors, the result matches the one with all keyframes.
     #[test]
     fn a_window_is_the_batch(seed in any::<u64>(), window in 2_usize..12) {
         let flight = Flight::new(seed, 40, 1.0);
@@ -44,7 +44,7 @@ proptest! {
         }
     }
 
-    /// What comes late, and in any order, makes the same estimate in the end.
+    /// Late measurements, in any order, give the same estimate in the end.
     #[test]
     fn the_order_of_arrival_does_not_matter(
         seed in any::<u64>(),
@@ -67,7 +67,7 @@ proptest! {
         };
         let mut in_order = arrived(&(1..12).collect::<Vec<_>>());
         let mut shuffled = arrived(&order);
-        // At once, the samples are freed of biases that are known better.
+        // With an update at each keyframe, the samples are integrated with better-known biases.
         let mut at_once = flight.flown(converged(12));
         for id in 0..12 {
             let (a, b) = (in_order.smoothed(id).unwrap(), shuffled.smoothed(id).unwrap());
@@ -79,7 +79,7 @@ proptest! {
         }
     }
 
-    /// Nor which of the measurements of one keyframe comes first, without an update between.
+    /// The order of the measurements of one keyframe does not matter either, without an update in between.
     #[test]
     fn nor_does_that_at_one_keyframe(seed in any::<u64>()) {
         let mut flight = Flight::new(seed, 36, 1.0);
@@ -91,7 +91,7 @@ proptest! {
         prop_assert!(differ(&one.covariance().unwrap(), &other.covariance().unwrap()) < 1e-9);
     }
 
-    /// Where the world has its origin, and which way its axes point, is nothing to it.
+    /// The estimate does not depend on the origin of the world or its heading.
     #[test]
     fn heading_and_origin(seed in any::<u64>(), heading in -3.1..3.1, x in -1e4..1e4, y in -1e4..1e4) {
         let flight = Flight::new(seed, 30, 1.0);
@@ -114,7 +114,7 @@ proptest! {
                 _ => {}
             }
         }
-        // To convergence: whether a keyframe is linearised again must not hang on the last bit of how far it moved.
+        // To convergence: relinearisation must not depend on the last bit of how far a keyframe moved.
         let params = converged(10);
         let (here, there) = (flight.flown(params).estimate().unwrap(), other.flown(params).estimate().unwrap());
         prop_assert!((place(&here.position) - there.position).norm() < 1e-6);
@@ -123,7 +123,7 @@ proptest! {
         prop_assert!((here.gyroscope_bias - there.gyroscope_bias).norm() < 1e-7);
     }
 
-    /// What no sensor tells stays unknown, however often it is linearised again: without a compass or a position, heading
+    /// Unobservable states stay unknown, however often they are relinearised: without a compass or a position, heading
     /// and position are never better known than at the start.
     #[test]
     fn what_is_unobservable_stays_unknown(seed in any::<u64>()) {
@@ -149,7 +149,7 @@ proptest! {
         prop_assert!(least >= 0.05 * 0.05 * (1.0 - 1e-9), "{least}");
     }
 
-    /// Any numbers at all leave it as it was or with finite numbers.
+    /// Arbitrary numbers leave it unchanged or with finite numbers.
     #[test]
     fn absurd_measurements(
         seed in any::<u64>(),
@@ -186,7 +186,7 @@ proptest! {
     }
 }
 
-/// A new keyframe costs the elimination of what it changes, whatever the window holds.
+/// A new keyframe costs only the elimination of what it changes, regardless of the size of the window.
 #[test]
 fn only_the_end_is_eliminated_again() {
     for window in [5, 10, 100] {
@@ -206,7 +206,7 @@ fn only_the_end_is_eliminated_again() {
     }
 }
 
-/// Incrementally as from scratch.
+/// Incremental elimination gives the same result as elimination from scratch.
 #[test]
 fn elimination_is_the_same_from_the_start() {
     let flight = Flight::new(9, 50, 1.0);

@@ -1,4 +1,4 @@
-//! Preintegration against the filter, which goes sample by sample, against numeric differentiation and integrating again.
+//! Preintegration against the sample-by-sample filter, numeric differentiation and reintegration.
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -43,13 +43,13 @@ fn densities() -> ImuDensities {
 }
 
 proptest! {
-    /// Mean and covariance are those of the filter, without gravity and from a state that is known.
+    /// Mean and covariance match those of the filter without gravity, from a known state.
     #[test]
     fn it_is_the_filter_in_one_step(seed in 0.0..100.0, samples in 1_usize..200) {
         let biases = SVector::<f64, 6>::new(0.1, -0.2, 0.05, 0.01, -0.02, 0.005);
         let all = integrated(seed, samples, &biases, &densities());
         let mut filter: Eskf = Eskf::new(EskfParams { gravity: 1.0, ..params() }).unwrap();
-        // As known as a filter can be.
+        // As small as the filter allows.
         let known = 1e-9;
         let rest = (Vector3::zeros(), known);
         let start = Start {
@@ -83,7 +83,7 @@ proptest! {
         prop_assert!(covariance.cholesky().is_some());
     }
 
-    /// Derivatives by the biases, against integrating again with other ones.
+    /// Derivatives by the biases, against reintegration with other biases.
     #[test]
     fn derivatives_by_biases(seed in 0.0..100.0, samples in 1_usize..60) {
         let at = SVector::<f64, 6>::new(0.1, -0.2, 0.05, 0.01, -0.02, 0.005);
@@ -100,7 +100,7 @@ proptest! {
             let check = |numeric: Vector3<f64>, matrix: &Matrix3<f64>, what: &str| {
                 let apart = (numeric / (2.0 * step) - column(matrix)).norm();
                 let seconds = here.seconds();
-                // The derivative of the mean over one sample is to second order in its turn.
+                // The derivative of the mean over one sample is of second order in its turn.
                 prop_assert!(apart < 1e-5 * seconds, "{what} by {bias}: {apart} after {seconds} s");
                 Ok(())
             };

@@ -1,4 +1,4 @@
-//! Landmarks below a simulated flight, and what a camera sees of them.
+//! Landmarks below a simulated flight, and their observations by a camera.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 
@@ -9,13 +9,13 @@ use crate::navigation::{Camera, Kernel, LandmarkParams, Observation, Refusal};
 /// The deviation of a pixel.
 pub(super) const PIXEL: f64 = 1.0;
 
-/// What the camera sees at each keyframe.
+/// The observations at each keyframe.
 pub(super) struct Scenery {
     pub(super) places: Vec<Vector3<f64>>,
     pub(super) seen: Vec<Vec<Observation>>,
 }
 
-/// A camera that looks down, with a lens that distorts.
+/// A downward-looking camera with lens distortion.
 pub(super) fn camera() -> Camera {
     let down = Matrix3::new(0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
     Camera {
@@ -26,14 +26,14 @@ pub(super) fn camera() -> Camera {
     }
 }
 
-/// To convergence, all alike.
+/// Iterates to convergence, with equal weights.
 pub(super) fn exact() -> LandmarkParams {
     LandmarkParams { kernel: Kernel::Squares, relinearise: 0.0, ..LandmarkParams::default() }
 }
 
 impl Scenery {
-    /// `count` of them in each image, each for at most `longest` keyframes; what is known of them to within `guess` m, if
-    /// anything.
+    /// `count` landmarks in each image, each seen from at most `longest` keyframes. If `guess` is given, each has a
+    /// prior to within that many metres.
     pub(super) fn new(flight: &Flight, seed: u64, count: usize, longest: usize, guess: Option<f64>) -> Self {
         let mut noise = Noise::new(seed ^ 0x5eed);
         let camera = camera();
@@ -70,10 +70,10 @@ impl Scenery {
         scenery
     }
 
-    /// Adds what the camera saw at keyframe k, ungated.
+    /// Adds the observations at keyframe k, ungated.
     pub(super) fn observe(&self, smoother: &mut Smoother, k: usize) {
         for observation in &self.seen[k] {
-            // Now and then directions do not meet within their noise, or only behind a camera.
+            // Occasionally the directions do not intersect within their noise, or only behind a camera.
             match smoother.observe(&mut super::flight::open(), k as u64, observation) {
                 Ok(_) | Err(Refusal::NotObservable) => {}
                 Err(refusal) => panic!("{k}: {refusal}"),
@@ -81,7 +81,7 @@ impl Scenery {
         }
     }
 
-    /// Flies it all with landmarks, and updates at each keyframe.
+    /// Flies the whole flight with landmarks, with an update at each keyframe.
     pub(super) fn flown(&self, flight: &Flight, mut smoother: Smoother, params: LandmarkParams) -> Smoother {
         smoother.set_camera(camera(), params).unwrap();
         smoother.start(0, &flight.start).unwrap();

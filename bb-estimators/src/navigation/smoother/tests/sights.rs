@@ -1,4 +1,4 @@
-//! What holds of every flight with a camera, and what becomes of observations that are wrong.
+//! Invariants of every flight with a camera, and the handling of wrong observations.
 
 use nalgebra::{SVector, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
@@ -16,7 +16,7 @@ fn apart(a: &Estimate<N>, b: &Estimate<N>) -> f64 {
     a.error_to::<Drone>(b).amax()
 }
 
-/// Everything is linearised where it was first.
+/// Every landmark keeps its first linearisation point.
 fn once() -> LandmarkParams {
     LandmarkParams { relinearise: 1.0, ..exact() }
 }
@@ -24,7 +24,7 @@ fn once() -> LandmarkParams {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// The Jacobians by pose and landmark are the numeric ones.
+    /// The Jacobians by pose and landmark match the numeric ones.
     #[test]
     fn derivatives_are_the_numeric_ones(
         seed in any::<u64>(), u in 20.0..730.0_f64, v in 20.0..460.0_f64, depth in 5.0..80.0_f64,
@@ -54,7 +54,7 @@ proptest! {
                 keyframe.correction[error] = step;
                 residual(&keyframe, &point)
             });
-            // What is left to explain falls by what an error explains.
+            // The residual falls by the part that an error explains.
             let numeric = (back - ahead) / (2.0 * step);
             prop_assert!((numeric - expected).norm() < 1e-5 * (1.0 + expected.norm()), "{error}: {numeric} {expected}");
         }
@@ -65,7 +65,7 @@ proptest! {
         }
     }
 
-    /// Tracks that end before their first keyframe leaves lose nothing.
+    /// Tracks that end before their first keyframe leaves lose no information.
     #[test]
     fn a_window_is_the_batch(seed in any::<u64>(), window in 7_usize..12) {
         let flight = Flight::new(seed, 30, 1.0);
@@ -82,7 +82,7 @@ proptest! {
         }
     }
 
-    /// What comes late, and in any order, makes the same estimate in the end.
+    /// Late observations, in any order, give the same estimate in the end.
     #[test]
     fn the_order_of_arrival_does_not_matter(
         seed in any::<u64>(),
@@ -90,7 +90,7 @@ proptest! {
     ) {
         let flight = Flight::new(seed, 10, 1.0);
         let scenery = Scenery::new(&flight, seed, 6, 8, Some(5.0));
-        // What is known of a landmark is given with whatever comes first.
+        // The prior of a landmark is given with whichever observation comes first.
         let guessed = |id: u64| {
             let all = scenery.seen.iter().flatten();
             all.filter(|seen| seen.landmark == id).find_map(|seen| seen.guess)
@@ -124,8 +124,8 @@ proptest! {
         }
     }
 
-    /// Without a guess, landmarks say nothing of where the world is and which way it points, however often they are
-    /// linearised again or marginalised.
+    /// Without a guess, landmarks give no information on the origin and heading of the world, however often they are
+    /// relinearised or marginalised.
     #[test]
     fn what_is_unobservable_stays_unknown(seed in any::<u64>()) {
         let mut flight = Flight::new(seed, 60, 1.0);
@@ -152,7 +152,7 @@ proptest! {
         prop_assert!(smoother.landmarks().1 > 0);
     }
 
-    /// Any numbers at all leave it with finite numbers.
+    /// Arbitrary numbers leave it with finite numbers.
     #[test]
     fn absurd_observations(
         seed in any::<u64>(),
@@ -179,8 +179,8 @@ proptest! {
     }
 }
 
-/// With sensors that err exactly as the smoother is told, its errors are as large as it says, with tracks that outlive the
-/// window.
+/// If the sensors err exactly as the smoother is told, its errors match its covariance, also with tracks that outlive
+/// the window.
 #[test]
 fn errors_are_as_large_as_the_smoother_says() {
     const FLIGHTS: u32 = 100;
@@ -203,7 +203,7 @@ fn errors_are_as_large_as_the_smoother_says() {
     }
 }
 
-/// A flight with its last keyframe in the window, and landmarks that it uses.
+/// A flight with its last keyframe in the window, and landmarks in use.
 fn flown() -> (Flight, Scenery, Smoother) {
     let flight = Flight::new(11, 12, 0.0);
     let scenery = Scenery::new(&flight, 11, 8, 100, Some(5.0));
@@ -254,7 +254,7 @@ fn refusals_are_named_and_counted() {
     assert_eq!((counts.invalid, counts.gate, counts.not_applicable, counts.fused), (8, 1, 3, 1));
     smoother.update().unwrap();
     assert!(apart(&before, &smoother.estimate().unwrap()) < 0.01);
-    // Full: ids that are new each, and are never seen again.
+    // Fill it with new ids that are never seen again.
     let (mut full, mut more) = (0, Stream::default());
     for id in 0..40 {
         let seen = Observation::new(20_000 + id, Vector2::new(100.0, 100.0), 1.0);
@@ -266,7 +266,7 @@ fn refusals_are_named_and_counted() {
     assert_eq!(blind.observe(&mut stream, 0, &good), Err(Refusal::NotStarted));
 }
 
-/// One that was taken for known above the camera does not stay so until it leaves the window.
+/// A landmark with a wrong guess, above the camera, is restarted instead of kept until it leaves the window.
 #[test]
 fn a_landmark_behind_the_camera_begins_again() {
     let (_, scenery, mut smoother) = flown();
@@ -283,7 +283,7 @@ fn a_landmark_behind_the_camera_begins_again() {
     assert_eq!(smoother.landmark(9999), None);
 }
 
-/// What nothing determines is not known exactly: it waits until something does.
+/// A landmark without any information is not treated as exactly known: it waits until it is determined.
 #[test]
 fn an_indeterminate_landmark_waits() {
     let (_, scenery, mut smoother) = flown();
@@ -298,12 +298,12 @@ fn an_indeterminate_landmark_waits() {
     assert_eq!(smoother.observe(&mut stream, 11, &Observation { landmark: 9999, ..good }), Ok(Sighted::Waiting));
 }
 
-/// An id that is another landmark by now begins again, and what it was stays used.
+/// When an id is reused for another landmark, the landmark restarts, and the old information stays in use.
 #[test]
 fn an_id_is_reused() {
     let flight = Flight::new(5, 30, 1.0);
     let mut scenery = Scenery::new(&flight, 5, 8, 100, None);
-    // From keyframe 12 on, two landmarks have each other's ids.
+    // From keyframe 12 on, two landmarks have swapped ids.
     let ids: Vec<u64> = scenery.seen[12].iter().map(|seen| seen.landmark).take(2).collect();
     for seen in scenery.seen.iter_mut().skip(12).flatten() {
         if let Some(which) = ids.iter().position(|id| *id == seen.landmark) {
@@ -333,13 +333,13 @@ fn an_id_is_reused() {
     }
 }
 
-/// Where the camera stands still nothing can be triangulated: that is no error, and nothing is used.
+/// Without parallax, no landmark is triangulated. This is not an error, and nothing is used.
 #[test]
 fn without_parallax_landmarks_wait() {
     let (_, _, mut smoother) = flown();
     let mut stream = open();
     for k in 5..12 {
-        // As far away as a star: at the same place in each image but for how the body turned.
+        // As distant as a star: it appears at the same place in each image except for the turn of the body.
         let keyframe = smoother.window[k].estimate::<Drone>();
         let (camera_from_world, _) = camera().placed(&keyframe.position, &keyframe.world_from_body);
         let Ok(seen) = camera().seen(&(camera_from_world * Vector3::new(10.0, 20.0, -1000.0))) else { continue };
@@ -354,7 +354,7 @@ fn without_parallax_landmarks_wait() {
     assert!((smoother.covariance().unwrap() - before).amax() < 1e-12);
 }
 
-/// Landmarks that are lost do not stay for ever, and those that outlive the window go on.
+/// Lost landmarks are eventually removed, and landmarks that outlive the window continue.
 #[test]
 fn landmarks_come_and_go() {
     let flight = Flight::new(17, 150, 1.0);
@@ -380,7 +380,7 @@ fn landmarks_come_and_go() {
     assert!(smoother.landmarks().1 > 5);
 }
 
-/// A camera turns a world of the same landmarks with the same result.
+/// Turning the world and its landmarks gives the same result.
 #[test]
 fn heading_and_origin() {
     let flight = Flight::new(23, 25, 1.0);
@@ -413,6 +413,6 @@ fn heading_and_origin() {
     let (here, there) = (here.estimate().unwrap(), there.estimate().unwrap());
     let apart = (place(&here.position) - there.position).norm();
     let turned = (turn * here.world_from_body).angle_to(&there.world_from_body);
-    // Depths that are next to unknown cost digits.
+    // Depths that are almost unknown lose digits.
     assert!(apart < 1e-4 && turned < 1e-6, "{apart} m, {turned} rad");
 }
