@@ -14,7 +14,7 @@ pub(in crate::navigation) struct Watch {
     limits: Limits,
     recoveries: u64,
     distrusted_until_ns: i64,
-    /// Since the start.
+    /// Number of resets already seen. 1 after the start.
     resets: u32,
     moved_until_ns: i64,
 }
