@@ -160,8 +160,8 @@ impl Rooms {
 }
 
 impl StateEstimatorParams {
-    /// Maximum numbers of IMU samples and of other inputs held: `imu_rate (1.25 lateness + keyframe_interval + 1)` and `input_rate
-    /// (1.25 lateness + lead + 1)`. The memory for them is allocated when the estimator is created.
+    /// Maximum numbers of IMU samples and of other inputs held: `imu_rate (1.25 lateness + keyframe_interval + 1)` and
+    /// `input_rate (1.25 lateness + lead + 1)`. The memory for them is allocated when the estimator is created.
     ///
     /// Samples are needed since the oldest copy of the estimate, and since the keyframe before it. That copy is as old as an input
     /// may be late, plus at most a fifth of that.
