@@ -10,13 +10,13 @@ use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::refusal::Refusal;
 use nalgebra::Vector3;
 
-/// How long a start may take, ns, before that is reported.
+/// How long a start may take before it is reported, ns.
 const LONGEST_NS: i64 = 10_000_000_000;
 
-/// Where the world begins without satellites is known by definition, m.
+/// Standard deviation of the world's origin without satellites, m: it is known by definition.
 const ORIGIN: f64 = 0.01;
 
-/// Gathers what a start needs.
+/// Gathers the data that a start needs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Aligning {
     alignment: Alignment,
@@ -26,19 +26,19 @@ pub(super) struct Aligning {
 }
 
 impl Aligning {
-    /// `frame` is that of the world, if there is one already.
+    /// `frame` is that of the world, if it already has one.
     pub(super) fn new(options: &NavigationOptions, frame: Option<LocalFrame>) -> Self {
         let params = AlignmentParams { gravity: options.gravity, ..AlignmentParams::default() };
         let alignment = Alignment::new(params);
         Self { alignment, course: Course::within(frame), first_ns: None, last_ns: i64::MIN }
     }
 
-    /// Whether it has gone on for so long that somebody should be told.
+    /// Whether alignment has taken long enough to be reported.
     pub(super) fn takes_too_long(&self) -> bool {
         self.first_ns.is_some_and(|first_ns| self.last_ns.saturating_sub(first_ns) > LONGEST_NS)
     }
 
-    /// Takes what has come; where the filter starts, once that is known.
+    /// Takes the new inputs. Returns the start of the filter once it is known.
     pub(super) fn take(
         &mut self,
         sample: &ImuMean,
@@ -71,7 +71,7 @@ impl Aligning {
         } else {
             self.alignment.at_rest(position, (options.heading, options.heading_deviation))?
         };
-        // The fix is the antenna's.
+        // The fix is the position of the antenna.
         let antenna = start.world_from_body * mounting.antenna();
         Ok(Start { position: start.position - antenna, position_covariance: fix.covariance, ..start })
     }

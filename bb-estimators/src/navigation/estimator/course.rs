@@ -1,4 +1,4 @@
-//! What fixes show before a filter starts: where the world begins, a position, and a course.
+//! Positions and courses from fixes before a filter starts: the origin of the world, a position, and a course.
 
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
@@ -11,32 +11,32 @@ use nalgebra::Vector3;
 /// How far the robot's motion may differ from its x axis, rad.
 pub(in crate::navigation) const SLIP: f64 = 0.1;
 
-/// So many fixes that agree may begin a world: a robot often waits no longer for a receiver that gives one a second.
+/// Number of agreeing fixes that may define a world. With a receiver at 1 Hz, a robot often cannot wait for more.
 const AGREED: u32 = 2;
 
-/// After so long, ns, fewer fixes have to do, if none disagreed: those of a receiver that is slow, or has fallen silent.
+/// After this time, ns, fewer fixes suffice if none disagreed: the receiver may be slow or may have stopped.
 const LONGEST_WAIT_NS: i64 = 10_000_000_000;
 
-/// The fixes of a receiver, of which no single one is believed: a receiver may begin with where it was switched off, or with
-/// zeros.
+/// The fixes of a receiver. No single fix is trusted: a receiver may first report the position where it was switched off, or zeros.
 ///
-/// The newest fix counts once it agrees with the one before, and a course once three agree; after 10 s if all that have come agree.
+/// The newest fix counts once it agrees with the previous one, and a course once three agree. After 10 s, either counts if all
+/// fixes so far agree.
 #[derive(Clone, Copy, Debug)]
 pub struct Course {
-    /// Begun by the first fix of the track, unless it was there already.
+    /// Set by the first fix of the track, unless it was given.
     frame: Option<LocalFrame>,
     is_given: bool,
     track: Track,
-    /// Whether fixes disagreed.
+    /// Whether any fixes disagreed.
     is_disputed: bool,
     first_ns: Option<i64>,
-    /// How far it has turned about up, rad, and until when.
+    /// Rotation about the up axis, rad, and the time up to which it is integrated.
     yaw: f64,
     turned_ns: Option<i64>,
 }
 
 impl Course {
-    /// One without a fix, in a frame that is there already: the world does not move when a filter starts again.
+    /// Starts without fixes in an optional existing frame: the world does not move when a filter restarts.
     pub fn within(frame: Option<LocalFrame>) -> Self {
         let track = Track::default();
         Self {
@@ -50,7 +50,8 @@ impl Course {
         }
     }
 
-    /// Takes a sample of the IMU: how far it turns about up, which is where the specific force points. A course on a curve needs that.
+    /// Integrates the rotation in an IMU sample about the up axis, which is the direction of the specific force. A course on a
+    /// curve needs it.
     pub fn turn(&mut self, sample: &ImuMean) {
         let since_s = self.turned_ns.map_or(0.0, |before| sample.time_ns.saturating_sub(before) as f64 * 1e-9);
         let about_up = sample.angular_velocity.dot(&sample.specific_force) / sample.specific_force.norm();
@@ -60,28 +61,29 @@ impl Course {
         self.turned_ns = Some(sample.time_ns);
     }
 
-    /// Takes a fix, if it is new; `deviation` is that of one that says nothing about its own.
+    /// Takes a fix, if it is new. `deviation` applies to a fix that does not report its own.
     pub(in crate::navigation) fn see(&mut self, fix: Option<Input<'_, GnssFix>>, deviation: f64) {
         if let Some(fix) = fix.filter(Input::is_new) {
             self.add(fix.monotonic_time.as_nanos(), &fix.payload, deviation);
         }
     }
 
-    /// Takes a fix of that time; `deviation` is that of one that says nothing about its own, m. One without a position is left out.
+    /// Takes a fix of that time. `deviation`, m, applies to a fix that does not report its own. A fix without a position is
+    /// skipped.
     pub fn add(&mut self, time_ns: i64, fix: &GnssFix, deviation: f64) {
         let Some(place) = Geodetic::of_fix(fix, 0.0) else { return };
         let frame = *self.frame.get_or_insert_with(|| LocalFrame::new(place));
         let Some(point) = point(time_ns, fix, &frame, deviation) else { return };
         if !self.add_point(point) && !self.is_given {
-            // The world does not begin at what was not there.
+            // A disputed fix must not define the world.
             self.frame = Some(LocalFrame::new(place));
             self.track = Track::default();
             self.track.add(TrackPoint { position: Vector3::zeros(), yaw: self.yaw, ..point });
         }
     }
 
-    /// Takes the position of an antenna in the frame; whether it agrees with those before. How far the robot has turned is known
-    /// here.
+    /// Takes the position of an antenna in the frame. Returns whether it agrees with the previous ones. The rotation of the robot
+    /// is already known here.
     pub fn add_point(&mut self, point: TrackPoint) -> bool {
         let point = TrackPoint { yaw: self.yaw, ..point };
         self.first_ns = self.first_ns.or(Some(point.time_ns));
@@ -90,29 +92,29 @@ impl Course {
         agrees
     }
 
-    /// Where the world is on the Earth, once a fix counts.
+    /// Location of the world on the Earth, once a fix counts.
     pub fn frame(&self) -> Option<LocalFrame> {
         self.frame
     }
 
-    /// The newest fix, of the antenna in the frame, if it counts at that time.
+    /// The newest fix, as the antenna's position in the frame, if it counts at that time.
     pub fn newest(&self, now_ns: i64) -> Option<&TrackPoint> {
         self.track.newest().filter(|_| self.agree(AGREED, now_ns))
     }
 
-    /// The velocity over the last seconds, in the frame, with its standard deviation, m/s, if it counts at that time.
+    /// The mean velocity over the last seconds, in the frame, with its standard deviation, m/s, if it counts at that time.
     pub fn velocity(&self, now_ns: i64) -> Option<(Vector3<f64>, f64)> {
         self.track.velocity().filter(|_| self.agree(CONFIRMED, now_ns))
     }
 
-    /// Whether so many agree, or all there are after a while.
+    /// Whether `count` fixes agree, or, after a while, all of them.
     fn agree(&self, count: u32, now_ns: i64) -> bool {
         let has_waited = self.first_ns.is_some_and(|first_ns| now_ns.saturating_sub(first_ns) >= LONGEST_WAIT_NS);
         self.track.count() >= count || (has_waited && !self.is_disputed)
     }
 }
 
-/// A fix in a frame; none if it has no position.
+/// A fix in a frame. `None` if it has no position.
 pub(in crate::navigation) fn point(
     time_ns: i64,
     fix: &GnssFix,

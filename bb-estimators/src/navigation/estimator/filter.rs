@@ -1,4 +1,4 @@
-//! The filter with a stream for each sensor.
+//! The filter with a stream per sensor.
 
 use super::health::{Sight, largest_deviation};
 use super::input::keyframe_at;
@@ -22,11 +22,11 @@ use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 #[derive(Clone, Debug)]
 pub(super) struct Filter<S: States, const N: usize> {
     eskf: Eskf<S, N>,
-    /// By [`Measured::sensor`].
+    /// Indexed by [`Measured::sensor`].
     streams: [Stream; SENSORS],
 }
 
-/// A measurement of one of the sensors.
+/// A measurement from one of the sensors.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Measured {
     Gnss(GnssPosition),
@@ -34,13 +34,13 @@ pub(super) enum Measured {
     Wheels(WheelSpeed),
     Sideways(NonHolonomic),
     Pose(AbsolutePose),
-    /// With the instant at which the next one begins, ns.
+    /// With the start of the next relative pose, ns.
     Relative(RelativePose, i64),
     MagneticField(MagneticHeading),
     Pressure(BarometricHeight),
 }
 
-/// The streams of sensors: wheels have a second one, for what they do not do.
+/// The streams of sensors. Wheels have a second one for their motion constraints.
 const SENSORS: usize = 7;
 const GNSS: usize = 0;
 const POSE: usize = 3;
@@ -71,7 +71,7 @@ impl<S: States, const N: usize> Filter<S, N> {
         eskf.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let stream = Stream::new(StreamParams { patience: options.patience, ..StreamParams::default() });
         let mut streams = [stream; SENSORS];
-        // A filter that these refute is moved instead: see `refuted.rs`.
+        // If these refute a filter, it is moved instead: see `refuted.rs`.
         for sensor in [GNSS, POSE] {
             streams[sensor] = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
         }
@@ -90,19 +90,20 @@ impl<S: States, const N: usize> Filter<S, N> {
         self.estimate().map(|estimate| estimate.position)
     }
 
-    /// Standard deviation of the horizontal position, in the direction where it is least known, m.
+    /// Standard deviation of the horizontal position in its least certain direction, m.
     pub(super) fn horizontal_deviation(&self) -> f64 {
         let covariance = self.eskf.covariance();
         let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
-    /// What became of the measurements: satellites, odometry, what wheels do not do, poses, relative poses, magnetic field, pressure.
+    /// Counts of the measurements by result: satellites, odometry, wheel constraints, poses, relative poses, magnetic field,
+    /// pressure.
     pub(super) fn counts(&self) -> [&Counts; SENSORS] {
         self.streams.each_ref().map(Stream::counts)
     }
 
-    /// What its health is judged by.
+    /// The data from which its health is judged.
     pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
         Some(Sight {
             now_ns: self.time_ns()?,
@@ -113,13 +114,13 @@ impl<S: States, const N: usize> Filter<S, N> {
         })
     }
 
-    /// What became of fixes, and of poses.
+    /// Counts of fixes and of poses by result.
     pub(super) fn positions(&self) -> [&Counts; 2] {
         [GNSS, POSE].map(|sensor| self.streams[sensor].counts())
     }
 
-    /// Moves it to where the sensor of `found` was found to be: at `lever_arm` in the body, m, turned as `orientation` says, if
-    /// that is known.
+    /// Moves the filter so that its sensor is at the position of `found`. The sensor is at `lever_arm` in the body, m, and
+    /// `orientation` gives its rotation, if known.
     pub(super) fn relocate(
         &mut self,
         found: &Found,
@@ -170,7 +171,7 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
             Measured::Pose(pose) => eskf.update(stream, pose),
             Measured::Relative(relative, end_ns) => {
                 let result = eskf.update(stream, relative);
-                // The next one begins here, whatever became of this one.
+                // The next one begins here, whether this one was fused or not.
                 eskf.set_keyframe(keyframe_at(*end_ns));
                 result
             }

@@ -1,42 +1,42 @@
-//! When the estimate is not to be trusted.
+//! Conditions under which the estimate is not to be trusted.
 
 use crate::navigation::stream::Counts;
 
-/// For how long the filter is distrusted after it had to be pulled towards its sensors, ns.
+/// How long the filter is distrusted after a recovery pulled it towards its sensors, ns.
 const DISTRUST_NS: i64 = 1_000_000_000;
 
-/// Refusals in a row of one sensor that are more than outliers.
+/// Number of consecutive refusals of one sensor that are more than outliers.
 const STORM: u64 = 3;
 
-/// What was seen of the filter so far.
+/// Observations of the filter so far.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Watch {
     limits: Limits,
     recoveries: u64,
     distrusted_until_ns: i64,
-    /// After the start.
+    /// Number of resets already seen. 1 after the start.
     resets: u32,
     moved_until_ns: i64,
 }
 
-/// What an estimate may be at most.
+/// Limits of an estimate.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Limits {
-    /// For how long the position may be dead-reckoned, s; none if nothing measures it.
+    /// How long the position may be dead-reckoned, s. `None` if no sensor measures it.
     pub(in crate::navigation) dead_reckoning_s: Option<f64>,
     /// Standard deviation of the horizontal position, m.
     pub(in crate::navigation) deviation: f64,
 }
 
-/// What there is to see of a filter.
+/// Observable quantities of a filter.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Sight<'a> {
     pub(in crate::navigation) now_ns: i64,
     pub(in crate::navigation) counts: &'a [&'a Counts],
-    /// How often the filter was started or moved.
+    /// Number of times the filter was started or moved.
     pub(in crate::navigation) resets: u32,
     pub(in crate::navigation) dead_reckoning_s: f64,
-    /// Standard deviation of the horizontal position, in the direction where it is least known, m.
+    /// Standard deviation of the horizontal position in its least certain direction, m.
     pub(in crate::navigation) deviation: f64,
 }
 
@@ -48,7 +48,7 @@ impl Watch {
     /// Why the estimate is not to be trusted, if it is not.
     pub(in crate::navigation) fn look(&mut self, sight: &Sight<'_>) -> Option<&'static str> {
         let recoveries = sight.counts.iter().map(|counts| counts.recoveries).sum();
-        // A late measurement has the filter take back a recovery, and perhaps make it again.
+        // A late measurement may make the filter undo a recovery and then repeat it.
         if recoveries > self.recoveries {
             self.distrusted_until_ns = sight.now_ns.saturating_add(DISTRUST_NS);
         }
@@ -67,13 +67,13 @@ impl Watch {
         if self.limits.dead_reckoning_s.is_some_and(|longest_s| sight.dead_reckoning_s > longest_s) {
             return Some("the position was dead-reckoned for too long");
         }
-        // Of a deviation that is no number, nothing is known.
+        // A NaN deviation carries no information.
         let is_certain = sight.deviation <= self.limits.deviation;
         (!is_certain).then_some("the position is too uncertain")
     }
 }
 
-/// The standard deviation of a covariance of two numbers in the direction where it is the largest.
+/// The largest standard deviation in any direction, from a 2×2 covariance.
 pub(in crate::navigation) fn largest_deviation(xx: f64, xy: f64, yy: f64) -> f64 {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     (mean + half.hypot(xy)).sqrt()

@@ -1,4 +1,4 @@
-//! What the declared filter takes, and where its sensors are.
+//! Inputs of the declared filter, and the mounting of its sensors.
 
 use super::options::NavigationOptions;
 use crate::navigation::eskf::ImuMean;
@@ -15,11 +15,11 @@ pub struct NavigationInputs<'a> {
     pub imu: Input<'a, Imu>,
     /// Satellite navigation.
     pub gnss: Option<Input<'a, GnssFix>>,
-    /// Wheels, or anything else that counts its own motion: of an odometry, the velocity is used.
+    /// Wheels, or any other source of odometry. Only the velocity is used.
     pub odometry: Option<Input<'a, Odometry>>,
     /// Poses in the world, from a map or a tracking system.
     pub pose: Option<Input<'a, Pose>>,
-    /// Poses relative to the one before, of a visual or lidar odometry: each begins where the last one ended.
+    /// Poses relative to the previous one, from a visual or lidar odometry: each begins where the last one ended.
     pub relative: Option<Input<'a, payload::RelativePose>>,
     /// A magnetometer: the heading of the field is used.
     pub magnetic_field: Option<Input<'a, MagneticField>>,
@@ -27,9 +27,9 @@ pub struct NavigationInputs<'a> {
     pub pressure: Option<Input<'a, FluidPressure>>,
 }
 
-/// Where the sensors are; none where the robot does not declare an input.
+/// Poses of the sensors. `None` for inputs that the robot does not declare.
 ///
-/// The body of the filter has the axes of the link, and its origin where the IMU is.
+/// The filter's body frame has the axes of the link and its origin at the IMU.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mounting {
     link_from_imu: Isometry3<f64>,
@@ -42,14 +42,14 @@ pub(super) struct Mounting {
 }
 
 impl Mounting {
-    /// As the robot declares them.
+    /// Reads the mounting that the robot declares.
     pub(super) fn of(context: &Context) -> Result<Self, Fault> {
         let link_from_imu = context.frame_from_driver()?;
         let of_body = |sensor: Isometry3<f64>| {
             let from_imu = sensor.translation.vector - link_from_imu.translation.vector;
             Isometry3::from_parts(from_imu.into(), sensor.rotation)
         };
-        // Of inputs that the robot does not declare, there is none.
+        // `None` for inputs that the robot does not declare.
         let optional = |name: &str| context.frame_from_input(name).ok().map(of_body);
         Ok(Self {
             link_from_imu,
@@ -62,7 +62,7 @@ impl Mounting {
         })
     }
 
-    /// Whether something measures the position in the world.
+    /// Whether any input measures the position in the world.
     pub(super) fn has_positions(&self) -> bool {
         self.has_gnss() || self.pose.is_some()
     }
@@ -91,13 +91,14 @@ impl Mounting {
         -self.link_from_imu.translation.vector
     }
 
-    /// The velocity that an odometry has counted.
+    /// The velocity in an odometry.
     pub(super) fn velocity(&self, odometry: &Odometry, options: &NavigationOptions) -> BodyVelocity {
         let body_from_sensor = self.odometry.unwrap_or_else(Isometry3::identity);
         BodyVelocity::of_odometry(odometry, &body_from_sensor, options.odometry_deviation)
     }
 
-    /// The same of wheels: their speed along the sensor's x axis, and that they move neither sideways nor off the ground.
+    /// The same for wheels: their speed along the sensor's x axis, with the constraint that they move neither sideways nor off the
+    /// ground.
     pub(super) fn wheels(&self, odometry: &Odometry, options: &NavigationOptions) -> (WheelSpeed, NonHolonomic) {
         let variance = odometry.twist.covariance.map(|covariance| covariance[(0, 0)]);
         let body_from_vehicle = rotation(self.odometry.as_ref());
@@ -112,7 +113,7 @@ impl Mounting {
         (speed, NonHolonomic { lateral, vertical: lateral, body_from_vehicle, lever_arm })
     }
 
-    /// The heading that a magnetic field shows.
+    /// The heading from a magnetic field.
     pub(super) fn magnetic_heading(&self, field: &MagneticField, options: &NavigationOptions) -> MagneticHeading {
         MagneticHeading {
             field: rotation(self.magnetic_field.as_ref()) * field.magnetic_field,
@@ -121,9 +122,10 @@ impl Mounting {
         }
     }
 
-    /// A relative pose of its sensor, as one of the body: `X T X⁻¹` with the pose X of the sensor in the body.
+    /// Converts a relative pose of its sensor to one of the body: `X T X⁻¹`, where X is the pose of the sensor in the body.
     ///
-    /// The scale is that of the sensor's way. Where the body turns, a part of the lever arm is not scaled; that is left out.
+    /// The scale applies to the translation of the sensor. Where the body rotates, part of the lever arm is not scaled. This is
+    /// neglected.
     pub(super) fn relative_pose(
         &self,
         relative: &payload::RelativePose,
@@ -140,7 +142,7 @@ impl Mounting {
                     let turn = rotation.to_rotation_matrix().into_inner();
                     turn * covariance.fixed_view::<3, 3>(first, first) * turn.transpose()
                 };
-                // In the frame at the start; the filter has it in that of the body at the end.
+                // Given in the frame at the start. The filter expects it in the body frame at the end.
                 (turned(start_from_end.inverse() * body_from_sensor, 0), turned(body_from_sensor, 3))
             }
             None => (isotropic(options.relative_deviation), isotropic(0.1 * options.relative_deviation)),
@@ -155,12 +157,12 @@ impl Mounting {
     }
 }
 
-/// What the filter calls the keyframe of an instant.
+/// The filter's keyframe id for an instant.
 pub(super) fn keyframe_at(time_ns: i64) -> u64 {
     time_ns.cast_unsigned()
 }
 
-/// Where a sensor is in the body, m.
+/// Position of a sensor in the body, m.
 pub(super) fn place(body_from_sensor: Option<&Isometry3<f64>>) -> Vector3<f64> {
     body_from_sensor.map_or(Vector3::zeros(), |sensor| sensor.translation.vector)
 }
@@ -169,7 +171,7 @@ fn rotation(body_from_sensor: Option<&Isometry3<f64>>) -> UnitQuaternion<f64> {
     body_from_sensor.map_or(UnitQuaternion::identity(), |sensor| sensor.rotation)
 }
 
-/// The square root of a variance, if one is told.
+/// The square root of a variance, if it is given.
 pub(super) fn deviation(variance: Option<f64>, otherwise: f64) -> f64 {
     variance.filter(|variance| *variance > 0.0).map_or(otherwise, f64::sqrt)
 }

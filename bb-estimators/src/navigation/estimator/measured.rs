@@ -1,4 +1,4 @@
-//! Payloads as measurements, with where their sensor is in the body.
+//! Payloads as measurements, with the lever arm of their sensor in the body.
 
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::skew;
@@ -6,13 +6,13 @@ use crate::navigation::measurement::{AbsolutePose, BodyVelocity, GnssPosition, i
 use bb_core::payload::{GnssFix, GnssStatus, Odometry, Pose};
 use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 
-/// Standard deviation of a height that a fix does not tell, m.
+/// Standard deviation of the height where a fix has none, m.
 const UNKNOWN_HEIGHT: f64 = 1e4;
 
-/// Heights that something on or above the Earth has, m.
+/// Heights possible on or above the Earth, m.
 const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
 
-/// A covariance, if it tells something: in ROS all zeros mean unknown, and no noise has a variance of zero or less.
+/// A covariance, if it carries information: in ROS all zeros mean unknown, and no noise has a variance of zero or less.
 pub(in crate::navigation) fn told<const D: usize>(
     covariance: Option<SMatrix<f64, D, D>>,
 ) -> Option<SMatrix<f64, D, D>> {
@@ -20,7 +20,8 @@ pub(in crate::navigation) fn told<const D: usize>(
 }
 
 impl Geodetic {
-    /// Where a fix is, at `height` (m) if it does not tell; none if it has no position, or one that is nowhere near the Earth.
+    /// Position of a fix. `height` (m) is used if it has none. Returns `None` if it has no position, or one that is far from the
+    /// Earth.
     pub fn of_fix(fix: &GnssFix, height: f64) -> Option<Self> {
         let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
         let height = position.altitude.unwrap_or(height);
@@ -33,8 +34,8 @@ impl Geodetic {
 }
 
 impl GnssPosition {
-    /// A fix in a frame, of an antenna at `lever_arm` in the body (m), none if it has no position. `deviation` is that of a fix that tells none,
-    /// horizontal, m; vertical it is twice as much.
+    /// A fix in a frame, of an antenna at `lever_arm` in the body (m). Returns `None` if it has no position. `deviation`,
+    /// horizontal, m, applies to a fix that reports none. Vertically, twice that is used.
     pub fn of_fix(fix: &GnssFix, frame: &LocalFrame, lever_arm: Vector3<f64>, deviation: f64) -> Option<Self> {
         let geodetic = Geodetic::of_fix(fix, frame.origin().height)?;
         let deviations = Vector3::new(1.0, 1.0, 2.0) * deviation;
@@ -48,9 +49,9 @@ impl GnssPosition {
 }
 
 impl BodyVelocity {
-    /// The velocity that an odometry has counted in its own frame. `deviation` is that of one that tells none, m/s.
+    /// The velocity that an odometry measured in its own frame. `deviation`, m/s, applies if it reports none.
     pub fn of_odometry(odometry: &Odometry, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
-        // One deviation for all axes: from the mean of their variances.
+        // One deviation for all axes, from the mean of their variances.
         let covariance = odometry.twist.covariance;
         let variance = covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).trace() / 3.0);
         let deviation = variance.filter(|variance| *variance > 0.0).map_or(deviation, f64::sqrt);
@@ -64,8 +65,8 @@ impl BodyVelocity {
 }
 
 impl AbsolutePose {
-    /// The pose of the body, from that of a sensor in it. `deviation` is that of the position of one that tells none, m; of its
-    /// orientation it is a tenth, in rad.
+    /// The pose of the body, from that of a sensor in it. `deviation`, m, is that of the position if the pose reports none. A tenth
+    /// of it, in rad, applies to the orientation.
     pub fn of_pose(pose: &Pose, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
         let world_from_body = pose.world_from_body * body_from_sensor.rotation.inverse();
         let arm = world_from_body * body_from_sensor.translation.vector;

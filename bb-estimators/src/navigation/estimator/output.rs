@@ -1,4 +1,4 @@
-//! What the declared filter emits.
+//! Outputs of the declared filter.
 
 use super::input::Mounting;
 use super::report::NavigationStatus;
@@ -6,7 +6,7 @@ use super::running::Core;
 use bb_core::Outputs;
 use bb_core::payload::Odometry;
 
-/// An output that can be made of the filter after a sample.
+/// An output that the filter can produce after a sample.
 #[diagnostic::on_unimplemented(
     message = "a navigation filter cannot emit `{Self}`",
     label = "not an output of navigation filters",
@@ -14,7 +14,7 @@ use bb_core::payload::Odometry;
 )]
 #[expect(private_interfaces, reason = "implemented here alone")]
 pub trait NavigationOutput: Outputs + Sized {
-    /// What there is to emit.
+    /// The value to emit.
     #[doc(hidden)]
     fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self>;
 }
@@ -24,7 +24,7 @@ pub trait NavigationOutput: Outputs + Sized {
 pub struct NavigationOutputs {
     /// Pose in the world and motion of the link, with every sample.
     pub odometry: Option<Odometry>,
-    /// What else the filter knows, with every sample.
+    /// The remaining status of the filter, with every sample.
     pub status: Option<NavigationStatus>,
 }
 

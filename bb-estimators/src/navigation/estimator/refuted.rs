@@ -1,59 +1,60 @@
-//! When positions that the gate refuses are right and the filter is wrong.
+//! Recovery when positions that the gate refuses are right and the filter is wrong.
 //!
-//! Raising the covariance until such a position fits would take the difference, however many kilometres, for errors of attitude
-//! and biases too, in proportion to their correlations. The filter is moved to where the positions are instead, and keeps what
-//! does not depend on where it is.
+//! Raising the covariance until such a position fits would also attribute the difference, possibly kilometres, to errors of
+//! attitude and biases, in proportion to their correlations. Instead, the filter is moved to the positions. It keeps all states
+//! that do not depend on its location.
 
 use crate::navigation::stream::Counts;
 use crate::navigation::track::{CONFIRMED, Track, TrackPoint};
 use nalgebra::{Matrix3, Vector3};
 
-/// A filter's velocity is kept unless it is off by so many standard deviations from that of the positions.
+/// A filter keeps its velocity unless it differs from that of the positions by this many standard deviations.
 const SIGMAS: f64 = 5.0;
 
-/// What a velocity that is a mean over seconds is off by, m/s.
+/// Error of a velocity that is a mean over seconds, m/s.
 const CHANGE: f64 = 1.0;
 
-/// Positions of one sensor, and what they are held against.
+/// Positions of one sensor, and the count they are compared with.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::navigation) struct Refuted {
     track: Track,
-    /// How many were fused before the filter began where it is.
+    /// Number fused before the filter was last started or moved.
     fused: u64,
 }
 
-/// Where positions show a robot to be.
+/// Location of a robot as shown by positions.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Found {
-    /// Of the sensor, at a time of its own.
+    /// Position of the sensor, with its own time stamp.
     pub(in crate::navigation) point: TrackPoint,
-    /// In the world, with its standard deviation, m/s, if they show that.
+    /// In the world, with its standard deviation, m/s, if the positions determine it.
     pub(in crate::navigation) velocity: Option<(Vector3<f64>, f64)>,
 }
 
 impl Refuted {
-    /// Notes a position, fused or refused.
+    /// Records a position, fused or refused.
     pub(in crate::navigation) fn see(&mut self, point: TrackPoint) {
         self.track.add(point);
     }
 
-    /// Coordinates are those of another world from now on: those before are forgotten.
+    /// From now on, coordinates are those of another world. Earlier positions are dropped.
     pub(in crate::navigation) fn move_world(&mut self) {
         self.track = Track::default();
     }
 
-    /// The filter has begun elsewhere.
+    /// The filter has been started or moved elsewhere.
     pub(in crate::navigation) fn begin(&mut self, counts: &Counts) {
         *self = Self { track: Track::default(), fused: counts.fused };
     }
 
-    /// Whether the filter rests on so many positions that what began the world cannot have been wrong.
+    /// Whether the filter rests on enough positions to rule out a wrong origin of the world.
     pub(in crate::navigation) fn confirms(&self, counts: &Counts, patience: u32) -> bool {
         counts.fused.saturating_sub(self.fused) >= u64::from(patience)
     }
 
-    /// Where the robot is, if the filter is wrong: the last positions were refused, agree among each other, and are more than those
-    /// that the filter rests on, or as many as `patience` if that is less. 0: never.
+    /// Position of the robot, if the filter is wrong. The last positions must have been refused and must agree with each other.
+    /// They must also outnumber those that the filter rests on, or reach `patience` if that is less. With 0, the result is always
+    /// `None`.
     pub(in crate::navigation) fn verdict(&self, counts: &Counts, patience: u32) -> Option<Found> {
         let confirmed = u64::from(CONFIRMED);
         let rests_on = confirmed + counts.fused.saturating_sub(self.fused);
@@ -67,7 +68,7 @@ impl Refuted {
 }
 
 impl Found {
-    /// The velocity that a filter has to take; none if its own, with that covariance, agrees.
+    /// The velocity to set in the filter. `None` if its own, with that covariance, agrees.
     pub(in crate::navigation) fn new_velocity(
         &self,
         own: &Vector3<f64>,
@@ -80,7 +81,7 @@ impl Found {
         (!agrees).then(|| (velocity, Matrix3::identity() * variance))
     }
 
-    /// Where the sensor is at `now_ns`, with its covariance, for a robot that moves with `velocity`.
+    /// Position of the sensor at `now_ns`, with its covariance, for a robot that moves with `velocity`.
     pub(in crate::navigation) fn at(
         &self,
         now_ns: i64,

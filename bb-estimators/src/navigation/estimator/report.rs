@@ -1,4 +1,4 @@
-//! What there is to say of the filter.
+//! Outputs and status of the filter.
 
 use super::filter::Filter;
 use super::input::Mounting;
@@ -10,20 +10,20 @@ use bb_core::Payload;
 use bb_core::payload::{Odometry, Pose, Twist};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-/// What the filter knows beside the odometry.
+/// Status of the filter beside its odometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub struct NavigationStatus {
-    /// What the accelerometer reads more than the specific force, axes of the link, m/s².
+    /// Accelerometer bias: the reading minus the specific force, axes of the link, m/s².
     pub accelerometer_bias: Vector3<f64>,
-    /// What the gyroscope reads more than the angular velocity, axes of the link, rad/s.
+    /// Gyroscope bias: the reading minus the angular velocity, axes of the link, rad/s.
     pub gyroscope_bias: Vector3<f64>,
-    /// For how long the horizontal position has not been corrected by one in the world, s.
+    /// Time since the horizontal position was last corrected by a position in the world, s.
     pub dead_reckoning_s: f64,
-    /// Standard deviation of the horizontal position, in the direction where it is least known, m.
+    /// Standard deviation of the horizontal position in its least certain direction, m.
     pub horizontal_deviation: f64,
-    /// Fixes that were fused, and that were refused.
+    /// Fixes by result.
     pub gnss: Verdicts,
-    /// The same for velocities of the odometry.
+    /// The same for velocities from odometry.
     pub odometry: Verdicts,
     /// The same for poses.
     pub pose: Verdicts,
@@ -33,32 +33,32 @@ pub struct NavigationStatus {
     pub magnetic_field: Verdicts,
     /// The same for pressures.
     pub pressure: Verdicts,
-    /// Scale of the wheels, less 1; 0 where it is no state.
+    /// Scale of the wheels, less 1. 0 if it is not a state.
     pub wheel_scale: f64,
-    /// Scale of relative poses, less 1; 0 where it is no state.
+    /// Scale of relative poses, less 1. 0 if it is not a state.
     pub relative_scale: f64,
-    /// How far the GNSS antenna is from where it is declared, axes of the link, m; 0 where it is no state.
+    /// Offset of the GNSS antenna from its declared position, axes of the link, m. 0 if it is not a state.
     pub gnss_lever_arm: Vector3<f64>,
-    /// How late fixes are beyond their stamps, s; 0 where it is no state.
+    /// Delay of fixes beyond their stamps, s. 0 if it is not a state.
     pub gnss_delay: f64,
-    /// Magnetic field of the robot itself, axes of the link, T; 0 where it is no state.
+    /// Magnetic field of the robot itself, axes of the link, T. 0 if it is not a state.
     pub hard_iron: Vector3<f64>,
-    /// What the barometric height reads more than the height, m; 0 where it is no state.
+    /// Barometric height minus the height, m. 0 if it is not a state.
     pub barometer_bias: f64,
-    /// How often samples of the IMU were missing for longer than a sample may take.
+    /// Number of times that IMU samples were missing for longer than a sample may take.
     pub gaps: u32,
-    /// How often the filter was wrong, and began again where fixes or poses agree.
+    /// Number of times the filter was wrong and restarted where fixes or poses agree.
     pub resets: u32,
 }
 
-/// What became of a sensor's measurements since the start.
+/// A sensor's measurements since the start, by result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub struct Verdicts {
-    /// They have corrected the estimate.
+    /// Those that corrected the estimate.
     pub fused: u64,
-    /// The gate refused them: too far from what was expected.
+    /// Those refused by the gate: too far from the prediction.
     pub refused: u64,
-    /// They were not finite, or came too late or from the future.
+    /// Those that were not finite, too late or in the future.
     pub invalid: u64,
 }
 
@@ -84,7 +84,7 @@ pub(super) fn odometry_of<S: States, const N: usize>(
     let rotation = estimate.rotation();
     let link = mounting.link();
     let arm = rotation * link;
-    // The link's origin: errors of the body's, and of where the rotation takes it, θ × R l.
+    // The link's origin: errors of the body's origin and of the rotated lever arm, θ × R l.
     let from_rotation = -skew(&arm);
     let position = block(POSITION, POSITION)
         + block(POSITION, ROTATION) * from_rotation.transpose()
@@ -126,7 +126,7 @@ pub(super) fn odometry_of<S: States, const N: usize>(
     Some(Odometry { pose, twist })
 }
 
-/// What else the filter knows.
+/// The remaining status of the filter.
 pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Option<NavigationStatus> {
     let estimate = filter.estimate()?;
     let [gnss, odometry, _, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
@@ -148,12 +148,12 @@ pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Opt
         hard_iron: estimate.vector::<S>(Optional::HardIron),
         barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
         gaps: filter.eskf().gaps(),
-        // The start is the first.
+        // The start counts as the first.
         resets: filter.eskf().resets().saturating_sub(1),
     })
 }
 
-/// The matrix of these blocks and the transpose of the second, symmetric to the last bit.
+/// The symmetric block matrix of `first`, `between`, its transpose and `second`, exact to the last bit.
 fn symmetric(first: Matrix3<f64>, between: Matrix3<f64>, second: Matrix3<f64>) -> Matrix6<f64> {
     let mut matrix = Matrix6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&(0.5 * (first + first.transpose())));

@@ -1,4 +1,4 @@
-//! The filter once it has started, whatever its states.
+//! The filter once it has started, for any set of states.
 
 use super::filter::{Filter, Measured};
 use super::health::{Limits, Watch};
@@ -21,21 +21,21 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::any::TypeId;
 use std::fmt::Debug;
 
-/// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
+/// Number of IMU samples by which measurements may be late: 1.3 s at 400 Hz.
 const SAMPLES: usize = 512;
 const MEASUREMENTS: usize = 128;
-/// Each is a filter with all its states: more would be many hundred kilobytes.
+/// Each entry is a filter with all its states: more would take many hundred kilobytes.
 const STATES: usize = 8;
 type Past<S, const N: usize> = History<Filter<S, N>, SAMPLES, MEASUREMENTS, STATES>;
 
 /// How far ahead of the IMU a measurement may be stamped, ns.
 const LONGEST_LEAD_NS: i64 = 500_000_000;
 
-/// What the estimator needs of a filter.
+/// Interface of a filter to the estimator.
 pub(super) trait Core: Debug + Send {
-    /// Whether all that is emitted is a number, and no variance is negative.
+    /// Whether all outputs are finite and no variance is negative.
     fn is_sound(&self) -> bool;
-    /// Takes a sample, and what else has come.
+    /// Takes a sample and the other new inputs.
     fn take(
         &mut self,
         sample: &ImuMean,
@@ -44,13 +44,13 @@ pub(super) trait Core: Debug + Send {
         mounting: &Mounting,
     ) -> Result<(), Refusal>;
 
-    /// The frame that outputs are in; none without satellites.
+    /// The frame of the outputs. `None` without satellites.
     fn frame(&self) -> Option<LocalFrame>;
 
     /// Pose and motion of the link.
     fn odometry(&self, mounting: &Mounting) -> Option<Odometry>;
 
-    /// What else it knows.
+    /// The remaining status.
     fn status(&self) -> Option<NavigationStatus>;
 
     /// Why the estimate is not to be trusted, if it is not.
@@ -66,13 +66,13 @@ struct Running<S: States, const N: usize> {
     /// Fixes, and poses.
     fixes: Refuted,
     poses: Refuted,
-    /// How the last pose was turned.
+    /// Orientation of the last pose.
     orientation: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
 }
 
 /// A filter that has started.
 ///
-/// With states that come with this crate it is compiled with this crate, with the optimisation that is set for that, and not
+/// For states that this crate provides, the function is compiled with this crate and its optimisation level. It is not compiled
 /// with the robot, which may be a debug build.
 pub(super) fn started<S: States + Send + 'static, const N: usize>(
     options: &NavigationOptions,
@@ -129,7 +129,7 @@ impl<S: States, const N: usize> Running<S, N> {
         }
     }
 
-    /// If fixes or poses agree among each other and not with the filter, it is moved there.
+    /// If fixes or poses agree with each other but not with the filter, moves the filter to them.
     fn go_where_positions_agree(
         &mut self,
         options: &NavigationOptions,
@@ -155,7 +155,7 @@ impl<S: States, const N: usize> Running<S, N> {
         let mut filter = now.clone();
         filter.relocate(&found, &lever_arm, orientation)?;
         tracing::warn!(position = ?found.point.position, "it was wrong, and begins again where positions agree");
-        // The barometer is read anew from here.
+        // The next reading becomes the barometer's reference.
         self.heights = Heights::default();
         let [of_fixes, of_poses] = filter.positions();
         self.fixes.begin(of_fixes);
@@ -163,7 +163,7 @@ impl<S: States, const N: usize> Running<S, N> {
         self.begin_again(filter, world)
     }
 
-    /// Goes on with a filter that is elsewhere or in another world: what is in the history belongs to what is left.
+    /// Continues with a filter in another place or world. The history belongs to the old one.
     fn begin_again(&mut self, filter: Filter<S, N>, world: World) -> Result<(), Refusal> {
         self.past.restart(filter)?;
         self.world = world;

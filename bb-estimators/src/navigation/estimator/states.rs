@@ -1,15 +1,15 @@
-//! Which inputs and which states belong together.
+//! Checks that inputs and states match.
 
 use super::input::Mounting;
 use crate::navigation::state::{Optional, States, offset};
 use bb_core::Fault;
 
-/// Whether a set of states can be estimated at all, whatever the inputs.
+/// Whether a set of states can be estimated at all, with any inputs.
 pub(super) const fn is_possible<S: States>() -> bool {
     offset::<S>(Optional::RelativeScale).is_none() || offset::<S>(Optional::Keyframe).is_some()
 }
 
-/// Refuses a state that no input of the robot tells, and an input that a state is missing for.
+/// Rejects a state that no input of the robot observes, and an input that needs a missing state.
 pub(super) fn check<S: States>(mounting: &Mounting) -> Result<(), Fault> {
     for state in S::OPTIONAL {
         let (input, is_declared) = match state {
@@ -25,7 +25,7 @@ pub(super) fn check<S: States>(mounting: &Mounting) -> Result<(), Fault> {
             )));
         }
     }
-    // A pressure without its bias would be as sure of the height as the first reading was by chance.
+    // Without its bias, a pressure would give the height the unjustified certainty of the first reading.
     let needed = [
         ("relative", mounting.relative, Optional::Keyframe),
         ("pressure", mounting.pressure, Optional::BarometerBias),

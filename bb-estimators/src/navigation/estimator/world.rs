@@ -1,4 +1,4 @@
-//! Which world the filter works in, and which one it speaks of.
+//! The world that the filter works in, and the one that its outputs refer to.
 
 use super::course::point;
 use super::input::Mounting;
@@ -9,23 +9,23 @@ use crate::navigation::track::TrackPoint;
 use bb_core::payload::{GnssFix, Pose};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-/// How far from the origin of its world a filter works, m: there down differs by 0.8 mrad, as much as a good accelerometer's
-/// bias.
+/// Largest distance of a filter from the origin of its world, m. At that distance, down differs by 0.8 mrad, as much as a good
+/// accelerometer's bias.
 const FARTHEST: f64 = 5000.0;
 
-/// A filter that is found to be off by more was never near: what began its world was wrong, m.
+/// A filter that is found to be off by more than this, m, was never near: the origin of its world was wrong.
 pub(in crate::navigation) const FARTHEST_JUMP: f64 = 100_000.0;
 
-/// The world that outputs are in has its origin where the filter started. The filter's own is the same until it has left it far
-/// behind.
+/// The world of the outputs has its origin where the filter started. The filter's own world is the same until it is far from that
+/// origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct World {
-    /// On the Earth; none without satellites.
+    /// On the Earth. `None` without satellites.
     frame: Option<LocalFrame>,
-    /// Where it was at the start.
+    /// The frame at the start.
     first: Option<LocalFrame>,
     first_from_frame: Isometry3<f64>,
-    /// So many fixes agreed with it that it did not begin at wrong ones.
+    /// Whether enough fixes agreed with it to rule out a start from wrong ones.
     is_confirmed: bool,
 }
 
@@ -34,17 +34,17 @@ impl World {
         Self { frame, first: frame, first_from_frame: Isometry3::identity(), is_confirmed: false }
     }
 
-    /// The frame that outputs are in.
+    /// The frame of the outputs.
     pub(super) fn first(&self) -> Option<LocalFrame> {
         self.first
     }
 
-    /// Takes coordinates of the filter's world to the one that outputs are in.
+    /// Transforms coordinates from the filter's world to that of the outputs.
     pub(super) fn first_from_frame(&self) -> &Isometry3<f64> {
         &self.first_from_frame
     }
 
-    /// A fix as a measurement; none if it has no position.
+    /// A fix as a measurement. `None` if it has no position.
     pub(super) fn fix(
         &self,
         fix: &GnssFix,
@@ -61,14 +61,15 @@ impl World {
             .moved(&self.first_from_frame.inverse())
     }
 
-    /// How far the world's z is below the height above the ellipsoid that it began at, at `position`, m: its plane is no sphere.
+    /// How far the world's z is below the height above the ellipsoid of its origin, at `position`, m: its plane does not follow the
+    /// ellipsoid.
     pub(super) fn drop(&self, position: &Vector3<f64>) -> f64 {
         self.frame.map_or(0.0, |frame| frame.geodetic(position).height - frame.origin().height - position.z)
     }
 
-    /// The world of a filter that was wrong by `jump` (m) and is at `position`. Far from the origin of its frame the filter works
-    /// in one that begins there; and if no robot could have gone so far, neither did the world begin where it was taken to, unless
-    /// many fixes have confirmed it.
+    /// The world of a filter that was wrong by `jump` (m) and is at `position`. Far from the origin of its frame, the filter
+    /// continues in one with its origin at `position`. If no robot could have moved that far, the assumed origin of the world was
+    /// wrong as well, unless many fixes have confirmed it.
     pub(super) fn corrected(&self, position: &Vector3<f64>, jump: f64, is_confirmed: bool) -> Self {
         let is_confirmed = self.is_confirmed || is_confirmed;
         let kept = Self { is_confirmed, ..*self };
@@ -82,7 +83,7 @@ impl World {
         Self { frame: Some(next), first_from_frame, ..kept }
     }
 
-    /// Coordinates of this world in that of `other`, which is elsewhere on the same Earth.
+    /// Coordinates in the world `other`, elsewhere on the same Earth.
     pub(super) fn position_in(&self, other: &Self, position: &Vector3<f64>) -> Vector3<f64> {
         match (self.frame, other.frame) {
             (Some(own), Some(others)) => own.other_from_self(&others).transform_point(&(*position).into()).coords,
@@ -90,7 +91,7 @@ impl World {
         }
     }
 
-    /// Takes vectors of this world to those of `other`.
+    /// Rotates vectors from this world to `other`.
     pub(super) fn rotation_to(&self, other: &Self) -> Matrix3<f64> {
         match (self.frame, other.frame) {
             (Some(own), Some(others)) => own.other_from_self(&others).rotation.to_rotation_matrix().into_inner(),
@@ -98,12 +99,12 @@ impl World {
         }
     }
 
-    /// A fix as a point of a track; none if it has no position.
+    /// A fix as a point of a track. `None` if it has no position.
     pub(super) fn point(&self, time_ns: i64, fix: &GnssFix, options: &NavigationOptions) -> Option<TrackPoint> {
         point(time_ns, fix, &self.frame?, options.gnss_deviation)
     }
 
-    /// The filter is at `position`: if that is far out, its world moves on, and what takes coordinates there is returned.
+    /// If the filter, at `position`, is far from the origin, moves its world there and returns the transform of coordinates to it.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
         let frame = self.frame.as_mut().filter(|_| position.xy().norm() > FARTHEST)?;
         let next = LocalFrame::new(Geodetic { height: frame.origin().height, ..frame.geodetic(position) });

@@ -1,4 +1,4 @@
-//! Whether positions agree with those before: one that does not fit overrules the estimate only if they do.
+//! Whether positions agree with earlier ones. A position that does not fit overrules the estimate only if they do.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,16 +10,16 @@ use crate::navigation::track::{Track, TrackPoint};
 #[cfg(test)]
 mod tests;
 
-/// No aircraft is faster, m/s.
+/// Largest speed of an aircraft, m/s.
 const FASTEST: f64 = 1000.0;
 
-/// Positions that are farther apart in time tell nothing of each other, ns: anchors may be slow.
+/// Positions further apart in time than this cannot be compared, ns: anchors may be slow.
 const LONGEST_NS: i64 = 600_000_000_000;
 
-/// What a velocity that is a mean over seconds is off by, m/s.
+/// Error of a velocity that is a mean over seconds, m/s.
 const CHANGE: f64 = 1.0;
 
-/// The positions of one kind of source, in a frame of their own: they agree whatever becomes of the world of the estimate.
+/// The positions of one kind of source, in a separate frame: changes to the world of the estimate do not affect them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Agreement {
     frame: Option<LocalFrame>,
@@ -33,10 +33,11 @@ impl Default for Agreement {
 }
 
 impl Agreement {
-    /// Adds a position with its covariance; what it may do. As many as must be refused before, and one more, agree if it may
-    /// overrule the estimate.
+    /// Adds a position with its covariance. Returns whether it may overrule the estimate: one more than the number that must be
+    /// refused first have to agree.
     pub(super) fn add(&mut self, time_ns: i64, position: &Geodetic, covariance: &Matrix3<f64>) -> Trust {
-        // Another provider may have spoken of the same moment: what is no part of the track is not confirmed by it.
+        // Another provider may have sent a position with the same stamp. The track cannot confirm a position that it does not
+        // contain.
         if self.track.newest().is_some_and(|newest| time_ns <= newest.time_ns) {
             return Trust::Doubted;
         }
@@ -51,7 +52,7 @@ impl Agreement {
         if self.track.count() > PATIENCE { Trust::Believed } else { Trust::Doubted }
     }
 
-    /// The velocity that the positions show, in a world, and its covariance.
+    /// The velocity of the positions, in `world`, and its covariance.
     pub(super) fn velocity(&self, world: &World) -> Option<(Vector3<f64>, Matrix3<f64>)> {
         let (velocity, deviation) = self.track.velocity()?;
         let world_from_own = self.frame?.other_from_self(world.frame()).rotation;

@@ -1,16 +1,15 @@
-//! Which stamps of the IMU are believed: its clock is that of the queue, and one broken stamp must not make all others too old.
+//! Plausibility of IMU stamps. The IMU's clock is that of the queue, and one corrupt stamp must not make all others too old.
 
-/// Two stamps that agree are at most this far apart, ns.
+/// Largest difference of two stamps that agree, ns.
 const AGREED_NS: i64 = 1_000_000_000;
 
-/// A jump of the clock is believed once stamps that agree have gone on for this long, ns, and none has come from the former
-/// clock.
+/// A clock jump is believed once agreeing stamps have covered this time, ns, and none has come from the former clock.
 const BELIEVED_NS: i64 = 500_000_000;
 
-/// There are at least this many of them.
+/// Minimum number of these stamps.
 const BELIEVED_STAMPS: u32 = 5;
 
-/// What a stamp says.
+/// Result for a stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stamped {
     /// It is the newest.
@@ -19,25 +18,25 @@ pub(super) enum Stamped {
     Late,
     /// It is too far ahead to be believed yet.
     Ahead,
-    /// It is older than what can be placed.
+    /// It is too old to be placed.
     TooOld,
-    /// So are those before it: the clock was set back.
+    /// It and the ones before it are old: the clock was set back.
     SetBack {
-        /// For how long stamps have come from the new clock, ns.
+        /// Time for which stamps have come from the new clock, ns.
         for_ns: i64,
     },
 }
 
 /// Samples that are not believed yet.
 ///
-/// A jump is weighed alike in both directions. Forwards, it may be a gap, and one of more than a minute loses the estimate;
-/// backwards, it forgets the times of what was measured. A few stamps must not do either.
+/// A jump is judged the same in both directions. A forward jump may be a gap, and one of more than a minute loses the estimate. A
+/// backward jump drops the times of all measurements. A few stamps must not cause either.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Clock {
     doubted: Option<Run>,
 }
 
-/// Stamps that agree with one another, and not with those before.
+/// Stamps that agree with one another, but not with the earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Run {
     first_ns: i64,
@@ -46,7 +45,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// The run with one stamp more. One that is repeated or overtaken confirms nothing; one that does not agree begins another.
+    /// Extends the run by one stamp. A repeated or late one confirms nothing; one that does not agree starts a new run.
     fn with(self, time_ns: i64) -> Self {
         match time_ns.saturating_sub(self.last_ns) {
             1..=AGREED_NS => Self { last_ns: time_ns, stamps: self.stamps.saturating_add(1), ..self },
@@ -69,10 +68,10 @@ impl Run {
 }
 
 impl Clock {
-    /// Judges a stamp; `longest_ns` is how late one is placed, and how far ahead one is believed at once.
+    /// Judges a stamp. `longest_ns` is how late a stamp may be to be placed, and how far ahead to be believed at once.
     pub(super) fn judge(&mut self, time_ns: i64, newest_ns: i64, longest_ns: i64) -> Stamped {
         let ahead_ns = time_ns.saturating_sub(newest_ns);
-        // What agrees with the newest is no jump, however short the time is in which late ones are placed.
+        // A stamp that agrees with the newest is no jump, even if late samples are placed for a shorter time only.
         if (-longest_ns..=longest_ns.max(AGREED_NS)).contains(&ahead_ns) {
             self.doubted = None;
             return if ahead_ns > 0 { Stamped::Next } else { Stamped::Late };
@@ -85,7 +84,7 @@ impl Clock {
         }
     }
 
-    /// Takes a stamp that is not believed by itself; the run that confirms it, if one does.
+    /// Takes a stamp that is not believed on its own. Returns the run that confirms it, if any.
     pub(super) fn doubt(&mut self, time_ns: i64) -> Option<Run> {
         let run = self.doubted.map_or(Run::of(time_ns), |run| run.with(time_ns));
         self.doubted = Some(run);
@@ -97,7 +96,7 @@ impl Clock {
     }
 }
 
-/// Whether a stamp may be that of the sample after another.
+/// Whether a stamp can be the next sample's after `previous_ns`.
 pub(super) fn follows(time_ns: i64, previous_ns: i64) -> bool {
     (1..=AGREED_NS).contains(&time_ns.saturating_sub(previous_ns))
 }
@@ -150,7 +149,7 @@ mod tests {
         }
     }
 
-    /// However short the time in which late ones are placed.
+    /// With any time limit for late samples.
     #[test]
     fn a_second_ahead_is_no_jump() {
         for lateness in [0, 50, 2000] {
@@ -174,7 +173,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever comes: a jump has enough stamps since the last one that was near, and they rise for half a second.
+        /// For any stamps: a jump has enough of them since the last one near the clock, and they rise for half a second.
         #[test]
         fn a_jump_needs_its_evidence(
             stamps in prop::collection::vec(prop_oneof![
@@ -192,7 +191,7 @@ mod tests {
                 }
                 doubted.push(millis);
                 if matches!(stamped, Stamped::Next | Stamped::SetBack { .. }) {
-                    // Those that lead up to it in steps of at most a second.
+                    // The stamps that lead up to it in steps of at most a second.
                     let all: BTreeSet<i64> = doubted.iter().copied().filter(|other| *other <= millis).collect();
                     let mut first = millis;
                     let steps = all.iter().rev().take_while(|other| {

@@ -16,8 +16,8 @@ use bb_core::{Context, Estimator, Fault, Reply};
 use input::Mounting;
 use std::time::Duration;
 
-/// Position, velocity and attitude of a flight as an estimator of a robot: [`StateEstimator`] with an IMU, relative poses, poses
-/// from satellite images, and the flight controller's receiver of satellite navigation.
+/// Position, velocity and attitude of a flight as an estimator of a robot. It is a [`StateEstimator`] with an IMU, relative poses,
+/// poses from satellite images, and the flight controller's GNSS receiver.
 ///
 /// ```
 /// # fn main() {}
@@ -61,28 +61,28 @@ use std::time::Duration;
 /// }
 /// ```
 ///
-/// It starts at the origin of the options, levelled by the input `attitude`, or once it was at rest for a second; from the input
-/// `warm_start`, with its deviations doubled; or at the first anchor. The body is the IMU, with the axes of the link; where the
-/// antenna of `gnss` is in it, the joints tell.
+/// It starts in one of three ways: at the origin of the options, at the state from the input `warm_start` with its deviations
+/// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second.
+/// The body is the IMU, with the axes of the link. The joints give the position of the `gnss` antenna in it.
 ///
-/// Estimates are emitted at the output's rate, with the health; events at the levels error, warn and info, and keyframes that
-/// leave the window, whenever there are any: record `events` for a flight-data recorder. All events go to `tracing` as well,
-/// as structured fields.
+/// Estimates are emitted at the output's rate, with the health. Events at the levels error, warn and info, and keyframes that leave
+/// the window, are emitted as they occur: record `events` for a flight-data recorder. All events also go to `tracing` as structured
+/// fields.
 #[derive(Debug)]
 pub struct FlightEstimator {
     estimator: StateEstimator<Sink>,
     mounting: Mounting,
     period_ns: i64,
-    /// The last sample of the IMU, and ticks since.
+    /// The last sample of the IMU, and the ticks since then.
     last_ns: i64,
     ticks: i64,
     health: Option<FlightHealth>,
 }
 
-/// The most events that one output holds.
+/// Maximum number of events in one output.
 const EVENTS: usize = 256;
 
-/// Logs events, and keeps those that are published.
+/// Logs events, and stores those to be published.
 #[derive(Debug, Default)]
 struct Sink {
     log: TracingSink,
@@ -126,7 +126,7 @@ impl FlightEstimator {
 }
 
 impl FlightEstimator {
-    /// What an estimator takes that does not know where it is. One that does would refuse it.
+    /// Passes on the attitude and the warm start to an estimator that has no position. One that has a position would refuse them.
     fn start(&mut self, inputs: &FlightInputs<'_>) {
         if !matches!(self.estimator.health().state, HealthState::Init | HealthState::Lost) {
             return;
@@ -154,14 +154,14 @@ impl Estimator for FlightEstimator {
             estimator.set_takeoff_origin(origin).map_err(|error| Fault::new(error.to_string()))?;
         }
         let period = Duration::from_secs_f64(1.0 / options.output_rate);
-        // The IMU may fall silent; what follows from that must not wait for it.
+        // The IMU may stop. Its consequences must not wait for another sample.
         context.request(Request::Tick(period.max(SLOWEST_LOOK)));
         let period_ns = period.max(SLOWEST_LOOK).as_nanos() as i64;
         let mounting = Mounting::of(context)?;
         Ok(Self { estimator, mounting, period_ns, last_ns: context.now().as_nanos(), ticks: 0, health: None })
     }
 
-    /// What is refused is told by events.
+    /// Refusals are reported by events.
     fn handle_input(&mut self, inputs: FlightInputs<'_>) -> Result<Reply<FlightOutputs>, Fault> {
         let sample = input::sample(inputs.imu.message(), &self.mounting);
         (self.last_ns, self.ticks) = (sample.time_ns, 0);
@@ -189,12 +189,12 @@ impl Estimator for FlightEstimator {
     fn handle_info(&mut self, _: Info) -> Result<Reply<FlightOutputs>, Fault> {
         self.ticks += 1;
         if self.ticks < 2 {
-            // The IMU is there, and has seen to it.
+            // The IMU is running, and its samples drive the ticks.
             return Ok(Reply::none());
         }
         Ok(self.reply(self.last_ns.saturating_add(self.ticks.saturating_mul(self.period_ns))))
     }
 }
 
-/// How often it looks whether the IMU is silent, at most.
+/// Shortest period of the checks for a silent IMU.
 const SLOWEST_LOOK: Duration = Duration::from_millis(50);

@@ -1,4 +1,4 @@
-//! What leaves, when, and what is seen of it: the covariance that grows, ticks without an estimate.
+//! Emission of estimates at the output's rate, with monitoring of covariance growth and of ticks without an estimate.
 
 use super::engine::Engine;
 use super::event::EventKind;
@@ -14,10 +14,10 @@ use crate::navigation::math::sqrt;
 use nalgebra::Matrix6;
 use uuid::Uuid;
 
-/// How fast the steady norm of the covariance follows, per output.
+/// Gain per output of the filter for the steady norm of the covariance.
 const STEADY: f64 = 0.05;
 
-/// A warning is given again once the norm was below this part of its limit.
+/// A warning is re-armed once the norm is below this fraction of its limit.
 const REARMED: f64 = 0.75;
 
 /// See the module.
@@ -34,12 +34,12 @@ pub(super) struct Emission {
     is_warned: bool,
 }
 
-/// What was emitted last.
+/// The last emitted norm.
 #[derive(Clone, Copy, Debug)]
 struct Norm {
     time_ns: i64,
     norm: f64,
-    /// Sums of the variances of position and rotation.
+    /// Traces of the position and rotation blocks.
     traces: [f64; 2],
     label: SourceLabel,
 }
@@ -70,10 +70,10 @@ impl Emission {
         }
     }
 
-    /// Whether it is time for an output; if so, it is not again before the next.
+    /// Whether an output is due. If so, the next one is scheduled.
     pub(super) fn is_due(&mut self, now_ns: i64) -> bool {
         let next_ns = match self.next_ns {
-            // A clock that was set back must not silence it.
+            // Setting the clock back must not stop the output.
             Some(next_ns) if next_ns.saturating_sub(now_ns) <= self.period_ns => next_ns,
             _ => now_ns,
         };
@@ -86,7 +86,7 @@ impl Emission {
         true
     }
 
-    /// An estimate for users; its name comes when it is emitted.
+    /// An estimate in the form for users. Its id is assigned when it is emitted.
     pub(super) fn describe<F: ProvidedFactor>(
         &self,
         pose: &Pose,
@@ -96,7 +96,7 @@ impl Emission {
         params: &StateEstimatorParams,
     ) -> Option<EstimatorOutput> {
         let (position, turn) = engine.world()?.local(&pose.position);
-        // What was led off the Earth is no estimate.
+        // A position that has diverged off the Earth is no estimate.
         check_position(&position).ok()?;
         let covariance = turned_pose(&turn, &pose.covariance);
         let label = sources.label(pose.time_ns, params);
@@ -125,7 +125,7 @@ impl Emission {
         })
     }
 
-    /// Makes an output of an estimate; by how much the covariance has grown, if that is worth a warning.
+    /// Turns an estimate into an output. Returns the factor by which the covariance has grown, if that requires a warning.
     pub(super) fn emitted(
         &mut self,
         now_ns: i64,
@@ -172,13 +172,13 @@ impl Emission {
         })
     }
 
-    /// For how long the norm of the covariance has been growing, s.
+    /// Time for which the norm of the covariance has been growing, s.
     pub(super) fn growing_s(&self) -> f64 {
         let since = self.last.zip(self.growing_since_ns);
         since.map_or(0.0, |(last, since_ns)| last.time_ns.saturating_sub(since_ns) as f64 * 1e-9)
     }
 
-    /// Whether the last tick had no estimate.
+    /// Whether there was no estimate at the last tick.
     pub(super) fn is_silent(&self) -> bool {
         self.is_silent
     }
@@ -188,11 +188,11 @@ impl Emission {
     }
 }
 
-/// So that rounding takes nothing away.
+/// Margin against rounding, which must not reduce the covariance.
 const ABOVE: f64 = 1.0 + 1e-12;
 
-/// While nothing tells where it is, nobody may believe that it is known better than before: what a relative pose or the
-/// correlation with the velocity took away stays. `D P D` with a diagonal D is a covariance if P is one.
+/// In dead reckoning, the reported covariance must not shrink. Reductions by a relative pose, or by the correlation with the
+/// velocity, are undone. `D P D` with a diagonal D is a covariance if P is one.
 fn raise(covariance: &mut Matrix6<f64>, last: &Norm) {
     let now = traces(covariance);
     let factor = |i: usize| if now[i] < last.traces[i] { sqrt(last.traces[i] / now[i]) * ABOVE } else { 1.0 };

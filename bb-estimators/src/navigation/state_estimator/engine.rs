@@ -1,5 +1,5 @@
-//! All that follows from the inputs in their order, and from nothing else: estimate, label, gate. It can be stored and run
-//! again, so that what arrives late is as if it had not.
+//! The deterministic part of the estimator: the estimate, its label and the gate depend only on the inputs in their order. The
+//! engine can be copied and run again, and a late input then gives the same result as one that arrives in time.
 
 use alloc::collections::VecDeque;
 
@@ -23,65 +23,65 @@ use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{GnssPosition, RelativePose};
 use crate::navigation::refusal::Refusal;
 
-/// For how long an estimate is distrusted after something that does not fit, s.
+/// How long an estimate is distrusted after an input that does not fit, s.
 const DISTRUST: f64 = 1.0;
 
-/// So many positions in a row must fit before an estimate is trusted that positions had to overrule.
+/// Number of consecutive positions that must fit before an estimate is trusted again after positions overruled it.
 const CONFIRMATIONS: u32 = 5;
 
 /// Normalised innovation squared over the dimension up to which a position fits.
 const FITS: f64 = 3.0;
 
-/// Farther from the origin nothing is, m: that is on the other side of the Earth.
+/// Largest possible distance from the origin, m: beyond the other side of the Earth.
 const FARTHEST: f64 = 1.4e7;
 
-/// Refused relative poses in a row that are more than outliers.
+/// Number of consecutive refused relative poses that are more than outliers.
 const STORM: u64 = 3;
 
-/// Refused positions in a row that are: there is one a second.
+/// Number of consecutive refused positions that are more than outliers. Positions arrive about once a second.
 const DOUBT: u64 = 2;
 
-/// Normalised innovation squared over the dimension at which one position is enough to doubt the estimate, and at which what
-/// overrules it does not correct it but begins again: thirty standard deviations.
+/// Normalised innovation squared over the dimension at which a single position makes the estimate doubtful: thirty standard
+/// deviations. A position that overrules the estimate from this far restarts it instead of correcting it.
 const FAR: f64 = 1000.0;
 
-/// After so long without a camera or an anchor, a receiver that is trusted may overrule the estimate, ns: the IMU alone knows
-/// less.
+/// Time without a camera or an anchor after which a trusted receiver may overrule the estimate, ns: the IMU alone is less certain.
 const ALONE_NS: i64 = 60_000_000_000;
 
 /// See the module.
 #[derive(Clone, Debug)]
 pub(super) struct Engine<F: ProvidedFactor> {
-    /// The last input it took.
+    /// The key of the last input that was applied.
     key: Key,
-    /// The time of the IMU that it has reached.
+    /// The IMU time up to which it has run.
     now_ns: Option<i64>,
     world: Option<World>,
     origin: Option<TakeoffOrigin>,
     phase: Phase,
     strategy: Strategy<F>,
     started: Option<(i64, StartedFrom)>,
-    /// How often it has jumped since it started first.
+    /// Number of jumps since the first start.
     resets: u32,
     gate: SpoofGate,
     sources: Sources,
-    /// What the estimate of each keyframe rests on.
+    /// Sources of the estimate at each keyframe.
     marks: VecDeque<(i64, Sources)>,
     bias: Option<ImuBias>,
     nis: Option<f64>,
     is_anchor_degraded: bool,
-    /// From when to when the estimate is distrusted.
+    /// The interval in which the estimate is distrusted.
     degraded_ns: Option<(i64, i64)>,
-    /// When something else than the IMU and the receiver was fused last.
+    /// Time of the last measurement that was neither from the IMU nor from the receiver.
     independent_ns: Option<i64>,
-    /// How many positions must still fit.
+    /// Number of positions that must still fit.
     unconfirmed: u32,
-    /// How often positions have overruled it since they last did.
+    /// Number of times that positions have overruled it since it was last confirmed.
     overruled: u32,
-    /// What the receiver and the anchors have said: one that does not fit overrules the estimate only if those before agree with it.
+    /// Positions of the receiver and of the anchors. One that does not fit overrules the estimate only if earlier ones agree with
+    /// it.
     fixes: Agreement,
     anchors: Agreement,
-    /// Normalised innovations squared of the last fix and the last anchor that were refused, over their dimension.
+    /// Normalised innovations squared of the last refused fix and the last refused anchor, over their dimension.
     refused_fix: f64,
     refused_anchor: f64,
     left: Option<(Pose, Sources)>,
@@ -92,11 +92,11 @@ pub(super) struct Engine<F: ProvidedFactor> {
 enum Phase {
     Starting(Starter),
     Running,
-    /// Nobody knows where it is, until an anchor or the flight controller tells.
+    /// The position is unknown until an anchor or the flight controller provides it.
     Lost,
 }
 
-/// How the engine is.
+/// State of the engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Condition {
     Starting,
@@ -190,20 +190,20 @@ impl<F: ProvidedFactor> Engine<F> {
         matches!(self.phase, Phase::Running).then(|| self.strategy.predictor()).flatten()
     }
 
-    /// The newest keyframe, and what it rests on.
+    /// The newest keyframe and its sources.
     pub(super) fn newest(&self) -> Option<(Pose, Sources)> {
         let pose = matches!(self.phase, Phase::Running).then(|| self.strategy.newest()).flatten()?;
         Some((pose, self.sources_at(pose.time_ns)))
     }
 
-    /// Keyframes before that, and whether they are smoothed.
+    /// Keyframes before the newest, and whether they are smoothed.
     pub(super) fn history(&mut self, most: usize) -> (impl Iterator<Item = (Pose, Sources)> + use<'_, F>, bool) {
         let (poses, is_smoothed) = self.strategy.history(most);
         let this = &*self;
         (poses.into_iter().map(|pose| (pose, this.sources_at(pose.time_ns))), is_smoothed)
     }
 
-    /// The time from which samples of the IMU are needed, to run on and to predict.
+    /// The time from which IMU samples are needed to run on and to predict.
     pub(super) fn needed_ns(&self) -> i64 {
         let now_ns = self.now_ns.unwrap_or(i64::MIN);
         match self.phase {
@@ -212,8 +212,8 @@ impl<F: ProvidedFactor> Engine<F> {
         }
     }
 
-    /// The clock of the IMU was set back: all that is known stays, but not when it was measured. A receiver that was not let
-    /// in stays out. The new clock has been seen `for_ns`; as much again may have passed before.
+    /// The clock of the IMU was set back. The estimate is kept, but the times of its measurements are dropped. A receiver that was
+    /// not let in stays out. The new clock has been seen for `for_ns`, and the same time again may have passed before.
     pub(super) fn set_clock_back(&mut self, sample_ns: i64, for_ns: i64, config: &StateEstimatorConfig) {
         (self.key, self.now_ns) = (Key::FIRST, None);
         self.sources = Sources::default();
@@ -221,7 +221,7 @@ impl<F: ProvidedFactor> Engine<F> {
         (self.fixes, self.anchors) = (Agreement::default(), Agreement::default());
         self.marks.clear();
         (self.degraded_ns, self.left) = (None, None);
-        // As if it were now: a receiver must not gain by it.
+        // The measurement counts as made now: a receiver must not benefit.
         self.independent_ns = self.independent_ns.and(Some(sample_ns));
         match self.phase {
             Phase::Starting(_) => self.phase = Phase::Starting(Starter::new(config)),
@@ -252,7 +252,7 @@ impl<F: ProvidedFactor> Engine<F> {
         mark.map_or(self.sources, |(_, sources)| *sources)
     }
 
-    /// Moves on by one sample of the IMU, or a part of one, which may follow a gap.
+    /// Advances by one sample of the IMU, or by part of one. A gap may precede it.
     pub(super) fn advance(
         &mut self,
         key: Key,
@@ -266,7 +266,7 @@ impl<F: ProvidedFactor> Engine<F> {
         match &mut self.phase {
             Phase::Starting(starter) => {
                 starter.sample(sample);
-                // A sample is a mean since the one before: the first has none.
+                // A sample is a mean since the previous one. The first has none.
                 if let (false, Some(origin)) = (is_first, &self.origin)
                     && let Some(start) = starter.at_origin(sample.time_ns, origin, config, self.bias.as_ref())
                 {
@@ -302,7 +302,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
     }
 
-    /// Takes an input of the present. `Fatal`: this engine is of no use any more.
+    /// Applies an input at the present time. After `Fatal`, this engine must be discarded.
     pub(super) fn apply(
         &mut self,
         entry: &Entry<F>,
@@ -310,10 +310,10 @@ impl<F: ProvidedFactor> Engine<F> {
     ) -> (Outcome, Option<Rejection>) {
         self.key = entry.key;
         if matches!(entry.payload, Payload::Warm(_)) {
-            // It is the first that is known; the first sample goes on from there.
+            // The first known time. The first sample continues from it.
             self.now_ns = self.now_ns.or(Some(entry.key.time_ns));
         }
-        // What is told before the first sample counts as well.
+        // Reports before the first sample count as well.
         let is_told = matches!(entry.payload, Payload::Attitude(_) | Payload::Health(_) | Payload::Frame);
         let Some(now_ns) = self.now_ns.or(is_told.then_some(entry.key.time_ns)) else {
             return (Outcome::Degraded(Refusal::NotStarted.into()), None);
@@ -322,7 +322,7 @@ impl<F: ProvidedFactor> Engine<F> {
         let result = match &entry.payload {
             Payload::Warm(state) => {
                 if matches!(self.phase, Phase::Running) {
-                    // Only what does not know better takes it.
+                    // Only an estimator without a position accepts a warm start.
                     Err(Reason::Duplicate.into())
                 } else {
                     let world = *self.world.get_or_insert_with(|| World::new(state.position));
@@ -383,7 +383,7 @@ impl<F: ProvidedFactor> Engine<F> {
         self.degraded_ns = Some((from_ns, now_ns.saturating_add(ns(DISTRUST))));
     }
 
-    /// What follows from anything that moved the strategy.
+    /// Updates that follow every change of the strategy's state.
     fn after(&mut self, config: &StateEstimatorConfig) {
         if !matches!(self.phase, Phase::Running) {
             return;
@@ -403,7 +403,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         if let (Some(world), Some((position, _))) = (&mut self.world, self.strategy.motion()) {
             let mut moved = *world;
-            // What cannot be moved stays where it is, and is tried again.
+            // If the move fails, the world stays where it is, and the move is tried again later.
             if let Some(new_from_old) = moved.moves_on(&position)
                 && self.strategy.move_world(&new_from_old).is_ok()
             {
@@ -419,7 +419,7 @@ impl<F: ProvidedFactor> Engine<F> {
         let result = self.strategy.measure(measured);
         let is_relative = matches!(measured, Measured::Relative(_));
         match &result {
-            // Where it was cannot be relied on either.
+            // After this, its earlier position is not reliable either.
             Ok(fused) if is_relative && fused.raised > 1.0 => self.unconfirmed = CONFIRMATIONS,
             result if !is_relative => {
                 let refused = match measured {
@@ -445,20 +445,20 @@ impl<F: ProvidedFactor> Engine<F> {
         Ok(fused)
     }
 
-    /// Whether it is on the Earth and slow enough to be corrected: what was led away by broken samples is finite, but neither.
+    /// Whether it is on the Earth and slow enough to be corrected. After corrupt samples, the state may be finite but neither.
     fn is_bounded(&self) -> bool {
         let Some((position, velocity)) = self.strategy.motion() else { return false };
         position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY
     }
 
-    /// Whether an aircraft may be so high. The IMU alone may drift away from there, until a position corrects it; after that it may
-    /// not be anywhere else.
+    /// Whether an aircraft can be at this height. With the IMU alone, the height may drift out of the range until a position
+    /// corrects it. After that, it must be within the range.
     fn is_height_plausible(&self) -> bool {
         let (Some((position, _)), Some(world)) = (self.strategy.motion(), &self.world) else { return false };
         HEIGHTS.contains(&world.height(&position))
     }
 
-    /// What a position says of the estimate itself.
+    /// Updates the trust in the estimate from the result of a position.
     fn weigh_position(&mut self, result: &Result<Fused, Failure>, is_repeated: bool) {
         let is_far = |nis: f64| nis > FAR * 6.0;
         let is_doubtful = match result {
@@ -510,9 +510,9 @@ impl<F: ProvidedFactor> Engine<F> {
         };
         if can_start {
             self.start_at(now_ns, anchor, config)?;
-            // One alone may be an outlier.
+            // A single anchor may be an outlier.
             self.unconfirmed = self.unconfirmed.max(1);
-            // It stands beside the receiver from here on.
+            // From here on, an anchor supports the receiver.
             self.independent_ns = Some(now_ns);
             self.sources.anchored(anchor.time_ns, &config.params);
             self.is_anchor_degraded = anchor.is_covariance_degraded;
@@ -523,7 +523,7 @@ impl<F: ProvidedFactor> Engine<F> {
         let trust = self.anchors.add(anchor.time_ns, &anchor.position, &blocks(&anchor.covariance)[0]);
         let is_repeated = self.strategy.refused_positions() >= u64::from(PATIENCE);
         if trust == Trust::Believed && is_repeated && self.refused_anchor > FAR {
-            // Nothing of the estimate can be relied on, and a correction might throw it off the Earth.
+            // The estimate is unreliable, and a correction might move it off the Earth.
             self.start_at(now_ns, anchor, config)?;
             self.unconfirmed = CONFIRMATIONS;
             self.overruled += 1;
@@ -541,7 +541,7 @@ impl<F: ProvidedFactor> Engine<F> {
         };
         let fused = result?;
         if fused.raised > FAR || (fused.raised > 1.0 && self.overruled > 1) {
-            // Far off, or not helped by the last correction: then nothing of it can be relied on.
+            // Far off, or still wrong after the last correction: the estimate is unreliable.
             self.start_at(now_ns, anchor, config)?;
         }
         self.sources.anchored(anchor.time_ns, &config.params);
@@ -575,7 +575,7 @@ impl<F: ProvidedFactor> Engine<F> {
             return Err(Trouble::Degraded(Reason::Gate(rejected)));
         }
         let trust = self.fixes.add(fix.time_ns, &fix.position, &fix.covariance);
-        // Where a camera or anchors tell where it is, it overrules nothing: one that is spoofed is patient.
+        // With a camera or anchors, the receiver overrules nothing: a spoofer can be patient.
         let is_alone = self.independent_ns.is_none_or(|at_ns| fix.time_ns.saturating_sub(at_ns) > ALONE_NS);
         let trust = if is_alone { trust } else { Trust::Doubted };
         let is_repeated = self.strategy.refused_fixes() >= u64::from(PATIENCE);
@@ -596,8 +596,8 @@ impl<F: ProvidedFactor> Engine<F> {
         Ok(Some(fused))
     }
 
-    /// Moves to where fixes have shown it to be: far from the estimate. A correction would take the difference for errors of attitude
-    /// and biases too.
+    /// Moves to the position of fixes far from the estimate. A correction would also attribute the difference to errors of attitude
+    /// and biases.
     fn relocate(
         &mut self,
         fix: &GnssPosition,

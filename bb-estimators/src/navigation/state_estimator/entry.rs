@@ -1,11 +1,11 @@
-//! Inputs in the order in which they count.
+//! Inputs in the order in which they are applied.
 
 use super::error::Reason;
 use super::event::InputKind;
 use super::gate::Rejection;
 use super::input::{AttitudeReading, FlightControllerState, GnssReading, GpsHealth, PoseAnchor, VioOutput};
 
-/// The place of an input: its stamp, and among those of the same stamp what it is. No two inputs have the same.
+/// The position of an input in the queue: its stamp, then its kind. Keys are unique.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
     pub(super) time_ns: i64,
@@ -17,7 +17,7 @@ impl Key {
     /// Before all inputs.
     pub(super) const FIRST: Self = Self { time_ns: i64::MIN, rank: 0, provider: 0 };
 
-    /// A sample of the IMU comes before what was measured at its end.
+    /// A sample of the IMU precedes measurements at its end.
     pub(super) const fn of_sample(time_ns: i64) -> Self {
         Self { time_ns, rank: 0, provider: 0 }
     }
@@ -28,13 +28,13 @@ impl Key {
     }
 }
 
-/// An input that is no sample of the IMU.
+/// An input other than a sample of the IMU.
 #[derive(Clone, Debug)]
 pub(super) enum Payload<F> {
     Warm(FlightControllerState),
     Attitude(AttitudeReading),
     Health(GpsHealth),
-    /// A camera has taken a frame: relative poses begin and end at frames.
+    /// A camera has captured a frame: relative poses begin and end at frames.
     Frame,
     Vio(VioOutput),
     Anchor(PoseAnchor),
@@ -57,7 +57,7 @@ impl<F> Payload<F> {
         Key { time_ns, rank, provider }
     }
 
-    /// None for what no user has added.
+    /// `None` for entries that no user has added.
     pub(super) fn kind(&self) -> Option<InputKind> {
         Some(match self {
             Self::Warm(_) => InputKind::WarmStart,
@@ -72,7 +72,7 @@ impl<F> Payload<F> {
     }
 }
 
-/// What became of an input.
+/// Result of an input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
     /// It is in the estimate.
@@ -80,14 +80,14 @@ pub(super) enum Outcome {
         /// Normalised innovation squared over its dimension.
         nis: Option<f64>,
     },
-    /// It is not, or only with the covariance raised.
+    /// It is not in the estimate, or only with the covariance raised.
     Degraded(Reason),
-    /// It broke the estimate, which goes on without it.
+    /// It broke the estimate, which continues without it.
     Fatal(Reason),
 }
 
 impl Outcome {
-    /// Why it is not as it should be.
+    /// The reason, if the input is not in the estimate or degraded it.
     pub(super) fn reason(&self) -> Option<Reason> {
         match self {
             Self::Added { .. } => None,
@@ -96,13 +96,13 @@ impl Outcome {
     }
 }
 
-/// An input in its place.
+/// An input at its position in the queue.
 #[derive(Clone, Debug)]
 pub(super) struct Entry<F> {
     pub(super) key: Key,
     pub(super) payload: Payload<F>,
-    /// None until it was its turn.
+    /// `None` until it is first applied.
     pub(super) outcome: Option<Outcome>,
-    /// What the gate of the receiver made of it.
+    /// Rejection by the gate of the receiver.
     pub(super) rejection: Option<Rejection>,
 }

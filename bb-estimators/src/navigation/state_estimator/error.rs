@@ -1,4 +1,4 @@
-//! Why an input is not in the estimate, or why there is no estimate.
+//! Reasons why an input is not in the estimate, or why there is no estimate.
 
 use core::error::Error;
 use core::fmt;
@@ -6,23 +6,23 @@ use core::fmt;
 use super::gate::Rejection;
 use crate::navigation::refusal::Refusal;
 
-/// What is wrong with an input, or came of it.
+/// Why an input was refused, or which side effect it had.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reason {
-    /// The filter or smoother refuses it.
+    /// The filter or smoother refused it.
     Refused(Refusal),
-    /// There is one of the same kind, provider and time stamp already.
+    /// There already is an input of the same kind, provider and time stamp.
     Duplicate,
-    /// The receiver of satellite navigation is not let in.
+    /// The GNSS receiver is not let in.
     Gate(Rejection),
-    /// There are as many inputs within the window as it has room for.
+    /// The window has no room for more inputs.
     Overflow,
-    /// The measurement was taken in, but only after the covariance was raised: it did not fit three times in a row.
+    /// The measurement was fused after the covariance was raised: it did not fit three times in a row.
     Raised {
-        /// By which factor.
+        /// The factor applied.
         factor: f64,
     },
-    /// Samples of the IMU were missing and the gap was bridged.
+    /// Samples of the IMU were missing, and the gap was bridged.
     Bridged,
 }
 
@@ -45,17 +45,17 @@ impl From<Refusal> for Reason {
     }
 }
 
-/// What an `add_…` failed with.
+/// Error of an `add_…` method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EstimatorError {
-    /// There is an estimate all the same: without the input, or with its covariance raised.
+    /// There still is an estimate: without the input, or with its covariance raised.
     Degraded(Reason),
-    /// There is no estimate for this tick: its numbers are no longer any good, or the window overflows.
+    /// There is no estimate for this tick: its numbers are no longer usable, or the window overflowed.
     Fatal(Reason),
 }
 
 impl EstimatorError {
-    /// Why.
+    /// The reason.
     pub fn reason(&self) -> Reason {
         match self {
             Self::Degraded(reason) | Self::Fatal(reason) => *reason,
@@ -79,12 +79,12 @@ impl fmt::Display for EstimatorError {
 
 impl Error for EstimatorError {}
 
-/// Why the take-off origin is not taken.
+/// Why the take-off origin was refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OriginError {
-    /// There has been a measurement already.
+    /// There already was a measurement.
     AfterMeasurement,
-    /// It is no position, or its deviations are none.
+    /// The position or a deviation is invalid.
     Refused(Refusal),
 }
 

@@ -24,7 +24,7 @@ use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::NavigationFactor;
 
-/// What became of an input that was taken.
+/// Result of an input that was accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Added {
     /// It is in the estimate.
@@ -32,14 +32,13 @@ pub enum Added {
         /// Normalised innovation squared over its dimension, if it was measured.
         nis: Option<f64>,
     },
-    /// It is newer than the last sample of the IMU, and waits for the next.
+    /// It is newer than the last sample of the IMU, and waits for the next one.
     Waits,
 }
 
-/// Position, velocity and attitude without satellite navigation, or with it while it can be trusted; see the
-/// [module](super).
+/// Position, velocity and attitude without satellite navigation, or with it while it is trusted; see the [module](super).
 ///
-/// `K` takes the events, `F` is the type of factors that outside providers add.
+/// `K` receives the events. `F` is the type of factors that outside providers add.
 #[derive(Debug)]
 pub struct StateEstimator<K = (), F: ProvidedFactor = NavigationFactor> {
     config: StateEstimatorConfig,
@@ -52,11 +51,11 @@ pub struct StateEstimator<K = (), F: ProvidedFactor = NavigationFactor> {
 }
 
 impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
-    /// Makes one that has not started. This is when most of its memory is taken.
+    /// Creates an estimator that has not started. Most of its memory is allocated here.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name.
+    /// Returns the name of the first parameter that is outside its accepted range.
     pub fn new(config: StateEstimatorConfig, sink: K) -> Result<Self, ParamsError> {
         config.check()?;
         let mut this = Self {
@@ -72,26 +71,26 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         Ok(this)
     }
 
-    /// What it was made with.
+    /// The configuration it was created with.
     pub fn config(&self) -> &StateEstimatorConfig {
         &self.config
     }
 
-    /// Where events go.
+    /// The sink that receives events.
     pub fn sink(&self) -> &K {
         &self.sink
     }
 
-    /// Where events go.
+    /// The sink that receives events, for changes.
     pub fn sink_mut(&mut self) -> &mut K {
         &mut self.sink
     }
 
-    /// Sets where the robot takes off. The start is levelled by the attitude of the flight controller, or at rest.
+    /// Sets the position of take-off. The start is levelled by the attitude of the flight controller, or at rest.
     ///
     /// # Errors
     ///
-    /// [`OriginError`] after the first measurement, or if it is no position. The estimator is then as it was.
+    /// [`OriginError`] after the first measurement, or if the position is invalid. The estimator is then unchanged.
     pub fn set_takeoff_origin(&mut self, origin: TakeoffOrigin) -> Result<(), OriginError> {
         if !self.queue.is_empty() {
             return Err(OriginError::AfterMeasurement);
@@ -101,12 +100,13 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         Ok(())
     }
 
-    /// Starts in the air, from what the flight controller knew last, with its deviations multiplied by
-    /// [`warm_inflation`](super::StateEstimatorParams::warm_inflation). One that runs is refused as [`Reason::Duplicate`].
+    /// Starts in the air, from the last known state of the flight controller, with its deviations multiplied by
+    /// [`warm_inflation`](super::StateEstimatorParams::warm_inflation). While the estimator is running, the state is refused as
+    /// [`Reason::Duplicate`].
     ///
     /// # Errors
     ///
-    /// [`EstimatorError`]; the estimator is then as it was.
+    /// [`EstimatorError`]; the estimator is then unchanged.
     pub fn warm_start(&mut self, state: FlightControllerState) -> Result<Added, EstimatorError> {
         let checked = state.check();
         self.add(InputKind::WarmStart, state.attitude.time_ns, checked, Payload::Warm(state), &[])
@@ -116,8 +116,8 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     ///
     /// # Errors
     ///
-    /// [`EstimatorError::Degraded`] if it is not in the estimate, or does not fit; [`EstimatorError::Fatal`] if it broke the
-    /// estimate, which goes on without it at the next tick.
+    /// [`EstimatorError::Degraded`] if it is not in the estimate, or does not fit. [`EstimatorError::Fatal`] if it broke the
+    /// estimate, which continues without it at the next tick.
     pub fn add_vio(&mut self, vio: VioOutput) -> Result<Added, EstimatorError> {
         let frames = [vio.from_ns, vio.to_ns];
         self.add(InputKind::Vio, vio.to_ns, vio.check(), Payload::Vio(vio), &frames)
@@ -127,26 +127,26 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     ///
     /// # Errors
     ///
-    /// As [`add_vio`](Self::add_vio).
+    /// Same as [`add_vio`](Self::add_vio).
     pub fn add_pose_anchor(&mut self, anchor: PoseAnchor) -> Result<Added, EstimatorError> {
         self.add(InputKind::Anchor, anchor.time_ns, anchor.check(), Payload::Anchor(anchor), &[])
     }
 
-    /// Adds a factor of an outside provider to the window itself, at a time. With several providers, each has a number.
+    /// Adds a factor of an outside provider directly to the window, at a time. If there are several providers, each has a number.
     ///
     /// # Errors
     ///
-    /// As [`add_vio`](Self::add_vio).
+    /// Same as [`add_vio`](Self::add_vio).
     pub fn add_factor(&mut self, time_ns: i64, provider: u32, factor: F) -> Result<Added, EstimatorError> {
         self.add(InputKind::Factor, time_ns, Ok(()), Payload::Provided(provider, factor), &[])
     }
 
-    /// Adds what the flight controller has sent: samples of its IMU, attitudes, health of its receiver, fixes of that. All
-    /// are taken, whatever becomes of the others.
+    /// Adds the data that the flight controller has sent: samples of its IMU, attitudes, and the health and fixes of its receiver.
+    /// All inputs are added, even if some fail.
     ///
     /// # Errors
     ///
-    /// That of the first which is not in the estimate.
+    /// The error of the first input that is not in the estimate.
     pub fn add_fc_imu(&mut self, window: &FlightControllerWindow<'_>) -> Result<(), EstimatorError> {
         let mut first = Ok(());
         let mut note = |result: Result<(), EstimatorError>| first = first.and(result);
@@ -192,7 +192,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         first
     }
 
-    /// Adds an attitude of the flight controller. It levels the start.
+    /// Adds an attitude of the flight controller, which levels the start.
     ///
     /// # Errors
     ///
@@ -201,7 +201,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         self.add(InputKind::Attitude, attitude.time_ns, attitude.check(), Payload::Attitude(attitude), &[])
     }
 
-    /// Adds what the flight controller says of its receiver of satellite navigation.
+    /// Adds the flight controller's report on its GNSS receiver.
     ///
     /// # Errors
     ///
@@ -214,7 +214,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     ///
     /// # Errors
     ///
-    /// As [`add_vio`](Self::add_vio); [`Reason::Gate`] if the receiver is not trusted.
+    /// Same as [`add_vio`](Self::add_vio), and [`Reason::Gate`] if the receiver is not trusted.
     pub fn add_gnss(&mut self, fix: GnssReading) -> Result<Added, EstimatorError> {
         self.add(InputKind::Gnss, fix.time_ns, fix.check(), Payload::Gnss(fix), &[])
     }
@@ -242,7 +242,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         }
     }
 
-    /// What became of an input that has its place.
+    /// Result of an input that is in the queue.
     fn became(&mut self, key: Key, input: InputKind) -> Result<Added, EstimatorError> {
         match self.queue.outcome(key) {
             Some(Outcome::Added { nis }) => Ok(Added::Taken { nis }),
@@ -272,7 +272,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         self.sink.event(&Event { time_ns, kind });
     }
 
-    /// Passes on what the queue has to tell.
+    /// Passes on the reports of the queue.
     fn drain(&mut self) {
         let mut told = core::mem::take(&mut self.queue.told);
         for told in told.drain(..) {
@@ -280,7 +280,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
                 Told::Taken(key, input, Outcome::Added { nis }) => {
                     self.tell(key.time_ns, EventKind::Added { input, nis, waits: false });
                 }
-                // The rejection tells it.
+                // The rejection event already reports it.
                 Told::Taken(_, _, Outcome::Degraded(Reason::Gate(_))) => {}
                 Told::Taken(key, input, Outcome::Degraded(reason)) => {
                     self.fail(key.time_ns, input, EstimatorError::Degraded(reason));
@@ -317,7 +317,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         self.config.strategy.is_smoothing()
     }
 
-    /// Tells changes of label and gate.
+    /// Reports changes of label and gate.
     fn look(&mut self) {
         let Some(now_ns) = self.queue.newest().map(|newest| newest.time_ns) else { return };
         let gate = self.queue.engine().gate().state();
@@ -332,8 +332,8 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         }
     }
 
-    /// Emits an estimate at the output's rate: call it as often as you like, at least as often as that. None if it is not
-    /// time yet, or if there is no estimate.
+    /// Emits an estimate at the output's rate. Call it at least at that rate; more often is fine. Returns `None` if no output is
+    /// due, or if there is no estimate.
     pub fn tick(&mut self, now_ns: i64) -> Option<EstimatorOutput> {
         if !self.emission.is_due(now_ns) {
             return None;
@@ -356,7 +356,8 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         output
     }
 
-    /// The estimate at a time, predicted; none if there is none, or the last sample of the IMU is too old. It changes nothing.
+    /// The estimate predicted to a time. Returns `None` if there is no estimate, or if the last sample of the IMU is too old. Does
+    /// not change the state.
     pub fn predicted(&self, time_ns: i64) -> Option<EstimatorOutput> {
         let pose = self.pose_at(time_ns)?;
         self.describe(&pose, self.queue.engine().sources(), false)
@@ -367,12 +368,12 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         let ahead_ns = time_ns.saturating_sub(newest.time_ns);
         let is_past = ahead_ns < -super::params::ns(self.config.params.lateness);
         if is_past || ahead_ns > super::params::ns(self.config.params.longest_prediction) {
-            // A clock that was set back is no reason to say again where it was.
+            // After the clock was set back, an old position must not be reported again.
             return None;
         }
         let predictor = self.queue.predictor()?;
         let pose = if ahead_ns > 0 {
-            // It goes on as it was.
+            // The motion is extrapolated with the newest sample.
             let mut ahead = *predictor;
             ahead.propagate(&ImuMean { time_ns, ..*newest }).ok()?;
             ahead.pose()
@@ -382,15 +383,15 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         pose.filter(Pose::is_finite)
     }
 
-    /// The newest keyframe: what is measured after it is not in it. None before the start, and while it is lost.
+    /// The newest keyframe. Later measurements are not in it. `None` before the start, and while the position is lost.
     pub fn current_estimate(&self) -> Option<EstimatorOutput> {
         let (pose, sources) = self.queue.engine().newest()?;
         self.describe(&pose, &sources, false)
     }
 
-    /// Up to `n` keyframes before the newest, the newest of them first. The smoother's are corrected by what was measured
-    /// later; the filter's are as they were, and say so: `smoothed` is false. They are for recorders: only the forward
-    /// estimate may leave.
+    /// Up to `n` keyframes before the newest, in reverse order of time. The smoother's are corrected by later measurements. The
+    /// filter's are as originally estimated, with `smoothed` set to `false`. They are for recorders: only the forward estimate may
+    /// be sent out.
     pub fn smoothed_history(&mut self, n: usize) -> Vec<EstimatorOutput> {
         let most = n.min(self.config.params.window as usize);
         let (history, is_smoothed) = self.queue.engine_mut().history(most);
@@ -398,7 +399,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         poses.iter().filter_map(|(pose, sources)| self.describe_past(pose, sources, is_smoothed)).collect()
     }
 
-    /// The last innovation is not one of the past.
+    /// The last innovation does not belong to a past keyframe.
     fn describe_past(&self, pose: &Pose, sources: &Sources, smoothed: bool) -> Option<EstimatorOutput> {
         let mut estimate = self.describe(pose, sources, smoothed)?;
         estimate.quality.nis = None;
@@ -410,7 +411,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         self.emission.describe(pose, sources, smoothed, engine, &self.config.params)
     }
 
-    /// How it is.
+    /// Health of the estimator.
     pub fn health(&self) -> EstimatorHealth {
         let engine = self.queue.engine();
         let now_ns = self.queue.newest().map_or(i64::MIN, |newest| newest.time_ns);
@@ -430,18 +431,18 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         }
     }
 
-    /// What the estimate rests on, at the newest sample of the IMU.
+    /// Source of the estimate, at the newest sample of the IMU.
     pub fn label(&self) -> SourceLabel {
         self.label
     }
 
-    /// The world of factors that outside providers add; none before the origin is known. It moves on where the robot is
-    /// farther than 5 km from its origin.
+    /// The world of factors that outside providers add. `None` before the origin is known. Its origin moves when the robot is more
+    /// than 5 km away from it.
     pub fn frame(&self) -> Option<&LocalFrame> {
         self.queue.engine().world().map(|world| world.frame())
     }
 
-    /// How inputs arrived.
+    /// Counts of inputs by how they arrived.
     pub fn counts(&self) -> &QueueCounts {
         self.queue.counts()
     }

@@ -1,4 +1,4 @@
-//! What the state estimator tells of itself: a value for logs, for a recorder, and as a text for the ground.
+//! Events of the state estimator: values for logs and recorders, and texts for the ground station.
 
 use super::error::Reason;
 use super::gate::{GateState, Rejection};
@@ -7,7 +7,7 @@ use super::output::EstimatorOutput;
 use super::params::StrategyKind;
 use super::status_text::StatusText;
 
-/// What an input is.
+/// Kind of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum InputKind {
     /// Sample of the IMU.
@@ -16,15 +16,15 @@ pub enum InputKind {
     Vio,
     /// Pose from a satellite image.
     Anchor,
-    /// Factor of an outside provider.
+    /// Factor from an outside provider.
     Factor,
-    /// Fix of the flight controller's receiver.
+    /// Fix from the flight controller's receiver.
     Gnss,
-    /// Health of that.
+    /// Health of that receiver.
     Health,
-    /// Attitude of the flight controller.
+    /// Attitude from the flight controller.
     Attitude,
-    /// State of the flight controller, to start with.
+    /// State of the flight controller, for a warm start.
     WarmStart,
 }
 
@@ -44,17 +44,17 @@ impl InputKind {
     }
 }
 
-/// How much an event matters.
+/// Severity of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
 pub enum Level {
-    /// There is no estimate, or soon none.
+    /// There is no estimate, or soon will be none.
     Error,
-    /// The estimate is not what it should be.
+    /// The estimate is impaired.
     Warn,
     /// Something changed.
     Info,
-    /// What was done with each input.
+    /// The result for each input.
     Debug,
 }
 
@@ -70,16 +70,16 @@ impl Level {
     }
 }
 
-/// What the estimator started from.
+/// Source of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum StartedFrom {
     /// From the take-off origin.
     Origin,
-    /// Warm, from what the flight controller knew last, with its covariance inflated.
+    /// Warm, from the last known state of the flight controller, with its covariance inflated.
     FlightController,
     /// From an anchor.
     Anchor,
-    /// Again, from fixes that agree and are far from the estimate.
+    /// A restart from fixes that agree and are far from the estimate.
     Receiver,
 }
 
@@ -95,105 +95,105 @@ impl StartedFrom {
     }
 }
 
-/// Something that happened.
+/// An event with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
-    /// When, ns: on the clock of the inputs.
+    /// Time on the clock of the inputs, ns.
     pub time_ns: i64,
-    /// What.
+    /// What happened.
     pub kind: EventKind,
 }
 
 #[expect(clippy::large_enum_variant, reason = "events are passed by reference, and allocate nothing")]
-/// What happened.
+/// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
-    /// It is ready to take inputs.
+    /// It is ready for inputs.
     Ready {
-        /// What does the work.
+        /// The strategy in use.
         strategy: StrategyKind,
-        /// How many keyframes it holds.
+        /// Number of keyframes held.
         window: u32,
     },
     /// It has started.
     Started {
-        /// From what.
+        /// Source of the start.
         from: StartedFrom,
     },
     /// An input is in the estimate.
     Added {
-        /// Which.
+        /// The input.
         input: InputKind,
         /// Normalised innovation squared over its dimension, if it was measured.
         nis: Option<f64>,
-        /// Whether it is newer than the last sample of the IMU, and waits for the next.
+        /// Whether it is newer than the last sample of the IMU, and waits for the next one.
         waits: bool,
     },
-    /// An input is not in the estimate, or was taken with its covariance raised.
+    /// An input is not in the estimate, or was fused with the covariance raised.
     Degraded {
-        /// Which.
+        /// The input.
         input: InputKind,
-        /// Why.
+        /// The reason.
         reason: Reason,
     },
     /// There is no estimate for this tick.
     Fatal {
-        /// Of which input.
+        /// The input concerned.
         input: InputKind,
-        /// Why.
+        /// The reason.
         reason: Reason,
     },
-    /// What arrived late has changed whether an earlier input is in the estimate.
+    /// A late input has changed whether an earlier one is in the estimate.
     Revised {
-        /// Which.
+        /// The earlier input.
         input: InputKind,
-        /// Why it is not, if it is not.
+        /// Why it is not in the estimate. `None` if it is.
         reason: Option<Reason>,
     },
-    /// The estimate rests on something else.
+    /// The source of the estimate has changed.
     Label {
         /// Before.
         from: SourceLabel,
         /// Now.
         to: SourceLabel,
     },
-    /// The gate of the receiver of satellite navigation changed.
+    /// The gate of the GNSS receiver has changed.
     Gate {
         /// Before.
         from: GateState,
         /// Now.
         to: GateState,
     },
-    /// The gate of the receiver of satellite navigation rejected it.
+    /// The gate of the GNSS receiver rejected it.
     Rejected {
-        /// Why.
+        /// The reason.
         rejection: Rejection,
     },
-    /// The clock of the IMU was set back: it goes on by the new one, degraded until positions confirm it.
+    /// The clock of the IMU was set back. The estimator continues on the new clock, degraded until positions confirm it.
     ClockSetBack {
         /// By how much, s.
         seconds: f64,
     },
-    /// Samples of the IMU left before their time, as more came than there is room for. Inputs that are late by less than they may
-    /// be are refused.
+    /// Samples of the IMU were dropped early because there was no room for more. Late inputs may then be refused even within the
+    /// configured lateness.
     SamplesDropped {
-        /// How many.
+        /// Number of samples.
         count: u64,
     },
     /// The covariance has grown.
     CovarianceGrowing {
-        /// Its norm over that of the steady one.
+        /// Its norm relative to the steady norm.
         ratio: f64,
     },
-    /// There was no estimate for two thirds of the time after which the fallback engages.
+    /// There has been no estimate for two thirds of the time after which the fallback engages.
     FallbackImminent,
-    /// There is no estimate: the flight controller's own IMU has to do.
+    /// There is no estimate: the flight controller's own IMU takes over.
     FallbackEngaged,
     /// There is an estimate again.
     FallbackRecovered,
     /// A keyframe has left the window.
     Keyframe {
-        /// What is known of it now. It is for recorders only.
+        /// Its present estimate, for recorders only.
         estimate: EstimatorOutput,
     },
 }
@@ -223,7 +223,7 @@ impl EventKind {
 }
 
 impl Event {
-    /// How much it matters.
+    /// Severity of the event.
     pub fn level(&self) -> Level {
         match self.kind {
             EventKind::Fatal { .. } | EventKind::FallbackImminent | EventKind::FallbackEngaged => Level::Error,
@@ -241,7 +241,7 @@ impl Event {
         }
     }
 
-    /// A text for the ground; none for what is of no use there.
+    /// A text for the ground station. `None` for events of no use there.
     pub fn status_text(&self) -> Option<StatusText> {
         let text = StatusText::new;
         Some(match self.kind {
@@ -276,9 +276,9 @@ impl Event {
     }
 }
 
-/// Where events go. Any closure is one; `()` drops them.
+/// Receives events. Any closure is a sink; `()` drops all events.
 pub trait EventSink {
-    /// Takes an event. It is called with every event, whatever is logged.
+    /// Takes an event. It is called for every event, regardless of the log level.
     fn event(&mut self, event: &Event);
 }
 
@@ -292,12 +292,12 @@ impl<T: FnMut(&Event)> EventSink for T {
     }
 }
 
-/// Two sinks: both get all events.
+/// A pair of sinks that both receive all events.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Both<A, B>(
-    /// Gets each event first.
+    /// Receives each event first.
     pub A,
-    /// Gets each event then.
+    /// Receives each event second.
     pub B,
 );
 

@@ -1,4 +1,4 @@
-//! What outside providers add to the window themselves.
+//! Factors that outside providers add directly to the window.
 
 #[cfg(feature = "eskf")]
 use crate::navigation::navigator::{NAVIGATED, Navigated};
@@ -8,7 +8,7 @@ use core::fmt::Debug;
 #[cfg(feature = "smoother")]
 use crate::navigation::state::{Optional, States};
 
-/// States of the smoother: the scale of relative poses besides those of navigation.
+/// States of the smoother: those of navigation and the scale of relative poses.
 #[cfg(feature = "smoother")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Smoothed;
@@ -24,11 +24,11 @@ pub const SMOOTHED: usize = Smoothed::DIMENSION;
 
 macro_rules! provided {
     ($($factor:path),*) => {
-        /// A factor that an outside provider adds itself: the window is shared. Every type that is a [`Factor`] of any
-        /// states, as [`NavigationFactor`](crate::navigation::NavigationFactor), is one.
+        /// A factor that an outside provider adds directly: the window is shared. Every type that implements [`Factor`] for any
+        /// states, such as [`NavigationFactor`](crate::navigation::NavigationFactor), is one.
         ///
-        /// Its world is that of [`StateEstimator::frame`](super::StateEstimator::frame). The filter takes those that
-        /// concern one keyframe.
+        /// Its world is that of [`StateEstimator::frame`](super::StateEstimator::frame). The filter accepts only factors on one
+        /// keyframe.
         pub trait ProvidedFactor: Clone + Debug $(+ $factor)* {}
         impl<F: Clone + Debug $(+ $factor)*> ProvidedFactor for F {}
     };

@@ -1,22 +1,22 @@
-//! When there is no estimate for too long.
+//! Fallback when there is no estimate for too long.
 
 use super::params::{StateEstimatorParams, ns};
 
-/// What a tick with or without an estimate leads to.
+/// A change caused by a tick with or without an estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fallback {
     /// Two thirds of the time have passed.
     Imminent,
-    /// The flight controller's own IMU has to do.
+    /// The flight controller's own IMU takes over.
     Engaged,
     /// There is an estimate again.
     Recovered,
 }
 
-/// Counts the time without an estimate.
+/// Measures the time without an estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Watchdog {
-    /// The last tick with an estimate; before the first, the first tick.
+    /// The last tick with an estimate. Before there is one, the first tick.
     last_ns: Option<i64>,
     is_warned: bool,
     is_engaged: bool,
@@ -27,7 +27,7 @@ impl Watchdog {
         self.is_engaged
     }
 
-    /// Takes a tick. Each change is told once.
+    /// Takes a tick. Each change is returned once.
     pub(super) fn tick(
         &mut self,
         now_ns: i64,
@@ -39,7 +39,7 @@ impl Watchdog {
             *self = Self { last_ns: Some(now_ns), ..Self::default() };
             return was_engaged.then_some(Fallback::Recovered);
         }
-        // A clock that was set back counts from there.
+        // If the clock was set back, the time is measured from there.
         let last_ns = self.last_ns.unwrap_or(now_ns).min(now_ns);
         self.last_ns = Some(last_ns);
         let without_ns = now_ns.saturating_sub(last_ns);

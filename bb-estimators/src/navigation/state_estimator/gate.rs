@@ -1,9 +1,8 @@
-//! Whether the receiver of satellite navigation is let in, after it was spoofed.
+//! Readmission of the GNSS receiver after spoofing.
 //!
-//! Once spoofing was reported, its fixes are used again only when all of this holds: it has been reported healthy for
-//! [`dwell`](super::StateEstimatorParams::dwell) without a break, the next anchor agrees with it, and it is no farther than
-//! [`bounded_distance`](super::StateEstimatorParams::bounded_distance) from the estimate. A fix that is rejected begins
-//! the dwell again.
+//! After a report of spoofing, its fixes are used again only under three conditions. The receiver has been reported healthy for
+//! [`dwell`](super::StateEstimatorParams::dwell) without interruption. The next anchor agrees with it. It is no farther than
+//! [`bounded_distance`](super::StateEstimatorParams::bounded_distance) from the estimate. A rejected fix restarts the dwell.
 
 use core::fmt;
 
@@ -18,14 +17,14 @@ pub enum GateState {
     /// Fixes are used while the receiver is reported stable.
     #[default]
     Open,
-    /// It was spoofed, and is not reported stable.
+    /// The receiver was spoofed, and is not reported stable.
     Blocked,
-    /// It is reported stable, but not for long enough.
+    /// The receiver is reported stable, but not for long enough.
     Dwelling {
-        /// Since when, ns.
+        /// Start of the dwell, ns.
         since_ns: i64,
     },
-    /// It was stable for long enough. The next anchor decides.
+    /// The receiver was stable for long enough. The next anchor decides.
     AwaitsAnchor,
 }
 
@@ -46,34 +45,34 @@ impl GateState {
     }
 }
 
-/// Why a fix is not used, or the receiver not let in.
+/// Why a fix is not used, or why the receiver is not let in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rejection {
-    /// The receiver is not reported stable, or nothing is reported.
+    /// The receiver is not reported stable, or there is no report.
     Unhealthy,
     /// The receiver was spoofed, and is not reported stable.
     Spoofed,
     /// The receiver has not been stable for long enough.
     Dwelling {
-        /// For how long it has been, s.
+        /// Time for which it has been stable, s.
         seconds: f64,
     },
-    /// The receiver was stable for long enough, and no anchor has agreed with it yet.
+    /// The receiver was stable for long enough, but no anchor has agreed with it yet.
     AwaitsAnchor,
-    /// It is too far from the estimate: the dwell begins again.
+    /// It is too far from the estimate: the dwell restarts.
     TooFar {
-        /// How far, m.
+        /// Distance, m.
         distance_m: f64,
     },
-    /// The next anchor is elsewhere: the dwell begins again.
+    /// The next anchor is elsewhere: the dwell restarts.
     Disagrees {
-        /// How far from the fix, m.
+        /// Distance from the fix, m.
         distance_m: f64,
     },
 }
 
 impl Rejection {
-    /// Whether it begins the dwell again.
+    /// Whether it restarts the dwell.
     pub fn restarts_dwell(&self) -> bool {
         matches!(self, Self::TooFar { .. } | Self::Disagrees { .. })
     }
@@ -96,7 +95,7 @@ impl fmt::Display for Rejection {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     time_ns: i64,
-    /// Less the estimate of then, m: what is compared when the robot has moved on.
+    /// Fix minus estimate at that time, m. It is compared after the robot has moved on.
     offset: Vector3<f64>,
 }
 
@@ -113,7 +112,7 @@ impl SpoofGate {
         self.state
     }
 
-    /// The receiver's health is reported.
+    /// Handles a report of the receiver's health.
     pub(super) fn health(&mut self, time_ns: i64, health: GpsHealth, params: &StateEstimatorParams) {
         self.look(time_ns, params);
         self.health = Some((time_ns, health));
@@ -130,7 +129,7 @@ impl SpoofGate {
         }
     }
 
-    /// Time has passed.
+    /// Handles the passage of time.
     fn look(&mut self, time_ns: i64, params: &StateEstimatorParams) {
         let is_reported = self.is_reported(time_ns, params);
         match self.state {
@@ -146,7 +145,7 @@ impl SpoofGate {
         self.health.is_some_and(|(at_ns, _)| time_ns.saturating_sub(at_ns) <= ns(params.health_gap))
     }
 
-    /// Whether a fix may be used; `offset` is what it is more than the estimate, m.
+    /// Whether a fix may be used. `offset` is the fix minus the estimate, m.
     pub(super) fn fix(
         &mut self,
         time_ns: i64,
@@ -175,8 +174,8 @@ impl SpoofGate {
         })
     }
 
-    /// An anchor was fused; `offset` is what it is more than the estimate, m. Whether it let the receiver in, if it was
-    /// asked to.
+    /// Handles a fused anchor. `offset` is the anchor minus the estimate, m. Returns whether it let the receiver in, if that was
+    /// pending.
     pub(super) fn anchor(
         &mut self,
         time_ns: i64,
@@ -198,7 +197,7 @@ impl SpoofGate {
         Some(Err(Rejection::Disagrees { distance_m }))
     }
 
-    /// The clock was set back: what was reported has no time any more.
+    /// The clock was set back: drops the times of reports.
     pub(super) fn forget_times(&mut self) {
         let state = if self.state.is_open() { GateState::Open } else { GateState::Blocked };
         *self = Self { state, ..Self::default() };

@@ -1,4 +1,4 @@
-//! What the state estimator takes. Orientations and covariances in the world are in the local tangent frame at the position
+//! Inputs of the state estimator. Orientations and covariances in the world are in the local tangent frame at the position that
 //! they come with: x east, y north, z up.
 
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
@@ -7,12 +7,12 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::refusal::Refusal;
 
-/// Biases of an IMU, as a visual-inertial odometry estimates them.
+/// IMU biases as estimated by a visual-inertial odometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuBias {
-    /// What the accelerometer reads more than the specific force, body axes, m/s².
+    /// Accelerometer bias: the reading minus the specific force, body axes, m/s².
     pub accelerometer: Vector3<f64>,
-    /// What the gyroscope reads more than the angular velocity, body axes, rad/s.
+    /// Gyroscope bias: the reading minus the angular velocity, body axes, rad/s.
     pub gyroscope: Vector3<f64>,
 }
 
@@ -23,15 +23,15 @@ pub struct VioOutput {
     pub from_ns: i64,
     /// When the later frame was taken, ns.
     pub to_ns: i64,
-    /// Of the body's origin at the later frame, in the axes of the body at the earlier one, m.
+    /// Position of the body's origin at the later frame, in the axes of the body at the earlier one, m.
     pub translation: Vector3<f64>,
-    /// Takes body coordinates at the later frame to those at the earlier one.
+    /// Rotates body coordinates at the later frame to those at the earlier one.
     pub from_to: UnitQuaternion<f64>,
-    /// Covariance of translation, m², and of the rotation vector of the error, rad², both in body axes at the later frame.
-    /// What correlates the two is left out.
+    /// Covariance of the translation, m², and of the rotation vector of the error, rad², both in body axes at the later frame. The
+    /// cross-correlation is ignored.
     pub covariance: Matrix6<f64>,
-    /// Its estimate of the biases. It was made of the same samples of the IMU, so it is no measurement: where the estimator
-    /// starts, or starts again, it starts with these.
+    /// Its estimate of the biases. It is not treated as a measurement, since it derives from the same IMU samples. When the
+    /// estimator starts or restarts, it uses them as initial values.
     pub bias: Option<ImuBias>,
 }
 
@@ -40,24 +40,24 @@ pub struct VioOutput {
 pub struct PoseAnchor {
     /// When the image was taken, ns.
     pub time_ns: i64,
-    /// Which provider it is from, if there are several.
+    /// Number of the provider, if there are several.
     pub provider: u32,
-    /// Of the body's origin.
+    /// Position of the body's origin.
     pub position: Geodetic,
-    /// Takes body coordinates to the tangent frame at the position.
+    /// Rotates body coordinates to the tangent frame at the position.
     pub world_from_body: UnitQuaternion<f64>,
-    /// Covariance of the position, m², and of the rotation vector of the error, rad², both in the tangent frame. What
-    /// correlates the two is left out.
+    /// Covariance of the position, m², and of the rotation vector of the error, rad², both in the tangent frame. The
+    /// cross-correlation is ignored.
     pub covariance: Matrix6<f64>,
-    /// The provider has saved time over its covariance, when it was too hot for one. It is used as it is, and the quality of
-    /// the estimate says so.
+    /// Whether the provider used a cheaper computation of its covariance because it was too hot. The covariance is used unchanged,
+    /// and the quality of the estimate reports it.
     pub is_covariance_degraded: bool,
 }
 
-/// Where the robot takes off.
+/// Position of take-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TakeoffOrigin {
-    /// Of the body's origin.
+    /// Position of the body's origin.
     pub position: Geodetic,
     /// Standard deviation of each horizontal coordinate, m.
     pub horizontal_deviation: f64,
@@ -66,7 +66,7 @@ pub struct TakeoffOrigin {
 }
 
 impl TakeoffOrigin {
-    /// An origin that is known to 5 m, and to 10 m of height.
+    /// An origin with standard deviations of 5 m horizontally and 10 m in height.
     pub const fn new(position: Geodetic) -> Self {
         Self { position, horizontal_deviation: 5.0, vertical_deviation: 10.0 }
     }
@@ -75,9 +75,9 @@ impl TakeoffOrigin {
 /// The attitude that the flight controller estimates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttitudeReading {
-    /// When, ns.
+    /// Time, ns.
     pub time_ns: i64,
-    /// Takes body coordinates to the tangent frame.
+    /// Rotates body coordinates to the tangent frame.
     pub world_from_body: UnitQuaternion<f64>,
     /// Standard deviation of roll and pitch, rad.
     pub tilt_deviation: f64,
@@ -85,28 +85,28 @@ pub struct AttitudeReading {
     pub heading_deviation: f64,
 }
 
-/// What the flight controller knew last: where a warm start begins.
+/// Last known state of the flight controller, from which a warm start begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlightControllerState {
-    /// Its attitude, and when.
+    /// Its attitude, with the time of the state.
     pub attitude: AttitudeReading,
-    /// Of the body's origin.
+    /// Position of the body's origin.
     pub position: Geodetic,
     /// Covariance of the position, in the tangent frame, m².
     pub position_covariance: Matrix3<f64>,
-    /// In the tangent frame, m/s.
+    /// Velocity in the tangent frame, m/s.
     pub velocity: Vector3<f64>,
     /// Covariance of the velocity, m²/s².
     pub velocity_covariance: Matrix3<f64>,
 }
 
-/// What the flight controller says of its receiver of satellite navigation.
+/// Health of the GNSS receiver as reported by the flight controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
 pub enum GpsHealth {
     /// It has no fix.
     NoFix,
-    /// It has one that comes and goes, or is jammed.
+    /// It has an intermittent fix, or is jammed.
     Unstable,
     /// It is stable and shows no sign of spoofing.
     Stable,
@@ -114,44 +114,44 @@ pub enum GpsHealth {
     Spoofed,
 }
 
-/// A report of that health.
+/// A report of the receiver's health.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GpsHealthReading {
-    /// When, ns.
+    /// Time, ns.
     pub time_ns: i64,
-    /// What is reported.
+    /// The health reported.
     pub health: GpsHealth,
 }
 
 /// A fix of the flight controller's receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssReading {
-    /// When, ns.
+    /// Time, ns.
     pub time_ns: i64,
-    /// Of the antenna.
+    /// Position of the antenna.
     pub position: Geodetic,
     /// Covariance of the position, in the tangent frame, m².
     pub covariance: Matrix3<f64>,
-    /// Of the antenna, in the tangent frame, m/s, with its covariance, m²/s².
+    /// Velocity of the antenna in the tangent frame, m/s, with its covariance, m²/s².
     pub velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
-    /// Where the antenna is in the body, m.
+    /// Position of the antenna in the body, m.
     pub lever_arm: Vector3<f64>,
 }
 
-/// What the flight controller has sent since the last time.
+/// Data that the flight controller has sent since the last call.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlightControllerWindow<'a> {
-    /// Samples of the IMU, each a mean since the one before.
+    /// Samples of the IMU, each a mean since the previous one.
     pub imu: &'a [ImuMean],
     /// Its attitudes.
     pub attitudes: &'a [AttitudeReading],
-    /// How its receiver of satellite navigation is.
+    /// Health of its GNSS receiver.
     pub health: &'a [GpsHealthReading],
-    /// The fixes of that.
+    /// Fixes of that receiver.
     pub fixes: &'a [GnssReading],
 }
 
-/// Standard deviations from a thousandth of a millimetre to a million kilometres, and the like of rotations.
+/// Standard deviations range from a thousandth of a millimetre to a million kilometres, and similarly for rotations.
 const LEAST_VARIANCE: f64 = 1e-18;
 const MOST_VARIANCE: f64 = 1e18;
 
@@ -163,7 +163,7 @@ pub(super) fn check_covariance(covariance: &Matrix3<f64>) -> Result<(), Refusal>
     if is_usual && nalgebra::linalg::Cholesky::new(*covariance).is_some() { Ok(()) } else { Err(Refusal::Noise) }
 }
 
-/// The blocks of the diagonal.
+/// The blocks on the diagonal.
 pub(super) fn blocks(covariance: &Matrix6<f64>) -> [Matrix3<f64>; 2] {
     [0, 3].map(|first| covariance.fixed_view::<3, 3>(first, first).into_owned())
 }
@@ -176,7 +176,7 @@ pub(super) fn check_vector(vector: &Vector3<f64>, limit: f64) -> Result<(), Refu
 }
 
 pub(super) fn check_rotation(rotation: &UnitQuaternion<f64>) -> Result<(), Refusal> {
-    // NaN is in no range.
+    // The range does not contain NaN.
     if (0.99..1.01).contains(&rotation.norm()) { Ok(()) } else { Err(Refusal::NonFinite) }
 }
 
@@ -191,11 +191,11 @@ pub(super) fn check_position(position: &Geodetic) -> Result<(), Refusal> {
     if is_there { Ok(()) } else { Err(Refusal::OutOfRange) }
 }
 
-/// Where aircraft are, m above the ellipsoid.
+/// Possible heights of aircraft, m above the ellipsoid.
 pub(super) const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
-/// Faster than anything that flies in the air, m/s.
+/// A speed above that of any aircraft, m/s.
 pub(super) const MOST_VELOCITY: f64 = 1e4;
-/// The longest way between two frames, m.
+/// Longest distance between two frames, m.
 const LONGEST_WAY: f64 = 1e5;
 
 impl VioOutput {

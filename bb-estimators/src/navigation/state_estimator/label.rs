@@ -1,4 +1,4 @@
-//! What the estimate rests on.
+//! Source of the estimate.
 //!
 //! ```text
 //! dead_reckoned ──► satellite_anchored ◄──► visual_propagated
@@ -10,16 +10,16 @@ use core::fmt;
 
 use super::params::{StateEstimatorParams, ns};
 
-/// What the estimate rests on.
+/// Source of the estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
 pub enum SourceLabel {
-    /// On the IMU alone, or on a camera that has not seen where it is since it was last lost. The covariance grows.
+    /// The IMU alone, or a camera that has had no position since it was last lost. The covariance grows.
     #[default]
     DeadReckoned,
-    /// On a recent anchor, or on a recent fix of a receiver that is trusted.
+    /// A recent anchor, or a recent fix of a trusted receiver.
     SatelliteAnchored,
-    /// On a camera, since the last anchor.
+    /// A camera, since the last anchor.
     VisualPropagated,
 }
 
@@ -40,12 +40,12 @@ impl fmt::Display for SourceLabel {
     }
 }
 
-/// The state machine of the label. It is asked at any time, and so keeps times instead of a label.
+/// The state machine of the label. It can be queried for any time, and so stores times instead of a label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sources {
-    /// The newest pose or position in the world.
+    /// Time of the newest pose or position in the world.
     anchored_ns: Option<i64>,
-    /// The newest measurement of any of these and of relative poses.
+    /// Time of the newest of these or of the relative poses.
     seen_ns: Option<i64>,
     /// Whether there was an anchor since the camera was last lost.
     is_grounded: bool,
@@ -84,7 +84,7 @@ impl Sources {
         }
     }
 
-    /// Time since the last anchor; none before the first.
+    /// Time since the last anchor. `None` before the first.
     pub(super) fn age_ns(&self, time_ns: i64) -> Option<i64> {
         self.anchored_ns.map(|anchored_ns| time_ns.saturating_sub(anchored_ns).max(0))
     }

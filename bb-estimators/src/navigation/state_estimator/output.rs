@@ -1,4 +1,4 @@
-//! What leaves the state estimator.
+//! Outputs of the state estimator.
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use uuid::{Builder, Uuid};
@@ -10,68 +10,66 @@ use crate::navigation::geodesy::Geodetic;
 /// One estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorOutput {
-    /// The name of this one, another for each.
+    /// Unique id of this estimate.
     pub frame_id: Uuid,
-    /// When it was emitted, ns.
+    /// Time of emission, ns.
     pub emitted_ns: i64,
-    /// What it is an estimate of, ns: of what leaves at the output's rate, the time of emission.
+    /// Time that the estimate refers to, ns. For estimates at the output's rate, it is the time of emission.
     pub time_ns: i64,
-    /// Of the body's origin.
+    /// Position of the body's origin.
     pub position: Geodetic,
-    /// Takes body coordinates to the tangent frame at the position: x east, y north, z up.
+    /// Rotates body coordinates to the tangent frame at the position: x east, y north, z up.
     pub world_from_body: UnitQuaternion<f64>,
-    /// Of the body's origin, in that frame, m/s.
+    /// Velocity of the body's origin, in that frame, m/s.
     pub velocity: Vector3<f64>,
     /// Covariance of the position error, m², then of the rotation error, rad², both in that frame.
     pub covariance: Matrix6<f64>,
-    /// What it rests on.
+    /// Source of the estimate.
     pub label: SourceLabel,
-    /// Time since the last anchor, or fix of a trusted receiver; none before the first.
+    /// Time since the last anchor, or since the last fix of a trusted receiver. `None` before the first.
     pub anchor_age_ms: Option<u64>,
-    /// Whether it was corrected by what was measured later.
+    /// Whether later measurements have corrected it.
     pub smoothed: bool,
-    /// Whether it is not to be trusted as its covariance says: something did not fit, or was missing. The label stays what
-    /// it is.
+    /// Whether its covariance is not to be trusted, because an input did not fit or was missing. The label does not change.
     pub degraded: bool,
-    /// How often the estimate has jumped since the first start: it started again elsewhere, or was corrected by what it had
-    /// refused before. Who differentiates it, or controls by it, must begin again with each.
+    /// Number of jumps of the estimate since the first start: it restarted elsewhere, or was corrected by measurements that it had
+    /// refused before. A consumer that differentiates it, or uses it for control, must reset at each jump.
     pub resets: u32,
-    /// How good it is.
+    /// Quality of the estimate.
     pub quality: Quality,
 }
 
-/// How good an estimate is, for those who sort errors by it.
+/// Quality of an estimate, for grouping errors by it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// What it rests on.
+    /// Source of the estimate.
     pub label: SourceLabel,
     /// Frobenius norm of the covariance, of m² and rad².
     pub covariance_norm: f64,
-    /// Time since the last anchor; none before the first.
+    /// Time since the last anchor. `None` before the first.
     pub anchor_age_ms: Option<u64>,
-    /// Normalised innovation squared of the last measurement, over its dimension: 1 on average if the estimate is
-    /// consistent.
+    /// Normalised innovation squared of the last measurement, over its dimension. It is 1 on average if the estimate is consistent.
     pub nis: Option<f64>,
-    /// The provider of the last anchor had saved time over its covariance.
+    /// Whether the provider of the last anchor used a cheaper computation of its covariance.
     pub is_anchor_degraded: bool,
 }
 
-/// How the estimator is.
+/// Health of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorHealth {
-    /// What it does.
+    /// Current state.
     pub state: HealthState,
-    /// Keyframes that are held.
+    /// Number of keyframes held.
     pub keyframes: usize,
-    /// For how long the norm of the covariance has been growing, s.
+    /// Time for which the norm of the covariance has been growing, s.
     pub covariance_growing_s: f64,
-    /// Whether the receiver of satellite navigation is let in.
+    /// State of the gate of the GNSS receiver.
     pub gate: GateState,
-    /// Whether the flight controller's own IMU has to do.
+    /// Whether the fallback to the flight controller's own IMU is engaged.
     pub is_fallback_engaged: bool,
 }
 
-/// What the estimator does.
+/// State of the estimator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
 pub enum HealthState {
@@ -80,7 +78,7 @@ pub enum HealthState {
     Init,
     /// It follows its sensors.
     Tracking,
-    /// It is not to be trusted as its covariance says.
+    /// Its covariance is not to be trusted.
     Degraded,
     /// It has no estimate.
     Lost,
@@ -98,7 +96,7 @@ impl HealthState {
     }
 }
 
-/// Names frames: the flight's number and a count, as a UUID of version 8.
+/// Generates frame ids: the number of the flight and a count, as a UUID of version 8.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FrameIds {
     flight: u64,
@@ -113,7 +111,7 @@ impl FrameIds {
     pub(super) fn next(&mut self) -> Uuid {
         self.count = self.count.wrapping_add(1);
         let mut bytes = [0; 16];
-        // Version and variant take six bits of bytes 6 and 8, so that those must not matter.
+        // Version and variant overwrite six bits of bytes 6 and 8, which must therefore carry no information.
         let (flight, count) = (self.flight.to_be_bytes(), self.count.to_be_bytes());
         bytes[..6].copy_from_slice(&flight[..6]);
         bytes[7] = flight[6];

@@ -1,9 +1,9 @@
-//! How the state estimator is set up.
+//! Configuration of the state estimator.
 
 use crate::navigation::eskf::EskfParams;
 use crate::params::{Params as _, ParamsError, params};
 
-/// Which estimator does the work. Each is there if the crate was built with the feature of its name.
+/// The estimator in use. Each is available if the crate was built with the feature of its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum StrategyKind {
     /// [`FixedLagSmoother`](crate::navigation::FixedLagSmoother), with the feature `smoother`: the default.
@@ -15,7 +15,7 @@ pub enum StrategyKind {
 }
 
 impl StrategyKind {
-    /// Those that were built.
+    /// The strategies that were built.
     pub const ALL: &'static [Self] = &[
         #[cfg(feature = "smoother")]
         Self::FixedLagSmoother,
@@ -33,7 +33,7 @@ impl StrategyKind {
         }
     }
 
-    /// Whether its keyframes are corrected by what is measured later.
+    /// Whether later measurements correct its keyframes.
     pub(super) const fn is_smoothing(self) -> bool {
         match self {
             #[cfg(feature = "smoother")]
@@ -43,7 +43,7 @@ impl StrategyKind {
         }
     }
 
-    /// The strategy of that name, if it was built.
+    /// The strategy with that name, if it was built.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|strategy| strategy.name() == name)
     }
@@ -119,7 +119,7 @@ params! {
     }
 }
 
-/// All that a [`StateEstimator`](super::StateEstimator) is made with.
+/// Complete configuration of a [`StateEstimator`](super::StateEstimator).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StateEstimatorConfig {
     /// Which estimator does the work.
@@ -145,7 +145,7 @@ impl StateEstimatorConfig {
     }
 }
 
-/// The most that the queue holds.
+/// Capacity of the queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Rooms {
     pub(super) samples: usize,
@@ -160,25 +160,25 @@ impl Rooms {
 }
 
 impl StateEstimatorParams {
-    /// The most samples of the IMU and the most other inputs that are held: `imu_rate (1.25 lateness + keyframe_interval + 1)`
-    /// and `input_rate (1.25 lateness + lead + 1)`. Room for them is taken when the estimator is made.
+    /// Maximum numbers of IMU samples and of other inputs held: `imu_rate (1.25 lateness + keyframe_interval + 1)` and
+    /// `input_rate (1.25 lateness + lead + 1)`. The memory for them is allocated when the estimator is created.
     ///
-    /// Samples are needed from the oldest copy of the estimate on, which is as old as an input may be late and at most a fifth
-    /// of that older, and from the keyframe before it.
+    /// Samples are needed since the oldest copy of the estimate, and since the keyframe before it. That copy is as old as an input
+    /// may be late, plus at most a fifth of that.
     pub fn room(&self) -> [usize; 2] {
         let late = 1.25 * self.lateness + 1.0;
-        // A cast saturates.
+        // The cast saturates.
         let samples = self.imu_rate * (late + self.keyframe_interval);
         let inputs = self.input_rate * (late + self.lead);
         [samples, inputs].map(|most| (most as usize).max(LEAST_ROOM))
     }
 }
 
-/// There is room for so many whatever the rates.
+/// Minimum capacity at any rates.
 const LEAST_ROOM: usize = 32;
 
 /// Seconds as nanoseconds.
 pub(super) fn ns(seconds: f64) -> i64 {
-    // A float is cast to the nearest there is.
+    // The cast saturates.
     (seconds * 1e9) as i64
 }

@@ -1,8 +1,8 @@
-//! The one queue of all inputs, in the order of their stamps, and the one writer behind it.
+//! The single queue of all inputs, ordered by stamp, and the only writer that follows it.
 //!
-//! The engine is run up to the newest input that is no sample of the IMU; what the IMU says since is for the predictor. What
-//! arrives late is put in its place, and the engine is run again from the last copy of it that is older: the result is
-//! that of inputs that arrive in order, to the last bit.
+//! The engine is run up to the newest input that is not a sample of the IMU. Later IMU samples only feed the predictor. A late
+//! input is inserted at its place, and the engine is run again from its last copy before that input. The result equals that of
+//! inputs that arrive in order, to the last bit.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -22,53 +22,53 @@ use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::refusal::Refusal;
 
-/// Copies of the engine.
+/// Number of copies of the engine.
 const COPIES: usize = 8;
-/// How far the engine may be behind the IMU, ns.
+/// Longest time by which the engine may lag the IMU, ns.
 const LONGEST_TAIL_NS: i64 = 250_000_000;
-/// The part of the samples that leaves at once where there is no room.
+/// One over the fraction of the samples that is dropped at once when there is no room.
 const LEAVING: usize = 8;
 
-/// How inputs arrived.
+/// Counts of inputs by how they arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct QueueCounts {
-    /// Put in a place before others.
+    /// Inserted before others.
     pub late: u64,
     /// Older than the window, and refused.
     pub too_old: u64,
     /// Stamped in the future, and refused.
     pub in_the_future: u64,
-    /// There already, and refused.
+    /// Already present, and refused.
     pub duplicates: u64,
-    /// Refused since there was no room.
+    /// Refused because there was no room.
     pub overflows: u64,
-    /// Not finite or otherwise no measurement, and refused.
+    /// Not finite or otherwise invalid, and refused.
     pub invalid: u64,
-    /// How often the engine was run again from an earlier copy.
+    /// Number of times the engine was run again from an earlier copy.
     pub reruns: u64,
-    /// Samples of the IMU that left before their time, as more came than there is room for.
+    /// Samples of the IMU that were dropped early because there was no room for more.
     pub dropped: u64,
-    /// How often the clock of the IMU was set back, and the estimator went on by the new one.
+    /// Number of times the clock of the IMU was set back and the estimator continued on the new clock.
     pub set_back: u64,
 }
 
-/// What became of a sample of the IMU.
+/// Result of a sample of the IMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sampled {
     Taken,
     /// It follows a gap.
     Bridged,
-    /// It is the first: the next tells whether its stamp can be believed.
+    /// It is the first: the next one shows whether its stamp can be believed.
     Waits,
 }
 
 #[expect(clippy::large_enum_variant, reason = "its room is taken once")]
-/// What the queue has to tell.
+/// Reports of the queue.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Told {
-    /// It was an input's turn for the first time.
+    /// An input was applied for the first time.
     Taken(Key, InputKind, Outcome),
-    /// It was again, and came out otherwise.
+    /// An input was applied again, with a different result.
     Revised(Key, InputKind, Outcome),
     /// The gate of the receiver rejected something.
     Rejected(i64, Rejection),
@@ -76,11 +76,11 @@ pub(super) enum Told {
     Started(i64, StartedFrom),
     /// A keyframe has left the window.
     Left(Pose, Sources),
-    /// The IMU broke the estimate.
+    /// An IMU sample broke the estimate.
     Broken(i64, Reason),
-    /// Samples left before their time.
+    /// Samples were dropped early.
     Dropped(i64, u64),
-    /// The clock of the IMU was set back, by so many ns.
+    /// The clock of the IMU was set back, by this many ns.
     SetBack(i64, i64),
 }
 
@@ -93,7 +93,7 @@ pub(super) struct Queue<F: ProvidedFactor> {
     copies: VecDeque<Engine<F>>,
     predictor: Option<Predictor>,
     newest: Option<ImuMean>,
-    /// The first sample, as long as nothing agrees with its stamp.
+    /// The first sample, until another stamp agrees with its own.
     first: Option<ImuMean>,
     clock: Clock,
     rooms: Rooms,
@@ -126,7 +126,7 @@ impl<F: ProvidedFactor> Queue<F> {
         })
     }
 
-    /// Whether nothing has come in yet.
+    /// Whether there has been no input yet.
     pub(super) fn is_empty(&self) -> bool {
         self.newest.is_none() && self.first.is_none() && self.inputs.is_empty()
     }
@@ -157,13 +157,13 @@ impl<F: ProvidedFactor> Queue<F> {
         &self.counts
     }
 
-    /// What became of an input; none if it waits.
+    /// Result of an input. `None` while it waits.
     pub(super) fn outcome(&self, key: Key) -> Option<Outcome> {
         let index = self.inputs.binary_search_by(|entry| entry.key.cmp(&key)).ok()?;
         self.inputs.get(index)?.outcome
     }
 
-    /// How much is held: samples, inputs, copies.
+    /// Numbers of samples, inputs and copies held.
     #[cfg(test)]
     pub(super) fn held(&self) -> [usize; 3] {
         [self.samples.len(), self.inputs.len(), self.copies.len()]
@@ -182,7 +182,7 @@ impl<F: ProvidedFactor> Queue<F> {
         reason
     }
 
-    /// Counts an input that was refused before it came here.
+    /// Counts an input that was refused before it reached the queue.
     pub(super) fn refuse(&mut self, refusal: Refusal) -> Reason {
         self.count(refusal.into())
     }
@@ -229,8 +229,8 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
     }
 
-    /// The first sample sets the time, once another stamp agrees with its own. What was told before is not given up for two
-    /// stamps: that takes as many as a jump of the clock does.
+    /// The first sample sets the time, once another stamp agrees with its own. Two stamps are not enough to discard earlier
+    /// reports: that takes as many as a jump of the clock.
     fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
         let time_ns = sample.time_ns;
         let before = self.first.take();
@@ -240,7 +240,7 @@ impl<F: ProvidedFactor> Queue<F> {
             return self.place_sample(sample, config);
         }
         if let Some(first) = before {
-            // Neither is known to be wrong, but the later one may be confirmed yet.
+            // Neither is known to be wrong, but the later one may still be confirmed.
             let (key, refusal) = (Key::of_sample(first.time_ns), stranger(first.time_ns, time_ns));
             let reason = self.count(refusal.into());
             self.told.push(Told::Taken(key, InputKind::Imu, Outcome::Degraded(reason)));
@@ -260,7 +260,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.settle(sample.time_ns, config);
     }
 
-    /// The clock of the IMU was set back: the engine goes on by the new one, without the past.
+    /// The clock of the IMU was set back: the engine continues on the new clock, without the past.
     fn set_back(&mut self, sample: &ImuMean, for_ns: i64, newest_ns: i64, config: &StateEstimatorConfig) {
         self.settle(newest_ns, config);
         for entry in self.inputs.drain(..) {
@@ -303,16 +303,16 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(Sampled::Taken)
     }
 
-    /// Whether there is a copy from before an input. For what is within the lateness there is, unless samples were dropped or the
-    /// clock was set back.
+    /// Whether there is a copy from before an input. Within the lateness there always is, unless samples were dropped or the clock
+    /// was set back.
     fn reaches(&self, key: Key) -> bool {
         let is_before =
             |copy: &Engine<F>| copy.key() < key && copy.now_ns().is_none_or(|now_ns| now_ns <= key.time_ns);
         self.copies.front().is_some_and(is_before)
     }
 
-    /// If there is no room for another sample, the oldest leave: first those that only an input that is late needs, which is
-    /// then refused as too old.
+    /// If there is no room for another sample, drops the oldest. Those needed only for late inputs are dropped first, and such
+    /// inputs are then refused as too old.
     fn make_room(&mut self, config: &StateEstimatorConfig) {
         let most = self.rooms.samples;
         if self.samples.len() < most {
@@ -331,7 +331,7 @@ impl<F: ProvidedFactor> Queue<F> {
             self.trim();
         }
         if self.samples.len() >= most {
-            // They are needed since the newest keyframe: the prediction has to bridge them.
+            // All remaining samples are later than the newest keyframe. The prediction has to bridge the dropped ones.
             self.samples.drain(..(most / LEAVING).max(1));
         }
         self.predict();
@@ -340,7 +340,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.told.push(Told::Dropped(newest_ns, dropped));
     }
 
-    /// Whether an input may belong to a sample.
+    /// Whether an input may belong to the time of a sample.
     fn is_near(&self, input_ns: i64, sample_ns: i64, config: &StateEstimatorConfig) -> bool {
         let (oldest_ns, latest_ns) = (
             sample_ns.saturating_sub(ns(config.params.lateness)),
@@ -349,7 +349,7 @@ impl<F: ProvidedFactor> Queue<F> {
         (oldest_ns..=latest_ns).contains(&input_ns)
     }
 
-    /// Inputs that came before the IMU and are not of its time.
+    /// Drops inputs that came before the IMU and do not match its time.
     fn drop_strangers(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
         let mut index = 0;
         while let Some(entry) = self.inputs.get(index) {
@@ -366,7 +366,7 @@ impl<F: ProvidedFactor> Queue<F> {
         }
     }
 
-    /// Takes an input that is no sample of the IMU; where it is.
+    /// Adds an input that is not a sample of the IMU. Returns its key.
     pub(super) fn add(
         &mut self,
         time_ns: i64,
@@ -428,14 +428,14 @@ impl<F: ProvidedFactor> Queue<F> {
         self.inputs.insert(index, Entry { key, payload, outcome: None, rejection: None });
     }
 
-    /// Runs the engine on, to the end of all that is stamped up to a time.
+    /// Runs the engine on, through all inputs stamped up to a time.
     fn settle(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
         self.run(until_ns, config);
         self.keep_copy(config);
         self.predict();
     }
 
-    /// Runs the engine again from before an input.
+    /// Runs the engine again from a copy before an input.
     fn run_again(&mut self, from: Key, until_ns: i64, config: &StateEstimatorConfig) {
         self.take_back(from);
         self.settle(until_ns, config);
@@ -459,7 +459,7 @@ impl<F: ProvidedFactor> Queue<F> {
         }
     }
 
-    /// Runs the engine on; an input that breaks it is marked, and the engine has to be taken back.
+    /// Runs the engine on. An input that breaks it is marked, and the engine must be restored from a copy.
     fn run_until(&mut self, until: Key, config: &StateEstimatorConfig) -> Result<(), Key> {
         let key = self.engine.key();
         let mut sample_index = self.samples.partition_point(|sample| Key::of_sample(sample.time_ns) <= key);
@@ -470,7 +470,7 @@ impl<F: ProvidedFactor> Queue<F> {
             let input_key = self.inputs.get(input_index).map(|entry| entry.key);
             let is_input = match (sample_key, input_key) {
                 (Some(sample), Some(input)) => input < sample,
-                // Beyond the newest sample nothing is known.
+                // Nothing is known after the newest sample.
                 (None, Some(input)) => self.newest.is_some_and(|newest| input.time_ns <= newest.time_ns),
                 _ => false,
             };
@@ -489,7 +489,7 @@ impl<F: ProvidedFactor> Queue<F> {
             if self.engine.now_ns().is_some_and(|now_ns| now_ns < next.time_ns)
                 && let Some(sample) = sample
             {
-                // The sample is a mean: each part of it is the same.
+                // The sample is a mean, so its parts have the same values.
                 let part = ImuMean { time_ns: next.time_ns, ..sample };
                 self.advance(Key::of_sample(next.time_ns), &part, is_gap, config);
             }
@@ -499,7 +499,7 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(())
     }
 
-    /// Whether a sample is the first after a gap, however short the parts are that inputs part it into.
+    /// Whether a sample is the first after a gap. Inputs may divide the sample into parts of any length.
     fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
         let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
         let (Some(before), Some(sample)) = (before, self.samples.get(index)) else { return false };
@@ -543,7 +543,7 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(())
     }
 
-    /// What the engine has to tell. What a run tells again is left out.
+    /// Collects the reports of the engine. Those already made in an earlier run are skipped.
     fn look(&mut self) {
         if let Some((pose, sources)) = self.engine.take_left()
             && pose.time_ns > self.left_ns
@@ -575,12 +575,12 @@ impl<F: ProvidedFactor> Queue<F> {
         self.trim();
     }
 
-    /// Drops what no copy needs any more, to run on or to predict.
+    /// Drops entries that no copy needs to run on or to predict.
     fn trim(&mut self) {
         let Some(oldest) = self.copies.front() else { return };
         let key = oldest.key();
         let kept_ns = oldest.needed_ns().min(self.engine.needed_ns());
-        // The one before the first that is needed shows whether that follows a gap.
+        // The sample before the first needed one shows whether that one follows a gap.
         while self.samples.get(1).is_some_and(|sample| sample.time_ns <= kept_ns) {
             self.samples.pop_front();
         }
@@ -589,7 +589,7 @@ impl<F: ProvidedFactor> Queue<F> {
         }
     }
 
-    /// Begins the prediction again at the newest estimate.
+    /// Restarts the prediction at the newest estimate.
     fn predict(&mut self) {
         self.predictor = self.engine.predictor();
         let Some(predictor) = &mut self.predictor else { return };
@@ -603,7 +603,7 @@ impl<F: ProvidedFactor> Queue<F> {
     }
 }
 
-/// Why an input is not placed that is not of the time of a sample.
+/// The refusal of an input whose time does not match that of a sample.
 fn stranger(time_ns: i64, sample_ns: i64) -> Refusal {
     if time_ns < sample_ns { Refusal::TooOld { time_ns } } else { Refusal::InTheFuture { time_ns } }
 }

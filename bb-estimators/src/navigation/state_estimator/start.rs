@@ -1,4 +1,4 @@
-//! Where the estimator starts.
+//! Initial states of the estimator.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -8,16 +8,16 @@ use super::world::World;
 use crate::navigation::alignment::{Alignment, AlignmentParams};
 use crate::navigation::eskf::{ImuMean, Start};
 
-/// How old an attitude may be at the start, s.
+/// Maximum age of an attitude at the start, s.
 const ATTITUDE_AGE: f64 = 1.0;
 
-/// Standard deviation of each component of the velocity of what starts from an anchor in the air, m/s.
+/// Standard deviation of each velocity component after a start from an anchor in the air, m/s.
 const UNKNOWN_VELOCITY: f64 = 30.0;
 
-/// A bias larger than this many of its standard deviations is not believed.
+/// A bias is rejected if it exceeds this many of its standard deviations.
 const PLAUSIBLE: f64 = 5.0;
 
-/// Gathers what a start from the take-off origin needs.
+/// Gathers the data for a start from the take-off origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Starter {
     alignment: Alignment,
@@ -35,11 +35,11 @@ impl Starter {
     }
 
     pub(super) fn sample(&mut self, sample: &ImuMean) {
-        // One that is refused says nothing.
+        // A refused sample carries no information.
         let _ = self.alignment.add(sample);
     }
 
-    /// The start from an origin, once the attitude is known: from the flight controller's, or from rest.
+    /// The start from an origin, once the attitude is known from the flight controller or from rest.
     pub(super) fn at_origin(
         &self,
         now_ns: i64,
@@ -65,7 +65,7 @@ impl Starter {
     }
 }
 
-/// The start from what the flight controller knew last, with its covariance inflated.
+/// The start from the last known state of the flight controller, with its covariance inflated.
 pub(super) fn warm(
     now_ns: i64,
     state: &FlightControllerState,
@@ -111,7 +111,7 @@ pub(super) fn at_anchor(
 
 fn with_bias(start: Start, config: &StateEstimatorConfig, bias: Option<&ImuBias>) -> Start {
     let (accelerometer, gyroscope) = (config.params.accelerometer_bias, config.params.gyroscope_bias);
-    // An odometry that has lost itself says anything.
+    // An odometry that is lost may report any values.
     let is_plausible = |bias: &&ImuBias| {
         bias.accelerometer.norm() <= PLAUSIBLE * accelerometer && bias.gyroscope.norm() <= PLAUSIBLE * gyroscope
     };

@@ -10,13 +10,13 @@ pub struct StatusText {
 }
 
 impl StatusText {
-    /// The most characters that there are in one.
+    /// Maximum number of characters.
     pub const CAPACITY: usize = 50;
 
-    /// A text; what is longer is cut off, and what is not ASCII is a question mark.
+    /// Formats a text. It is truncated at the capacity, and characters outside ASCII become question marks.
     pub fn new(arguments: fmt::Arguments<'_>) -> Self {
         let mut text = Self { bytes: [0; Self::CAPACITY], length: 0 };
-        // Writing to it does not fail.
+        // Writing to a `StatusText` never fails.
         let _ = fmt::write(&mut text, arguments);
         text
     }

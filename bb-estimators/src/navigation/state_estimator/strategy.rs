@@ -1,4 +1,4 @@
-//! The two estimators that can do the work, and what both do.
+//! The two estimation strategies and their common interface.
 
 #[cfg(feature = "eskf")]
 mod eskf;
@@ -50,7 +50,7 @@ impl Pose {
     }
 }
 
-/// What was measured, in the world of the engine.
+/// A measurement, in the world of the engine.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Measured<'a, F> {
     Relative(RelativePose),
@@ -59,34 +59,34 @@ pub(super) enum Measured<'a, F> {
     Provided(&'a F),
 }
 
-/// What a position may do that does not fit.
+/// Permission of a position that does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Trust {
-    /// Nothing: it is refused.
+    /// None: it is refused.
     Doubted,
-    /// Overrule the estimate, if [`PATIENCE`] were refused before: they agree with it.
+    /// It may overrule the estimate if [`PATIENCE`] were refused before, since they agree with it.
     Believed,
 }
 
-/// So many measurements in a row must be refused before one overrules the estimate.
+/// Number of consecutive refusals before a measurement overrules the estimate.
 pub(super) const PATIENCE: u32 = 3;
 
-/// Where it is, where the estimate is wrong: what is not known of it stays.
+/// The position to move a wrong estimate to. States that it does not determine are kept.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// Of what was measured, an antenna.
+    /// Position of an antenna, as measured.
     pub(super) position: (Vector3<f64>, Matrix3<f64>),
-    /// Where that is in the body.
+    /// Position of the antenna in the body.
     pub(super) lever_arm: Vector3<f64>,
     pub(super) velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
 }
 
-/// Why something was not taken in.
+/// Why a measurement was not fused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Failure {
-    /// All is as it was.
+    /// The state is unchanged.
     Refused(Refusal),
-    /// The numbers are no longer any good.
+    /// The numbers are no longer usable.
     Fatal(Refusal),
 }
 
@@ -96,7 +96,7 @@ impl From<Refusal> for Failure {
     }
 }
 
-/// A gate for each kind of measurement.
+/// A gate per kind of measurement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Streams {
     pub(super) relative: Stream,
@@ -114,7 +114,7 @@ impl Streams {
     }
 }
 
-/// A gate for a position.
+/// Configures a gate for a position.
 fn trusting(stream: &mut Stream, trust: Trust) -> &mut Stream {
     stream.set_patience(match trust {
         Trust::Doubted => 0,
@@ -123,17 +123,17 @@ fn trusting(stream: &mut Stream, trust: Trust) -> &mut Stream {
     stream
 }
 
-/// How much longer than [`keyframe_interval`](super::params::StateEstimatorParams::keyframe_interval) a keyframe may wait for a slow camera:
-/// [`room`](super::params::StateEstimatorParams::room) has as much to spare.
+/// How much longer than [`keyframe_interval`](super::params::StateEstimatorParams::keyframe_interval) a keyframe may wait for a
+/// slow camera. [`room`](super::params::StateEstimatorParams::room) includes this margin.
 const SLACK_NS: i64 = 1_000_000_000;
 
-/// When keyframes were made.
+/// Timing of keyframes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cadence {
     interval_ns: i64,
     keyframe_ns: i64,
     camera_ns: i64,
-    /// Between the last two frames of the camera.
+    /// Time between the last two frames of the camera.
     spacing_ns: i64,
 }
 
@@ -143,7 +143,7 @@ impl Cadence {
         Self { interval_ns, keyframe_ns: i64::MIN, camera_ns: i64::MIN, spacing_ns: 0 }
     }
 
-    /// It has begun at a time, which counts as a frame.
+    /// Starts at a time, which counts as a frame.
     fn begin(&mut self, time_ns: i64) {
         (self.keyframe_ns, self.camera_ns) = (time_ns, time_ns);
     }
@@ -156,7 +156,7 @@ impl Cadence {
         }
     }
 
-    /// For how long after a frame the next is waited for: a keyframe between two frames would part them.
+    /// How long to wait for the next frame: a keyframe between two frames would separate them.
     fn patience_ns(&self) -> i64 {
         (self.spacing_ns / 2).saturating_mul(3).min(self.interval_ns.saturating_add(SLACK_NS))
     }
@@ -170,19 +170,19 @@ impl Cadence {
         now_ns.saturating_sub(self.keyframe_ns) >= self.interval_ns && !self.awaits_camera(now_ns, 0)
     }
 
-    /// Whether the camera determines where keyframes are.
+    /// Whether the camera determines the times of keyframes.
     #[cfg(feature = "smoother")]
     fn has_camera(&self, now_ns: i64) -> bool {
         self.awaits_camera(now_ns, self.interval_ns / 2)
     }
 }
 
-/// A stamp as an id that increases with it.
+/// Converts a stamp to an id that increases with it.
 pub(super) fn id_of(time_ns: i64) -> u64 {
     (time_ns as u64) ^ (1 << 63)
 }
 
-/// The one that does the work.
+/// The strategy in use.
 #[derive(Clone, Debug)]
 pub(super) enum Strategy<F: ProvidedFactor> {
     #[cfg(feature = "smoother")]
@@ -203,7 +203,7 @@ macro_rules! each {
 }
 
 impl<F: ProvidedFactor> Strategy<F> {
-    /// Makes one that has not started.
+    /// Creates a strategy that has not started.
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
         Ok(match config.strategy {
             #[cfg(feature = "smoother")]
@@ -213,37 +213,37 @@ impl<F: ProvidedFactor> Strategy<F> {
         })
     }
 
-    /// Starts, or starts again.
+    /// Starts or restarts.
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         each!(self, strategy => strategy.start(start))
     }
 
-    /// Moves on by one sample; makes a keyframe if one is due.
+    /// Advances by one sample. Makes a keyframe if one is due.
     pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
         each!(self, strategy => strategy.propagate(sample))
     }
 
-    /// Makes the present a keyframe: a camera has taken a frame.
+    /// Makes the present state a keyframe: a camera has captured a frame.
     pub(super) fn frame(&mut self) -> Result<(), Failure> {
         each!(self, strategy => strategy.camera_frame())
     }
 
-    /// Takes in what was measured at present.
+    /// Fuses a measurement at the present time.
     pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
         each!(self, strategy => strategy.measure(measured))
     }
 
-    /// Where it is at present, and how fast.
+    /// Present position and velocity.
     pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         each!(self, strategy => strategy.motion())
     }
 
-    /// How many gaps of the IMU were bridged.
+    /// Number of gaps in the IMU samples that were bridged.
     pub(super) fn gaps(&self) -> u32 {
         each!(self, strategy => strategy.gaps())
     }
 
-    /// What goes on from the newest estimate, and the time of that.
+    /// The predictor from the newest estimate, if there is one.
     pub(super) fn predictor(&self) -> Option<Predictor> {
         each!(self, strategy => strategy.predictor())
     }
@@ -253,48 +253,48 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.newest())
     }
 
-    /// Keyframes before the newest, the newest of them first, and whether they are smoothed.
+    /// Keyframes before the newest, in reverse order of time, and whether they are smoothed.
     pub(super) fn history(&mut self, most: usize) -> (Vec<Pose>, bool) {
         each!(self, strategy => strategy.history(most))
     }
 
-    /// The keyframe that has left the window with the last frame, if one has.
+    /// The keyframe that left the window at the last frame, if any.
     pub(super) fn take_left(&mut self) -> Option<Pose> {
         each!(self, strategy => strategy.take_left())
     }
 
-    /// When the newest keyframe was, ns.
+    /// Time of the newest keyframe, ns.
     pub(super) fn keyframe_ns(&self) -> i64 {
         each!(self, strategy => strategy.keyframe_ns())
     }
 
-    /// How many keyframes are held.
+    /// Number of keyframes held.
     pub(super) fn keyframes(&self) -> usize {
         each!(self, strategy => strategy.keyframes())
     }
 
-    /// How many relative poses the gate has refused since it let one pass.
+    /// Number of relative poses that the gate has refused since it last accepted one.
     pub(super) fn refused_relative(&self) -> u64 {
         each!(self, strategy => strategy.streams()).relative.counts().gate_in_a_row
     }
 
-    /// How many anchors, or factors of providers, the gate has refused since it let one pass.
+    /// Number of anchors, or factors of providers, that the gate has refused since it last accepted one.
     pub(super) fn refused_positions(&self) -> u64 {
         let Streams { anchors, provided, .. } = each!(self, strategy => strategy.streams());
         anchors.counts().gate_in_a_row.max(provided.counts().gate_in_a_row)
     }
 
-    /// How many fixes the gate has refused since it let one pass.
+    /// Number of fixes that the gate has refused since it last accepted one.
     pub(super) fn refused_fixes(&self) -> u64 {
         each!(self, strategy => strategy.streams()).positions.counts().gate_in_a_row
     }
 
-    /// Moves the present elsewhere; what does not depend on where it is stays. Keyframes are forgotten.
+    /// Moves the present state elsewhere. States that do not depend on the position are kept. Keyframes are dropped.
     pub(super) fn relocate(&mut self, place: &Place) -> Result<(), Refusal> {
         each!(self, strategy => strategy.relocate(place))
     }
 
-    /// What is estimated is from now on what was so at another time; keyframes are forgotten.
+    /// Assigns a new time to the present state. Keyframes are dropped.
     pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
         each!(self, strategy => strategy.set_clock(time_ns))
     }

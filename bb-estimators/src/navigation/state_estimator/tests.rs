@@ -1,4 +1,4 @@
-//! The rows of the design, on every strategy that was built.
+//! The requirements of the design, for every strategy that was built.
 
 mod cadence;
 mod clock;
@@ -42,7 +42,7 @@ fn started(flight: &Flight, strategy: StrategyKind) -> Estimator {
     estimator
 }
 
-/// For inputs of which something is refused.
+/// Discards the result of inputs, some of which are refused.
 fn ignore<T>(_: Result<T, EstimatorError>) {}
 
 fn kinds<'a>(events: &'a Events, name: &'a str) -> impl Iterator<Item = &'a Event> {

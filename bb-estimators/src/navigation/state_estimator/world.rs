@@ -1,4 +1,4 @@
-//! The tangent frame that the strategy works in, and positions on the Earth.
+//! The tangent frame of the strategy, and positions on the Earth.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
@@ -6,7 +6,7 @@ use super::input::{GnssReading, PoseAnchor, blocks};
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
 
-/// How far from its origin the strategy works, m: there down differs by 0.8 mrad.
+/// Largest distance of the strategy from its origin, m. At that distance, down differs by 0.8 mrad.
 const FARTHEST: f64 = 5000.0;
 
 /// See the module.
@@ -28,7 +28,7 @@ impl World {
         self.frame.position(position)
     }
 
-    /// Takes vectors of the tangent frame at a position to that of the world.
+    /// Rotates vectors from the tangent frame at a position to that of the world.
     pub(super) fn frame_from_local(&self, position: &Geodetic) -> UnitQuaternion<f64> {
         LocalFrame::new(*position).other_from_self(&self.frame).rotation
     }
@@ -60,22 +60,22 @@ impl World {
         (position, velocity)
     }
 
-    /// Position on the Earth, and what takes vectors of the world to the tangent frame there.
+    /// Position on the Earth, and the rotation from the world to the tangent frame there.
     pub(super) fn local(&self, position: &Vector3<f64>) -> (Geodetic, UnitQuaternion<f64>) {
         let geodetic = self.frame.geodetic(position);
         (geodetic, self.frame_from_local(&geodetic).inverse())
     }
 
-    /// Above the ellipsoid, m.
+    /// Height above the ellipsoid, m.
     pub(super) fn height(&self, position: &Vector3<f64>) -> f64 {
         if position.xy().norm() > FARTHEST {
             return self.frame.geodetic(position).height;
         }
-        // The Earth falls away by no more than 2 m.
+        // Within this distance, the ellipsoid falls away from the plane by at most 2 m.
         self.frame.origin().height + position.z
     }
 
-    /// If a position is far out, moves on to a frame that is nearer by; what takes coordinates there.
+    /// If a position is far from the origin, moves to a nearer frame. Returns the transform of coordinates to it.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
         if position.xy().norm() <= FARTHEST {
             return None;
@@ -93,7 +93,7 @@ fn turned(turn: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) -> Matrix3<f64>
     0.5 * (turned + turned.transpose())
 }
 
-/// Both blocks of a covariance and what correlates them, turned.
+/// Rotates both blocks of a covariance and their cross-correlation.
 pub(super) fn turned_pose(turn: &UnitQuaternion<f64>, covariance: &Matrix6<f64>) -> Matrix6<f64> {
     let matrix = turn.to_rotation_matrix().into_inner();
     let mut both = Matrix6::zeros();

@@ -1,6 +1,6 @@
 use super::*;
 
-/// On a straight way to the north.
+/// On a straight track to the north.
 fn trust_of_each(agreement: &mut Agreement, period_s: i64, speed: f64, count: i64) -> Vec<Trust> {
     let frame = LocalFrame::new(Geodetic { latitude: 0.9, longitude: 0.2, height: 100.0 });
     let at = |i: i64| frame.geodetic(&Vector3::new(0.0, speed * (i * period_s) as f64, 0.0));
@@ -20,7 +20,7 @@ fn slow_anchors_and_a_fast_aircraft_are_believed() {
     }
 }
 
-/// Of two providers with one stamp, the second is not believed because the first is.
+/// With two providers at one stamp, the second is not believed because the first is.
 #[test]
 fn what_is_not_newer_is_doubted() {
     let mut agreement = Agreement::default();

@@ -1,4 +1,4 @@
-//! What the declared state estimator takes.
+//! Inputs of the declared state estimator.
 
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
@@ -21,59 +21,59 @@ pub struct FlightInputs<'a> {
     pub vio: Option<Input<'a, RelativePoseReading>>,
     /// Poses from satellite images.
     pub anchor: Option<Input<'a, AnchorReading>>,
-    /// The flight controller's receiver of satellite navigation.
+    /// The flight controller's GNSS receiver.
     pub gnss: Option<Input<'a, GnssFix>>,
-    /// What the flight controller says of that.
+    /// The flight controller's report on that receiver.
     pub gps_health: Option<Input<'a, GpsReport>>,
-    /// The flight controller's attitude, which levels the start.
+    /// The flight controller's attitude, used to level the start.
     pub attitude: Option<Input<'a, AttitudeReport>>,
-    /// What the flight controller knows of its state: where the estimator starts, and starts again when it is lost.
+    /// The flight controller's own state. The estimator starts from it, and restarts from it when it is lost.
     pub warm_start: Option<Input<'a, WarmStartReport>>,
 }
 
-/// The pose of the body at a camera frame relative to an earlier one; it is stamped with the time of the later frame.
+/// The pose of the body at a camera frame relative to an earlier one, stamped with the time of the later frame.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct RelativePoseReading {
     /// When the earlier frame was taken.
     pub from: MonotonicTime,
-    /// Of the body's origin at the later frame, in the axes of the body at the earlier one, m.
+    /// Position of the body's origin at the later frame, in the axes of the body at the earlier one, m.
     pub translation: Vector3<f64>,
-    /// Takes body coordinates at the later frame to those at the earlier one.
+    /// Rotates body coordinates at the later frame to those at the earlier one.
     pub from_to: UnitQuaternion<f64>,
-    /// Covariance of translation, m², and of the rotation vector of the error, rad², both in body axes at the later frame.
+    /// Covariance of the translation, m², and of the rotation vector of the error, rad², both in body axes at the later frame.
     pub covariance: Matrix6<f64>,
-    /// Its estimate of the accelerometer's bias, body axes, m/s².
+    /// The odometry's estimate of the accelerometer bias, body axes, m/s².
     pub accelerometer_bias: Option<Vector3<f64>>,
-    /// Its estimate of the gyroscope's bias, body axes, rad/s.
+    /// The odometry's estimate of the gyroscope bias, body axes, rad/s.
     pub gyroscope_bias: Option<Vector3<f64>>,
 }
 
-/// The pose of the body from a satellite image; it is stamped with the time of the image.
+/// The pose of the body from a satellite image, stamped with the time of the image.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct AnchorReading {
-    /// Which provider it is from, if there are several.
+    /// Number of the provider, if there are several.
     pub provider: u32,
-    /// Of the body's origin. One without a height is not used.
+    /// Position of the body's origin. One without a height is not used.
     pub position: GeodeticPosition,
-    /// Takes body coordinates to the tangent frame at the position.
+    /// Rotates body coordinates to the tangent frame at the position.
     pub world_from_body: UnitQuaternion<f64>,
     /// Covariance of the position, m², and of the rotation vector of the error, rad², both in the tangent frame.
     pub covariance: Matrix6<f64>,
-    /// The provider has saved time over its covariance.
+    /// Whether the provider used a cheaper computation of its covariance.
     pub is_covariance_degraded: bool,
 }
 
-/// What the flight controller says of its receiver of satellite navigation.
+/// The flight controller's report on its GNSS receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct GpsReport {
-    /// How it is.
+    /// Health of the receiver.
     pub health: GpsHealth,
 }
 
 /// The attitude that the flight controller estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct AttitudeReport {
-    /// Takes coordinates of the link to the tangent frame: x east, y north, z up.
+    /// Rotates coordinates of the link to the tangent frame: x east, y north, z up.
     pub world_from_body: UnitQuaternion<f64>,
     /// Standard deviation of roll and pitch, rad.
     pub tilt_deviation: f64,
@@ -81,34 +81,34 @@ pub struct AttitudeReport {
     pub heading_deviation: f64,
 }
 
-/// What the flight controller knows of its state.
+/// The flight controller's estimate of its own state.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct WarmStartReport {
     /// Its attitude.
     pub attitude: AttitudeReport,
-    /// Of the body's origin. One without a height is not used.
+    /// Position of the body's origin. One without a height is not used.
     pub position: GeodeticPosition,
     /// Covariance of the position, in the tangent frame, m².
     pub position_covariance: Matrix3<f64>,
-    /// In the tangent frame, m/s.
+    /// Velocity in the tangent frame, m/s.
     pub velocity: Vector3<f64>,
     /// Covariance of the velocity, m²/s².
     pub velocity_covariance: Matrix3<f64>,
 }
 
-/// Where the sensors are. The body has the axes of the link, and its origin where the IMU is.
+/// Poses of the sensors. The body has the axes of the link and its origin at the IMU.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mounting {
     link_from_imu: Isometry3<f64>,
-    /// Of the antenna, in the body, m.
+    /// Position of the antenna in the body, m.
     lever_arm: Vector3<f64>,
 }
 
 impl Mounting {
-    /// As the robot declares them.
+    /// Reads the mounting that the robot declares.
     pub(super) fn of(context: &Context) -> Result<Self, Fault> {
         let link_from_imu = context.frame_from_driver()?;
-        // Of an input that the robot does not declare, there is none.
+        // `None` for an input that the robot does not declare.
         let antenna = context.frame_from_input("gnss").ok().map(|antenna| antenna.translation.vector);
         let lever_arm = antenna.map_or_else(Vector3::zeros, |antenna| antenna - link_from_imu.translation.vector);
         Ok(Self { link_from_imu, lever_arm })
@@ -171,7 +171,7 @@ pub(super) fn anchor(reading: &Stamped<AnchorReading>) -> Option<PoseAnchor> {
     })
 }
 
-/// Standard deviation of a fix that says nothing about its own, m; of its height it is twice as much.
+/// Standard deviation of a fix that does not report its own, m. For its height, twice that is used.
 const FIX: f64 = 5.0;
 
 pub(super) fn fix(fix: &Stamped<GnssFix>, mounting: &Mounting) -> Option<GnssReading> {

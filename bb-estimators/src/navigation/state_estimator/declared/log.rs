@@ -3,18 +3,18 @@
 use super::output::Parts;
 use crate::navigation::state_estimator::{Event, EventKind, EventSink, Level};
 
-/// Gives every event to `tracing`, at its level, with its fields: a subscriber that writes JSON writes one object a line.
+/// Passes every event to `tracing`, at its level and with its fields: a subscriber that writes JSON writes one object per line.
 ///
 /// | field | |
 /// |---|---|
-/// | `event` | the name of the kind |
-/// | `time_ns` | when, on the clock of the inputs |
-/// | `input`, `reason` | which input, and why it is not in the estimate |
-/// | `from`, `to` | what changed |
-/// | `nis` | of a measurement, over its dimension |
-/// | `ratio` | of a covariance that has grown |
-/// | `waits` | an input that is ahead of the IMU |
-/// | `status_text` | what is sent to the ground |
+/// | `event` | name of the kind |
+/// | `time_ns` | time on the clock of the inputs |
+/// | `input`, `reason` | the input, and why it is not in the estimate |
+/// | `from`, `to` | the old and the new value of a change |
+/// | `nis` | normalised innovation squared of a measurement, over its dimension |
+/// | `ratio` | growth of a covariance |
+/// | `waits` | whether an input is ahead of the IMU |
+/// | `status_text` | text for the ground station |
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TracingSink;
 

@@ -1,4 +1,4 @@
-//! What can be set of the declared state estimator.
+//! Options of the declared state estimator.
 
 use crate::navigation::eskf::EskfParams;
 use crate::navigation::geodesy::Geodetic;

@@ -1,4 +1,4 @@
-//! What the declared state estimator emits.
+//! Outputs of the declared state estimator.
 
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::state_estimator::{
@@ -14,49 +14,49 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 pub struct FlightOutputs {
     /// The estimate, at the output's rate.
     pub estimate: Option<FlightEstimate>,
-    /// How the estimator is, with each estimate and with each change.
+    /// The health of the estimator, with each estimate and each change.
     pub health: Option<FlightHealth>,
-    /// What happened, for a recorder.
+    /// Events since the last output, for a recorder.
     pub events: Option<FlightEvents>,
 }
 
 /// One estimate; see [`EstimatorOutput`].
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct FlightEstimate {
-    /// The bytes of the UUID that names it.
+    /// The bytes of the UUID that identifies it.
     pub frame_id: [u8; 16],
-    /// When it was emitted.
+    /// Time of emission.
     pub emitted: MonotonicTime,
-    /// What it is an estimate of.
+    /// Time that the estimate refers to.
     pub time: MonotonicTime,
-    /// Of the body's origin.
+    /// Position of the body's origin.
     pub position: GeodeticPosition,
-    /// Takes body coordinates to the tangent frame at the position.
+    /// Rotates body coordinates to the tangent frame at the position.
     pub world_from_body: UnitQuaternion<f64>,
-    /// In that frame, m/s.
+    /// Velocity in that frame, m/s.
     pub velocity: Vector3<f64>,
     /// Covariance of the position, m², then of the rotation, rad².
     pub covariance: Matrix6<f64>,
-    /// What it rests on.
+    /// Source of the estimate.
     pub label: SourceLabel,
     /// Time since the last anchor, ms.
     pub anchor_age_ms: Option<u64>,
-    /// Whether it was corrected by what was measured later.
+    /// Whether later measurements have corrected it.
     pub smoothed: bool,
-    /// Whether it is not to be trusted as its covariance says.
+    /// Whether its covariance is not to be trusted.
     pub degraded: bool,
-    /// How often the estimate has jumped since the first start.
+    /// Number of jumps of the estimate since the first start.
     pub resets: u32,
     /// Frobenius norm of the covariance.
     pub covariance_norm: f64,
     /// Normalised innovation squared of the last measurement, over its dimension.
     pub nis: Option<f64>,
-    /// The provider of the last anchor had saved time over its covariance.
+    /// Whether the provider of the last anchor used a cheaper computation of its covariance.
     pub is_anchor_degraded: bool,
 }
 
 impl FlightEstimate {
-    /// As a payload.
+    /// Converts an output to a payload.
     pub fn of(output: &EstimatorOutput) -> Self {
         let Geodetic { latitude, longitude, height } = output.position;
         Self {
@@ -79,18 +79,18 @@ impl FlightEstimate {
     }
 }
 
-/// How the estimator is; see [`EstimatorHealth`].
+/// Health of the estimator; see [`EstimatorHealth`].
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct FlightHealth {
-    /// What it does.
+    /// Current state.
     pub state: HealthState,
-    /// Keyframes that are held.
+    /// Number of keyframes held.
     pub keyframes: u32,
-    /// For how long the norm of the covariance has been growing, s.
+    /// Time for which the norm of the covariance has been growing, s.
     pub covariance_growing_s: f64,
-    /// Whether the receiver of satellite navigation is let in.
+    /// Whether the GNSS receiver is let in.
     pub is_gate_open: bool,
-    /// Whether the flight controller's own IMU has to do.
+    /// Whether the fallback to the flight controller's own IMU is engaged.
     pub is_fallback_engaged: bool,
 }
 
@@ -105,40 +105,40 @@ impl FlightHealth {
         }
     }
 
-    /// Whether somebody should be told at once.
+    /// Whether the change must be published at once.
     pub(super) fn differs(&self, other: &Self) -> bool {
         let Self { state, is_gate_open, is_fallback_engaged, .. } = *self;
         (state, is_gate_open, is_fallback_engaged) != (other.state, other.is_gate_open, other.is_fallback_engaged)
     }
 }
 
-/// What happened since the last time, in order.
+/// Events since the last output, in order.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub struct FlightEvents {
     /// The events.
     pub events: Vec<FlightEvent>,
-    /// How many more there were than one message holds.
+    /// Number of further events that did not fit in the message.
     pub lost: u32,
 }
 
 /// An event; see [`Event`].
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub struct FlightEvent {
-    /// When.
+    /// Time of the event.
     pub time: MonotonicTime,
-    /// How much it matters.
+    /// Severity.
     pub level: Level,
-    /// What happened: the name of its kind.
+    /// Name of the kind of event.
     pub kind: String,
-    /// Of which input.
+    /// The input concerned.
     pub input: Option<String>,
-    /// Why.
+    /// Reason.
     pub reason: Option<String>,
-    /// What was before, of a change.
+    /// Old value of a change.
     pub from: Option<String>,
-    /// What is now, of a change or a start.
+    /// New value of a change, or the source of a start.
     pub to: Option<String>,
-    /// The text for the ground, of at most 50 characters.
+    /// Text for the ground station, at most 50 characters.
     pub status_text: Option<String>,
     /// The keyframe that has left the window.
     pub keyframe: Option<FlightEstimate>,
@@ -165,7 +165,7 @@ impl FlightEvent {
     }
 }
 
-/// What the kinds of events have in common.
+/// Fields common to several kinds of events.
 #[derive(Debug, Default)]
 pub(super) struct Parts {
     pub(super) input: Option<&'static str>,

@@ -24,12 +24,12 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     filter: Eskf<Navigated, NAVIGATED>,
     streams: Streams,
     cadence: Cadence,
-    /// What was estimated at the last keyframes, the newest last. It is never corrected.
+    /// Estimates at the last keyframes, the newest last. They are never corrected.
     past: VecDeque<Pose>,
     window: usize,
     records: bool,
     left: Option<Pose>,
-    /// The present is to be what the next relative pose refers to, once all is fused that was measured at it.
+    /// Whether the present becomes the reference of the next relative pose, once all measurements at this time are fused.
     is_next: bool,
 }
 
@@ -51,12 +51,12 @@ impl EskfStrategy {
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filter.start(start)?;
         self.begin(start.time_ns);
-        // What was refused did not fit another estimate.
+        // Earlier refusals relate to another estimate.
         self.streams.anchors.forgive();
         Ok(())
     }
 
-    /// The present is the first keyframe.
+    /// The present state is the first keyframe.
     fn begin(&mut self, time_ns: i64) {
         self.filter.set_keyframe(id_of(time_ns));
         self.cadence.begin(time_ns);
@@ -108,7 +108,7 @@ impl EskfStrategy {
                 let stream = trusting(&mut streams.positions, *trust);
                 let fused = self.filter.update(stream, position).map_err(absurd)?;
                 if let Some(velocity) = velocity {
-                    // A receiver whose position is good is trusted, whether its velocity is or not.
+                    // A receiver with a good position is trusted even if its velocity is refused.
                     let _ = self.filter.update(&mut streams.velocities, velocity);
                 }
                 fused
@@ -116,7 +116,7 @@ impl EskfStrategy {
             Measured::Provided(factor) => update(&mut self.filter, &mut streams.provided, *factor)?,
         };
         let pose = self.pose().filter(Pose::is_finite).ok_or(Failure::Fatal(Refusal::NonFinite))?;
-        // What was measured at a keyframe belongs to it.
+        // A measurement at a keyframe belongs to that keyframe.
         if let Some(newest) = self.past.back_mut().filter(|newest| newest.time_ns == pose.time_ns) {
             *newest = pose;
         }
@@ -197,7 +197,7 @@ impl EskfStrategy {
     }
 }
 
-/// What would move the filter farther than anything on the Earth goes is fatal, as it is to the smoother.
+/// A correction that would move the filter farther than any distance on the Earth is fatal, as it is for the smoother.
 fn absurd(refusal: Refusal) -> Failure {
     match refusal {
         Refusal::OutOfRange => Failure::Fatal(refusal),
@@ -205,7 +205,7 @@ fn absurd(refusal: Refusal) -> Failure {
     }
 }
 
-/// Fuses a factor that concerns the present alone.
+/// Fuses a factor that involves only the present state.
 fn update<F: ProvidedFactor>(
     filter: &mut Eskf<Navigated, NAVIGATED>,
     stream: &mut Stream,
@@ -231,7 +231,7 @@ fn update<F: ProvidedFactor>(
     of_dimension!(1 2 3 4 5 6 7 8 9)
 }
 
-/// A factor that was linearised where the filter is: its noise is 1.
+/// A factor linearised at the filter's estimate, with unit noise.
 struct Whitened<const D: usize> {
     residual: [f64; D],
     jacobian: [[f64; NAVIGATED]; D],

@@ -1,4 +1,4 @@
-//! What goes on from the newest estimate with each sample of the IMU, for outputs between keyframes.
+//! Prediction from the newest estimate with each sample of the IMU, for outputs between keyframes.
 
 use super::Pose;
 #[cfg(feature = "smoother")]

@@ -1,7 +1,7 @@
 //! The fixed-lag smoother.
 //!
-//! Keyframes are the frames of the camera; without one, they are made at intervals, and where something is measured. What is
-//! measured between two keyframes is carried back to the last by the motion since.
+//! Keyframes are the frames of the camera. Without a camera, they are made at intervals, and at measurements. A measurement between
+//! two keyframes is carried back to the earlier one by the motion since then.
 
 use alloc::vec::Vec;
 
@@ -19,7 +19,7 @@ use crate::navigation::state_estimator::factor::{ProvidedFactor, SMOOTHED, Smoot
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 
 #[expect(clippy::large_enum_variant, reason = "factors of providers are as large as theirs are")]
-/// What a window is made of.
+/// Configuration of a window.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Held<F> {
     Navigation(NavigationFactor),
@@ -57,13 +57,13 @@ pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFa
     left: Option<Pose>,
 }
 
-/// How far it is from the newest keyframe to the present.
+/// Motion from the newest keyframe to the present.
 struct Way {
     position: Vector3<f64>,
     velocity: Vector3<f64>,
-    /// Takes body coordinates of the keyframe to those of the present.
+    /// Rotates body coordinates at the keyframe to those at present.
     now_from_keyframe: UnitQuaternion<f64>,
-    /// Of that position.
+    /// Covariance of that position.
     covariance: Matrix3<f64>,
 }
 
@@ -83,7 +83,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.smoother.start(id_of(start.time_ns), start)?;
         self.cadence.begin(start.time_ns);
-        // What was refused did not fit another estimate.
+        // Earlier refusals relate to another estimate.
         self.streams.anchors.forgive();
         Ok(())
     }
@@ -113,7 +113,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.update()
     }
 
-    /// The oldest keyframe, if the next will take its place.
+    /// The oldest keyframe, if the next one will replace it.
     fn leaving(&mut self) -> Option<Pose> {
         if self.smoother.keyframes().len() < self.smoother.params().window {
             return None;
@@ -134,7 +134,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
         let now_ns = self.smoother.predicted().ok_or(Refusal::NotStarted)?.time_ns;
-        // Without a camera nothing else says where keyframes must be.
+        // Without a camera, nothing else determines the times of keyframes.
         if !self.cadence.has_camera(now_ns) {
             self.keyframe()?;
         }
@@ -166,13 +166,13 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                 let fused = self.smoother.add(stream, id, Held::Navigation(moved.into()))?;
                 if let Some(velocity) = velocity {
                     let moved = GnssVelocity { velocity: velocity.velocity - way.velocity, ..*velocity };
-                    // A receiver whose position is good is trusted, whether its velocity is or not.
+                    // A receiver with a good position is trusted even if its velocity is refused.
                     let _ = self.smoother.add(&mut self.streams.velocities, id, Held::Navigation(moved.into()));
                 }
                 fused
             }
             Measured::Provided(factor) => {
-                // What it says of the present is not known, so it cannot be carried back.
+                // The factor's dependence on the present state is unknown, so it cannot be carried back.
                 if now_ns != self.cadence.keyframe_ns {
                     self.keyframe()?;
                 }
@@ -239,7 +239,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.smoother.keyframes().len()
     }
 
-    /// The window begins again with the newest keyframe.
+    /// The window restarts with the newest keyframe.
     pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
         if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
             return Err(refusal);
@@ -251,7 +251,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         Ok(())
     }
 
-    /// The window begins again with the present.
+    /// The window restarts with the present state.
     pub(super) fn relocate(&mut self, place: &Place) -> Result<(), Refusal> {
         if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
             return Err(refusal);
@@ -269,9 +269,9 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         Ok(())
     }
 
-    /// The window begins again with the newest keyframe.
+    /// The window restarts with the newest keyframe.
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
-        // Samples since the newest keyframe would be lost.
+        // Otherwise samples since the newest keyframe would be lost.
         if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
             return Err(refusal);
         }
@@ -294,7 +294,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 }
 
-/// The covariance of three errors, which are correlated with no other from here on.
+/// Replaces the covariance of three errors and clears their correlations with all others.
 fn replace(covariance: &mut SMatrix<f64, SMOOTHED, SMOOTHED>, first: usize, by: &Matrix3<f64>) {
     covariance.rows_mut(first, 3).fill(0.0);
     covariance.columns_mut(first, 3).fill(0.0);

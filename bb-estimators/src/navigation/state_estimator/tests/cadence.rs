@@ -1,10 +1,10 @@
-//! Cameras that are slower than keyframes are without one.
+//! Cameras with a frame period longer than the keyframe interval without a camera.
 
 use super::flight::{FRAME, SECOND, STEP};
 use super::*;
 use nalgebra::Isometry3;
 
-/// The camera with every n-th frame only: as if those between had not been taken.
+/// The camera with every n-th frame only, as if the others had not been captured.
 fn every(flight: &Flight, n: usize) -> impl Iterator<Item = VioOutput> {
     flight.vio.chunks_exact(n).map(move |parts| {
         let way = parts.iter().fold(Isometry3::identity(), |way, part| {
@@ -15,7 +15,7 @@ fn every(flight: &Flight, n: usize) -> impl Iterator<Item = VioOutput> {
             to_ns: parts[n - 1].to_ns,
             translation: way.translation.vector,
             from_to: way.rotation,
-            // Errors of orientation move what follows, by 15 m/s times their time.
+            // Orientation errors displace the next pose, by 15 m/s times the time since then.
             covariance: parts[0].covariance * (2 * n) as f64,
             bias: None,
         }
@@ -41,7 +41,7 @@ fn a_slow_camera_is_waited_for() {
                     refused += usize::from(estimator.add_vio(vio).is_err());
                 }
             }
-            // How far apart frames are is known from the second on.
+            // The frame period is known from the second frame on.
             assert!(refused <= 1, "{}, {n}, {keyframe_interval} s: {refused}", strategy.name());
             assert_eq!(estimator.counts().dropped, 0);
             assert!(flight.error(&estimator.predicted(30 * SECOND).unwrap()).0 < 3.0, "{}", strategy.name());
@@ -49,7 +49,7 @@ fn a_slow_camera_is_waited_for() {
     }
 }
 
-/// One that has stopped is not waited for.
+/// A keyframe does not wait for a camera that has stopped.
 #[test]
 fn without_the_camera_keyframes_come_at_their_interval() {
     let flight = Flight::new(12, 3);
@@ -67,7 +67,7 @@ fn without_the_camera_keyframes_come_at_their_interval() {
         let late: Vec<i64> =
             times.windows(2).filter(|two| two[0] > 4 * SECOND).map(|two| two[1] - two[0]).collect();
         assert!(late.len() >= 4 && late.iter().all(|apart| *apart == SECOND), "{}: {late:?}", strategy.name());
-        // A frame and a half after the last, and a sample.
+        // One and a half frame periods after the last frame, plus one sample.
         let first = times.iter().find(|time_ns| **time_ns > 4 * SECOND).unwrap() - 4 * SECOND;
         assert!((first - 15 * FRAME - STEP).abs() <= STEP, "{}: {first}", strategy.name());
     }

@@ -1,11 +1,11 @@
-//! Stamps that cannot be believed, clocks that are set back, and more samples than there is room for.
+//! Implausible stamps, clocks that are set back, and more samples than the configured rate.
 
 use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::{ImuMean, Refusal};
 use proptest::prelude::*;
 
-/// Something sent, on a clock that is behind by so much.
+/// An input on a clock that is behind by `by_ns`.
 fn behind(sent: &Sent, by_ns: i64) -> Sent {
     match *sent {
         Sent::Imu(sample) => Sent::Imu(ImuMean { time_ns: sample.time_ns - by_ns, ..sample }),
@@ -45,7 +45,7 @@ fn a_clock_that_is_set_back_is_followed_and_told() {
             assert!((16 * SECOND..22 * SECOND).contains(&confirmed_ns), "trusted after {confirmed_ns}");
             let told: Vec<_> = kinds(estimator.sink(), "clock_set_back").collect();
             let EventKind::ClockSetBack { seconds } = told[0].kind else { unreachable!() };
-            // Half a second is needed to believe it.
+            // Believing it takes half a second.
             assert!((seconds - by_ns as f64 * 1e-9 + 0.5).abs() < 0.02, "{seconds}");
             assert_eq!((told.len(), told[0].level(), estimator.counts().set_back), (1, Level::Warn, 1));
             assert!(told[0].status_text().unwrap().as_str().starts_with("NAV IMU clock set back"));
@@ -90,7 +90,8 @@ fn a_clock_that_is_set_back_does_not_let_a_spoofed_receiver_in() {
     }
 }
 
-/// A stamp alone, before the first sample, as the first, or among others, and what is sent as if it were not.
+/// An isolated absurd stamp, before the first sample, as the first, or among others. Other inputs are processed as if it were
+/// absent.
 #[test]
 fn one_absurd_stamp_moves_nothing() {
     let flight = Flight::new(8, 3);
@@ -120,26 +121,26 @@ fn one_absurd_stamp_moves_nothing() {
     }
 }
 
-/// Fewer stamps than it takes: what they cannot do.
+/// A burst of stamps too small to be believed.
 #[derive(Clone, Copy, Debug)]
 struct Burst {
-    /// Before which sample.
+    /// The index of the sample it precedes.
     at: usize,
     count: i64,
     step_ns: i64,
-    /// How far from the present.
+    /// Offset from the present.
     off_ns: i64,
-    /// Whether the right samples of that time are missing.
+    /// Whether it replaces the regular samples of that time.
     replaces: bool,
 }
 
 fn burst() -> impl Strategy<Value = Burst> {
     let off = prop_oneof![2 * SECOND + STEP..10 * SECOND, 10 * SECOND..8000 * SECOND];
-    // Many within less than half a second, or four in any time.
+    // Many within less than half a second, or up to four over any time.
     let size = prop_oneof![(1..100_i64, Just(STEP)), (1..=4_i64, STEP..SECOND)];
     (0..2000_usize, size, off, any::<bool>(), any::<bool>()).prop_map(
         |(at, (count, step_ns), off_ns, is_ahead, replaces)| {
-            // In front of the start of the clock is time as well.
+            // Times before the origin of the clock are valid.
             let off_ns = if is_ahead { off_ns } else { -off_ns - count * step_ns };
             Burst { at, count, step_ns, off_ns, replaces }
         },
@@ -149,7 +150,7 @@ fn burst() -> impl Strategy<Value = Burst> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
-    /// The estimate is as if they had not been there, but for what is missing.
+    /// The estimate is the same as without the burst, except for any missing samples.
     #[test]
     fn stamps_that_are_too_few_move_nothing(mut bursts in prop::collection::vec(burst(), 1..6), seed in 0..1000_u64) {
         let flight = Flight::new(10, seed);
@@ -162,7 +163,7 @@ proptest! {
             for sent in &flight.sent(true, true, false) {
                 if let Sent::Imu(sample) = sent {
                     seen += 1;
-                    // Two in a row would be one of more stamps.
+                    // Two bursts in a row would form a larger one.
                     while let Some(burst) = left.next_if(|burst| burst.at <= seen) {
                         if seen < missing_until + 2 {
                             continue;
@@ -188,8 +189,8 @@ proptest! {
         }
     }
 
-    /// A clock that jumps and stays there: there is an estimate again within a second, or with the next anchor where the gap is
-    /// longer than any that is bridged, and it is right once anchors confirm it.
+    /// A clock that jumps and keeps its new time. There is an estimate again within a second, or with the next anchor if the gap is
+    /// too long to be bridged. It is accurate once anchors confirm it.
     #[test]
     fn a_clock_that_jumps_is_followed(
         off_ns in prop_oneof![2100 * SECOND / 1000..61 * SECOND, 61 * SECOND..8000 * SECOND],
@@ -221,12 +222,12 @@ proptest! {
                 }
             }
             let again_ns = again_ns.unwrap() - jump_ns - silence_ns;
-            // A gap of a minute, with what it takes to believe it.
+            // A gap of a minute, including the time that it takes to believe it.
             let is_lost = is_ahead && off_ns + silence_ns + SECOND / 2 + 2 * STEP > 60 * SECOND;
             let bound_ns = if is_lost { 3 * SECOND / 2 + 5 * STEP } else { SECOND / 2 + 2 * STEP };
             prop_assert!(again_ns <= bound_ns, "{}: again after {again_ns} ns", strategy.name());
             let (error_m, degraded) = last.unwrap();
-            // After a long gap its attitude is unknown, and it may take longer to confirm it.
+            // After a long gap the attitude is unknown, and confirming it may take longer.
             let is_long = is_ahead && !is_lost && off_ns + silence_ns > 10 * SECOND;
             let is_told = error_m < 6.0 && (!degraded || is_long);
             prop_assert!(is_told, "{}: {error_m} m, degraded {degraded}", strategy.name());
@@ -234,7 +235,7 @@ proptest! {
     }
 }
 
-/// What was told before the first sample is not given up for two stamps that agree.
+/// Reports before the first sample are not discarded for two stamps that agree.
 #[test]
 fn two_absurd_stamps_before_the_first_do_not_cost_the_warm_start() {
     let flight = Flight::new(4, 3);
@@ -264,7 +265,7 @@ fn the_first_sample_waits_for_one_that_agrees() {
     }
 }
 
-/// Legal settings: nothing is dropped, and no more is held than is stated.
+/// With valid settings, nothing is dropped and the stated capacity is not exceeded.
 #[test]
 fn a_fast_imu_and_a_long_lateness_fit() {
     let flight = Flight::new(4, 3);
@@ -274,7 +275,7 @@ fn a_fast_imu_and_a_long_lateness_fit() {
         config.params.lateness = 3.0;
         config.params.keyframe_interval = 2.0;
         let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
-        // Before the start, too: nothing tells where it is for twenty seconds.
+        // Before the start as well: the position is unknown for twenty seconds.
         let fast = |i: i64, from: &ImuMean| ImuMean { time_ns: i * SECOND / 4000, ..*from };
         let most = config.params.room()[0];
         let mut held = 0;
@@ -295,7 +296,7 @@ fn a_fast_imu_and_a_long_lateness_fit() {
     }
 }
 
-/// More than was said: the oldest leave, which is counted and told, and the estimate goes on.
+/// More than the configured rate: the oldest samples are dropped, which is counted and reported, and the estimate continues.
 #[test]
 fn an_imu_that_is_too_fast_drops_the_oldest_and_says_so() {
     let flight = Flight::new(12, 3);
@@ -320,7 +321,7 @@ fn an_imu_that_is_too_fast_drops_the_oldest_and_says_so() {
             assert!(dropped > 0, "{}: {dropped}", strategy.name());
             assert_eq!(told.sum::<u64>(), dropped);
             assert!(count(estimator.sink(), "samples_dropped") < 1000, "not one event a sample");
-            // What can no longer be placed is refused.
+            // Inputs that can no longer be placed are refused.
             let late = estimator.add_pose_anchor(PoseAnchor { provider: 3, ..flight.anchors[9] });
             let too_old = Refusal::TooOld { time_ns: flight.anchors[9].time_ns };
             assert_eq!(late, Err(EstimatorError::Degraded(Reason::Refused(too_old))), "{}", strategy.name());

@@ -6,7 +6,7 @@ use crate::navigation::smoother::{Factor, Rows};
 use crate::navigation::{Estimate, POSITION, Refusal, States};
 use nalgebra::{Matrix1, Vector3};
 
-/// A provider that says where it is along x, whatever that is.
+/// A provider that reports its position along x, with any value.
 #[derive(Clone, Copy, Debug)]
 struct Along(f64);
 
@@ -40,7 +40,7 @@ fn degraded_an_outlier_is_refused_and_the_estimate_goes_on() {
             }
         }
         assert_eq!(outputs, 40);
-        // The third in a row is more than an outlier.
+        // Three consecutive refusals are more than an outlier.
         assert_eq!(estimator.health().state, HealthState::Degraded);
         let degraded = estimator.predicted(8 * SECOND).unwrap();
         assert!(degraded.degraded && degraded.label == SourceLabel::VisualPropagated, "it keeps its label");
@@ -92,7 +92,7 @@ fn degraded_a_gap_of_the_imu_is_bridged() {
             assert_eq!(result, if is_after { Err(EstimatorError::Degraded(Reason::Bridged)) } else { Ok(()) });
         }
         assert!(estimator.predicted(4 * SECOND).unwrap().covariance[(0, 0)] > 0.1);
-        // The camera parts the gap, and says something of the motion in it; what the IMU missed is not known all the same.
+        // The camera divides the gap and measures the motion in it. The motion that the IMU missed is still unknown.
         let mut estimator = started(&flight, *strategy);
         for sent in &flight.sent(true, false, false) {
             let is_missing = (2 * SECOND..5 * SECOND / 2).contains(&sent.time_ns());
@@ -120,7 +120,7 @@ fn fatal_a_window_that_overflows_has_no_estimate_for_this_tick() {
         let mut overflows = 0;
         let later = Flight::new(6, 2);
         for provider in 0..600 {
-            // They wait for the IMU, all of them: a flood.
+            // All of them wait for the IMU: a flood.
             let anchor = PoseAnchor { provider, time_ns: 3 * SECOND + i64::from(provider), ..later.anchors[2] };
             overflows +=
                 usize::from(estimator.add_pose_anchor(anchor) == Err(EstimatorError::Fatal(Reason::Overflow)));
@@ -143,7 +143,7 @@ fn fatal_numbers_that_are_no_good_are_taken_back() {
         estimator.warm_start(flight.warm_start(0)).unwrap();
         flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
         let results: Vec<_> = (0..5).map(|i| estimator.add_factor(2 * SECOND + i * STEP, 0, Along(1e12))).collect();
-        // The fourth overrules the gate, and would be on the far side of the sun.
+        // The fourth overrides the gate, and would move the estimate to the far side of the sun.
         assert!(matches!(results[3], Err(EstimatorError::Fatal(Reason::Refused(_)))), "{results:?}");
         assert!(estimator.tick(3 * SECOND).is_none(), "none for this tick");
         let after = estimator.tick(3 * SECOND + SECOND / 5).unwrap();
@@ -164,7 +164,7 @@ fn fatal_after_a_minute_without_the_imu_it_is_lost_until_an_anchor() {
             later.samples.iter().filter(move |sample| (from * SECOND + 1..=to * SECOND).contains(&sample.time_ns))
         };
         let results: Vec<_> = between(70, 80).map(|sample| estimator.add_imu(sample)).collect();
-        // A few samples might have broken stamps.
+        // A few samples might have corrupt stamps.
         for (i, result) in results[..100].iter().enumerate() {
             let ahead = Refusal::InTheFuture { time_ns: 70 * SECOND + (i as i64 + 1) * STEP };
             assert_eq!(*result, Err(EstimatorError::Degraded(Reason::Refused(ahead))));
@@ -201,10 +201,10 @@ fn without_an_estimate_for_three_seconds_the_fallback_engages_once_and_recovers_
         }
         let times =
             |name| kinds(estimator.sink(), name).map(|event| event.time_ns / (SECOND / 10)).collect::<Vec<_>>();
-        // The last estimate was the one of 5.0 s, or of 5.2 s, by prediction.
+        // The last estimate was at 5.0 s, or at 5.2 s by prediction.
         let engaged = times("fallback_engaged");
         assert!(engaged.len() == 1 && (80..=84).contains(&engaged[0]), "{engaged:?}");
-        // Half a second of its samples is needed to believe a gap that is as long.
+        // A gap of this length is believed only after half a second of samples.
         assert_eq!(times("fallback_recovered"), [126]);
         assert_eq!(times("fallback_imminent").len(), 1);
         let levels: Vec<_> = ["fallback_imminent", "fallback_engaged", "fallback_recovered"]

@@ -1,4 +1,4 @@
-//! A flight as sums of sinusoids, and what its sensors measure.
+//! A flight as sums of sinusoids, and its sensor measurements.
 
 use super::*;
 use crate::navigation::eskf::ImuMean;
@@ -20,7 +20,7 @@ pub(super) struct State {
     pub(super) world_from_body: UnitQuaternion<f64>,
 }
 
-/// Something that reaches the estimator.
+/// An input of the estimator.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Sent {
     Imu(ImuMean),
@@ -52,11 +52,11 @@ impl Sent {
     }
 }
 
-/// What is measured from the start on.
+/// Measurements since the start.
 pub(super) struct Flight {
     pub(super) frame: LocalFrame,
     pub(super) samples: Vec<ImuMean>,
-    /// Of the accelerometer, and of the gyroscope.
+    /// Accelerometer bias and gyroscope bias.
     pub(super) biases: [Vector3<f64>; 2],
     pub(super) vio: Vec<VioOutput>,
     /// One a second, between two frames.
@@ -90,7 +90,7 @@ fn motion(t: f64) -> [Vector3<f64>; 3] {
     all
 }
 
-/// Its thrust carries it.
+/// The direction of thrust follows from the acceleration.
 fn attitude(t: f64) -> UnitQuaternion<f64> {
     let [_, velocity, acceleration] = motion(t);
     let up = (acceleration + Vector3::new(0.0, 0.0, GRAVITY)).normalize();
@@ -190,7 +190,7 @@ impl Flight {
         Self { frame, samples, biases, vio, anchors, fixes, health: health.collect() }
     }
 
-    /// What the flight controller knows at a time: nearly the truth.
+    /// The flight controller's state at a time: close to the truth.
     pub(super) fn warm_start(&self, time_ns: i64) -> FlightControllerState {
         let truth = Self::truth(time_ns);
         let (tilt_deviation, heading_deviation) = (0.01, 0.03);
@@ -208,7 +208,7 @@ impl Flight {
         }
     }
 
-    /// Everything after the first sample, in the order of stamps; the camera, anchors and receiver only where they are asked for.
+    /// All inputs after the first sample, ordered by stamp. The camera, anchors and receiver are included on request.
     pub(super) fn sent(&self, with_vio: bool, with_anchors: bool, with_gnss: bool) -> Vec<Sent> {
         let mut sent: Vec<Sent> = self.samples.iter().skip(1).copied().map(Sent::Imu).collect();
         if with_vio {
@@ -225,7 +225,7 @@ impl Flight {
         sent
     }
 
-    /// How far an estimate is from the truth of its time, m, and how it is turned, rad.
+    /// Position error, m, and rotation error, rad, of an estimate at its time.
     pub(super) fn error(&self, output: &EstimatorOutput) -> (f64, f64) {
         let truth = Self::truth(output.time_ns);
         let turn = self.frame.other_from_self(&LocalFrame::new(output.position)).rotation;

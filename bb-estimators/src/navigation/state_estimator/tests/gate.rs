@@ -1,4 +1,4 @@
-//! The rows of the spoof gate.
+//! The requirements of the spoof gate.
 
 use super::flight::{SECOND, STEP};
 use super::*;
@@ -6,16 +6,16 @@ use crate::navigation::Refusal;
 use crate::navigation::geodesy::Geodetic;
 use nalgebra::Vector3;
 
-/// What the receiver and the anchors do.
+/// The receiver and the anchors in a test.
 struct Scenario {
     health: fn(i64) -> GpsHealth,
-    /// What the fixes are off, m.
+    /// Offset of the fixes, m.
     off: fn(i64) -> f64,
     /// Whether there are anchors.
     anchors: fn(i64) -> bool,
 }
 
-/// Plays it with a camera; times in ns.
+/// Plays the scenario with a camera. Times are in ns.
 fn play(strategy: StrategyKind, scenario: &Scenario) -> (Estimator, Vec<EstimatorOutput>) {
     let flight = Flight::new(40, 5);
     let mut estimator = started(&flight, strategy);
@@ -47,7 +47,7 @@ fn play(strategy: StrategyKind, scenario: &Scenario) -> (Estimator, Vec<Estimato
     (estimator, outputs)
 }
 
-/// Changes of the gate: time in tenths of a second, and to what.
+/// Changes of the gate: the time in tenths of a second, and the new state.
 fn changes(estimator: &Estimator) -> Vec<(i64, &'static str)> {
     let change = |event: &Event| match event.kind {
         EventKind::Gate { to, .. } => (event.time_ns / (SECOND / 10), to.name()),
@@ -66,7 +66,7 @@ fn a_spoofed_receiver_is_let_in_after_ten_seconds_and_an_anchor_that_agrees() {
     let scenario = Scenario { health: spoofed_from_5_to_10, off, anchors: |_| true };
     for strategy in StrategyKind::ALL {
         let (estimator, _) = play(*strategy, &scenario);
-        // The anchor of 20 s comes 15 ms after the second.
+        // The anchor at 20 s comes 15 ms after the full second.
         let expected = [(50, "blocked"), (100, "dwelling"), (200, "awaits_anchor"), (200, "open")];
         assert_eq!(changes(&estimator), expected);
         let rejected = kinds(estimator.sink(), "rejected").count();
@@ -145,10 +145,10 @@ fn a_fix_beyond_the_bounded_distance_begins_the_dwell_again() {
     }
 }
 
-/// Each reason, and that it goes to the recorder: at warn.
+/// Each reason is produced, and reaches the recorder at the level warn.
 #[test]
 fn every_rejection_is_provoked_and_told() {
-    // Unhealthy before, spoofed, then far off, then elsewhere than the anchor, then right.
+    // Unhealthy, then spoofed, then far off, then in disagreement with the anchor, then correct.
     let health = |time_ns| match time_ns / SECOND {
         0..2 => GpsHealth::NoFix,
         5..6 => GpsHealth::Spoofed,
@@ -159,7 +159,7 @@ fn every_rejection_is_provoked_and_told() {
         8..22 => 60.0,
         _ => 0.0,
     };
-    // Between two anchors, a receiver that was stable for long enough waits.
+    // A receiver that was stable for long enough waits for the next anchor.
     let scenario = Scenario { health, off, anchors: |time_ns| (time_ns / SECOND) % 5 == 4 };
     for strategy in StrategyKind::ALL {
         let (estimator, _) = play(*strategy, &scenario);
@@ -194,7 +194,7 @@ fn every_rejection_is_a_text_that_fits() {
             let text = event.status_text().unwrap();
             assert!(text.as_str().len() <= 50 && text.as_str().starts_with("NAV GPS re"), "{text}");
         }
-        // A receiver that lies while it is reported stable is refused by the filter's own gate.
+        // If a receiver is wrong but reported stable, the filter's own gate refuses it.
         let outliers = kinds(estimator.sink(), "degraded").filter(|event| event.time_ns < 5 * SECOND).count();
         assert_eq!(outliers, 24);
         let unhealthy = estimator.sink().iter().filter(|event| event.time_ns < STEP).count();
@@ -213,7 +213,8 @@ fn a_receiver_of_which_nothing_is_reported_is_not_used() {
     }
 }
 
-/// Fixes that are moved, or an estimate that is: the outputs from 4 s on, the error of each from the fixes, and whether it is degraded.
+/// Tests with moved fixes or a moved estimate. Returns the outputs from 4 s on, each with its error from the fixes, and whether it
+/// is degraded.
 fn moved_fixes(strategy: StrategyKind, with_vio: bool) -> Vec<(f64, f64, bool)> {
     let flight = Flight::new(20, 3);
     let mut estimator = started(&flight, strategy);
@@ -235,7 +236,7 @@ fn moved_fixes(strategy: StrategyKind, with_vio: bool) -> Vec<(f64, f64, bool)> 
     outputs
 }
 
-/// Where nothing but the IMU and the receiver tell where it is, a gate that never yields would lose it for ever.
+/// With only the IMU and the receiver, a gate that is never overridden would lose the position permanently.
 #[test]
 fn a_receiver_that_is_alone_overrules_the_estimate() {
     for strategy in StrategyKind::ALL {
@@ -249,7 +250,7 @@ fn a_receiver_that_is_alone_overrules_the_estimate() {
     }
 }
 
-/// Fixes that are wild contradict one another: however many are refused, none is believed, and nothing learns from them.
+/// Random fixes contradict one another: none is believed after any number of refusals, and none affects the estimate.
 #[test]
 fn fixes_and_anchors_that_do_not_agree_overrule_nothing() {
     let flight = Flight::new(80, 3);
@@ -283,7 +284,7 @@ fn fixes_and_anchors_that_do_not_agree_overrule_nothing() {
             let refused = |event: &Event| {
                 matches!(event.kind, EventKind::Degraded { reason: Reason::Refused(Refusal::Gate { .. }), .. })
             };
-            // Each that is wild, and no other.
+            // Exactly the random ones are refused.
             let expected = if with_anchors { 10 } else { 50 };
             assert_eq!(estimator.sink().iter().filter(|event| refused(event)).count(), expected);
             assert_eq!(count(estimator.sink(), "degraded"), expected, "{}", strategy.name());
@@ -291,7 +292,7 @@ fn fixes_and_anchors_that_do_not_agree_overrule_nothing() {
     }
 }
 
-/// Kilometres away by a clock that stood, or a world that was wrong: the fixes agree, and what is known of attitude stays.
+/// The estimate is kilometres off, through a stopped clock or a wrong world, and the fixes agree. The attitude is kept.
 #[test]
 fn a_receiver_that_is_alone_moves_an_estimate_that_is_kilometres_off() {
     let flight = Flight::new(80, 3);
@@ -323,7 +324,7 @@ fn a_receiver_that_is_alone_moves_an_estimate_that_is_kilometres_off() {
                 assert!(flight.error(&output).1 < 0.02, "{}: its attitude stays", strategy.name());
             }
         }
-        // The fourth that agrees.
+        // The fourth fix that agrees.
         assert_eq!(moved_ns.map(|time_ns| (time_ns - 65 * SECOND) / (SECOND / 5)), Some(3));
         assert!(worst < 10.0, "{}: {worst} m", strategy.name());
         let started: Vec<_> = kinds(estimator.sink(), "started").map(|event| event.kind).collect();
@@ -333,7 +334,7 @@ fn a_receiver_that_is_alone_moves_an_estimate_that_is_kilometres_off() {
     }
 }
 
-/// Beside a camera it does not, but nobody is told that all is well.
+/// With a camera, fixes do not override the estimate, but it is reported as degraded.
 #[test]
 fn a_receiver_beside_a_camera_never_overrules_it() {
     for strategy in StrategyKind::ALL {

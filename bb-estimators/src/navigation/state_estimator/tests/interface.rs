@@ -1,4 +1,4 @@
-//! The rows of the interface.
+//! The requirements of the interface.
 
 use super::flight::{FRAME, SECOND, STEP};
 use super::*;
@@ -6,7 +6,7 @@ use crate::navigation::geodesy::Geodetic;
 use crate::navigation::{GnssPosition, ImuMean, NavigationFactor};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// At rest, one g upwards.
+/// At rest, 1 g upwards.
 fn at_rest(time_ns: i64) -> ImuMean {
     ImuMean { time_ns, angular_velocity: Vector3::zeros(), specific_force: Vector3::new(0.0, 0.0, 9.80665) }
 }
@@ -94,7 +94,7 @@ fn set_takeoff_origin_starts_levelled_by_the_flight_controller() {
     }
 }
 
-/// The flight controller tells it before the first sample comes.
+/// The flight controller reports it before the first sample comes.
 #[test]
 fn an_attitude_from_before_the_first_sample_levels_the_start() {
     let world_from_body = UnitQuaternion::from_euler_angles(0.0, 0.0, 1.0);
@@ -143,7 +143,7 @@ fn a_warm_start_inflates_what_the_flight_controller_says() {
     for strategy in StrategyKind::ALL {
         let estimator = started(&flight, *strategy);
         let start = estimator.predicted(STEP).unwrap();
-        // 1 m, times two; 0.03 rad, times two.
+        // 1 m, doubled, and 0.03 rad, doubled.
         assert!((start.covariance[(0, 0)].sqrt() - 2.0).abs() < 0.01, "{}", start.covariance[(0, 0)].sqrt());
         assert!((start.covariance[(5, 5)].sqrt() - 0.06).abs() < 1e-3);
         let (position, rotation) = flight.error(&start);
@@ -192,7 +192,7 @@ fn add_vio_and_add_pose_anchor_say_what_became_of_them() {
             Err(EstimatorError::Degraded(Reason::Refused(crate::navigation::Refusal::NoKeyframe { .. })))
         ));
         let anchor = PoseAnchor { time_ns: 30 * STEP, ..flight.anchors[0] };
-        // A second too early, it is far off.
+        // One second too early, it is far off.
         assert!(matches!(
             estimator.add_pose_anchor(anchor),
             Err(EstimatorError::Degraded(Reason::Refused(crate::navigation::Refusal::Gate { .. })))
@@ -275,7 +275,7 @@ fn current_estimate_is_the_newest_keyframe_and_the_history_says_whether_it_is_sm
     }
 }
 
-/// What is measured later corrects the smoother's keyframes, and not the filter's.
+/// Later measurements correct the smoother's keyframes, but not the filter's.
 #[test]
 fn history_of_the_smoother_is_better_than_that_of_the_filter() {
     for strategy in StrategyKind::ALL {
@@ -305,7 +305,7 @@ fn outputs_come_at_their_rate_predicted_to_the_moment_of_emission() {
         let mut outputs = Vec::new();
         for sent in &flight.sent(true, true, false) {
             sent.to(&mut estimator).unwrap();
-            // A clock of its own, 1 ms after the sample.
+            // The caller's own clock, 1 ms after the sample.
             if let Sent::Imu(sample) = sent {
                 outputs.extend(estimator.tick(sample.time_ns + 1_000_000));
             }
@@ -348,7 +348,7 @@ fn a_degraded_covariance_of_the_provider_is_in_the_quality() {
     }
 }
 
-/// 60 km, so that the world moves on eleven times.
+/// A flight of 60 km: the world's origin moves eleven times.
 #[test]
 fn the_world_moves_on_with_the_robot() {
     for strategy in StrategyKind::ALL {
@@ -370,7 +370,7 @@ fn the_world_moves_on_with_the_robot() {
         for i in 1..=1500 {
             let time_ns = i * SECOND / 10;
             estimator.add_imu(&ImuMean { time_ns, ..at_rest(0) }).unwrap();
-            // North along the meridian, 6,366 km from the centre of curvature or so: anchors tell.
+            // North along the meridian, about 6,366 km from the centre of curvature, as measured by anchors.
             let latitude = start.latitude + 400.0 * (time_ns as f64 * 1e-9) / 6_366_000.0;
             let mut anchor = flight.anchors[0];
             anchor.time_ns = time_ns;

@@ -1,9 +1,9 @@
-//! The rows of the source label.
+//! The requirements of the source label.
 
 use super::flight::SECOND;
 use super::*;
 
-/// Labels with their times, s, of a flight whose camera and anchors are only seen at some times.
+/// Labels with their times, s, of a flight with camera and anchors only at some times.
 fn timeline(
     strategy: StrategyKind,
     sees: impl Fn(i64) -> bool,
@@ -56,7 +56,7 @@ fn visual_loss_demotes_to_dead_reckoning_until_the_next_anchor() {
 #[test]
 fn while_dead_reckoning_the_covariance_grows_monotonically() {
     for strategy in StrategyKind::ALL {
-        // The camera comes back at 20 s, and says more of the velocity than was known; where it is, only the anchor says.
+        // The camera returns at 20 s and improves the velocity. Only the anchor determines the position.
         let (_, outputs) =
             timeline(*strategy, |second| !(10..20).contains(&second), |second| !(10..25).contains(&second));
         let lost: Vec<_> = outputs

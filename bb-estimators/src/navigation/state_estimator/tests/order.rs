@@ -4,7 +4,7 @@ use super::flight::SECOND;
 use super::*;
 use proptest::prelude::*;
 
-/// All that can be asked for.
+/// All query results.
 fn answers(estimator: &mut Estimator) -> impl PartialEq + core::fmt::Debug + use<> {
     let now_ns = 3 * SECOND;
     let gate = estimator.health().gate;
@@ -46,7 +46,7 @@ proptest! {
             for sent in &sent {
                 let _ = sent.to(&mut in_order);
             }
-            // One sample of the IMU in ten up to 0.3 s late, and the others up to 1.6 s, the longest that is placed being 2 s.
+            // One IMU sample in ten is up to 0.3 s late, and other inputs up to 1.6 s. The limit is 2 s.
             let mut arriving: Vec<(i64, &Sent)> = sent.iter().enumerate().map(|(i, sent)| {
                 let most = match sent {
  Sent::Imu(_) if i % 10 == 0 => 0.3e9,
@@ -88,14 +88,14 @@ fn what_is_older_than_the_window_is_refused_and_counted() {
     }
 }
 
-/// A late input may change what was decided of earlier ones, and says so.
+/// A late input may change earlier decisions, and this is reported.
 #[test]
 fn what_is_revised_is_told() {
     let flight = Flight::new(4, 1);
     for strategy in StrategyKind::ALL {
         let mut estimator = started(&flight, *strategy);
         flight.samples[1..].iter().for_each(|sample| estimator.add_imu(sample).unwrap());
-        // Fixes, and only then the health of their time.
+        // Fixes first, and only then the health at their times.
         flight.fixes[14..].iter().for_each(|fix| assert!(estimator.add_gnss(*fix).is_err()));
         flight.health[10..].iter().for_each(|reading| ignore(estimator.add_gps_health(*reading)));
         let revised = kinds(estimator.sink(), "revised").map(|event| event.kind);

@@ -1,11 +1,11 @@
-//! The rows of recorder and logs.
+//! The requirements of recorder and logs.
 
 use super::flight::{FRAME, SECOND, STEP};
 use super::*;
 use crate::navigation::Refusal;
 use nalgebra::Vector3;
 
-/// A flight with all that can go wrong.
+/// A flight with every kind of fault.
 fn bad_day(strategy: StrategyKind) -> Estimator {
     let flight = Flight::new(30, 4);
     let mut estimator = started(&flight, strategy);
@@ -113,7 +113,7 @@ fn status_texts_have_at_most_fifty_characters() {
         let text = Event { time_ns: 0, kind }.status_text().unwrap();
         assert!((10..=50).contains(&text.as_str().len()) && text.as_str().starts_with("NAV "), "{text}");
     }
-    // Those of usual numbers are not cut.
+    // Texts with typical numbers are not truncated.
     let usual = EventKind::Rejected { rejection: Rejection::Disagrees { distance_m: 123.4 } };
     assert_eq!(
         Event { time_ns: 0, kind: usual }.status_text().unwrap().as_str(),
@@ -142,7 +142,7 @@ fn keyframes_that_leave_the_window_go_to_the_recorder_once_and_in_order() {
             })
             .collect();
         let times: Vec<i64> = left.iter().map(|estimate| estimate.time_ns).collect();
-        // From the start to the fifteenth before the newest.
+        // From the start to the fifteenth keyframe before the newest.
         let expected: Vec<i64> = (0..=80 - 15).map(|i| i * FRAME).collect();
         assert_eq!(times, expected);
         assert!(left.iter().all(|estimate| estimate.smoothed == strategy.is_smoothing()));

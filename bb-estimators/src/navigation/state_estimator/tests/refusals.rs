@@ -1,4 +1,4 @@
-//! Each reason for which an input is not in the estimate is provoked, counted and told.
+//! Each reason for which an input is not in the estimate is provoked, counted and reported.
 
 use super::flight::{FRAME, SECOND, STEP};
 use super::strategy::{Measured, Strategy, Trust};
@@ -10,7 +10,7 @@ use crate::navigation::{AbsolutePose, Estimate, GnssPosition, Refusal, States};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 #[expect(clippy::large_enum_variant, reason = "there are few of them")]
-/// A provider that sees nothing, cannot say anything of where it would be, or says where it is.
+/// A provider that observes nothing, is out of range at the estimate, or gives a position.
 #[derive(Clone, Copy, Debug)]
 enum Provided {
     Nothing,
@@ -97,7 +97,7 @@ fn every_refusal_that_a_user_can_see() {
     }
 }
 
-/// A keyframe of the smoother takes so many; the filter holds none of them, and takes any number.
+/// A keyframe of the smoother takes a limited number. The filter holds none of them, and takes any number.
 #[test]
 fn factors_beyond_the_room_of_a_keyframe_are_refused() {
     let flight = Flight::new(4, 3);
@@ -115,8 +115,8 @@ fn factors_beyond_the_room_of_a_keyframe_are_refused() {
     }
 }
 
-/// Samples that are within the range of a sensor lead an estimate away, until it is nowhere that an aircraft may be; the flight
-/// controller, or an anchor, tells where it is then.
+/// Samples within the range of a sensor move the estimate to an impossible position for an aircraft. The flight controller, or an
+/// anchor, then provides the right one.
 #[test]
 fn an_estimate_that_was_led_off_the_earth_is_lost() {
     let flight = Flight::new(40, 3);
@@ -180,7 +180,7 @@ fn health_goes_through_all_its_states() {
     }
 }
 
-/// Biases of the odometry are no measurement, but what starts in the air begins with them, unless they are absurd.
+/// The odometry's biases are no measurement. A start in the air uses them as initial values, unless they are implausible.
 #[test]
 fn the_bias_of_the_odometry_is_what_a_start_begins_with() {
     let flight = Flight::new(12, 3);
@@ -201,7 +201,7 @@ fn the_bias_of_the_odometry_is_what_a_start_begins_with() {
     }
 }
 
-/// Anchors that did not fit the estimate of before do not help the next to overrule the new one.
+/// Anchors that did not fit the previous estimate do not help the next one to overrule the new estimate.
 #[test]
 fn a_start_forgets_which_anchors_were_refused() {
     for strategy in StrategyKind::ALL {
@@ -224,7 +224,7 @@ fn a_start_forgets_which_anchors_were_refused() {
     }
 }
 
-/// A height that the IMU alone has drifted to is no reason to give up: the receiver tells the right one.
+/// A height that has drifted with the IMU alone is not fatal: the receiver provides the right one.
 #[test]
 fn a_height_that_drifted_away_is_corrected() {
     let flight = Flight::new(12, 3);
@@ -236,7 +236,7 @@ fn a_height_that_drifted_away_is_corrected() {
         let mut was_outside = false;
         for sent in &flight.sent(false, false, true) {
             match sent {
-                // It falls by some 50 m, or seems to.
+                // It falls by about 50 m, or appears to.
                 Sent::Imu(sample) if sample.time_ns < 3 * SECOND => {
                     let less = crate::navigation::ImuMean {
                         specific_force: sample.specific_force - Vector3::z() * 12.0,

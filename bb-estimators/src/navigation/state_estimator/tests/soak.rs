@@ -1,4 +1,4 @@
-//! Random, broken, late, repeated and absurd inputs: nothing panics, nothing grows, and it recovers.
+//! Random, corrupt, late, repeated and absurd inputs: no panic, no growing memory, and recovery afterwards.
 
 use super::flight::{SECOND, STEP};
 use super::*;
@@ -25,7 +25,7 @@ fn orientation() -> impl Strategy<Value = UnitQuaternion<f64>> {
     ]
 }
 
-/// A stamp near the present, or none at all.
+/// A stamp near the present, or any stamp.
 #[derive(Clone, Copy, Debug)]
 enum Stamp {
     Near(i64),
@@ -75,7 +75,7 @@ impl Chaos {
         };
         let near =
             |[x, y, z]: [f64; 3]| Geodetic { latitude: 0.8377 + x * 1e-6, longitude: 0.192 + y * 1e-6, height: z };
-        // Twice, as a broken link would.
+        // Twice, as over a faulty link.
         for _ in 0..2 {
             match self {
                 Self::Imu(stamp, angular_velocity, specific_force) => {
@@ -150,13 +150,13 @@ proptest! {
         for strategy in StrategyKind::ALL {
             let mut estimator = estimator(*strategy);
             let _ = estimator.warm_start(flight.warm_start(0));
-            // Good samples between the bad, so that time goes on.
+            // Good samples between the bad ones advance the time.
             for (i, chaos) in chaos.iter().enumerate() {
                 let sample = &flight.samples[i * 15];
                 let _ = estimator.add_imu(sample);
                 chaos.to(&mut estimator, &flight, sample.time_ns);
             }
-            // Then all is well again. From the second anchor on that contradicts it, it must know that it was led astray.
+            // Afterwards all inputs are good. From the second anchor that contradicts it, a wrong estimate must be degraded.
             let (mut anchors, mut outputs) = (0, 0);
             for sent in &flight.sent(true, true, false) {
                 if sent.time_ns() <= 6 * SECOND {
@@ -207,7 +207,7 @@ fn nothing_grows_over_a_long_flight() {
     }
 }
 
-/// However far away wrong anchors are, right ones find the way back: even from the other side of the Earth.
+/// The estimate recovers with correct anchors after wrong anchors at any distance, even on the other side of the Earth.
 #[test]
 fn anchors_lead_back_from_anywhere() {
     let flight = Flight::new(30, 8);
@@ -238,8 +238,8 @@ fn anchors_lead_back_from_anywhere() {
     }
 }
 
-/// Anchors that are far off and agree are believed; what counts is that the right ones are believed again, and that it says so
-/// meanwhile.
+/// Anchors that are far off but agree are believed. Correct ones must be believed again later, and the estimate must be degraded in
+/// between.
 #[test]
 fn wrong_anchors_that_agree_are_overruled_by_right_ones() {
     let flight = Flight::new(50, 8);
@@ -264,7 +264,7 @@ fn wrong_anchors_that_agree_are_overruled_by_right_ones() {
                 believed |= error_m > 0.9 * off_m;
                 let is_trusted = error_m < 5.0 && !output.degraded;
                 if contradicted {
-                    // Two in a row are more than an outlier, unless it is absurd.
+                    // Two in a row are more than an outlier, unless the offset is absurd.
                     let is_told = output.degraded || (off_m < 100.0 && time_ns < 32 * SECOND + SECOND / 10);
                     assert!(error_m < 20.0 || is_told, "{}: {error_m} m at {time_ns}", strategy.name());
                     trusted_ns = trusted_ns.or(is_trusted.then_some(time_ns));
