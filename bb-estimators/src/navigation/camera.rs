@@ -1,4 +1,4 @@
-//! A camera: where a point of the body is seen, and from which direction a pixel comes.
+//! A camera model: projects points to pixels and recovers the direction of a pixel.
 
 #[cfg(test)]
 mod tests;
@@ -7,11 +7,11 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3, UnitQuaternion, Vector2, Vector3};
 
 use crate::navigation::refusal::Refusal;
 
-/// Newton steps before a pixel counts as one that the lens cannot have produced.
+/// Newton steps before a pixel is rejected as one that the lens cannot have produced.
 const STEPS: usize = 30;
 
-/// A pinhole camera with radial and tangential distortion, and its place on the body. The optical axis is z, x points to the
-/// right of the image and y down.
+/// A pinhole camera with radial and tangential distortion, and its pose on the body. The optical axis is z; x points to the right
+/// of the image and y down.
 ///
 /// With normalised coordinates `x = X / Z`, `y = Y / Z`, and `r² = x² + y²`, a point appears at
 ///
@@ -39,13 +39,13 @@ pub struct Camera {
     pub focal_length: Vector2<f64>,
     /// cx, cy, pixels.
     pub centre: Vector2<f64>,
-    /// Width and height of the image, pixels; nothing is seen outside.
+    /// Width and height of the image, pixels; nothing outside it is visible.
     pub size: Vector2<f64>,
     /// k1, k2, k3, p1, p2.
     pub distortion: [f64; 5],
-    /// Takes coordinates in the camera to the body.
+    /// Rotates camera coordinates to body coordinates.
     pub body_from_camera: UnitQuaternion<f64>,
-    /// Of the camera's centre in the body, m.
+    /// Position of the camera's centre in the body frame, m.
     pub position: Vector3<f64>,
 }
 
@@ -54,22 +54,22 @@ pub struct Camera {
 pub struct Seen {
     /// u, v, pixels.
     pub pixel: Vector2<f64>,
-    /// What the pixel changes by with the point, in the camera's axes, `2 × 3`.
+    /// Derivative of the pixel with respect to the point, in camera axes, `2 × 3`.
     pub jacobian: Matrix2x3<f64>,
 }
 
-/// Where a pixel comes from.
+/// The direction that corresponds to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Undistorted {
     /// x, y at depth 1.
     pub direction: Vector2<f64>,
-    /// What the pixel changes by with these, `2 × 2`.
+    /// Derivative of the pixel with respect to these coordinates, `2 × 2`.
     pub jacobian: Matrix2<f64>,
 }
 
 impl Camera {
-    /// A camera without distortion at the body's origin, with the body's axes: focal lengths, principal point and size in
-    /// pixels.
+    /// Creates a camera without distortion at the body's origin, aligned with the body's axes. Takes the focal lengths, the
+    /// principal point and the size, in pixels.
     pub fn pinhole(focal_length: (f64, f64), centre: (f64, f64), size: (f64, f64)) -> Self {
         Self {
             focal_length: Vector2::new(focal_length.0, focal_length.1),
@@ -81,7 +81,7 @@ impl Camera {
         }
     }
 
-    /// Whether every number is finite, and lengths and sizes are positive.
+    /// Whether every number is finite and all lengths and sizes are positive.
     pub(in crate::navigation) fn is_sound(&self) -> bool {
         let lengths = [self.focal_length, self.size];
         let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
@@ -92,11 +92,11 @@ impl Camera {
             && (self.body_from_camera.coords.norm() - 1.0).abs() < 1e-6
     }
 
-    /// Where a point in the camera's axes appears, m.
+    /// Projects a point in camera axes, m, to a pixel.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NotObservable`] if it is not in front of the camera; [`Refusal::NonFinite`].
+    /// Returns [`Refusal::NotObservable`] if the point is not in front of the camera, and [`Refusal::NonFinite`].
     pub fn seen(&self, point: &Vector3<f64>) -> Result<Seen, Refusal> {
         if !point.iter().all(|x| x.is_finite()) {
             return Err(Refusal::NonFinite);
@@ -109,12 +109,12 @@ impl Camera {
         Ok(Seen { pixel, jacobian: jacobian * by_point })
     }
 
-    /// Where a pixel comes from, by Newton's method.
+    /// Recovers the direction of a pixel by Newton's method.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`]; [`Refusal::OutOfRange`] if the pixel is outside the image, or not one that the lens can have
-    /// produced.
+    /// Returns [`Refusal::NonFinite`], or [`Refusal::OutOfRange`] if the pixel is outside the image or the lens cannot have
+    /// produced it.
     pub fn undistorted(&self, pixel: &Vector2<f64>) -> Result<Undistorted, Refusal> {
         if !pixel.iter().all(|x| x.is_finite()) {
             return Err(Refusal::NonFinite);
@@ -125,7 +125,7 @@ impl Camera {
         let mut direction = (pixel - self.centre).component_div(&self.focal_length);
         for _ in 0..STEPS {
             let (expected, jacobian) = self.distorted(&direction);
-            // Beyond the fold of the distortion, where it turns back, two directions have one pixel.
+            // Beyond the fold of the distortion, two directions map to the same pixel.
             let determinant = jacobian.determinant();
             if determinant.is_nan() || determinant <= 0.0 {
                 break;
@@ -140,13 +140,13 @@ impl Camera {
         Err(Refusal::OutOfRange)
     }
 
-    /// The pixel of normalised coordinates, and its derivatives by them.
+    /// The pixel of normalised coordinates, and its derivatives with respect to them.
     fn distorted(&self, direction: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let [k1, k2, k3, p1, p2] = self.distortion;
         let (x, y) = (direction.x, direction.y);
         let square = x * x + y * y;
         let radial = 1.0 + square * (k1 + square * (k2 + square * k3));
-        // ∂radial/∂r², twice: for the factor 2 of ∂r²/∂x.
+        // Twice ∂radial/∂r², for the factor 2 of ∂r²/∂x.
         let slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3));
         let at = Vector2::new(
             x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x),
@@ -163,7 +163,7 @@ impl Camera {
         (self.focal_length.component_mul(&at) + self.centre, focal * by_direction)
     }
 
-    /// `camera_from_world`, and the camera's centre in the world, of a body.
+    /// `camera_from_world` and the camera's centre in the world, for a given body pose.
     pub(in crate::navigation) fn placed(
         &self,
         position: &Vector3<f64>,
@@ -174,7 +174,7 @@ impl Camera {
     }
 }
 
-/// Normalised coordinates of a point, and their derivatives by it; none of one that is not in front.
+/// Normalised coordinates of a point and their derivatives with respect to it; `None` if the point is not in front of the camera.
 pub(in crate::navigation) fn normalised(point: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
     const NEAREST_M: f64 = 1e-3;
     if point.z.is_nan() || point.z <= NEAREST_M {
