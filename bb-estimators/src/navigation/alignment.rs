@@ -110,7 +110,7 @@ impl Alignment {
         let bias = sqrt(self.rotation.largest_variance(self.count)) / sqrt(self.count);
         Ok(Start {
             gyroscope_bias: self.rotation.mean,
-            // Of noise that is not white over the whole of it, no less than a part is known.
+            // Non-white noise does not average out, so the bias is never known better than this.
             gyroscope_bias_deviation: bias.max(1e-4),
             accelerometer_bias_deviation: accelerometer_bias,
             rotation_covariance: rotation_covariance(tilt, heading.1),

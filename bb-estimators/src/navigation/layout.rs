@@ -24,7 +24,7 @@ pub(in crate::navigation) struct Layout<const N: usize> {
 }
 
 impl<const N: usize> Layout<N> {
-    /// Creates the layout of errors that all belong to one, known quantity.
+    /// A layout in which all errors form one quantity that is known.
     pub(in crate::navigation) const EMPTY: Self = Self { blocks: [0; N], largest: [0.0; N], lost: [0.0; N] };
 
     /// The layout of an [`Eskf`](super::Eskf). The keyframe and the barometer's bias refer to the pose.

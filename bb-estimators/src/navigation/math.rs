@@ -168,7 +168,7 @@ mod tests {
         for angle in [0.0, 1e-6, 0.05, 0.1999, 0.2001, 1.5, 4.0] {
             let vector = AXIS * angle;
             let integrals = Integrals::new(&vector);
-            // Fewer Gauss–Legendre nodes would suffice; the midpoint rule needs no table.
+            // Gauss–Legendre quadrature would need fewer nodes; the midpoint rule needs no table.
             let steps = 20_000;
             let (mut once, mut twice) = (Vector3::zeros(), Vector3::zeros());
             for i in 0..steps {

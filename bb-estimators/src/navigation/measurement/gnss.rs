@@ -122,7 +122,7 @@ impl Measurement<1> for GnssHeading {
         let (heading, gradient) = heading_of(&direction).ok_or(Refusal::NotObservable)?;
         model.residual[0] = wrapped(self.heading - heading);
         model.noise[(0, 0)] = self.deviation * self.deviation;
-        // The horizontal part of θ × w, rotated about the world's axes.
+        // The rotation error θ changes the world vector w by θ × w.
         model.set_row(0, ROTATION, &direction.cross(&gradient));
         Ok(())
     }
