@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use super::layout::Layout;
 use super::math::{ln, sqrt};
 
-/// The largest factor by which one update may reduce the variance in a direction. The rounding error, 1e-16 of the variance
+/// The smallest ratio of the variance in a direction that one update may leave. The rounding error, 1e-16 of the variance
 /// before, stays far below the variance after.
 const LEAST_NOISE: f64 = 1e-10;
 

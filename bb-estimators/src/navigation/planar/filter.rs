@@ -153,7 +153,7 @@ impl PlanarEkf {
         Ok(())
     }
 
-    /// Propagates the filter over one sample. Only the rotation about z is used of its angular velocity, in body axes.
+    /// Propagates the filter over one sample. Uses only the z component of its angular velocity, in body axes.
     ///
     /// A sample that covers more than [`PlanarParams::longest_sample`] is a gap: the robot is assumed to continue straight on, up
     /// to the gap noise in the parameters.

@@ -29,7 +29,7 @@ fn a_correction_by_whole_turns_keeps_the_covariance_regular() {
         for i in 1..100 {
             filter.propagate(&sample(i)).unwrap();
         }
-        // Chosen so that the correction about the vertical is a whole turn.
+        // Chosen so that the correction about the vertical is this many whole turns.
         let variance = filter.covariance()[(ROTATION + 2, ROTATION + 2)];
         let residual = core::f64::consts::TAU * turns * (variance + Turned::VARIANCE) / variance;
         filter.update(&mut open(), &Turned(residual)).unwrap();
