@@ -121,7 +121,7 @@ impl Alignment {
     /// Initialises in motion: the tilt from the last specific force, the heading from the course.
     ///
     /// `position` (m) and `velocity` (m/s) in the world come with their standard deviations. `forward` is the direction of travel
-    /// in the body frame, and `slip` is the largest expected angle between it and the actual course, rad.
+    /// in the body frame, and `slip` is how far the course may deviate from it, rad.
     ///
     /// # Errors
     ///

@@ -9,12 +9,12 @@
 //!
 //! # States
 //!
-//! | index | what | unit |
+//! | index | quantity | unit |
 //! |---|---|---|
 //! | [`POSITION`], 2 | of the body's origin, in the world: x east, y north | m |
 //! | [`HEADING`] | of the body's x axis, from the world's counter-clockwise | rad |
 //! | [`VELOCITY`], 2 | of the body's origin, in the body: x forward, y left | m/s |
-//! | [`GYROSCOPE_BIAS`] | what the gyroscope reads more than the yaw rate | rad/s |
+//! | [`GYROSCOPE_BIAS`] | reading of the gyroscope minus the yaw rate | rad/s |
 //! | [`WHEEL_SCALE`] | scale of the wheels' velocity, less 1 | |
 //!
 //! An error is the truth minus the estimate. Wheels correct the filter rather than drive it: they may slip, stall or report late,

@@ -292,7 +292,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Covariance of all errors, `N × N`, in the order of the constants [`POSITION`] to
-    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states. Symmetric to the last bit.
+    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states. Exactly symmetric.
     pub fn covariance(&self) -> &SMatrix<f64, N, N> {
         self.covariance.matrix()
     }
